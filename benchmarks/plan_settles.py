@@ -23,12 +23,8 @@ from benchmarks.random_visits import random_visits
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.planning.menu import Menu
-from toolpath_stiff.planning.next_visit import next_visit
-from toolpath_stiff.planning.outlook import SETTLED
-from toolpath_stiff.planning.plan import RivalPlan
-from toolpath_stiff.planning.result import plan
-from toolpath_stiff.planning.rows import plan_csv, plan_rows
-from toolpath_stiff.planning.tables import TABLES, tables_of
+from toolpath_stiff.planning.plan import SETTLED, RivalPlan
+from toolpath_stiff.planning.result import plan, plan_csv, plan_rows
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig.case import DrawnCase, draw_case
 from toolpath_stiff.rig.exercise import csv_text, read_plan
@@ -85,13 +81,12 @@ def _planned(seed: int, hidden: str, folder: Path) -> Record:
         return {}
     proposal = plan(machine, data, replace(Menu.of(data), indicators=True), n=POSES, judgement=before.main)
     assert isinstance(proposal.choice, RivalPlan)
-    (folder / TABLES).write_bytes(tables_of(proposal.choice))
     visits, chosen = proposal.choice.visits, proposal.choice.chosen
     minutes, files = [], list[str]()
     for name, some in (("plan", chosen), ("random", random_visits(proposal.choice, POSES, seed))):
         taken = [_measured(case, proposal.choice, visit, folder / f"{name}{k}.csv", k) for k, visit in enumerate(some)]
         files = files or taken
-        needed = _needed(folder, taken)
+        needed = _needed(str(tip), taken)
         minutes.append(visits.minutes(some[:needed]))
     after = diagnose(machine, read_measurements([str(tip), *files], machine))
     outlook = proposal.choice.after
@@ -107,10 +102,12 @@ def _planned(seed: int, hidden: str, folder: Path) -> Record:
     }
 
 
-def _needed(folder: Path, files: list[str]) -> int:
+def _needed(tip: str, files: list[str]) -> int:
     """How many of the visits, in their order, until one explanation has 95 %; all where none has."""
+    machine = load_machine("nist")
     for k in range(1, len(files)):
-        if max(next_visit(folder, tuple(files[:k])).probability.values()) >= SETTLED:
+        after = diagnose(machine, read_measurements([tip, *files[:k]], machine))
+        if max(after.main.probability.values()) >= SETTLED:
             return k
     return len(files)
 

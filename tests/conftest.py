@@ -129,7 +129,7 @@ def predictors_are_shared() -> Iterator[None]:
     from tests.stiffness.cases import nist
     from tests.updating.cases import predictor_for
     from toolpath_stiff.comparison import compare as comparison
-    from toolpath_stiff.correction import ladder
+    from toolpath_stiff.correction import update as ladder
     from toolpath_stiff.diagnosis import diagnose as diagnosis
     from toolpath_stiff.inference.prediction import Predictor
     from toolpath_stiff.machine.writer import machine_toml

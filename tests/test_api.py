@@ -114,13 +114,6 @@ def test_an_effect_check_is_its_function_s(here, capsys):
     assert json.loads(capsys.readouterr().out) == tps.check_effects("my_screw.py").to_dict()
 
 
-def test_the_next_visit_is_its_function_s(here, capsys):
-    tps.plan(machine="nist", between=("spindle_compliance", "none"), n=2).save("plan", plots=False)
-    found = tps.next_visit("plan")
-    assert main(["plan", "--next", "plan", "--json"]) == 0
-    assert capsys.readouterr().out == found.to_json()
-
-
 def test_many_programs_are_their_function_s(here, capsys):
     Path("other.nc").write_text(SLOT)
     assert main(["analyze", "slot.nc", "other.nc", "--step", "20", "--jobs", "1", "--no-plots", "--json"]) == 0
@@ -204,10 +197,8 @@ NO_EXAMPLE = {
         "unconfirmed",
         "predictor",
         "explanations",
-        "before",
         "after",
     },
-    "NextVisit": {"rows", "sentences"},
     "Plan": {"rows", "sentences", "notes", "visits"},
     "Analysis": {  # arrays in SI and what figures and pictures are made from
         *("machine", "moves", "path", "operations", "operation", "parameter_band", "figures", "weakest_rows"),
@@ -216,7 +207,7 @@ NO_EXAMPLE = {
     "Case": {"preview", "record", "next_result"},
     "Update": {  # steps and fits in SI, and what follows from them
         *("described", "last", "changed", "worse", "supported", "verdict", "widening", "corrected", "fitted"),
-        "document",
+        *("document", "noise", "question", "text", "assumptions"),
     },
     "Machine": {"picture"},
     "MachineCheck": {"picture"},

@@ -89,7 +89,9 @@ def test_what_nothing_explains_is_written_and_tried(here, capsys):
     rows, _ = case.make_case(7, layout="paper", hidden="weak_strut", size=0.1)
     (here / "data.csv").write_text(exercise.csv_text(rows), encoding="utf-8")
     asked = Asked(("data.csv",), effects=(), noise=0.03)
-    said = SimpleNamespace(verdict="unexplained", best=None, main=SimpleNamespace(question=""), portrait=None)
+    said = SimpleNamespace(
+        verdict="unexplained", best=None, main=SimpleNamespace(question=""), portrait=None, remarks=()
+    )
     lines = [line for _, line in map(parted, next_steps(said, asked))]
     assert [shlex.split(line)[1] for line in lines] == ["compare", "effects", "diagnose"]
     for line in lines:

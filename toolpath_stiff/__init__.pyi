@@ -51,8 +51,6 @@ from toolpath_stiff.path.table import SampledPath as SampledPath
 from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
 from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
 from toolpath_stiff.placement.result import Placement as Placement
-from toolpath_stiff.planning.next_visit import NextVisit as NextVisit
-from toolpath_stiff.planning.next_visit import next_visit as next_visit
 from toolpath_stiff.planning.result import Plan as Plan
 from toolpath_stiff.readings.raw import Reduction as Reduction
 from toolpath_stiff.readings.raw import reduce as reduce

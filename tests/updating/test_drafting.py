@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.updating.cases import campaign, effect_of, predictor_for
-from toolpath_stiff.correction.draft import draft_text, effect_names
+from toolpath_stiff.correction.draft import draft_text
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.portrait.columns import Ground
@@ -120,7 +120,7 @@ def test_every_kind_of_term_that_a_portrait_may_choose_can_be_written(some_path,
     dictionary = dictionary_of(Ground(predictor, np.exp(-predictor.log_stiffness()), np.zeros(2)))
     kinds = {
         (t.action, t.variable, t.shape, bool(t.where), t.column, t.direction, *(name for name, _ in t.at)): t
-        for t in (entry.term for entry in dictionary.entries)
+        for t in dictionary.terms
         if t.acts
     }
     assert len(kinds) > 30
@@ -170,7 +170,7 @@ def test_a_draft_keeps_the_contract(term, tmp_path):
 def test_several_terms_are_one_effect_but_readings_and_geometry_have_their_own(tmp_path, some_path):
     terms = (TERMS[0], TERMS[0], TERMS[20])
     found = written(tmp_path, *terms)
-    assert list(found) == effect_names("missing", terms) == ["missing"]
+    assert list(found) == ["missing"]
     (effect,) = found.values()
     assert [p.name for p in effect.parameters] == ["table_y", "table_y_2", "strut_3"]
     values = {p.name: p.typical[1] * p.si for p in effect.parameters}
@@ -179,10 +179,8 @@ def test_several_terms_are_one_effect_but_readings_and_geometry_have_their_own(t
     np.testing.assert_allclose(effect.load_compliance(some_path, values), twice)
     assert effect.needs == ("temperature_C",)
     three = [TERMS[0], *(next(t for t in TERMS if t.action == action) for action in ("joint offset", "reading factor"))]
-    names = effect_names("missing", three)
-    assert names == ["missing", "missing_geometry", "missing_reading"]
     several = written(tmp_path / "..", *three)
-    assert list(several) == names
+    assert list(several) == ["missing", "missing_geometry", "missing_reading"]
     assert all(effect.described_from == MARKS for effect in several.values())
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, dense, make_problem, simple_noise
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.rows import fitted_sizes
+from toolpath_stiff.diagnosis.examination import fitted_sizes
 from toolpath_stiff.inference.candidates import Candidate, candidates_of
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.fits import fit_effects

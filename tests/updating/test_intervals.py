@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from tests.conftest import seeds
 from tests.updating.cases import campaign, predictor_for
-from toolpath_stiff.diagnosis.rows import fitted_sizes
+from toolpath_stiff.diagnosis.examination import fitted_sizes
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.hypotheses import averaged_interval, score_family

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
 
 from tests.stiffness.cases import nist
-from toolpath_stiff.cli.main import main
 from toolpath_stiff.comparison.compare import compare
-from toolpath_stiff.correction.document import residuals_csv
+from toolpath_stiff.correction.result import residuals_csv
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.planning.menu import Menu
-from toolpath_stiff.planning.next_visit import Taken, conditioned, next_visit
 from toolpath_stiff.planning.result import plan
-from toolpath_stiff.planning.rows import plan_csv, plan_rows
-from toolpath_stiff.planning.tables import TABLES, Tables, tables_of
 from toolpath_stiff.readings.measurements import measured_path, model_stiffness, read_measurements
 from toolpath_stiff.report.compare import text
 from toolpath_stiff.rig.case import draw_case
@@ -236,7 +231,7 @@ def test_what_the_tip_cannot_tell_an_indicator_names(joints):
     assert (found.verdict, found.plausible) == ("identified", ["joint_compliance"])
     written = found.to_dict()
     # Errors are those of the tip's readings; the loops stand beside them.
-    assert written["readings"] == 42 == len(found.before)
+    assert written["readings"] == 42 == len(found.as_given.residual)
     assert [one["loop"] for one in written["loops"]] == ["joint 1", "strut 1", "table"]
     assert all(abs(one["standard_deviations"]) < 4.0 for one in written["loops"])
 
@@ -286,73 +281,3 @@ def test_a_plan_sets_an_indicator_where_the_tip_tells_less():
     without = plan(nist(), between=("joint_compliance", "none"), n=3, noise=0.02)
     assert not any(without.choice.visits.loop[visit] for visit in without.choice.chosen)
     assert without.choice.pairs[0].separation_sigma < 0.7 * found.choice.pairs[0].separation_sigma
-
-
-# -- one pose after another --------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def step_by_step(tmp_path_factory):
-    """A plan's folder."""
-    folder = tmp_path_factory.mktemp("next")
-    found = plan(nist(), between=("spindle_compliance", "table_compliance", "none"), n=2, noise=0.02)
-    (folder / TABLES).write_bytes(tables_of(found.choice))
-    (folder / "plan.csv").write_text(plan_csv(found.rows))
-    return found, folder
-
-
-def test_readings_change_rivals_as_bayes_rule_says(step_by_step):
-    """Against the dense formula: each rival's readings are normal with its own covariance."""
-    found, folder = step_by_step
-    tables = Tables.read(folder)
-    rows = np.concatenate([tables.visits.rows(v) for v in found.choice.chosen])
-    clamp = np.repeat(["1", "2"], [len(tables.visits.rows(v)) for v in found.choice.chosen])
-    truth = tables.forecasts[0]
-    rng = np.random.default_rng(3)
-    logs = truth.mean[rows] + 0.02 * rng.standard_normal(len(rows))
-    after, far = conditioned(tables, Taken(rows, logs, clamp, ("",) * len(rows)))
-    same = clamp[:, None] == clamp[None, :]
-    noise = tables.noise.repeat**2 * np.eye(len(rows)) + tables.noise.clamping**2 * same
-    likelihood = []
-    for before, one in zip(tables.forecasts, after, strict=True):
-        own = np.concatenate([before.factor, tables.noise.machine], axis=1)
-        some = rows[:3]
-        whole = own[rows] @ own[rows].T + noise
-        gain = own[some] @ own[rows].T @ np.linalg.inv(whole)
-        assert one.mean[some] == pytest.approx(before.mean[some] + gain @ (logs - before.mean[rows]), rel=1e-9)
-        left = own[some] @ own[some].T - gain @ own[rows] @ own[some].T
-        assert one.factor[some] @ one.factor[some].T == pytest.approx(left, abs=2e-6)
-        likelihood.append(multivariate_normal(before.mean[rows], whole).logpdf(logs) + np.log(before.weight))
-    weights = np.exp(np.array(likelihood) - max(likelihood))
-    assert [one.weight for one in after] == pytest.approx(weights / weights.sum(), rel=1e-6)
-    assert not far
-
-
-def test_the_next_pose_is_another_one_until_it_is_settled(step_by_step, tmp_path):
-    _, folder = step_by_step
-    first = next_visit(folder)
-    assert first.visit is not None and not len(first.taken.rows) and not first.settled
-    tables = first.tables
-    truth = tables.forecasts[0]
-    files, last = [], first
-    for step in range(8):
-        rows = plan_rows(tables.visits, [last.visit])
-        for row, k in zip(rows, tables.visits.rows(last.visit), strict=True):
-            row["stiffness_N_per_mm"] = f"{1e-3 * np.exp(truth.mean[k]):.6g}"
-        file = tmp_path / f"{step}.csv"
-        file.write_text(plan_csv(rows))
-        files.append(str(file))
-        last = next_visit(folder, tuple(files))
-        if last.visit is None:
-            break
-        been = tables.visits.readings.position[last.taken.rows]
-        assert not (np.abs(been - tables.visits.pose[last.visit, :3]) < 1e-9).all(axis=1).any()
-    assert last.settled and next(iter(last.probability)) == truth.name
-
-
-def test_next_says_what_it_needs(tmp_path, capsys):
-    assert main(["plan", "--next", str(tmp_path)]) == 2
-    assert "no table of a plan" in capsys.readouterr().err
-    (tmp_path / TABLES).write_bytes(b"nothing")
-    assert main(["plan", "--next", str(tmp_path)]) == 2
-    assert "no table of a plan" in capsys.readouterr().err

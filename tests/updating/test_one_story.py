@@ -19,13 +19,13 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import VERDICTS as CASES
 from tests.updating.cases import campaign, diagnosed, examined, table_1
 from toolpath_stiff.comparison.compare import Comparison, compare
-from toolpath_stiff.correction.document import residuals_csv
-from toolpath_stiff.correction.ladder import _Work, build_ladder
-from toolpath_stiff.correction.result import Update
+from toolpath_stiff.correction import update as ladder
+from toolpath_stiff.correction.result import Update, residuals_csv
 from toolpath_stiff.correction.task import UpdateTask
+from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.diagnosis import words as verdict_words
+from toolpath_stiff.diagnosis.examination import odds_words
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.diagnosis.rows import odds_words
 from toolpath_stiff.diagnosis.words import next_steps, verdict_text, why
 from toolpath_stiff.hints import Asked, parted
 from toolpath_stiff.inference.errors import raised_text, scatter_text
@@ -297,30 +297,31 @@ def test_a_share_of_a_strut_is_told_as_the_strut():
 # -- effects given together --------------------------------------------------------------------------------------------
 
 
-def ladder(errors: dict[frozenset[str], float], *names: str) -> list[tuple[str, ...]]:
+def rungs(monkeypatch: pytest.MonkeyPatch, errors: dict[frozenset[str], float], *names: str) -> list[tuple[str, ...]]:
     """Which effects each step holds, of a fit that would leave these errors."""
 
     def step(held: tuple[str, ...]) -> SimpleNamespace:
         value = errors[frozenset(held)]
         return SimpleNamespace(fit=SimpleNamespace(names=held), error=value, held=SimpleNamespace(mean_error=value))
 
-    work = object.__new__(_Work)
-    work.task = SimpleNamespace(progress=lambda text: None)
-    work.together = lambda before, asked: step((*before.fit.names, *(one[0].name for one in asked)))
+    task = SimpleNamespace(progress=lambda text: None)
+    monkeypatch.setattr(
+        ladder, "step_up", lambda task, before, asked: step((*before.fit.names, *(one[0].name for one in asked)))
+    )
     asked = [[SimpleNamespace(name=name)] for name in names]
-    return [one.fit.names for one in work.ladder(step(()), asked)]
+    return [one.fit.names for one in ladder.ladder_of(task, step(()), asked)]
 
 
-def test_effects_that_only_together_help_are_one_step():
+def test_effects_that_only_together_help_are_one_step(monkeypatch):
     sets = {"": 4.59, "a": 5.82, "b": 4.9, "ab": 1.91}
     errors = {frozenset(names): value for names, value in sets.items()}
-    assert ladder(errors, "a", "b") == [("a", "b")]
+    assert rungs(monkeypatch, errors, "a", "b") == [("a", "b")]
 
 
-def test_effects_are_ordered_so_that_each_step_falls():
+def test_effects_are_ordered_so_that_each_step_falls(monkeypatch):
     sets = {"": 4.59, "a": 5.82, "b": 3.0, "ab": 1.91}
     errors = {frozenset(names): value for names, value in sets.items()}
-    assert ladder(errors, "a", "b") == [("b",), ("b", "a")]
+    assert rungs(monkeypatch, errors, "a", "b") == [("b",), ("b", "a")]
 
 
 def test_a_real_ladder_falls_whatever_the_order():
@@ -349,6 +350,7 @@ def test_the_next_step_is_one_that_would_be_taken(bounded, command):
         explanations=("weak_strut",),
         plausible=("weak_strut", "frame_compliance"),
         fits={"weak_strut": fit},
+        remarks=(),
     )
     steps = verdict_words.next_steps(diagnosis, Asked(("m.csv",)))
     assert [parted(step)[1] for step in steps] == [command]

@@ -21,9 +21,8 @@ from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all, joint_columns
-from toolpath_stiff.planning.gaps import ReadingNoise, pair_shares
-from toolpath_stiff.planning.menu import Costs, Menu
-from toolpath_stiff.planning.outlook import expected_outcome
+from toolpath_stiff.planning.gaps import ReadingNoise, expected_outcome, pair_shares
+from toolpath_stiff.planning.menu import COSTS, Menu
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.visits import possible_visits
@@ -74,7 +73,7 @@ def test_the_gap_is_the_quadratic_form_in_both_covariances(made_up, seed, count,
         d = first.mean[rows] - second.mean[rows]
         expected = float(np.sqrt(d @ np.linalg.solve(total, d)))
         # Woodbury subtracts two terms of the size of d^T N^-1 d: absolute accuracy is that of their rounding.
-        assert share.gap(chosen, repeats) == pytest.approx(expected, abs=1e-4)
+        assert share.gap(np.tile(chosen, repeats)) == pytest.approx(expected, abs=1e-4)
 
 
 @settings(max_examples=15, deadline=None)
@@ -249,8 +248,8 @@ def test_places_are_different_and_the_same_seed_gives_the_same_plan():
 def test_what_is_dear_is_avoided():
     """The longer tool helps here, but not if changing it costs a day."""
     pair = rivals("frame_compliance", "joint_moment_stiffness")
-    cheap = plan_measurements(nist(), pair, 0.02, menu=menu(costs=Costs(tool=0.0)))
-    dear = plan_measurements(nist(), pair, 0.02, menu=menu(costs=Costs(tool=480.0)))
+    cheap = plan_measurements(nist(), pair, 0.02, menu=menu(costs={**COSTS, "tool": 0.0}))
+    dear = plan_measurements(nist(), pair, 0.02, menu=menu(costs={**COSTS, "tool": 480.0}))
     assert cheap.visits.extension[list(cheap.chosen)].any()
     assert not dear.visits.extension[list(dear.chosen)].any()
     assert dear.minutes < 480.0
@@ -259,7 +258,7 @@ def test_what_is_dear_is_avoided():
 def test_minutes_count_every_change_once():
     found = plan_for("spindle_compliance", "table_compliance", 4, max_tilt=np.radians(25.0), tool_extensions=(0.0,))
     readings = int(found.visits.counts[list(found.chosen)].sum())
-    assert found.minutes == pytest.approx(4 * Costs().pose + readings * Costs().reading)
+    assert found.minutes == pytest.approx(4 * COSTS["pose"] + readings * COSTS["reading"])
 
 
 def test_repeats_and_noise_hang_together():

@@ -20,7 +20,7 @@ from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.planning.campaign import Campaign, first_campaign
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import plan_measurements
-from toolpath_stiff.planning.rows import plan_csv, plan_rows
+from toolpath_stiff.planning.result import plan_csv, plan_rows
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import exercise as rig
 from toolpath_stiff.rig.nominal import load_nominal
@@ -207,7 +207,7 @@ def test_between_two_effects_fitted_to_the_data(tmp_path, capsys):
     document = json.loads(first)
     assert [rival["name"] for rival in document["rivals"]] == ["frame_compliance", "none"]
     assert document["poses"] == 3 == len(document["visits"])
-    assert sorted(f.name for f in tmp_path.glob("[!.]*")) == ["plan.csv", "plan.json", "plan_tables.npz"]
+    assert sorted(f.name for f in tmp_path.glob("[!.]*")) == ["plan.csv", "plan.json"]
     assert {row["stiffness_N_per_mm"] for row in read_csv(tmp_path / "plan.csv")} == {""}
     content = (tmp_path / "plan.csv").read_bytes()
     assert main([*arguments, "--out", str(tmp_path), "--json"]) == 0
@@ -237,7 +237,7 @@ def test_between_two_effects_before_any_data(tmp_path, capsys):
         (["--loads", "0,500"], "loads of 0, 500 N"),
         (["--max-tilt", "95"], "less than 90"),
         (["--noise", "0"], "more than 0"),
-        (["--seed", "-1"], "0 or more"),
+        (["--seed", "-1"], "at least 0"),
         (["no_such_file.csv"], "no_such_file.csv"),
     ],
 )

@@ -11,10 +11,9 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.correction.additions import parse_addition
-from toolpath_stiff.correction.document import residuals_csv
-from toolpath_stiff.correction.ladder import build_ladder
+from toolpath_stiff.correction.result import residuals_csv
 from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
-from toolpath_stiff.correction.update import update_by_mean_error
+from toolpath_stiff.correction.update import build_ladder, update_by_mean_error
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import parse_machine

@@ -111,7 +111,7 @@ def test_the_papers_own_estimation_with_its_figure_3(tmp_path, capsys):
     # The paper: above 1e10 N/m the platform makes no difference.
     assert np.ptp(curve["error_percent"][stiff]) < 0.1
     told = json.loads((tmp_path / "update.json").read_text())
-    assert told["search"]["agreeing"] == len(told["search"]["starts_N_per_um"])
+    assert told["search"]["agreeing"] == len(told["search"]["end_errors_percent"])
 
 
 @pytest.mark.parametrize(

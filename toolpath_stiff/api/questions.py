@@ -24,8 +24,8 @@ from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, finite_number, names, numbers, words_of
 from toolpath_stiff.placement.case_study import case_study_program
-from toolpath_stiff.planning.menu import Costs
-from toolpath_stiff.planning.result import Plan, usual_menu
+from toolpath_stiff.planning.menu import COSTS, Menu
+from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.result import plan as plan_visits
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import Progress, one_of, teller
@@ -48,7 +48,6 @@ StrutSpread = Annotated[
 ]
 Seed = Annotated[int, Option("--seed", at_least=0, help="Of every random draw.")]
 COMMON = ("columns", "noise_percent", "strut_spread_percent")  # options that `Asked.command` says
-COSTS = ("reading", "pose", "tool", "setup", "indicator")
 
 
 class Question:
@@ -405,17 +404,17 @@ def plan(
     >>> len(found.to_dict()["visits"]), found.to_frame().columns.tolist()[:6]
     (2, ['x_mm', 'y_mm', 'z_mm', 'a_deg', 'b_deg', 'c_deg'])
     >>> list(found.files(plots=False)), len(found.rows) == len(found.to_frame())
-    (['plan.csv', 'plan.json', 'plan_tables.npz'], True)
+    (['plan.csv', 'plan.json'], True)
     """
     line = words_of(plan, {name: value for name, value in locals().items() if name not in COMMON})
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     minutes = {name: float(value) for name, value in (minutes or {}).items()}
     for name, value in minutes.items():
-        one_of("minutes", name, COSTS)
+        one_of("minutes", name, tuple(COSTS))
         if not value >= 0.0:
             raise InputError(f"{name}={value:g}", expected="minutes, 0 or more")
     readings = None if question.data is None else question.readings
-    menu = usual_menu(readings).with_options(
+    menu = Menu.of(readings).with_options(
         radius=None if radius_mm is None else m_from_mm(radius_mm),
         heights=_in_metres(heights_mm),
         max_tilt=None if max_tilt_deg is None else rad_from_deg(max_tilt_deg),
@@ -423,7 +422,7 @@ def plan(
         tool_extensions=_in_metres(tool_extensions_mm),
         setups=setups,
         indicators=indicators,
-        costs=Costs(**minutes),
+        costs={**COSTS, **minutes},
     )
     judgement = None if diagnosis is None else diagnosis.main
     proposal = plan_visits(

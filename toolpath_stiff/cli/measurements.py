@@ -125,27 +125,16 @@ def update(
 def plan(
     args: Namespace,
     data: Annotated[Sequence[str], Option("DATA", count="*", help=f"{FILES}; none: a first campaign")] = (),
-    next: Annotated[str | None, Option("--next", "FOLDER")] = None,
 ) -> int:
     """What to measure next to tell explanations apart, or a first campaign.
 
     for example:
       tps plan measurements.csv                       what would tell the plausible explanations apart
       tps plan measurements.csv --between frame_compliance,joint_moment_stiffness --n 4
-      tps plan --next FOLDER [READINGS.csv]           at the machine: where to go after the readings of that plan so far
+      tps plan measurements.csv first.csv --n 1       at the machine: where to go after the readings so far
       tps plan --machine nist                         a good first campaign
       tps plan --machine nist --between spindle_compliance,table_compliance
 
-    Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json, plan.png, and
-    plan_tables.npz, from which --next chooses within a second or two; --next writes next_1.csv (2, 3 ...) beside them.
-
-    Parameters
-    ----------
-    next
-        Of a plan: the next pose after the readings so far (DATA; else its own files as filled in).
+    Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json and plan.png.
     """
-    if next is not None:
-        visit = tps.next_visit(next, data, columns=args.columns)
-        written = visit.save()
-        return run.show(args, visit, *([run.written_text(written)] if written else []))
     return run.to_folder(args, tps.plan, tps.Plan, data or [args.machine], minutes=dict(args.minutes or ()))

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Candidate, Component, candidates_of
@@ -10,7 +9,7 @@ from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Parameter
 
-AXES = {"X": 1, "Y": 2, "Z": 3}
+AXES = {"X": "1", "Y": "2", "Z": "3"}
 
 
 def parse_addition(text: str, data: Readings, effect_files: Sequence[str | Path] = ()) -> list[Candidate]:
@@ -29,31 +28,30 @@ def parse_addition(text: str, data: Readings, effect_files: Sequence[str | Path]
         fault = f"these data cannot test {effect.name}: column {', '.join(lacking)} is missing"
         raise InputError(fault, hint="measure with it, or add another effect")
     choices = {p.name: p for p in effect.parameters if p.discrete}
-    choice = {}
-    for part in filter(None, (piece.strip() for piece in rest.split(","))):
-        key, equals, value = (piece.strip() for piece in part.partition("="))
+    values: dict[str, str | int] = {name: "" if p.kind == "text" else 0 for name, p in choices.items()}
+    for part in filter(None, map(str.strip, rest.split(","))):
+        key, equals, value = map(str.strip, part.partition("="))
         if key not in choices or not equals:
             known = ", ".join(f"{key}=..." for key in choices) or f"nothing after {effect.name}: it has no choices"
             raise InputError(f"--add {text}: {part!r}", expected=known)
-        choice[key] = _chosen(choices[key], value, text, data)
-    values = {name: choice.get(name, "" if p.kind == "text" else 0) for name, p in choices.items()}
+        values[key] = _chosen(choices[key], value, text, data)
     real = tuple(Component.of(p) for p in effect.parameters if not p.discrete)
-    candidates = [Candidate(effect, tuple(values.items()), real)] if choice else candidates_of(effect, data)
+    named = [Candidate(effect, tuple(values.items()), real)]
+    candidates = named if rest.strip() else candidates_of(effect, data)
     if not candidates or not real:
         raise InputError(f"--add {text}: nothing of it could be fitted to these data")
     return candidates
 
 
-def _chosen(parameter: Parameter, value: str, text: str, data: Readings) -> Any:
+def _chosen(parameter: Parameter, value: str, text: str, data: Readings) -> str | int:
     """The value of a choice. A direction may be called by its axis, a set-up must be one of the data's."""
     if parameter.kind == "text":
         setups = sorted(set(data.setup.tolist()) - {""})
         if parameter.name == "setup" and value not in setups:
             raise InputError(f"--add {text}: the data have no set-up {value!r}", expected=f"one of {', '.join(setups)}")
         return value
-    low, high = (int(bound) for bound in parameter.bounds)
-    if parameter.name == "direction" and value.upper() in AXES:
-        return AXES[value.upper()]
-    if not value.isdigit() or not low <= int(value) <= high:
+    low, high = parameter.bounds
+    number = AXES.get(value.upper(), value) if parameter.name == "direction" else value
+    if not number.isdigit() or not low <= int(number) <= high:
         raise InputError(f"--add {text}: {parameter.name} = {value!r}", expected=parameter.expected)
-    return int(value)
+    return int(number)

@@ -87,14 +87,14 @@ def draft(diagnosis: Diagnosis, file: str) -> EffectDraft:
     file
         Where it is to be written: the effect is named after it, and the commands in the file read it there.
     """
-    name, portrait = PurePath(file).stem, diagnosis.portrait
+    name, portrait, names = PurePath(file).stem, diagnosis.portrait, diagnosis.names
     reason = _nothing_to_describe(diagnosis)
     if reason or portrait is None:
         return EffectDraft(name, diagnosis, reason=reason)
-    request = diagnosis.asked or Asked(diagnosis.names, diagnosis.machine.name)
+    request = diagnosis.asked or Asked(names, diagnosis.machine.name)
     source = (
-        f"{len(diagnosis.data)} readings of {joined(list(diagnosis.names))} "
-        f"(SHA-256 {data_hash(diagnosis.names)[:16]}), machine {diagnosis.machine.name}"
+        f"{len(diagnosis.data)} readings of {joined(names)} (SHA-256 {data_hash(names)[:16]}), "
+        f"machine {diagnosis.machine.name}"
     )
     drawn = request.command("effects draft", "-o", file, *options(seed=diagnosis.seed or None))
     commands = {
@@ -103,9 +103,9 @@ def draft(diagnosis: Diagnosis, file: str) -> EffectDraft:
         "measure where it would show, or fail": request.command("plan", effects=[file]),
     }
     marks = sorted(set(reading_marks(diagnosis.data).tolist()))
-    origin = f"Drawn by `{drawn}` from {source}."
-    text = draft_text(name, portrait, source, origin, list(commands.values()), marks)
-    effects = effect_names(name, [sized.term for sized in portrait.terms])
+    text = draft_text(name, portrait, source, f"Drawn by `{drawn}` from {source}.", list(commands.values()), marks)
+    endings = sorted({ENDINGS.get(sized.term.action, "") for sized in portrait.terms if sized.term.acts})
+    effects = [name] if len(endings) == 1 else [f"{name}{ending}" for ending in endings]
     return EffectDraft(name, diagnosis, text, effects, commands=[hint(*pair) for pair in commands.items()])
 
 
@@ -146,22 +146,20 @@ def draft_text(
     marks
         Of the readings, `measurements.reading_marks`.
     """
-    seen = [sized for sized in portrait.terms if sized.term.acts]
-    entries = list(zip(sizes_of([sized.term for sized in seen]), seen, strict=True))
-    alike = [f"{term_words(sized.term)} ({100.0 * (sized.probability or 0.0):.0f} %)" for sized in portrait.alike]
-    heading = ["The model lacks, by its readings (a description, no finding):", "", portrait_text(portrait)]
-    if alike:
-        heading += ["", "What would look the same on these readings, as far as they can tell:"]
-        heading += [f"- {words}" for words in alike]
-    heading += [
-        "", origin, "",
+    heading = [
+        "The model lacks, by its readings (a description, no finding):", "", portrait_text(portrait), "", origin, "",
         "The sizes are fitted to whatever readings you give; the constants below were read off these. Change bounds, "
         "constants and shapes into what you know of the machine (docs/effects.md). Then:", "",
         *(f"    {' '.join(command.split())}" for command in commands),
     ]  # fmt: skip
     lines = [line for paragraph in heading for line in _comment(paragraph)]
     lines += ["", f"name = {value_text(name)}", f"source = {value_text(f'described from {source}; not confirmed')}"]
-    for size, sized in entries:
+    sizes: list[str] = []
+    for sized in (sized for sized in portrait.terms if sized.term.acts):
+        size = base = size_name(sized.term)
+        if base in sizes:
+            size = f"{base}_{sum(other.startswith(base) for other in sizes) + 1}"
+        sizes.append(size)
         lines += ["", *_comment(f"{size_words(sized)}: {formula(sized.term, size)}"), "[[effect]]"]
         meaning = " ".join(term_words(sized.term).split())
         lines += [f"{key} = {value_text(value)}" for key, value in entry_of(sized.term, size, meaning).items()]
@@ -177,45 +175,29 @@ def draft_text(
     return "\n".join(lines) + "\n"
 
 
-def effect_names(name: str, terms: Sequence[Term]) -> list[str]:
-    """Names of the effects in a file of these terms."""
-    endings = sorted({ENDINGS.get(term.action, "") for term in terms if term.acts})
-    return [name] if len(endings) == 1 else [f"{name}{ending}" for ending in endings]
-
-
-def sizes_of(terms: Sequence[Term]) -> list[str]:
-    """Names of the sizes of terms, each its own."""
-    sizes: list[str] = []
-    for term in terms:
-        size = base = size_name(term)
-        while size in sizes:
-            size = f"{base}_{sum(other.startswith(base) for other in sizes) + 1}"
-        sizes.append(size)
-    return sizes
-
-
 def size_name(term: Term) -> str:
     """What the size of a term is called: its link, which one, and its direction."""
-    if term.action == "coupling":
-        return f"coupling_{term.constants['first']:.0f}_{term.constants['second']:.0f}"
-    place = [f"strut_{term.where}" if term.link == "one strut" else f"{term.link} {term.where or ''}"]
-    if term.action == "joint offset":
-        place = [f"{term.column}_joint_{term.where}"]
-    if term.action == "turning" or term.action in PINS:
-        place = [f"strut_{term.where}" if term.where else "", term.action]
-    if term.direction not in ("reading", "along the struts") and term.action != "turning":
-        place.append(term.direction)
-    if term.action in ("rocking", "tilting", "reading shift"):
-        place.append(term.action.removeprefix("reading "))
-    return re.sub(r"\W+", "_", " ".join(place).strip().lower()).strip("_")
+    action, strut = term.action, f"strut_{term.where}" if term.where else ""
+    parts = [strut if term.link == "one strut" else f"{term.link} {term.where or ''}", term.direction]
+    if action == "coupling":
+        parts = [f"coupling_{term.constants['first']:.0f}_{term.constants['second']:.0f}"]
+    elif action == "joint offset":
+        parts[0] = f"{term.column}_joint_{term.where}"
+    elif action == "turning":
+        parts = [strut, action]
+    elif action in PINS:
+        parts = [strut, action, term.direction]
+    elif action in ("rocking", "tilting", "reading shift"):
+        parts.append(action.removeprefix("reading "))
+    name = " ".join(part for part in parts if part not in ("reading", "along the struts"))
+    return re.sub(r"\W+", "_", name.lower()).strip("_")
 
 
 def _comment(text: str) -> list[str]:
     """A paragraph as comment lines; a command, which is indented, stays on one."""
     if text.startswith("    "):
         return [f"# {text}"]
-    rest = "#   " if text.startswith("- ") else "# "
-    plain = " ".join(text.split())
-    return textwrap.wrap(
-        plain, WIDTH, initial_indent="# ", subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
-    ) or ["#"]
+    wrapper = textwrap.TextWrapper(
+        WIDTH, initial_indent="# ", subsequent_indent="# ", break_long_words=False, break_on_hyphens=False
+    )
+    return wrapper.wrap(" ".join(text.split())) or ["#"]

@@ -1,6 +1,7 @@
 """The paper's machine figures: six lengths fitted to the modelled stiffnesses that its Table 1 prints."""
 
 import csv
+from collections.abc import Callable
 from importlib import resources
 from typing import Any
 
@@ -55,15 +56,10 @@ def machine_of(
     radius, height, lower_radius, lower_height, upper_radius, upper_height = lengths
     angle = np.deg2rad(HEXAGON_DEG) + hexagon_twist * np.array([1, -1, 1, -1, 1, -1])
     platform = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(6, height)])
-    vertex = np.deg2rad(VERTEX_DEG)
-    out = np.where(np.arange(6) % 2 == 0, lower_radius, upper_radius)
-    up = np.where(np.arange(6) % 2 == 0, lower_height, upper_height)
-    frame = np.column_stack([out * np.cos(vertex), out * np.sin(vertex), up])
-    blown = scale * platform
+    vertex, out, up = np.deg2rad(VERTEX_DEG), [lower_radius, upper_radius] * 3, [lower_height, upper_height] * 3
+    frame = np.column_stack([out * np.cos(vertex), out * np.sin(vertex), up]) + (scale * platform - platform)
     nist = load_machine("nist")
-    return nist.with_changes(
-        frame_joints=frame + (blown - platform), platform_joints=blown, strut_law=law or nist.strut_law
-    )
+    return nist.with_changes(frame_joints=frame, platform_joints=scale * platform, strut_law=law or nist.strut_law)
 
 
 def modelled_stiffness(machine: Hexapod, position: FloatArray) -> FloatArray:
@@ -88,73 +84,53 @@ def recover_geometry(starts: int = 20, seed: int = 1) -> Document:
     centre strut lengths that the fit never saw, what stays unidentified.
     """
     position, table = table_1()
-    rng = np.random.default_rng(seed)
+    rng, law = np.random.default_rng(seed), load_machine("nist").strut_law
     # Unknowns are measured in units of their scatter: in metres and N/mm a solver would stop at once.
     low, width = SCATTER[:, 0], SCATTER[:, 1] - SCATTER[:, 0]
 
-    def residuals(unit: FloatArray) -> FloatArray:
-        return np.asarray((modelled_stiffness(machine_of(low + width * unit), position) - table).ravel())
+    def machine_at(unit: FloatArray) -> Hexapod:
+        return machine_of(low + width * unit)
 
-    fits = [_fit(residuals, rng.uniform(size=6), (0.0, 1.0)) for _ in range(starts)]
-    best = min(fits, key=lambda fit: float(fit.cost))
-    lengths = low + width * best.x
-    agree = sum(bool(np.abs(width * (fit.x - best.x)).max() < SAME_OPTIMUM) for fit in fits)
-    covariance = np.linalg.inv(best.jac.T @ best.jac) * ROUNDING_SD**2
-    errors = width * np.sqrt(np.diag(covariance))
-    machine = machine_of(lengths)
-    left = best.fun
-    centre = [float(solve_struts(machine, position[i]).lengths.mean()) for i in (0, 7)]
+    def freed(x: FloatArray) -> Hexapod:
+        """With the hexagon's twist and the two strut stiffnesses free as well."""
+        stiff = StrutLaw(law.length_1, law.stiffness_1 * (1 + x[7]), law.length_2, law.stiffness_2 * (1 + x[8]))
+        return machine_of(lengths + width * x[:6], float(x[6]), stiff)
+
+    def fit(machine: Callable[[FloatArray], Hexapod], start: FloatArray, bounds: tuple[float, float]) -> Any:
+        def residuals(x: FloatArray) -> FloatArray:
+            return np.asarray((modelled_stiffness(machine(x), position) - table).ravel())
+
+        return least_squares(
+            residuals, start, bounds=bounds, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=500
+        )
+
+    fits = [fit(machine_at, rng.uniform(size=6), (0.0, 1.0)) for _ in range(starts)]
+    best = min(fits, key=lambda result: float(result.cost))
+    lengths, left, machine = low + width * best.x, best.fun, machine_at(best.x)
+    errors = width * np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac) * ROUNDING_SD**2))
+    free = fit(freed, np.zeros(9), (-np.inf, np.inf)).x
+    twist_deg, stiff = float(np.rad2deg(free[6])), freed(free).strut_law
+    # A platform that is blown up by a tenth changes nothing, so its scale cannot be fitted.
+    blown = modelled_stiffness(machine_of(lengths, scale=1.1), position) - modelled_stiffness(machine, position)
     return {
         "unknowns": [
             {"name": name, "mm": mm_from_m(float(value)), "standard_error_mm": mm_from_m(float(error))}
             for name, value, error in zip(UNKNOWNS, lengths, errors, strict=True)
         ],
         "starts": starts,
-        "starts_that_agree": agree,
+        "starts_that_agree": sum(bool(np.abs(width * (fit.x - best.x)).max() < SAME_OPTIMUM) for fit in fits),
         "seed": seed,
         "values": int(left.size),
         "largest_residual_N_per_mm": float(np.abs(left).max()),
         "rms_residual_N_per_mm": float(np.sqrt(np.mean(left**2))),
         "values_to_the_printed_digit": int((np.abs(left) <= 0.5).sum()),
-        "centre_strut_lengths_m": centre,
+        "centre_strut_lengths_m": [float(solve_struts(machine, position[i]).lengths.mean()) for i in (0, 7)],
         "paper_centre_strut_lengths_m": list(PAPER_CENTRE_LENGTHS),
-        **_freed(lengths, position, table),
-        "unidentified_scale_changes_N_per_mm": _scale_effect(lengths, position),
-    }
-
-
-def _fit(residuals: Any, start: FloatArray, bounds: tuple[float, float] = (-np.inf, np.inf)) -> Any:
-    return least_squares(
-        residuals, start, bounds=bounds, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=500
-    )
-
-
-def _freed(lengths: FloatArray, position: FloatArray, table: FloatArray) -> dict[str, float]:
-    """With the hexagon's twist and the two strut stiffnesses freed too, they come out as the paper has them."""
-    width = SCATTER[:, 1] - SCATTER[:, 0]
-    law = load_machine("nist").strut_law
-
-    def unpack(x: FloatArray) -> tuple[FloatArray, float, StrutLaw]:
-        stiff = StrutLaw(law.length_1, law.stiffness_1 * (1 + x[7]), law.length_2, law.stiffness_2 * (1 + x[8]))
-        return lengths + width * x[:6], float(x[6]), stiff
-
-    def residuals(x: FloatArray) -> FloatArray:
-        size, twist, stiff = unpack(x)
-        return np.asarray((modelled_stiffness(machine_of(size, twist, stiff), position) - table).ravel())
-
-    _, twist, stiff = unpack(_fit(residuals, np.zeros(9)).x)
-    return {
-        "freed_hexagon_angles_deg": [30.0 + float(np.rad2deg(twist)), 90.0 - float(np.rad2deg(twist))],  # type: ignore[dict-item]
+        "freed_hexagon_angles_deg": [30.0 + twist_deg, 90.0 - twist_deg],
         "freed_stiffness_1_N_per_um": n_per_um_from_n_per_m(stiff.stiffness_1),
         "freed_stiffness_2_N_per_um": n_per_um_from_n_per_m(stiff.stiffness_2),
+        "unidentified_scale_changes_N_per_mm": float(np.abs(blown).max()),
     }
-
-
-def _scale_effect(lengths: FloatArray, position: FloatArray) -> float:
-    """Largest change of the 42 values when the platform is blown up by a tenth: nothing, so it cannot be fitted."""
-    plain = modelled_stiffness(machine_of(lengths), position)
-    blown = modelled_stiffness(machine_of(lengths, scale=1.1), position)
-    return float(np.abs(blown - plain).max())
 
 
 def recovery_text(fit: Document) -> str:

@@ -4,7 +4,6 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib import resources
-from typing import Any
 
 import numpy as np
 
@@ -49,25 +48,32 @@ def fitted_machine(
     """
     effects, instruments = list(machine.effects), list(machine.instruments)
     for candidate, active in zip(fit.candidates, fit.effects, strict=True):
-        values = dict(active.values)
-        values |= {
-            p.name: _certain(float(values[p.name]) / p.si) for p in candidate.effect.parameters if not p.discrete
+        in_file = {
+            p.key: active.values[p.name] if p.discrete else _certain(float(active.values[p.name]) / p.si)
+            for p in candidate.effect.parameters
         }
-        in_file = {p.key: values[p.name] for p in candidate.effect.parameters}
-        entry = EffectEntry(candidate.name, in_file, dict(provenance))
-        (instruments if candidate.effect.is_instrument else effects).append(entry)
-    changes: dict[str, Any] = {"effects": tuple(effects), "instruments": tuple(instruments)}
-    if fit.law_free:
-        remark = f"fitted: {provenance['command']}; data sha256 {provenance['data_sha256']}"
-        changes |= {
-            "strut_law": _law(machine, fit),
-            "origins": {**machine.origins, "strut_law": "fitted"},
-            "remarks": {**machine.remarks, "strut_law": remark},
-        }
+        (instruments if candidate.effect.is_instrument else effects).append(
+            EffectEntry(candidate.name, in_file, dict(provenance))
+        )
+    # The fitted law's factors to digits on which all processors agree.
+    law = scaled_law(machine.strut_law, np.round(fit.law, 8))
+    known = machine.setups
     if any(SETUP in active.waits_for for active in fit.effects):
-        known = sorted({*setups} - {"", *machine.setups})
-        changes["setups"] = (*machine.setups, *known)
-    return machine.with_changes(**changes, uncertainty=_uncertainty(machine, fit, widened))
+        known = (*known, *sorted({*setups} - {"", *known}))
+    carrying = machine.with_changes(
+        effects=tuple(effects),
+        instruments=tuple(instruments),
+        setups=known,
+        uncertainty=_uncertainty(machine, law, fit, widened),
+    )
+    if not fit.law_free:
+        return carrying
+    remark = f"fitted: {provenance['command']}; data sha256 {provenance['data_sha256']}"
+    return carrying.with_changes(
+        strut_law=law,
+        origins={**machine.origins, "strut_law": "fitted"},
+        remarks={**machine.remarks, "strut_law": remark},
+    )
 
 
 def _certain(value: float) -> float:
@@ -75,38 +81,23 @@ def _certain(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def _law(machine: Hexapod, fit: Fit) -> StrutLaw:
-    """The fitted strut law, its factors to such digits."""
-    return scaled_law(machine.strut_law, np.round(fit.law, 8))
-
-
-def _uncertainty(machine: Hexapod, fit: Fit, widened: float) -> Uncertainty | None:
+def _uncertainty(machine: Hexapod, law: StrutLaw, fit: Fit, widened: float) -> Uncertainty | None:
     """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already."""
-    law = _law(machine, fit)
-    names, slopes, rows = [], [], []
-    if fit.law_free:
-        names += list(law.parameters)
-        slopes += [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)][: len(names)]
-        rows += [0, 1][: len(names)]
-    index = 0
-    for candidate, sizes in zip(fit.candidates, fit.sizes, strict=True):
-        for component, size in zip(candidate.components, sizes, strict=True):
-            if index in fit.free:
-                names.append(f"{candidate.name}.{component.parameter.key}")
-                # value = 1 / size for a stiffness whose neutral value is infinite.
-                slope = -1.0 / float(size) ** 2 if component.inverse else 1.0
-                slopes.append(slope / component.parameter.si)
-                rows.append(2 + fit.free.index(index))
-            index += 1
+    names = list(law.parameters) if fit.law_free else []
+    slopes = [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)][: len(names)]
+    rows = [0, 1][: len(names)]
+    owners = [candidate.name for candidate in fit.candidates for _ in candidate.components]
+    for index, (owner, (component, size)) in enumerate(zip(owners, fit.parts, strict=True)):
+        if index in fit.free:
+            names.append(f"{owner}.{component.parameter.key}")
+            # value = 1 / size for a stiffness whose neutral value is infinite.
+            slopes.append((-1.0 / size**2 if component.inverse else 1.0) / component.parameter.si)
+            rows.append(2 + fit.free.index(index))
     if not names:
         return machine.uncertainty
     scale = widened * np.array(slopes)
-    covariance = np.outer(scale, scale) * fit.covariance[np.ix_(rows, rows)]
-    uncertainty = Uncertainty.of(names, covariance)
-    certain = replace(
-        uncertainty,
-        sd=np.array([_certain(float(sd)) for sd in uncertainty.sd]),
-        correlation=np.round(uncertainty.correlation, 9),
-    )
+    fitted = Uncertainty.of(names, np.outer(scale, scale) * fit.covariance[np.ix_(rows, rows)])
+    sd = np.array([_certain(float(sd)) for sd in fitted.sd])
+    certain = replace(fitted, sd=sd, correlation=np.round(fitted.correlation, 9))
     kept = None if machine.uncertainty is None else machine.uncertainty.without(names)
     return kept.beside(certain) if kept and kept.names else certain

@@ -1,33 +1,67 @@
-"""The result of an update: the steps, what the data support of them, and the machine that came of it."""
+"""The result of an update: its steps, what the data support of them, in words, and the machine that came of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from toolpath_stiff.correction import words
-from toolpath_stiff.correction.document import document_of, rounded_step
-from toolpath_stiff.correction.outcome import UpdateOutcome
-from toolpath_stiff.documents import Document
+import numpy as np
+
+from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.correction.machines import fitted_machine
+from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
+from toolpath_stiff.correction.strut_law import BarCurve, StrutLawSearch
+from toolpath_stiff.correction.task import LIKELIHOOD, UpdateTask
+from toolpath_stiff.diagnosis.examination import percent_of, rounded_errors
+from toolpath_stiff.documents import Document, json_number, to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically
+from toolpath_stiff.inference.doubts import question
+from toolpath_stiff.inference.drawn import Drawn
+from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent, errors_text
+from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
-from toolpath_stiff.results import FolderResult
+from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.stiffness.sizes import joined
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
 
+UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
+NEEDED = 1.0  # standard errors by which the error at left-out points must fall
+# Share of the mean error, or of what scatter alone leaves of it, by which it may rise: a likelier strut law can raise
+# it a little (9.62 to 9.72 % on the paper's Table 1).
+WORSE = 0.05
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Update(UpdateOutcome, FolderResult):
+class Update(FolderResult):
     """A machine's model corrected by measurements, or why it was not.
 
     Attributes
     ----------
+    task
+        What was to be corrected, by what, and how.
+    steps
+        The ladder, from the machine file as it stands to the last model; arrays in SI.
+    refitted
+        The strut law refitted alone: the second step, unless the law is kept.
+    supports, turned_down
+        Of every effect that was asked for, or that `auto` took; of those that it tried last and did not take.
+    drawn
+        How effects stand whose form was read off these readings; None where there are none.
+    search, bars
+        Of the paper's own estimation: how its searches ended; its Figure 3. None otherwise.
+    provenance
+        Where the fitted values come from, for the record.
+    next
+        Commands that go on from here.
     inputs
         Files that must not be written over.
     opened
@@ -60,43 +94,109 @@ class Update(UpdateOutcome, FolderResult):
     command: ClassVar[str] = "update"
     shown_by: ClassVar[str] = "update"
 
+    task: UpdateTask
+    steps: tuple[LadderStep, ...]
+    refitted: LadderStep
+    supports: tuple[Support, ...] = ()
+    turned_down: tuple[Support, ...] = ()
+    drawn: Drawn | None = None
+    search: StrutLawSearch | None = None
+    bars: BarCurve | None = None
+    provenance: Document = field(default_factory=dict)
+    next: Sequence[str] = ()
     inputs: tuple[str, ...] = ()
     opened: Callable[[Hexapod], Any] | None = None
 
     @property
-    def machine(self) -> Any:
-        """The machine that carries what was added; raises `InputError` where it was refused."""
-        machine = self._corrected()
-        return machine if self.opened is None else self.opened(machine)
-
-    def _corrected(self) -> Hexapod:
-        if self.corrected is None:
-            hint = "" if self.worse else "force=True keeps it all the same"
-            raise InputError(f"the update was refused: {words.text(self)}", hint=hint)
-        return self.corrected
+    def noise(self) -> Noise:
+        """The noise model that was counted with."""
+        return self.task.noise_model
 
     @cached_property
-    def document(self) -> Document:
-        """The content of update.json."""
-        return document_of(self)
+    def question(self) -> str:
+        """That these are hardly readings of this machine, and why; "" where nothing says so."""
+        return question(self.task.problem.predictor)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The content of update.json."""
-        return dict(self.document)
+    @property
+    def described(self) -> Drawn | None:
+        """`drawn`, if new readings have not confirmed it."""
+        return None if self.drawn is None or self.drawn.confirmed else self.drawn
 
-    def to_frame(self) -> pd.DataFrame:
-        """The steps, one a row: as given, strut law refitted, each effect; errors in per cent."""
-        import pandas as pd
+    @property
+    def last(self) -> LadderStep:
+        """The last model of the ladder; the machine file as given where nothing is to be changed."""
+        return self.steps[-1] if self.changed else self.steps[0]
 
-        return pd.DataFrame([rounded_step(self, k) for k in range(len(self.steps))])
+    @property
+    def changed(self) -> bool:
+        """True where there is something to be written."""
+        return bool(self.steps[-1].fit.names) or self.task.strut_law
 
-    def _short(self) -> str:
-        first, last = (100.0 * step.error for step in (self.steps[0], self.steps[-1]))
-        return f"{self.verdict}, mean error {first:.2f} to {last:.2f} %"
+    @property
+    def worse(self) -> bool:
+        """True where the last model fits worse than the machine as given; such a machine is never written.
+
+        Counted by the mean error, which users see. The fit is by likelihood, which bounds the factor by which readings
+        are off, not the difference: where nothing fits, the one can fall while the other multiplies.
+        """
+        before, after = self.steps[0].error, self.steps[-1].error
+        return not after - before <= max(WORSE * before, WORSE * self.noise.floor_percent / 100.0)
+
+    @property
+    def supported(self) -> bool:
+        """True where nothing speaks against what is to be changed."""
+        return not self.question and all(support.supported for support in self.supports)
+
+    @property
+    def accepted(self) -> bool:
+        """True where a machine is to be written: the data support what was added, or it was forced."""
+        return self.changed and not self.worse and (self.task.force or self.supported)
+
+    @property
+    def verdict(self) -> str:
+        """`UPDATED`, `REFUSED`, `FORCED` or `NOTHING`."""
+        if not self.changed:
+            return NOTHING
+        if not self.accepted:
+            return REFUSED
+        return UPDATED if self.supported else FORCED
+
+    @property
+    def widening(self) -> float:
+        """Factor on standard deviations: how much wider the residuals are than the noise model says, at least 1."""
+        # A bootstrap over points has the residuals' own width already.
+        return float(np.sqrt(dispersion(self.last.fit))) if self.task.objective == LIKELIHOOD else 1.0
+
+    @cached_property
+    def corrected(self) -> Hexapod | None:
+        """The machine with the last model; None where nothing is to be written."""
+        return self.fitted(self.provenance) if self.accepted else None
+
+    def fitted(self, provenance: Document) -> Hexapod:
+        """The machine with the last model, which comes from there."""
+        setups = self.task.data.setup.tolist()
+        return fitted_machine(self.task.machine, self.last.fit, provenance, self.widening, setups)
+
+    def _written(self) -> Hexapod:
+        if self.corrected is None:
+            hint = "" if self.worse else "force=True keeps it all the same"
+            raise InputError(f"the update was refused: {self.text}", hint=hint)
+        return self.corrected
+
+    @property
+    def machine(self) -> Any:
+        """The machine that carries what was added; raises `InputError` where it was refused."""
+        machine = self._written()
+        return machine if self.opened is None else self.opened(machine)
 
     def machine_text(self) -> str:
         """The new machine file, with where its fitted values come from; raises `InputError` where it was refused."""
-        return machine_toml(self._corrected(), words.machine_heading(self))
+        heading = (
+            f"{fill(f'Machine {self.task.machine.name}, updated. {self.text}', 110)}\n"
+            f"Command: {self.provenance['command']}\n"
+            f"SHA-256 of the data: {self.provenance['data_sha256']}\n"
+        )
+        return machine_toml(self._written(), heading)
 
     def save_machine(self, file: str | Path) -> Path:
         """Write the new machine file, whole or not at all."""
@@ -104,5 +204,149 @@ class Update(UpdateOutcome, FolderResult):
 
     def files(self, *, plots: bool = True, machine: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps update`; the machine file too, unless it is said not."""
-        none = {"machine.toml": machine and self.accepted, "figure3.csv": self.bars is not None}
-        return self._files(plots, [name for name, there in none.items() if not there])
+        there = {"machine.toml": machine and self.accepted, "figure3.csv": self.bars is not None}
+        return self._files(plots, [name for name in there if not there[name]])
+
+    def _short(self) -> str:
+        first, last = (100.0 * step.error for step in (self.steps[0], self.steps[-1]))
+        return f"{self.verdict}, mean error {first:.2f} to {last:.2f} %"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The steps, one a row: as given, strut law refitted, each effect; errors in per cent."""
+        return frame_of(self.document["steps"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of update.json."""
+        return dict(self.document)
+
+    @cached_property
+    def document(self) -> Document:
+        """The content of update.json."""
+        task, predictor, law = self.task, self.task.problem.predictor, self.task.machine.strut_law
+        before = (None, *self.steps)
+        steps = [step.document(law, self.widening, before[k]) for k, step in enumerate(self.steps)]
+        uncertainty = None if self.corrected is None else self.corrected.uncertainty
+        document = {
+            "verdict": self.verdict,
+            "text": self.text,
+            "question": self.question,
+            "objective": task.objective,
+            "baseline": steps[0],
+            "strut_law_refitted": rounded_errors(self.refitted.residual),
+            "steps": steps,
+            "support": to_dict(self.supports),
+            "described": [] if self.described is None else list(self.described.names),
+            "rejected": to_dict(self.turned_down),
+            "noise_percent": percent_of(self.noise.typical),
+            "noise_floor_percent": json_number(self.noise.floor_percent),
+            "noise": {"name": self.noise.name, "origin": self.noise.origin},
+            "widening": json_number(self.widening),
+            "uncertainty": None
+            if uncertainty is None
+            else {
+                "parameters": list(uncertainty.names),
+                "sd": [json_number(sd) for sd in uncertainty.sd.tolist()],
+                "correlation": [[json_number(x, 3) for x in row] for row in uncertainty.correlation.tolist()],
+            },
+            "assumptions": self.assumptions,
+            "warnings": list(predictor.data.warnings),
+            "notes": list(task.data.notes),
+            "machine": task.machine.name,
+            "effects": predictor.effects_that_act,
+            "machine_file": task.machine_file if self.accepted else None,
+            "data": list(task.files),
+            "readings": len(task.data.of_tip),
+            "provenance": dict(self.provenance),
+            "seed": task.seed,
+            "next": list(self.next),
+        }
+        if (search := self.search) is None:
+            return document
+        errors = np.round(100.0 * search.end_errors, 4).tolist()
+        return {**document, "search": {"end_errors_percent": errors, "agreeing": search.agreeing}}
+
+    @property
+    def text(self) -> str:
+        """What was done, the cause first, then the error step by step."""
+        doubt = f"{self.question} " if self.question else ""
+        last, verdict = self.steps[-1], self.verdict
+        if verdict == NOTHING:
+            nothing = "These data support no further effect: the machine stays as it is."
+            return f"{doubt}{nothing} Mean error: {self._errors}."
+        held = 100.0 * last.held.mean_error
+        errors = f"Mean error: {self._errors}{f' ({held:.2f} % at left-out points)' if np.isfinite(held) else ''}."
+        if self.worse:
+            return f"{doubt}The new machine would fit worse than the one given: it is not written. {errors}"
+        doubted = [support for support in self.supports if not support.supported]
+        against = "; ".join(f"{support.effect}: {', and '.join(support.reasons)}" for support in doubted)
+        if verdict == REFUSED:
+            reason = f"The data do not support {against}." if against else "The machine stays as it is."
+            return f"{doubt}{reason} (--force, force=True, writes it all the same.) {errors}"
+        unconfirmed = "" if self.described is None else f"But {self.described.reason}. "
+        if verdict == FORCED:
+            reason = f" ({against})" if against else ""
+            return f"{doubt}Added by force, although the data do not support it{reason}. {unconfirmed}{errors}"
+        if not last.fit.names:
+            return f"Strut law refitted; no effect added. {errors}"
+        cause = joined(last.fit.findings)
+        word = "added" if self.described is None else "added as described, not as identified"
+        return f"{cause[:1].upper()}{cause[1:]} ({joined(last.fit.names)} {word}). {unconfirmed}{errors}"
+
+    @property
+    def _errors(self) -> str:
+        """Mean error of every step; of a law that is kept also what refitting it would leave."""
+        steps = [(step.name.replace("+ ", "with ", 1), 100.0 * step.error) for step in self.steps]
+        kept = self.refitted not in self.steps and self.task.objective == LIKELIHOOD
+        law = [(f"({LAW_REFITTED} alone)", 100.0 * self.refitted.error)] if kept else []
+        return errors_text(steps[0][1], None, [*law, *steps[1:]])
+
+    @property
+    def assumptions(self) -> list[str]:
+        """What the result rests on, sentences."""
+        sentences = [
+            f"noise: {self.noise.origin}",
+            "as given, nothing is fitted, so leaving points out changes nothing: where the machine file's figures were "
+            "fitted to these readings, its error at left-out points looks better than it is",
+        ]
+        if self.task.objective != LIKELIHOOD:
+            return [
+                *sentences,
+                "smallest mean |modelled - measured| / measured, as the paper counts it; standard deviations by a "
+                "bootstrap over the measuring points",
+            ]
+        sentences.append(
+            f"an effect is kept if the error at left-out points falls by more than {NEEDED:g} standard error, no "
+            "parameter ends at its bound, and its gain in likelihood, the strut law refitted with and without it, is "
+            "beyond what the best of all candidates gains by chance once in twenty campaigns"
+        )
+        if self.widening > 1.0:
+            sentences.append(
+                f"standard deviations are {self.widening:.2f} times those of the noise model: the residuals of the "
+                "last model are that much wider"
+            )
+        return sentences
+
+
+def residuals_csv(update: Update) -> str:
+    """One row a reading of the tip: measured, modelled as given and after, deviations, that with its point left out."""
+    data, given, last = update.task.data.of_tip, update.steps[0], update.last
+    wild = np.isin(np.flatnonzero(update.task.data.tip), last.fit.scatter.wild)
+    head = [
+        "file", "line", "point", "setup", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx",
+        "dy", "dz", "measured_N_per_mm", "as_given_N_per_mm", "after_N_per_mm", "as_given_deviation_percent",
+        "after_deviation_percent", "left_out_deviation_percent", "wild",
+    ]  # fmt: skip
+    poses = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles), data.direction], axis=1) + 0.0
+    residuals = np.stack([given.residual, last.residual, last.held.residual], axis=1)
+    measured = n_per_mm_from_n_per_m(data.stiffness)
+    stiffnesses = np.column_stack([measured, measured[:, None] * np.exp(-residuals[:, :2])])
+    errors = deviation_percent(residuals) + 0.0
+    rows = [
+        [
+            data.file[i], data.line[i], data.point[i], data.setup[i], last.along[i],
+            *(f"{value:.6g}" for value in poses[i]), *(f"{value:.1f}" for value in stiffnesses[i]),
+            *("" if np.isnan(error) else f"{error:.3f}" for error in errors[i]), int(wild[i]),
+        ]
+        for i in range(len(data))
+    ]  # fmt: skip
+    return csv_text(head, rows)

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions
-from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.rows import FittedSize, interval, percent_of, rounded_errors
-from toolpath_stiff.documents import Document, json_number
+from toolpath_stiff.diagnosis.examination import FittedSize, fitted_sizes, held_errors, percent_of, rounded_errors
+from toolpath_stiff.documents import Document, json_number, to_dict
 from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.left_out import HeldOut, held_out, of_readings
+from toolpath_stiff.inference.left_out import HeldOut, error_falls, gain_in_standard_errors, held_out
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.machine.model import StrutLaw
 from toolpath_stiff.readings.measurements import Readings
@@ -52,8 +51,8 @@ class LadderStep:
     @classmethod
     def of(cls, name: str, fit: Fit, data: Readings, held: HeldOut | None = None) -> LadderStep:
         """Of a fit to these data; `held`: its residuals at left-out points, where they are known."""
-        left_out = held_out(fit, data.point) if held is None else held
-        return cls(name, fit, left_out.of_readings(data.tip), data.tip, np.asarray(directions(data.of_tip)))
+        left_out = (held or held_out(fit, data.point)).of_readings(data.tip)
+        return cls(name, fit, left_out, data.tip, np.asarray(directions(data.of_tip)))
 
     @property
     def residual(self) -> FloatArray:
@@ -63,7 +62,7 @@ class LadderStep:
     @property
     def error(self) -> float:
         """Mean of |modelled - measured| / measured over the readings of the tip."""
-        return float(of_readings(self.fit, self.tip).errors.mean())
+        return float(np.abs(np.expm1(-self.residual)).mean())
 
     @property
     def title(self) -> str:
@@ -87,65 +86,73 @@ class LadderStep:
         law = scaled_law(given, self.fit.law)
         count = len(law.parameters)  # of a constant law one, which belongs to no length
         deviations = widening * np.sqrt(np.maximum(np.diag(self.fit.covariance)[:count], 0.0))
-        ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))[:count]
+        lengths_mm = [None] if law.constant else [float(mm_from_m(x)) for x in (law.length_1, law.length_2)]
+        stiffnesses = [n_per_um_from_n_per_m(stiffness) for stiffness in (law.stiffness_1, law.stiffness_2)[:count]]
         return [
             LawEnd(
-                None if law.constant else json_number(float(mm_from_m(length)), 7),
-                json_number(n_per_um_from_n_per_m(stiffness)),
-                json_number(n_per_um_from_n_per_m(stiffness) * float(deviation), 3) if self.fit.law_free else None,
+                length and json_number(length, 7),
+                json_number(k),
+                json_number(k * float(sd), 3) if self.fit.law_free else None,
             )
-            for (length, stiffness), deviation in zip(ends, deviations, strict=True)
+            for length, k, sd in zip(lengths_mm, stiffnesses, deviations, strict=True)
         ]
 
     def sizes(self, widening: float) -> dict[str, dict[str, FittedSize | str | int]]:
         """Effect -> key -> what it acts on, or value, unit and 95 % interval."""
-        sizes: dict[str, dict[str, FittedSize | str | int]] = {}
-        fit, index = self.fit, 0
-        for candidate, values in zip(fit.candidates, fit.sizes, strict=True):
-            entry = sizes[candidate.name] = {key: value for key, value in candidate.choice if value not in ("", 0)}
-            for component, size in zip(candidate.components, values.tolist(), strict=True):
-                ends = interval(fit, index, component, size)
-                if index in fit.free:
-                    reach = NORMAL_95 * widening * fit.deviation(index)
-                    ends = max(size - reach, component.bounds[0]), min(size + reach, component.bounds[1])
-                si = component.parameter.si
-                low, high = (json_number(value) for value in sorted(component.value(end) / si for end in ends))
-                value = json_number(component.value(size) / si)
-                entry[component.parameter.key] = FittedSize(value, component.parameter.unit, (low, high))
-                index += 1
-        return sizes
+        sizes = fitted_sizes(self.fit, widening=widening)
+        return {
+            candidate.name: {key: value for key, value in candidate.choice if value not in ("", 0)}
+            | sizes[candidate.name]
+            for candidate in self.fit.candidates
+        }
+
+    def document(self, given: StrutLaw, widening: float, before: LadderStep | None) -> Document:
+        """A step as update.json has it; with one before also what it gains over that."""
+        document = {
+            "name": self.name,
+            "effects": list(self.fit.names),
+            **rounded_errors(self.residual),
+            "findings": list(self.fit.findings),
+            **held_errors(self.held),
+            "by_direction": self.by_direction,
+            "strut_law_N_per_um": to_dict(self.law_ends(given, widening)),
+            "parameters": to_dict(self.sizes(widening)),
+            "outliers": len(self.fit.scatter.wild),
+        }
+        if before is None:
+            return document
+        gain, fall = gain_in_standard_errors(before.held, self.held), float(error_falls(before.held, self.held).mean())
+        return {
+            **document,
+            "held_out_gain_in_se": json_number(gain, 3),
+            "held_out_se_percent": percent_of(abs(fall / gain), 3) if gain else None,
+        }
 
 
 @dataclass(frozen=True)
 class Support:
-    """How far the data support an effect.
+    """How far the data support an effect, as update.json has it.
 
     Attributes
     ----------
-    effect
-        Its name.
-    gain_in_se
-        Fall of the error at left-out points over its standard error; nan where nothing can be left out.
-    error, held_out_error
-        Mean errors with it, in sample and at left-out points.
+    effect, supported, reasons
+        Its name; what is against it, sentences; nothing if it is supported.
+    mean_abs_error_percent, held_out_error_percent
+        With it, in sample and at left-out points.
+    held_out_gain_in_se
+        Fall of the error at left-out points over its standard error; None where nothing can be left out.
     likelihood_gain, threshold
         Twice the log likelihood gained, in units of the scatter that remains; what chance alone reaches.
-    reasons
-        What is against it, sentences; none if it is supported.
     """
 
     effect: str
-    gain_in_se: float
-    error: float
-    held_out_error: float
-    likelihood_gain: float
-    threshold: float
+    supported: bool
     reasons: tuple[str, ...]
-
-    @property
-    def supported(self) -> bool:
-        """True where nothing speaks against it."""
-        return not self.reasons
+    mean_abs_error_percent: float | None
+    held_out_error_percent: float | None
+    held_out_gain_in_se: float | None
+    likelihood_gain: float | None
+    threshold: float | None
 
 
 def dispersion(fit: Fit) -> float:

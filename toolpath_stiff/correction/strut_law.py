@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.diagnosis.diagnose import check_measured
 from toolpath_stiff.inference.prediction import NO_CHANGE, Predictor, at_both_ends, scaled_law
 from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.readings.measurements import Readings
@@ -25,6 +25,7 @@ START_SPREAD = 0.2  # sd of the starts' logarithms: a law wrong by 20 %
 FIRST_STEPS = 0.05 * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 FINE, ROUGH = (1e-7, 1e-10), (1e-5, 1e-7)  # law and mean error; a resampled search scatters a thousand times as much
 SAME = 1e-5  # of the mean error: two ends that close are one minimum
+RESAMPLES = 200
 # N/m; the paper's Figure 3 spans platforms far softer than any real one up to rigid ones.
 FIGURE_3_BARS = tuple(float(k) for k in np.geomspace(1e8, 1e13, 26))
 
@@ -85,32 +86,23 @@ def minimise_mean_error(predictor: Predictor, seed: int = 0, starts: int = START
     InputError
         A reading without a stiffness, or fewer than three.
     """
-    lacking = int(np.isnan(predictor.data.stiffness).sum())
-    if lacking or len(predictor.data) < 3:
-        raise InputError(
-            f"{len(predictor.data)} readings, {lacking} of them without a stiffness",
-            expected="at least 3 measured stiffnesses for a law of two constants",
-        )
-    rng = np.random.default_rng(seed)
-    given = predictor.machine.strut_law
-    begin = np.concatenate([np.zeros((1, 2)), rng.normal(0.0, START_SPREAD, (starts - 1, 2))])
-    begin = at_both_ends(given, begin)
+    check_measured(predictor.data, "for a law of two constants", fewest=3)
+    rng, given = np.random.default_rng(seed), predictor.machine.strut_law
+    drawn = rng.normal(0.0, START_SPREAD, (starts - 1, 2))
+    begin = at_both_ends(given, np.concatenate([np.zeros((1, 2)), drawn]))
     objective = _objective(predictor)
-    laws = []
-    for start in begin:
-        # A second search from the first one's end: a simplex can collapse on a kink.
-        laws.append(_downhill(objective, _downhill(objective, start, *FINE), *FINE))
-    errors = [mean_error(predictor, law) for law in laws]
-    ends = at_both_ends(given, np.array(laws))
-    best = int(np.argmin(errors))
+    # A second search from the first one's end: a simplex can collapse on a kink.
+    laws = [_downhill(objective, _downhill(objective, start, *FINE), *FINE) for start in begin]
+    errors = np.array([mean_error(predictor, law) for law in laws])
+    ends, best = at_both_ends(given, np.array(laws)), int(np.argmin(errors))
     return StrutLawSearch(
         law=ends[best],
         strut_law=scaled_law(given, ends[best]),
-        error=errors[best],
+        error=float(errors[best]),
         error_before=mean_error(predictor),
         starts=begin,
         ends=ends,
-        end_errors=np.array(errors),
+        end_errors=errors,
     )
 
 
@@ -142,16 +134,12 @@ def _objective(predictor: Predictor, weight: FloatArray | None = None) -> Callab
     return objective
 
 
-RESAMPLES = 200
-
-
 def leave_points_out(predictor: Predictor, law: FloatArray) -> FloatArray:
     """(n,) ln measured - ln modelled, each reading by the law with the smallest mean error over the other points.
 
     nan with fewer than three points.
     """
-    data = predictor.data
-    labels = np.unique(data.point)
+    data, labels = predictor.data, np.unique(predictor.data.point)
     residual = np.full(len(data), np.nan)
     for label in labels if len(labels) > 2 else ():
         out = data.point == label
@@ -160,12 +148,11 @@ def leave_points_out(predictor: Predictor, law: FloatArray) -> FloatArray:
     return residual
 
 
-def resampled_covariance(predictor: Predictor, law: FloatArray, seed: int = 0, draws: int = RESAMPLES) -> FloatArray:
+def resampled_covariance(predictor: Predictor, law: FloatArray, seed: int = 0) -> FloatArray:
     """(2, 2) covariance of the law: the bootstrap over points (Efron and Tibshirani 1993, chapter 6)."""
     labels, which = np.unique(predictor.data.point, return_inverse=True)
-    rng = np.random.default_rng(seed)
-    laws = []
-    for _ in range(draws):
+    rng, laws = np.random.default_rng(seed), []
+    for _ in range(RESAMPLES):
         count = np.bincount(rng.integers(len(labels), size=len(labels)), minlength=len(labels))
         laws.append(_downhill(_objective(predictor, count[which.reshape(-1)].astype(float)), law, *ROUGH))
     return np.asarray(np.cov(np.array(laws).T))
@@ -192,11 +179,6 @@ class BarCurve:
     error_refitted: FloatArray
     stiffness: FloatArray
 
-    @property
-    def best(self) -> int:
-        """Index of the bars with the smallest error after refitting."""
-        return int(np.argmin(self.error_refitted))
-
 
 def bar_curve(
     machine: Hexapod, data: Readings, bars: Sequence[float] = FIGURE_3_BARS, seed: int = 0, starts: int = 3
@@ -213,20 +195,19 @@ def bar_curve(
         As in `minimise_mean_error`.
     """
     stiffnesses = np.unique([*bars, np.inf])
-    errors, refitted, laws = [], [], []
-    for k in stiffnesses:
-        predictor = Predictor(machine.with_changes(platform_bar_stiffness=float(k)), data)
-        search = minimise_mean_error(predictor, seed, starts)
-        errors.append(search.error_before)
-        refitted.append(search.error)
-        laws.append([search.strut_law.stiffness_1, search.strut_law.stiffness_2])
-    return BarCurve(stiffnesses, np.array(errors), np.array(refitted), np.array(laws))
+    machines = [machine.with_changes(platform_bar_stiffness=float(k)) for k in stiffnesses]
+    searches = [minimise_mean_error(Predictor(other, data), seed, starts) for other in machines]
+    laws = np.array([[search.strut_law.stiffness_1, search.strut_law.stiffness_2] for search in searches])
+    given, refitted = (np.array([getattr(s, name) for s in searches]) for name in ("error_before", "error"))
+    return BarCurve(stiffnesses, given, refitted, laws)
 
 
 def bar_curve_csv(curve: BarCurve) -> str:
     """The curve as CSV: N/m, per cent, N/um."""
+    errors = 100 * np.column_stack([curve.error, curve.error_refitted])
+    figures = np.column_stack([errors, n_per_um_from_n_per_m(curve.stiffness)])
     rows = ["bar_stiffness_N_per_m,error_percent,error_refitted_percent,stiffness_1_N_per_um,stiffness_2_N_per_um"]
-    for k, error, refitted, law in zip(curve.bars, curve.error, curve.error_refitted, curve.stiffness, strict=True):
-        figures = (100 * error, 100 * refitted, n_per_um_from_n_per_m(law[0]), n_per_um_from_n_per_m(law[1]))
-        rows.append(f"{k:.6g}," + ",".join(f"{value:.4f}" for value in figures))
+    rows += [
+        ",".join([f"{k:.6g}", *(f"{value:.4f}" for value in row)]) for k, row in zip(curve.bars, figures, strict=True)
+    ]
     return "\n".join(rows) + "\n"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from toolpath_stiff.defaults import STRUT_SPREAD
@@ -62,7 +63,12 @@ class UpdateTask:
     request: Asked | None = None
     progress: Callable[[str], None] = lambda text: None
 
-    def problem(self) -> tuple[Noise, Problem]:
-        """The noise, of several models the one with the largest, as in a diagnosis; model and scatter."""
-        worst = max(noise_models(self.data, self.noise, self.strut_spread), key=lambda model: model.typical)
-        return worst, Problem.of(Predictor(self.machine, self.data, self.effect_files), worst)
+    @cached_property
+    def noise_model(self) -> Noise:
+        """Of several noise models the one with the largest noise, as in a diagnosis."""
+        return max(noise_models(self.data, self.noise, self.strut_spread), key=lambda model: model.typical)
+
+    @cached_property
+    def problem(self) -> Problem:
+        """Model and scatter."""
+        return Problem.of(Predictor(self.machine, self.data, self.effect_files), self.noise_model)

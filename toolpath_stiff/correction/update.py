@@ -1,31 +1,51 @@
-"""A model corrected: what it lacks is added, fitted, judged, and written to a machine file with its origin."""
+"""Update a machine: fit the effects that a user names (or that the data ask for), and judge whether data support them.
 
-from dataclasses import replace
+Everything starts from the machine file as given and then from its strut law refitted, which every effect is added to
+unless the law is kept. Effects that are given together are steps in the order in which each lets the error fall; where
+there is no such order, they are one step.
+
+An effect is supported if
+
+- the error at left-out points falls by more than one standard error of that fall, paired by point;
+- no parameter ends at its upper bound, and not all end at zero;
+- its gain in likelihood, the strut law refitted with and without it, is more than the best of all candidates reaches
+  by chance in one campaign of twenty: the relative gate of the diagnosis. The gain is counted in units of the scatter
+  that remains, so that data which no effect explains do not lend every effect significance.
+
+Of several effects each is judged beside the others.
+
+The paper's own estimation (`--objective mean-error`) is a ladder of one step, the strut law of smallest mean error.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolpath_stiff.correction.ladder import build_ladder
-from toolpath_stiff.correction.machines import data_hash
-from toolpath_stiff.correction.result import Update
-from toolpath_stiff.correction.steps import LadderStep
-from toolpath_stiff.correction.strut_law import (
-    BarCurve,
-    bar_curve,
-    leave_points_out,
-    minimise_mean_error,
-    resampled_covariance,
-)
+from toolpath_stiff.correction.additions import parse_addition
+from toolpath_stiff.correction.machines import data_hash, fitted_machine
+from toolpath_stiff.correction.result import NEEDED, Update
+from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
+from toolpath_stiff.correction.strut_law import bar_curve, leave_points_out, minimise_mean_error, resampled_covariance
 from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
-from toolpath_stiff.documents import Document
+from toolpath_stiff.diagnosis.diagnose import check_measured
+from toolpath_stiff.diagnosis.examination import percent_of
+from toolpath_stiff.documents import json_number
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
-from toolpath_stiff.inference.doubts import question
+from toolpath_stiff.inference.candidates import Candidate, testable_effects
+from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
-from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.fits import baseline
-from toolpath_stiff.inference.left_out import HeldOut
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fits import add_effect, base_fit, baseline
+from toolpath_stiff.inference.gates import gain_threshold, simulate
+from toolpath_stiff.inference.hypotheses import score_families, signatures, tables_of
+from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
+from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.stiffness.model import build_model
+
+TRIED = 4  # candidates a step of `--auto`, the most likely first
+MOST_EFFECTS = 4  # that `--auto` adds
 
 
 def update(task: UpdateTask) -> Update:
@@ -54,8 +74,7 @@ def update(task: UpdateTask) -> Update:
                 "--objective mean-error is the paper's own estimation, of the strut law alone",
                 expected="--strut-law, without --add and --auto",
             )
-        task = replace(task, data=task.data.of_tip)
-        result = replace(update_by_mean_error(task), bars=_bars(task))
+        result = update_by_mean_error(replace(task, data=task.data.of_tip))
     else:
         result = build_ladder(task)
     # Where its results go does not matter to the command that repeats the fit.
@@ -63,8 +82,178 @@ def update(task: UpdateTask) -> Update:
         add=list(task.add), strut_law=task.strut_law, keep_strut_law=task.keep_strut_law, auto=task.auto,
         force=task.force, objective=task.objective if task.objective == MEAN_ERROR else None, seed=task.seed or None,
     )  # fmt: skip
-    result = replace(result, provenance=_provenance(result, request.command("update", *words)))
-    return result if result.corrected is None else replace(result, next=_next(result.corrected, task, request))
+    # No date: the same data and command give the same bytes.
+    provenance = {
+        **({} if result.described is None else {"described": f"not confirmed: {result.described.reason}"}),
+        "data": list(task.files),
+        "data_sha256": data_hash(task.files),
+        "readings": len(result.task.data),
+        "command": request.command("update", *words),
+        "noise": result.noise.origin,
+        "mean_error_before_percent": round(100.0 * result.steps[0].error, 3),
+        "mean_error_after_percent": round(100.0 * result.last.error, 3),
+        "left_out_error_after_percent": round(100.0 * result.last.held.mean_error, 3),
+    }
+    result = replace(result, provenance=provenance)
+    if result.corrected is None:
+        return result
+    # An effect that belongs to a set-up acts only where that is named.
+    setups = (active.setup for active in build_model(result.corrected, task.effect_files).effects if active.setup)
+    shown = options(machine=task.machine_file, effects=list(task.effect_files), setup=next(setups, None))
+    compare = hint("what is left", request.command("compare", machine=task.machine_file))
+    also = "the stiffness over the workspace (analyze, place and pose take the same options)"
+    return replace(result, next=[compare, hint(also, command_line("map", *shown))])
+
+
+def build_ladder(task: UpdateTask) -> Update:
+    """Fit effects to measurements and judge them.
+
+    Raises
+    ------
+    InputError
+        Too few readings, an effect unknown, named twice or present already, or nothing to do.
+    """
+    wanted = [parse_addition(text, task.data, task.effect_files) for text in task.add]
+    by_name = {candidates[0].name: candidates for candidates in wanted}
+    _check(task, [candidates[0].name for candidates in wanted])
+    as_given, law_refitted = baseline(task.problem)
+    refitted = LadderStep.of(LAW_REFITTED, law_refitted, task.data)
+    steps = [LadderStep.of(AS_GIVEN, as_given, task.data), *([] if task.keep_strut_law else [refitted])]
+    steps += ladder_of(task, steps[-1], wanted)
+    full, supports, tried = steps[-1].fit, list[Support](), list[Support]()
+    for j, name in enumerate(full.names):
+        others = [[candidate] for k, candidate in enumerate(full.candidates) if k != j]
+        before = LadderStep.of("", _fitted(task, base_fit(task.problem, not task.keep_strut_law), others), task.data)
+        supports.append(_support(task, _field_of(task, before.fit), before, full, j, by_name[name]))
+    while task.auto and len(steps[-1].fit.candidates) < MOST_EFFECTS:
+        better, tried = _next_effect(task, steps[-1])
+        if better is None:
+            break
+        steps.append(better)
+        supports.append(tried[-1])
+        tried = []
+    return Update(
+        task, tuple(steps), refitted, tuple(supports), turned_down=tuple(tried), drawn=_drawn(task, steps[-1].fit)
+    )
+
+
+def _check(task: UpdateTask, names: Sequence[str]) -> None:
+    if not names and not task.strut_law and not task.auto:
+        raise InputError("nothing to update", expected="--add EFFECT, --strut-law or --auto")
+    check_measured(task.data, "to update from")
+    present = [entry.name for entry in (*task.machine.effects, *task.machine.instruments)]
+    if np.isfinite(task.machine.platform_bar_stiffness):
+        present.append("platform_flexibility")
+    for name in names:
+        if (*present, *names).count(name) > 1:
+            fault = f"--add {name}: given twice, or in machine {task.machine.name} already"
+            raise InputError(fault, hint="a machine carries an effect once")
+
+
+def _fitted(task: UpdateTask, fit: Fit, groups: Iterable[Sequence[Candidate]]) -> Fit:
+    """A fit with one effect of each group on top."""
+    for candidates in groups:
+        fit = add_effect(task.problem, fit, candidates, not task.keep_strut_law)
+    return fit
+
+
+def step_up(task: UpdateTask, before: LadderStep, groups: Sequence[Sequence[Candidate]]) -> LadderStep:
+    """A rung higher: one effect, or several as one step."""
+    fit = _fitted(task, before.fit, groups)
+    labels = [candidate.label for candidate in fit.candidates[-len(groups) :]]
+    return LadderStep.of(f"+ {' + '.join(labels)}", fit, task.data)
+
+
+def ladder_of(task: UpdateTask, start: LadderStep, wanted: Sequence[Sequence[Candidate]]) -> list[LadderStep]:
+    """Steps that add the effects asked for, each lower than the one before; one step if no order does."""
+    rest, steps = list(wanted), [start]
+    while rest:
+        task.progress(f"fitting {', '.join(candidates[0].name for candidates in rest)}")
+        trials = [step_up(task, steps[-1], [candidates]) for candidates in rest]
+        best = min(range(len(rest)), key=lambda k: trials[k].error)
+        lower = trials[best].error < steps[-1].error
+        if len(wanted) > 1 and (not lower or trials[best].held.mean_error >= steps[-1].held.mean_error):
+            return [step_up(task, start, wanted)]
+        steps.append(trials[best])
+        rest.pop(best)
+    return steps[1:]
+
+
+def _drawn(task: UpdateTask, full: Fit) -> Drawn | None:
+    """How the effects stand that were drawn from the readings, against the model without them."""
+    others = [[c] for c in full.candidates if not seen_readings([c.effect], task.data).any()]
+    if len(others) == len(full.candidates):
+        return None
+    fit = _fitted(task, base_fit(task.problem, not task.keep_strut_law), others)
+    return drawn(full, {" + ".join(fit.names) or "none": fit}, task.data)
+
+
+@dataclass(frozen=True)
+class Field:
+    """All candidates on a machine that carries other effects: model and scatter, the gain that chance alone reaches."""
+
+    problem: Problem
+    threshold: float
+
+
+def _field_of(task: UpdateTask, others: Fit) -> Field:
+    """What an effect is judged against on a machine that carries the other effects."""
+    task.progress("searching all effects for what chance alone would gain")
+    carrying = fitted_machine(task.machine, others, {"command": "", "data_sha256": ""})
+    problem = Problem.of(Predictor(carrying, task.data, task.effect_files), task.noise_model)
+    effects = testable_effects(problem.predictor)[0]
+    tables = [table for effect in effects for table in tables_of(problem, effect)]
+    draws = simulate(task.noise_model, problem.scatter.covariance, task.seed)
+    return Field(problem, gain_threshold(problem, problem.score_base().jacobian, draws, signatures(problem, tables)))
+
+
+def _support(
+    task: UpdateTask, others: Field, before: LadderStep, fit: Fit, j: int, candidates: Sequence[Candidate]
+) -> Support:
+    """Judge effect j of a fit against the model with the other effects."""
+    after = LadderStep.of("", fit, task.data)
+    in_se = gain_in_standard_errors(before.held, after.held)
+    none = base_fit(others.problem, law_free=True)
+    alone = add_effect(others.problem, none, candidates, law_free=True)
+    gained = 2.0 * (alone.log_posterior - none.log_posterior) / dispersion(alone)
+    reasons = []
+    if not fit.sizes[j].any():
+        reasons.append("it fits best when it is absent")
+    names = {component.parameter.name for component in fit.candidates[j].components}
+    bounded = [parameter for parameter in fit.at_upper_bound() if parameter in names]
+    if bounded:
+        reasons.append(f"{', '.join(bounded)} ends at its bound: the data would pull it beyond what is possible")
+    if np.isnan(in_se):
+        reasons.append("fewer than three points: none can be left out, so nothing can be said of unseen ones")
+    elif in_se <= NEEDED:
+        change = f"from {100 * before.held.mean_error:.2f} to {100 * after.held.mean_error:.2f} %"
+        reasons.append(
+            f"the error at left-out points goes {change}, {in_se:.1f} standard errors: more than {NEEDED:g} needed"
+        )
+    if gained <= others.threshold:
+        reasons.append(
+            f"twice the log likelihood rises by {gained:.1f}: the best of all candidates gains {others.threshold:.1f} "
+            "by chance once in twenty campaigns"
+        )
+    return Support(
+        fit.names[j], not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
+        json_number(in_se, 3), json_number(gained), json_number(others.threshold),
+    )  # fmt: skip
+
+
+def _next_effect(task: UpdateTask, before: LadderStep) -> tuple[LadderStep | None, list[Support]]:
+    """The most likely effect that the data support on top of a step, and the supports of all that were tried."""
+    others, tried = _field_of(task, before.fit), list[Support]()
+    effects = testable_effects(others.problem.predictor)[0]
+    families = score_families(others.problem, effects, others.problem.score_base())
+    for family in [f for f in families if f.best is not None][:TRIED]:
+        task.progress(f"fitting {family.name}")
+        candidates = [table.candidate for table in family.tables]
+        step = step_up(task, before, [candidates])
+        tried.append(_support(task, others, before, step.fit, len(step.fit.candidates) - 1, candidates))
+        if tried[-1].supported:
+            return step, tried
+    return None, tried
 
 
 def update_by_mean_error(task: UpdateTask) -> Update:
@@ -72,54 +261,20 @@ def update_by_mean_error(task: UpdateTask) -> Update:
 
     Noise is for the noise floor only: the objective does not know of it. Raises `InputError` as `minimise_mean_error`.
     """
-    noise, problem = task.problem()
-    predictor, say, data = problem.predictor, task.progress, task.data
-    say("searching from several starts")
+    predictor, data = task.problem.predictor, task.data
+    task.progress("searching from several starts")
     search = minimise_mean_error(predictor, task.seed)
-    (as_given, law_refitted), law = baseline(problem), search.law
-    say("leaving points out, drawing points anew")
+    (as_given, law_refitted), law = baseline(task.problem), search.law
+    task.progress("leaving points out, drawing points anew")
     modelled = predictor.log_stiffness(law)
     last = Fit(
-        (), (), (), law, problem.observed - modelled, predictor.law_columns(modelled, law),
-        resampled_covariance(predictor, law, task.seed), problem.scatter,
+        (), (), (), law, task.problem.observed - modelled, predictor.law_columns(modelled, law),
+        resampled_covariance(predictor, law, task.seed), task.problem.scatter,
     )  # fmt: skip
     left_out = HeldOut(leave_points_out(predictor, law), np.zeros((0, 2)), data.point)
     steps = LadderStep.of(AS_GIVEN, as_given, data), LadderStep.of("strut law by mean error", last, data, left_out)
-    refitted = LadderStep.of(LAW_REFITTED, law_refitted, data)
-    return Update(task, noise, problem, steps, refitted, question=question(predictor), search=search)
-
-
-def _provenance(update: Update, command: str) -> Document:
-    """Where the fitted values come from. No date: the same data and command give the same bytes."""
-    described = {} if update.described is None else {"described": f"not confirmed: {update.described.reason}"}
-    return {
-        **described,
-        "data": list(update.task.files),
-        "data_sha256": data_hash(update.task.files),
-        "readings": len(update.task.data),
-        "command": command,
-        "noise": update.noise.origin,
-        "mean_error_before_percent": round(100.0 * update.steps[0].error, 3),
-        "mean_error_after_percent": round(100.0 * update.last.error, 3),
-        "left_out_error_after_percent": round(100.0 * update.last.held.mean_error, 3),
-    }
-
-
-def _next(updated: Hexapod, task: UpdateTask, request: Asked) -> list[str]:
-    """Commands that use the new machine; an effect that belongs to a set-up acts only where that is named."""
-    model, file = build_model(updated, task.effect_files), task.machine_file
-    setups = [active.setup for active in model.effects if active.setup]
-    shown = options(machine=file, effects=list(task.effect_files), setup=setups[0] if setups else None)
-    also = " (analyze, place and pose take the same options)"
-    return [
-        hint("what is left", request.command("compare", machine=file)),
-        hint(f"the stiffness over the workspace{also}", command_line("map", *shown)),
-    ]
-
-
-def _bars(task: UpdateTask) -> BarCurve | None:
-    """The paper's Figure 3; None where the machine carries bars as an effect."""
-    if any(entry.name == "platform_flexibility" for entry in task.machine.effects):
-        return None
-    task.progress("the platform's bars, soft to rigid")
-    return bar_curve(task.machine, task.data, seed=task.seed, starts=1)
+    bars = None
+    if not any(entry.name == "platform_flexibility" for entry in task.machine.effects):
+        task.progress("the platform's bars, soft to rigid")
+        bars = bar_curve(task.machine, data, seed=task.seed, starts=1)
+    return Update(task, steps, LadderStep.of(LAW_REFITTED, law_refitted, data), search=search, bars=bars)

@@ -4,19 +4,19 @@ Reads the verdict of `verdict` for each noise model, takes what they have in com
 needs to judge it: fits with intervals, errors held out by point, what these data cannot tell, what to measure next.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolpath_stiff.analysis.results import analyze
+from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.comparison.loop_readings import beside_tip
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.diagnosis.examination import NAMING
 from toolpath_stiff.diagnosis.result import Diagnosis
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.inference import slips
 from toolpath_stiff.inference.candidates import testable_effects
@@ -29,22 +29,29 @@ from toolpath_stiff.inference.left_out import held_out, of_readings
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.planning.menu import Menu
-from toolpath_stiff.planning.plan import plan_measurements
-from toolpath_stiff.planning.rivals import rivals_of
-from toolpath_stiff.planning.rows import plan_rows
+from toolpath_stiff.nc.moves import ReadProgram
+from toolpath_stiff.planning.plan import RivalPlan
+from toolpath_stiff.planning.result import plan
 from toolpath_stiff.portrait.alike import Alike, looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import build_model
 
-if TYPE_CHECKING:
-    from toolpath_stiff.nc.moves import ReadProgram
-    from toolpath_stiff.poses import Pose
-
-
+Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise model; the one that is written out
+PATH_STEP = 5e-3  # m between samples: the mean of a path needs no more
 FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect and a few to spare
+
+
+def check_measured(data: Readings, purpose: str, fewest: int = FEWEST) -> None:
+    """Raise `InputError` where readings are too few, or some have no stiffness."""
+    lacking = int(np.isnan(data.stiffness).sum())
+    if len(data) < fewest or lacking:
+        raise InputError(
+            f"{len(data)} readings, {lacking} without a stiffness",
+            expected=f"at least {fewest} measured stiffnesses {purpose}",
+        )
 
 
 def diagnose(
@@ -88,11 +95,7 @@ def diagnose(
     >>> found.verdict
     'ambiguous'
     """
-    if len(data.of_tip) < FEWEST or np.isnan(data.stiffness).any():
-        raise InputError(
-            f"{len(data.of_tip)} readings, {int(np.isnan(data.stiffness).sum())} without a stiffness",
-            expected=f"at least {FEWEST} measured stiffnesses to diagnose from",
-        )
+    check_measured(data.of_tip, "to diagnose from")
 
     def judged(data: Readings) -> Judged:
         predictor, judgements = Predictor(machine, data, effect_files), {}
@@ -106,22 +109,21 @@ def diagnose(
     judgements, main, data, suspects = _without_slips(judged, data, progress)
     progress("final fits, errors held out by point")
     effects, cannot = testable_effects(main.problem.predictor)
-    tested = {family.name for family in main.families}
+    tested, tip = {family.name for family in main.families}, data.tip
     cannot |= {effect.name: () for effect in effects if effect.name not in tested}
     as_given, refitted = baseline(main.problem)
     # Of every family that the judgement has only on tables, the best once more with the model itself.
     best = {family.name: family.best for family in main.families if family.best is not None}
     fits = main.fits | {name: refine(main.problem, fit) for name, fit in best.items() if name not in main.fits}
-    held = {name: held_out(fit, data.point) for name, fit in fits.items()}
     likeliest = fits.get(max(main.probability, key=lambda name: main.probability[name], default=NONE), main.base)
-    log_model, tip = main.problem.observed - likeliest.residual, data.tip
+    log_model = main.problem.observed - likeliest.residual
     verdict, plausible = common_verdict(list(judgements.values()))
     diagnosis = Diagnosis(
         verdict, list(plausible), judgements, main, data.of_tip, machine, cannot,
         of_readings(as_given, tip), of_readings(refitted, tip),
         {name: of_readings(fit, tip) for name, fit in fits.items()},
         held_out(refitted, data.point).of_readings(tip),
-        {name: left_out.of_readings(tip) for name, left_out in held.items()},
+        {name: held_out(fit, data.point).of_readings(tip) for name, fit in fits.items()},
         confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
         tuple(dict.fromkeys(data.file.tolist())), seed, suspects=suspects,
@@ -129,9 +131,6 @@ def diagnose(
         loops=beside_tip(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
     )  # fmt: skip
     return replace(diagnosis, portrait=portrait_of(diagnosis, progress), alike=alike_of(diagnosis))
-
-
-Judged = tuple[dict[str, Judgement], Judgement]  # by the name of their noise model; the one that is written out
 
 
 def _without_slips(
@@ -150,12 +149,11 @@ def _without_slips(
         # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
         progress("once more with the rows mended that look mistyped")
         clear = clear if judged(slips.mended(data, clear))[1].explained else []
-    entries = slips.suspect_entries(suspects, data, left_out=clear)
-    if clear:
-        progress("once more without the rows that look mistyped")
-        data = data.select(kept)
-        judgements, main = judged(data)
-    return judgements, main, data, tuple(entries)
+    entries = tuple(slips.suspect_entries(suspects, data, left_out=clear))
+    if not clear:
+        return judgements, main, data, entries
+    progress("once more without the rows that look mistyped")
+    return *judged(data.select(kept)), data.select(kept), entries
 
 
 def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:
@@ -163,12 +161,12 @@ def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...
     verdicts = {judgement.verdict for judgement in judgements}
     plausible = tuple(dict.fromkeys(name for judgement in judgements for name in judgement.plausible))
     same = len({frozenset(judgement.plausible) for judgement in judgements}) == 1
-    if len(verdicts) == 1:
-        (verdict,) = verdicts
-        return verdict if same or verdict not in NAMING else "ambiguous", plausible
     if verdicts == set(NAMING) and same:
         return "described", plausible
-    return "ambiguous", plausible or (NONE,)
+    if len(verdicts) > 1:
+        return "ambiguous", plausible or (NONE,)
+    (verdict,) = verdicts
+    return verdict if same or verdict not in NAMING else "ambiguous", plausible
 
 
 def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portrait | None:
@@ -176,25 +174,19 @@ def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portra
 
     None where nothing stands out of what is left, and where the readings do not look as if they were of this machine.
     """
-    main, verdict = diagnosis.main, diagnosis.verdict
-    if main.question or verdict == "adequate":
+    main, unexplained = diagnosis.main, diagnosis.verdict == "unexplained"
+    problem, noise, base = main.problem, diagnosis.noise, main.base if unexplained else diagnosis.likeliest
+    gate = main.gates.get(diagnosis.best or "")
+    left = gate is not None and gate.probability <= FALSE_ALARM and noise.tip is None
+    if main.question or diagnosis.verdict == "adequate" or not (unexplained or left):
         return None
-    base = main.base
-    if verdict != "unexplained":
-        gate = main.gates.get(diagnosis.best or "")
-        if diagnosis.best is None or gate is None or gate.probability > FALSE_ALARM:
-            return None
-        base = diagnosis.fits[diagnosis.best]
-    problem, noise = main.problem, diagnosis.noise
     if noise.tip is not None:  # its terms are compliances at the tip: other loops are left out
-        if verdict != "unexplained":
-            return None
         noise = noise.select(noise.tip)
         problem = Problem.of(Predictor(diagnosis.machine, diagnosis.data, diagnosis.predictor.effect_files), noise)
         base = problem.score_base()
     progress("describing what is missing")
     portrait = draw_portrait(problem, base, noise, diagnosis.seed)
-    return portrait if portrait.terms or verdict == "unexplained" else None
+    return portrait if portrait.terms or unexplained else None
 
 
 def alike_of(diagnosis: Diagnosis) -> Alike | None:
@@ -204,12 +196,6 @@ def alike_of(diagnosis: Diagnosis) -> Alike | None:
     if diagnosis.verdict not in NAMING or named is None or main.noise.tip is not None:
         return None
     return looks_the_same(main.problem, diagnosis.base, named, diagnosis.noise, diagnosis.seed)
-
-
-POSES = 6
-
-
-PATH_STEP = 5e-3  # m between samples: the mean of a path needs no more
 
 
 def with_plan(diagnosis: Diagnosis, progress: Callable[[str], None] = lambda text: None) -> Diagnosis:
@@ -223,51 +209,44 @@ def with_plan(diagnosis: Diagnosis, progress: Callable[[str], None] = lambda tex
     if diagnosis.verdict not in ("ambiguous", "described") or not open_ones:
         return diagnosis
     progress("planning the next measurements")
-    judgement = open_ones[-1]
-    rivals = rivals_of(judgement)
-    if len(rivals) < 2:
-        return diagnosis
-    noise = (float(np.sqrt(np.mean(judgement.noise.repeat**2))), judgement.noise.clamping)
     try:
-        plan = plan_measurements(
-            diagnosis.machine, rivals, noise, POSES, menu=Menu.of(diagnosis.data), seed=diagnosis.seed,
-            effect_files=diagnosis.predictor.effect_files, strut_spread=judgement.noise.strut_spread,
+        proposal = plan(
+            diagnosis.machine, diagnosis.data, seed=diagnosis.seed, judgement=open_ones[-1],
+            effect_files=diagnosis.predictor.effect_files, strut_spread=diagnosis.noise.strut_spread,
         )  # fmt: skip
     except InputError as error:
         return replace(diagnosis, remarks=(f"no plan could be made: {error}",))
-    if not plan.gains:
-        return replace(diagnosis, remarks=(plan.nothing_gained,))
-    rows = plan_rows(plan.visits, plan.chosen, set(diagnosis.data.point.tolist()))
-    for row in rows:
-        row["why"] = plan.why[int(row["clamp"]) - 1]
+    visits = proposal.choice
+    assert isinstance(visits, RivalPlan)
+    if not visits.gains:
+        return replace(diagnosis, remarks=(visits.nothing_gained,))
+    why = visits.why
     remarks = [
         f"{' and '.join(pair.effects)}: tip stiffness cannot tell them apart; put an indicator "
-        + " or ".join(f"{place}" for place in dict.fromkeys(pair.indicator_across.values()))
-        for pair in plan.pairs
+        + " or ".join(dict.fromkeys(pair.indicator_across.values()))
+        for pair in visits.pairs
         if not pair.separable
     ]
-    return replace(diagnosis, next_measurements=tuple(rows), remarks=tuple(remarks))
+    rows = tuple({**row, "why": why[int(row["clamp"]) - 1]} for row in proposal.rows)
+    return replace(diagnosis, next_measurements=rows, remarks=tuple(remarks))
 
 
 def choice_on_path(
     diagnosis: Diagnosis, program: ReadProgram, origin: Pose | None = None, given: Conditions | None = None
-) -> dict[str, Any]:
+) -> Document:
     """Mean, range and minimum along a program under each plausible explanation: how much the choice matters.
 
     Where the program is out of reach, or a model has no answer there, the reason instead. `given` is under what the
     program runs; unless it names a set-up, the one that an explanation belongs to: there the choice matters.
     """
-    from toolpath_stiff.analysis.results import analyze
-    from toolpath_stiff.analysis.statistics import stiffness_figures
-
-    names = [name for name in diagnosis.explanations if name == NONE or name in diagnosis.fits]
+    fits = {NONE: diagnosis.base, **diagnosis.fits}
+    fits = {name: fits[name] for name in diagnosis.explanations if name in fits}
     conditions = given or Conditions(diagnosis.machine.setup, diagnosis.machine.temperature)
     if conditions.setup is None:
-        effects = [active for name in names if name != NONE for active in diagnosis.fits[name].effects]
-        conditions = replace(conditions, setup=next(filter(None, (active.setup for active in effects)), None))
+        setups = (active.setup for fit in fits.values() for active in fit.effects)
+        conditions = replace(conditions, setup=next(filter(None, setups), None))
     shown = {}
-    for name in names:
-        fit = diagnosis.base if name == NONE else diagnosis.fits[name]
+    for name, fit in fits.items():
         machine = diagnosis.machine.with_changes(strut_law=scaled_law(diagnosis.machine.strut_law, fit.law))
         try:
             model = build_model(machine, diagnosis.predictor.effect_files, fit.effects, conditions)
@@ -277,8 +256,8 @@ def choice_on_path(
             return {"program": program.name, "reason": str(error)}
         figures = stiffness_figures(analysis, analysis.headline)
         shown[name] = {key: round(figures[key], 1) for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")}
+    document = {"program": program.name, "setup": conditions.setup, "explanations": shown}
     means = [figures["mean_N_per_mm"] for figures in shown.values()]
-    spread = (
-        {"mean_spread_percent": round(100.0 * (max(means) - min(means)) / float(np.mean(means)), 2)} if means else {}
-    )
-    return {"program": program.name, "setup": conditions.setup, "explanations": shown, **spread}
+    if means:
+        document["mean_spread_percent"] = round(100.0 * (max(means) - min(means)) / float(np.mean(means)), 2)
+    return document

@@ -1,11 +1,8 @@
 """A diagnosis as JSON: the content of diagnose.json, in shop units; None stands for what JSON cannot hold."""
 
-from typing import Any
-
 import numpy as np
 
-from toolpath_stiff.diagnosis.examination import Examination
-from toolpath_stiff.diagnosis.rows import HypothesisRow, HypothesisRows, percent_of, rounded_errors
+from toolpath_stiff.diagnosis.examination import Examination, HypothesisRow, percent_of, rounded_errors
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why, would_tell
 from toolpath_stiff.documents import Document, certain, json_number, to_dict
 from toolpath_stiff.inference.confounding import CONFOUNDED
@@ -23,9 +20,9 @@ ERRORS = (
 )  # fmt: skip
 
 
-def document_of(diagnosis: Examination, rows: HypothesisRows) -> dict[str, Any]:
+def document_of(diagnosis: Examination) -> Document:
     """Everything that `diagnose.json` holds."""
-    main, alike, noise = diagnosis.main, diagnosis.alike, diagnosis.noise
+    main, alike, noise, rows = diagnosis.main, diagnosis.alike, diagnosis.noise, diagnosis.rows
     drawn = diagnosis.unconfirmed or main.drawn
     links = {family.name: family.effect.link for family in main.families}
     return {
@@ -33,7 +30,7 @@ def document_of(diagnosis: Examination, rows: HypothesisRows) -> dict[str, Any]:
         "text": verdict_text(diagnosis),
         "question": main.question,
         "draft_status": None if drawn is None else drawn.document,
-        "baseline": _baseline(diagnosis, rows),
+        "baseline": _baseline(diagnosis),
         "candidates": [_candidate(row, links[row.name]) for row in rows.candidates],
         "pairs": [_pair(row) for row in rows.pairs],
         "plausible": diagnosis.plausible,
@@ -51,7 +48,6 @@ def document_of(diagnosis: Examination, rows: HypothesisRows) -> dict[str, Any]:
             "repeat_percent": percent_of(noise.typical_repeat, 4),
             "clamping_percent": percent_of(noise.clamping, 4),
             "strut_spread_percent": percent_of(noise.strut_spread, 4),
-            "joint_error_mm": json_number(float(mm_from_m(noise.joint_error)), 4),
             "origin": noise.origin,
         },
         "gates": _gates(main),
@@ -81,26 +77,25 @@ def document_of(diagnosis: Examination, rows: HypothesisRows) -> dict[str, Any]:
     }
 
 
-def _baseline(diagnosis: Examination, rows: HypothesisRows) -> Document:
+def _baseline(diagnosis: Examination) -> Document:
     """The model as given, and with its strut law refitted."""
-    law, row = diagnosis.machine.strut_law, rows.refitted
+    law, rows = diagnosis.machine.strut_law, diagnosis.rows
     count = len(law.parameters)  # of a constant law one, which belongs to no length
     factors, deviations = np.exp(diagnosis.base.law[:count]), np.sqrt(np.diag(diagnosis.base.covariance)[:count])
     ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))[:count]
     return {
         **rounded_errors(diagnosis.base.residual),
-        **_part(row, ERRORS[2:4]),
+        **_part(rows.refitted, ERRORS[2:4]),
         "noise_percent": percent_of(diagnosis.noise.typical),
         "noise_floor_percent": json_number(diagnosis.noise.floor_percent),
-        "probability": row.probability,
+        "probability": rows.refitted.probability,
         "probability_outside": rows.outside.probability,
-        **_part(row, ("adequate", "words")),
-        "as_given": {**rounded_errors(diagnosis.before), **_part(rows.as_given, ERRORS[2:3])},
+        **_part(rows.refitted, ("adequate", "words")),
+        "as_given": {**rounded_errors(diagnosis.as_given.residual), **_part(rows.as_given, ERRORS[2:3])},
         "law": [
             {
                 "length_mm": None if law.constant else json_number(float(mm_from_m(length)), 7),
                 "stiffness_N_per_um": json_number(n_per_um_from_n_per_m(stiffness * factor)),
-                "machine_file_N_per_um": json_number(n_per_um_from_n_per_m(stiffness)),
                 "sd_percent": percent_of(deviation, 3),
             }
             for (length, stiffness), factor, deviation in zip(ends, factors, deviations, strict=True)
@@ -186,6 +181,5 @@ def _in_short(judgement: Judgement) -> Document:
         "noise_percent": percent_of(judgement.noise.typical, 4),
         "origin": judgement.noise.origin,
         "probability": {name: json_number(weight, 4) for name, weight in judgement.likely if weight > 1e-4},
-        "baseline_gate_probability": json_number(judgement.base_gate.probability, 3),
         "structure": judgement.base_gate.worst,
     }

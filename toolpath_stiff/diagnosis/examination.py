@@ -1,28 +1,107 @@
-"""What a diagnosis has found: judgements under each noise model, fits, errors held out, and what stands behind them."""
+"""What a diagnosis has found: judgements under each noise model, fits, errors held out; a row for each hypothesis."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+
+import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.loop_readings import LoopMean
+from toolpath_stiff.defaults import NORMAL_95
+from toolpath_stiff.documents import DIGITS, Document, json_number
 from toolpath_stiff.hints import Asked
+from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.confounding import Confounding
 from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.drawn import Drawn
+from toolpath_stiff.inference.errors import AS_GIVEN, error_figures
 from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.judgement import Judgement
-from toolpath_stiff.inference.left_out import HeldOut
+from toolpath_stiff.inference.hypotheses import Family, averaged_interval
+from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
+from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.slips import SuspectEntry
 from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.planning.result import PlanRow
 from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.stiffness.sizes import joined
 
 NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
+SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
+TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
+
+
+@dataclass(frozen=True)
+class FittedSize:
+    """A parameter's value, its unit and 95 % interval; None stands for infinite."""
+
+    value: float | None
+    unit: str
+    interval: tuple[float | None, float | None]
+
+
+@dataclass(frozen=True)
+class HypothesisRow:
+    """A hypothesis: figures rounded as documents have them, None where there is none.
+
+    Attributes
+    ----------
+    name, label
+        Effects as "a + b", `none`, "as given", "outside the catalogue"; the same with what they act on.
+    standing
+        Whether it is left standing.
+    title, finding
+        In general, and with the fitted sizes; "" where there is no effect.
+    probability, log_evidence, words
+        Against all others; above that of no effect; in words.
+    sizes, choice
+        Effect -> key -> size; effect -> what it acts on.
+    adequate, adequate_probability
+        Whether it leaves no more than noise would, and how often noise leaves as much.
+    eligible, remark
+        Whether it is offered as an explanation, and why not.
+    """
+
+    name: str
+    label: str
+    standing: bool = False
+    title: str = ""
+    finding: str = ""
+    probability: float | None = None
+    log_evidence: float | None = None
+    words: str = ""
+    sizes: Mapping[str, Mapping[str, FittedSize]] = field(default_factory=dict)
+    choice: Mapping[str, Document] = field(default_factory=dict)
+    mean_abs_error_percent: float | None = None
+    held_out_error_percent: float | None = None
+    held_out_rms_percent: float | None = None
+    held_out_gain_in_se: float | None = None
+    adequate: bool | None = None
+    adequate_probability: float | None = None
+    eligible: bool = True
+    remark: str = ""
+
+    @property
+    def offered(self) -> bool:
+        """Whether it may be relied on."""
+        return self.eligible or self.standing
+
+
+@dataclass(frozen=True)
+class HypothesisRows:
+    """All hypotheses; pairs and candidates with the likeliest first. `best`: the explanation that is written about."""
+
+    as_given: HypothesisRow
+    refitted: HypothesisRow
+    outside: HypothesisRow
+    pairs: tuple[HypothesisRow, ...]
+    candidates: tuple[HypothesisRow, ...]
+    best: HypothesisRow | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,9 +165,9 @@ class Examination:
     seed: int
     line: str = ""
     asked: Asked | None = None
-    next_measurements: tuple[dict[str, Any], ...] = ()
+    next_measurements: tuple[PlanRow, ...] = ()
     remarks: tuple[str, ...] = ()
-    path: dict[str, Any] | None = None
+    path: Document | None = None
     portrait: Portrait | None = None
     alike: Alike | None = None
     unexcluded: tuple[Unexcluded, ...] = ()
@@ -116,22 +195,15 @@ class Examination:
         standing = (name for judgement in self.judgements.values() for name in judgement.explanations[:most])
         return tuple(dict.fromkeys(standing))
 
-    @property
-    def before(self) -> FloatArray:
-        """(n,) ln measured - ln modelled of the machine file as given."""
-        return self.as_given.residual
-
     @cached_property
     def best(self) -> str | None:
         """Name of the best explanation by an effect or a pair; None where there is none.
 
         The likeliest, of equals the one with more evidence.
         """
-        names = [name for name, weight in self.main.likely if weight > 0.0] + [
-            family.name for family in self.main.families
-        ]
-        offered = (n for n in names if n in self.fits and any(size.any() for size in self.fits[n].sizes))
-        return next(offered, None)
+        names = [name for name, weight in self.main.likely if weight > 0.0]
+        names += [family.name for family in self.main.families]
+        return next((n for n in names if n in self.fits and any(size.any() for size in self.fits[n].sizes)), None)
 
     @property
     def likeliest(self) -> Fit:
@@ -148,3 +220,143 @@ class Examination:
         """How an answer that is only `described` stands, under the noise model that confirms it least."""
         drawn = (judgement.drawn for judgement in self.judgements.values() if judgement.verdict == "described")
         return next(filter(None, drawn), None)
+
+    @cached_property
+    def rows(self) -> HypothesisRows:
+        """Every hypothesis with its figures, in shop units."""
+        main, likely = self.main, self.main.probability
+        error = percent_of(float(self.as_given.errors.mean()))  # nothing is fitted: leaving points out changes nothing
+        refitted = replace(_row(self, NONE, main.base.log_evidence), held_out_gain_in_se=None)
+        families = sorted(main.families, key=lambda f: (-likely.get(f.name, 0.0), -f.log_evidence, f.name))
+        candidates = [_candidate(self, family) for family in families]
+        tried = [pair for pair in main.pairs if pair.name in self.fits and pair.name in main.gates]
+        pairs = [_row(self, pair.name, pair.log_evidence) for pair in tried]
+        pairs.sort(key=lambda row: (-(row.probability or 0.0), -(row.log_evidence or 0.0)))
+        every = [*candidates, *pairs]
+        offered = max((row for row in every if row.offered), key=lambda row: row.probability or 0.0, default=None)
+        as_given = HypothesisRow(AS_GIVEN, AS_GIVEN, title="the machine file as it stands")
+        outside = HypothesisRow(OUTSIDE, OUTSIDE, title="a smooth unknown")
+        return HypothesisRows(
+            replace(as_given, mean_abs_error_percent=error, held_out_error_percent=error),
+            replace(refitted, label="strut law refitted (none)", title="no further effect"),
+            replace(outside, probability=json_number(likely.get(OUTSIDE, 0.0))),
+            tuple(pairs), tuple(candidates), next((row for row in every if row.name == self.best), offered),
+        )  # fmt: skip
+
+
+def _row(diagnosis: Examination, name: str, log_evidence: float) -> HypothesisRow:
+    """A hypothesis with its final fit; the model alone where the effect fits best when it is absent."""
+    main, base = diagnosis.main, diagnosis.held_out_base
+    fit, held = diagnosis.fits.get(name, diagnosis.base), diagnosis.held_out.get(name, base)
+    if not any(size.any() for size in fit.sizes):
+        fit, held = diagnosis.base, base
+    labels = {candidate.name: candidate.label for candidate in fit.candidates}
+    gate, alone = main.gates.get(name), main.base_gate.probability > FALSE_ALARM
+    return HypothesisRow(
+        name,
+        " + ".join(labels.get(effect, effect) for effect in name.split(" + ")),
+        name in diagnosis.explanations,
+        finding=joined(fit.findings) if fit.findings else "",
+        probability=json_number(main.probability.get(name, 0.0)),
+        log_evidence=json_number(log_evidence - main.base.log_evidence),
+        words=row_words(diagnosis, name),
+        sizes=fitted_sizes(fit, next((family for family in main.families if family.name == name), None)),
+        choice={candidate.name: dict(candidate.choice) for candidate in fit.candidates},
+        mean_abs_error_percent=percent_of(float(fit.errors.mean())),
+        held_out_error_percent=percent_of(held.mean_error),
+        held_out_rms_percent=percent_of(held.rms),
+        held_out_gain_in_se=0.0 if held is base else json_number(gain_in_standard_errors(base, held), 3),
+        adequate=alone if gate is None else gate.probability > ADEQUATE,
+        adequate_probability=None if gate is None else json_number(gate.probability, 3),
+    )
+
+
+def _candidate(diagnosis: Examination, family: Family) -> HypothesisRow:
+    """A single effect; where it fits best when it is absent, without sizes."""
+    name, alone = family.name, diagnosis.main.base_gate.probability > FALSE_ALARM
+    row = replace(_row(diagnosis, name, family.log_evidence), title=family.effect.title)
+    if not row.sizes:
+        return replace(row, adequate=alone, eligible=False, remark="fits best when it is absent")
+    bounded = diagnosis.fits[name].at_upper_bound()
+    remark = "" if name in diagnosis.main.gates or alone else "not tested further"
+    return replace(row, eligible=not bounded, remark=f"{', '.join(bounded)} at its bound" if bounded else remark)
+
+
+def row_words(diagnosis: Examination, name: str) -> str:
+    """How a hypothesis stands: by its odds against the likeliest, unless a gate has settled it."""
+    main = diagnosis.main
+    probability = main.probability.get(name, 0.0)
+    if main.base_gate.probability > FALSE_ALARM:
+        return "enough" if name == NONE else "no more than chance" if probability >= SHOWN else "not needed"
+    gate = main.base_gate if name == NONE else main.gates.get(name)
+    if probability < SHOWN and gate is not None and gate.probability <= (FALSE_ALARM if name == NONE else ADEQUATE):
+        return "does not fit"
+    words = odds_words(probability, max(main.probability.values(), default=0.0))
+    return "closest" if words == "best" and main.verdict == "unexplained" else words
+
+
+def odds_words(probability: float, best: float) -> str:
+    """How a hypothesis stands against the likeliest one, by twice the logarithm of the odds (RadVel's wording)."""
+    if probability < SHOWN:
+        return "ruled out"
+    twice = 2.0 * float(np.log(best / probability))
+    limits = ((0.0, "best"), (2.0, "nearly indistinguishable"), (4.0, "somewhat disfavoured"))
+    return next((words for limit, words in limits if twice < limit or twice <= 0.0), "strongly disfavoured")
+
+
+def fitted_sizes(fit: Fit, family: Family | None = None, widening: float = 1.0) -> dict[str, dict[str, FittedSize]]:
+    """Effect -> key -> value, unit, 95 % interval of all effects of a fit, with standard deviations so much wider."""
+    sizes: dict[str, dict[str, FittedSize]] = {candidate.name: {} for candidate in fit.candidates}
+    owners = [candidate.name for candidate in fit.candidates for _ in candidate.components]
+    for index, (owner, (component, size)) in enumerate(zip(owners, fit.parts, strict=True)):
+        ends = [component.value(end) for end in interval(fit, index, component, size, family, widening)]
+        value, low, high = (json_number(x / component.parameter.si) for x in (component.value(size), *sorted(ends)))
+        sizes[owner][component.parameter.key] = FittedSize(value, component.parameter.unit, (low, high))
+    return sizes
+
+
+def interval(
+    fit: Fit, index: int, component: Component, size: float, family: Family | None, widening: float
+) -> tuple[float, float]:
+    """95 % interval of a size, within the bounds.
+
+    From its profile where that was scanned, averaged over subsets of components where there are several, else normal.
+    """
+    low_bound, high_bound = component.bounds
+    best = family.best if family is not None else None
+    if best is not None and best.interval is not None and index == 0:
+        # The scan ran on the table; the final fit with the model itself may sit a little beside it. What reached to a
+        # bound does so still.
+        shift, near = size - float(best.sizes[0][0]), TOUCHES * float(np.ptp(best.interval))
+        low, high = (float(end) for end in best.interval)
+        low = low_bound if low - low_bound < near else max(min(low + shift, size), low_bound)
+        high = high_bound if high_bound - high < near else min(max(high + shift, size), high_bound)
+        return low, high
+    averaged = None if family is None else averaged_interval(family, index)
+    if index in fit.free:
+        reach = NORMAL_95 * widening * fit.deviation(index)
+        low, high = (-reach, reach) if averaged is None or best is None else averaged - float(best.sizes[0][index])
+        low, high = size + min(float(low), 0.0), size + max(float(high), 0.0)
+        near = TOUCHES * (high - low)
+        return low_bound if low - low_bound < near else low, high_bound if high_bound - high < near else high
+    pull, deviation = fit.absent.get(index, (0.0, 0.0))
+    upper = max(pull, 0.0) + NORMAL_95 * deviation
+    if averaged is not None:
+        upper = max(upper, float(averaged[1]))
+    return max(0.0, low_bound), min(upper, high_bound)
+
+
+def percent_of(share: float, digits: int = DIGITS) -> float | None:
+    """A share in per cent, rounded as documents have it."""
+    return json_number(100.0 * share, digits)
+
+
+def rounded_errors(residual: FloatArray) -> dict[str, float | None]:
+    """`error_figures` as a document has them."""
+    figures: Document = error_figures(residual)
+    return {name: json_number(value) for name, value in figures.items()}
+
+
+def held_errors(held: HeldOut) -> dict[str, float | None]:
+    """Errors at left-out points."""
+    return {"held_out_error_percent": percent_of(held.mean_error), "held_out_rms_percent": percent_of(held.rms)}

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.diagnosis.document import document_of
 from toolpath_stiff.diagnosis.examination import Examination
-from toolpath_stiff.diagnosis.rows import HypothesisRows, rows_of
-from toolpath_stiff.results import FolderResult
+from toolpath_stiff.results import FolderResult, frame_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,21 +20,13 @@ class Diagnosis(Examination, FolderResult):
     command: ClassVar[str] = "diagnose"
     shown_by: ClassVar[str] = "diagnose"
 
-    @cached_property
-    def rows(self) -> HypothesisRows:
-        """Every hypothesis with its figures, in shop units."""
-        return rows_of(self)
-
     def to_dict(self) -> dict[str, Any]:
         """The content of diagnose.json."""
-        return document_of(self, self.rows)
+        return dict(document_of(self))
 
     def to_frame(self) -> pd.DataFrame:
         """The candidates, one a row: probability, errors, why not."""
-        import pandas as pd
-
-        return pd.DataFrame(self.to_dict()["candidates"])
+        return frame_of(self.to_dict()["candidates"])
 
     def _short(self) -> str:
-        names = ", ".join(self.plausible)
-        return f"{self.verdict}: {names}" if names else self.verdict
+        return f"{self.verdict}: {', '.join(self.plausible)}" if self.plausible else self.verdict

@@ -1,12 +1,13 @@
 """A diagnosis in sentences."""
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.examination import Examination
+from toolpath_stiff.diagnosis.examination import NAMING, Examination
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.confounding import CONFOUNDED
@@ -22,6 +23,8 @@ from toolpath_stiff.portrait.words import alike_text
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
 
+MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has all
+
 
 def verdict_text(diagnosis: Examination) -> str:
     """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
@@ -36,46 +39,40 @@ def doubts(diagnosis: Examination) -> list[str]:
 
 
 def _verdict_text(diagnosis: Examination) -> str:
+    main, judgements = diagnosis.main, diagnosis.judgements.values()
     if diagnosis.verdict == "adequate":
         names = [name for name in diagnosis.explanations if name != NONE]
         chance = f" Not ruled out either, but no more than chance would show: {joined(names)}." if names else ""
         return f"Nothing is missing that these data could show: what is left is scatter.{_hidden(diagnosis)}{chance}"
-    if diagnosis.verdict in ("identified", "described"):
+    if diagnosis.verdict in NAMING:
         best, drawn = diagnosis.explanations[0], diagnosis.unconfirmed
-        only = (
-            ""
-            if diagnosis.verdict == "identified" or drawn is None
-            else f"This describes the readings, and does not explain them yet: {drawn.reason}. "
-        )
-        return f"{_capital(_cause(diagnosis, best))}. {only}Mean error: {_errors(diagnosis, best)}."
+        only = "" if drawn is None else f"This describes the readings, and does not explain them yet: {drawn.reason}. "
+        return f"{_capital(_cause(diagnosis, best))}. {only}{_errors(diagnosis, best)}."
     if diagnosis.verdict == "ambiguous":
-        if len({(judgement.verdict, judgement.explanations) for judgement in diagnosis.judgements.values()}) == 1:
+        if len({(judgement.verdict, judgement.explanations) for judgement in judgements}) == 1:
             return _rivals(diagnosis)
         parts = [
             f"{judgement.noise.name} noise ({100 * judgement.noise.typical:.2g} %): {judgement.verdict}"
-            + (f" ({joined(list(judgement.explanations))})" if judgement.explanations else "")
-            for judgement in diagnosis.judgements.values()
+            + (f" ({joined(judgement.explanations)})" if judgement.explanations else "")
+            for judgement in judgements
         ]
-        return "The verdict depends on the noise, which these data do not tell. " + "; ".join(parts) + "."
-    main, noise = diagnosis.main, diagnosis.noise
+        return f"The verdict depends on the noise, which these data do not tell. {'; '.join(parts)}."
     if main.question:
-        return f"{main.question} Mean error: {_errors(diagnosis)}."
+        return f"{main.question} {_errors(diagnosis)}."
     noisy = f"; or nothing is missing, and the readings scatter {main.noise_factor:.2g} times as much as stated"
-    scatter = scatter_text(noise.floor_percent, 100.0 * float(diagnosis.base.errors.mean()), noise.guess)
-    named = {name: chance for name, chance in main.probability.items() if name in diagnosis.fits}
-    best = max(named, key=lambda name: named[name], default="")
-    outside = _percent(main.probability.get(OUTSIDE, 0.0))
-    return (
+    scatter = scatter_text(diagnosis.noise.floor_percent, _mean_errors(diagnosis)[1], diagnosis.noise.guess)
+    text = (
         "Something is missing, and nothing in the catalogue accounts for it"
-        f"{noisy if main.noise_factor > 1.0 else ''}. Mean error: {_errors(diagnosis)}; {scatter}."
-        + (f" What is left forms a pattern {main.form}." if main.form else "")
-        # What of the catalogue would explain them, were nothing outside it as likely.
-        + (
-            f" Closest: {_cause(diagnosis, best)}, but {outside} remain for something else."
-            if best and named[best] >= STANDS
-            else ""
-        )
+        f"{noisy if main.noise_factor > 1.0 else ''}. {_errors(diagnosis)}; {scatter}."
     )
+    if main.form:
+        text += f" What is left forms a pattern {main.form}."
+    # What of the catalogue would explain them, were nothing outside it as likely.
+    named = {name: chance for name, chance in main.probability.items() if name in diagnosis.fits and chance >= STANDS}
+    if named:
+        best, outside = max(named, key=lambda name: named[name]), _percent(main.probability.get(OUTSIDE, 0.0))
+        text += f" Closest: {_cause(diagnosis, best)}, but {outside} remain for something else."
+    return text
 
 
 def _cause(diagnosis: Examination, name: str) -> str:
@@ -112,17 +109,18 @@ def _hidden(diagnosis: Examination) -> str:
         return ""
     shown = [smallest.rms for smallest in diagnosis.detectable if smallest.seen]
     law = NORMAL_95 * np.sqrt(np.diag(diagnosis.base.covariance)[: len(diagnosis.machine.strut_law.parameters)].max())
-    change = f"a missing effect that changes the stiffness by less than {100.0 * min(shown):.2g} % (rms) and "
+    change = f"a missing effect that changes the stiffness by less than {100.0 * min(shown, default=0.0):.2g} % (rms)"
+    change = change if shown else "every effect"
     return (
         f" But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading would "
-        f"hide {change if shown else 'every effect and '}struts that are off by up to {100.0 * law:.2g} %."
+        f"hide {change} and struts that are off by up to {100.0 * law:.2g} %."
     )
 
 
 def _errors(diagnosis: Examination, name: str = "") -> str:
     """Mean errors as given, with the strut law refitted, with an explanation."""
     rest = [(f"with {name}", 100.0 * float(diagnosis.fits[name].errors.mean()))] if name else []
-    return errors_text(*_mean_errors(diagnosis), rest)
+    return f"Mean error: {errors_text(*_mean_errors(diagnosis), rest)}"
 
 
 def _mean_errors(diagnosis: Examination) -> tuple[float, float]:
@@ -137,13 +135,13 @@ def why(diagnosis: Examination) -> list[str]:
     if diagnosis.verdict == "identified" and main.drawn is not None:
         reasons.append(main.drawn.reason)
     if diagnosis.verdict == "ambiguous":
-        reasons += [*_confounded(diagnosis), *_drawn_from_these(diagnosis)]
+        reasons += _not_told_apart(diagnosis)
     if diagnosis.verdict == "unexplained" and not main.question:
         tested = [f"{name} (p = {gate.probability:.2g})" for name, gate in list(main.gates.items())[:4]]
         reasons += [f"the best of the catalogue leave more than noise would: {', '.join(tested)}"] if tested else []
         reasons += [main.doubt] if main.noise_factor > 1.0 else []
     raised = "" if main.question else raised_text(*_mean_errors(diagnosis))
-    return [*reasons, *([raised] if raised else []), *diagnosis.remarks]
+    return [*reasons, *filter(None, [raised]), *diagnosis.remarks]
 
 
 def _base_text(judgement: Judgement, several: bool) -> str:
@@ -164,72 +162,51 @@ def _base_text(judgement: Judgement, several: bool) -> str:
     )
 
 
-def _confounded(diagnosis: Examination) -> list[str]:
+def _not_told_apart(diagnosis: Examination) -> list[str]:
     """Why the plausible effects cannot be told apart."""
-    names, reasons = list(diagnosis.confounding.names), []
-    sets = [set(name.split(" + ")) for name in diagnosis.explanations]
-    plausible = [name for name in diagnosis.plausible if name in names]
-    for i, first in enumerate(plausible):
-        for second in plausible[:i]:
-            value = float(diagnosis.confounding.matrix[names.index(first), names.index(second)])
-            if not all(any(a in s and b not in s for s in sets) for a, b in ((first, second), (second, first))):
-                continue
-            if value > CONFOUNDED:
-                reasons.append(
-                    f"{second} and {first} have the same signature on these poses, loads and directions: correlation "
-                    f"{value:.3f}"
-                )
-    return [*reasons, "chance alone is not excluded either"] if NONE in diagnosis.plausible else reasons
-
-
-def _drawn_from_these(diagnosis: Examination) -> list[str]:
-    """Of plausible effects: those whose form was read off some of these readings."""
-    plausible = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
-    seen = {effect.name: int(seen_readings([effect], diagnosis.data).sum()) for effect in plausible}
-    return [
-        f"the form of {name} was read off {count} of these {len(diagnosis.data)} readings: its probability is too high"
-        for name, count in seen.items()
-        if count
-    ]
+    data, names, matrix = diagnosis.data, diagnosis.confounding.names, diagnosis.confounding.matrix
+    pairs = combinations([names.index(name) for name in diagnosis.plausible if name in names], 2)
+    same = "have the same signature on these poses, loads and directions: correlation"
+    reasons = [f"{names[i]} and {names[j]} {same} {matrix[i, j]:.3f}" for i, j in pairs if matrix[i, j] > CONFOUNDED]
+    if NONE in diagnosis.plausible:
+        reasons.append("chance alone is not excluded either")
+    for effect in (family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible):
+        if count := int(seen_readings([effect], data).sum()):
+            seen = f"was read off {count} of these {len(data)} readings: its probability is too high"
+            reasons.append(f"the form of {effect.name} {seen}")
+    return reasons
 
 
 def next_steps(diagnosis: Examination, request: Asked | None = None) -> list[str]:
     """What to do next, as hints: commands run as they stand."""
     request = request or diagnosis.asked or Asked(diagnosis.names)
     repeat = "repeat a few readings, re-clamped, or state --noise"
-    if diagnosis.verdict in ("identified", "described"):
+    plan, verdict = request.command("plan"), diagnosis.verdict
+    # Where there is no plan, the remark says why.
+    unplanned = diagnosis.remarks[0] if diagnosis.remarks and not diagnosis.next_measurements else ""
+    if verdict in NAMING:
         names = diagnosis.explanations[0].split(" + ")
         update = request.command("update", *options(add=names), "-o", request.updated_machine)
-    if diagnosis.verdict == "identified":
-        bounded = diagnosis.fits[diagnosis.explanations[0]].at_upper_bound()
-        if bounded:  # an update would refuse it
-            return [
-                hint(f"{joined(bounded)} ends at its bound: measure more before adding it", request.command("plan"))
-            ]
+        if verdict == "described":
+            measure = unplanned or hint("measure where it would show, or fail", plan)
+            return [measure, hint("add it all the same, as described", update)]
+        if bounded := diagnosis.fits[diagnosis.explanations[0]].at_upper_bound():  # an update would refuse it
+            return [hint(f"{joined(bounded)} ends at its bound: measure more before adding it", plan)]
         return [hint("add it" if len(names) == 1 else "add them", update)]
-    # Where there is no plan, the remark says why.
-    planned = diagnosis.verdict in ("described", "ambiguous") and (diagnosis.next_measurements or not diagnosis.remarks)
-    if diagnosis.verdict == "described":
-        measure = (
-            hint("measure where it would show, or fail", request.command("plan")) if planned else diagnosis.remarks[0]
-        )
-        return [measure, hint("add it all the same, as described", update)]
-    if diagnosis.verdict == "ambiguous":
-        measure = hint("measure what tells them apart", request.command("plan")) if planned else diagnosis.remarks[0]
+    if verdict == "ambiguous":
         depends = [f"{repeat}: the verdict depends on the scatter"] if len(diagnosis.judgements) > 1 else []
-        return [*depends, measure]
+        return [*depends, unplanned or hint("measure what tells them apart", plan)]
     if diagnosis.main.question:
         return [
             "check that machine file, poses and units are those of the readings: stiffness in N/mm, lengths in mm",
             hint("see which readings are how far off", request.command("compare")),
         ]
-    if diagnosis.verdict == "unexplained":
+    if verdict == "unexplained":
+        file = request.new_effect()
+        write = hint("write the effect that you suspect as one file", command_line("effects", "new", file))
         if diagnosis.portrait is not None and any(sized.term.acts for sized in diagnosis.portrait.terms):
             file = request.new_effect("missing", ".toml")
             write = hint("write what it looks like as an effect to edit", request.command("effects draft", "-o", file))
-        else:
-            file = request.new_effect()
-            write = hint("write the effect that you suspect as one file", command_line("effects", "new", file))
         look = hint("look where the residuals lie", request.command("compare"))
         return [look, write, hint("and try it", request.command("diagnose", effects=[file]))]
     use = "use the model; `detectable` lists what could still be there unseen"
@@ -258,31 +235,23 @@ def assumptions(diagnosis: Examination) -> list[str]:
     return sentences
 
 
-MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has all
-
-
 def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
     """What is neither shown nor excluded, and where an indicator would tell; "" where there is nothing."""
     if not unexcluded:
         return ""
-    named, more = unexcluded[:MOST_BESIDE], len(unexcluded) - MOST_BESIDE
-    effects = [
-        f"{hidden.effect.name} ({_up_to(hidden)}, {100.0 * hidden.rms:.2g} % of the tip's stiffness)"
-        for hidden in named
-    ]
+    named, more, effects = unexcluded[:MOST_BESIDE], len(unexcluded) - MOST_BESIDE, list[str]()
+    for hidden in named:
+        parameter, choice = hidden.parameter, hidden.candidate.choice
+        chosen = [choice_text(key, value) for key, value in choice if value not in ("", 0)]
+        way = "down to" if np.isinf(parameter.neutral) else "up to"  # a stiffness goes down
+        up_to = f"{way} {float(f'{hidden.value / parameter.si:.2g}'):g} {parameter.unit}"
+        share = f"{100.0 * hidden.rms:.2g} % of the tip's stiffness"
+        effects.append(f"{hidden.effect.name} ({', '.join([up_to, *chosen, share])})")
     effects += [f"{more} more"] if more > 0 else []
     places = dict.fromkeys(INDICATORS[hidden.effect.link].split(":")[0] for hidden in named)
     tells = " or ".join(place for place in places if place != "none")
     words = f"{joined(effects)}: the readings neither show nor exclude {'it' if len(unexcluded) == 1 else 'them'}"
     return f"{words}; an indicator {tells} would tell" if tells else words
-
-
-def _up_to(hidden: Unexcluded) -> str:
-    """The size up to which an effect is not excluded, with its unit and what it acts on; a stiffness goes down."""
-    parameter = hidden.parameter
-    chosen = [choice_text(key, value) for key, value in hidden.candidate.choice if value not in ("", 0)]
-    way = "down to" if np.isinf(parameter.neutral) else "up to"
-    return ", ".join([f"{way} {float(f'{hidden.value / parameter.si:.2g}'):g} {parameter.unit}", *chosen])
 
 
 def would_tell(hidden: Unexcluded) -> str:

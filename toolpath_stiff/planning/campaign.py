@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.random import Generator
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import AnyArray, FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.evidence import LAW_PRIOR
@@ -24,9 +24,17 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.forecasts import forecast_all
 from toolpath_stiff.planning.gaps import ReadingNoise, pair_shares, repeat_and_clamping
 from toolpath_stiff.planning.menu import Menu
-from toolpath_stiff.planning.poses import axis_levels, draw_poses, images, reachable
 from toolpath_stiff.planning.rivals import unfitted_rivals
-from toolpath_stiff.planning.visits import AXES, READING_EVERY, Visits, visits_of
+from toolpath_stiff.planning.visits import (
+    AXES,
+    READING_EVERY,
+    Visits,
+    axis_levels,
+    draw_poses,
+    reachable,
+    tilts,
+    visits_of,
+)
 from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.units import RAD_PER_DEG
 
@@ -34,10 +42,8 @@ FEWEST, MOST = 8, 200  # poses
 LEAST_TILT = 15.0 * RAD_PER_DEG
 IMAGES = 3
 LONG_TOOL_SHARE, CLAMPINGS = 6, 3  # every sixth pose with a longer tool; two poses clamped three times a set-up
-TABLE, RISER = "table", "riser"
 TRIES = 600  # poses to choose from
 SHOWS = 3.0  # standard deviations from which on an effect is said to show
-Stop = tuple[int, float, str, str]  # number of the pose, tool's extension, set-up, purpose
 
 
 @dataclass(frozen=True)
@@ -81,10 +87,12 @@ class Campaign:
     def minutes(self) -> float:
         """Work."""
         visits, costs = self.visits, self.visits.menu.costs
-        minutes = len(visits) * costs.pose + costs.reading * len(visits.readings)
-        for before, after in pairwise(zip(visits.setup.tolist(), visits.extension.tolist(), strict=True)):
-            minutes += costs.setup * (before[0] != after[0]) + costs.tool * (before[1] != after[1])
-        return float(minutes)
+        changes = {
+            "setup": sum(before != after for before, after in pairwise(visits.setup.tolist())),
+            "tool": sum(before != after for before, after in pairwise(visits.extension.tolist())),
+        }
+        counts = {"pose": len(visits), "reading": len(visits.readings), **changes}
+        return float(sum(count * costs[name] for name, count in counts.items()))
 
     @property
     def sentences(self) -> list[str]:
@@ -145,17 +153,20 @@ def first_campaign(
     """
     if not FEWEST <= n <= MOST:
         raise InputError(f"a first campaign of {n} poses", expected=f"{FEWEST} to {MOST}")
-    menu = menu or Menu(setups=(TABLE, RISER))
+    menu = menu or Menu.of(None)
     rng = np.random.default_rng(seed)
     poses = _poses(machine, menu, n, rng)
-    stops = _stops(machine, poses, menu)
-    first = {stop[1:3]: k for k, stop in reversed(list(enumerate(stops)))}
-    # At random within a set-up and a tool, which are changed as seldom as can be.
-    stops = sorted((stops[k] for k in rng.permutation(len(stops))), key=lambda stop: first[stop[1:3]])
-    visits = _visits(poses, stops, menu, rng)
-    repeat_clamping = repeat_and_clamping(noise)
-    sees = {} if effects is None else _sees(machine, visits, effects, repeat_clamping, effect_files)
-    return Campaign(visits, tuple(purpose for _, _, _, purpose in stops), float(np.hypot(*repeat_clamping)), sees)
+    which, extension, setup, kinds = _stops(machine, poses, menu, rng)
+    loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads))))
+    names, forces = (np.array(column) for column in zip(*product(AXES, loads), strict=True))
+    orders = np.array([rng.permutation(len(names)) for _ in which])
+    places = list(zip(which.tolist(), extension.tolist(), setup.tolist(), strict=True))
+    repeat = np.array([[places[: k + 1].count(place)] for k, place in enumerate(places)])
+    time = READING_EVERY * np.arange(1.0, len(names) + 1.0)
+    visits = visits_of(menu, (poses[which], extension, setup), names[orders], forces[orders], time, repeat)
+    noises = repeat_and_clamping(noise)
+    sees = {} if effects is None else _sees(machine, visits, effects, noises, effect_files)
+    return Campaign(visits, tuple(kinds.tolist()), float(np.hypot(*noises)), sees)
 
 
 def _poses(machine: Hexapod, menu: Menu, n: int, rng: Generator) -> FloatArray:
@@ -164,15 +175,17 @@ def _poses(machine: Hexapod, menu: Menu, n: int, rng: Generator) -> FloatArray:
     if len(levels) < 4:
         raise InputError(f"a first campaign at {len(levels)} heights", expected="4 or more")
     drawn = np.concatenate([draw_poses(machine, menu, TRIES // 4, rng) for _ in range(4)])
-    tilt = np.arccos(np.clip(np.cos(drawn[:, 3]) * np.cos(drawn[:, 4]), -1.0, 1.0))
-    upright = drawn[tilt == 0.0]
-    tilted = drawn[tilt >= min(LEAST_TILT, 0.6 * menu.max_tilt)]
-    tilted = tilted if menu.max_tilt > 0.0 else drawn[:0]
-    n_tilted = n // 2 if len(tilted) else 0
-    scale = np.array([menu.radius, menu.radius, np.ptp(levels) / 2.0, *[max(menu.max_tilt, 1e-3)] * 3])
-    chosen = _images_of(machine, upright, levels, menu)
-    for pool, count in ((upright, n - n_tilted), (tilted, n)):
-        chosen = _spread(chosen, pool, count, scale)
+    tilt, largest = tilts(drawn), menu.max_tilt
+    upright, tilted = drawn[tilt == 0.0], drawn[(tilt >= min(LEAST_TILT, 0.6 * largest)) & (largest > 0.0)]
+    scale = np.array([menu.radius, menu.radius, np.ptp(levels) / 2.0, *[max(largest, 1e-3)] * 3])
+    chosen = _images(machine, upright, levels[len(levels) // 2], menu)
+    for pool, count in ((upright, n - (n // 2 if len(tilted) else 0)), (tilted, n)):
+        while len(chosen) < count and len(pool):  # the farthest from all before it
+            apart = np.linalg.norm((pool[:, None] - chosen[None]) / scale, axis=2).min(axis=1, initial=np.inf)
+            best = int(np.argmax(apart))
+            if apart[best] < 1e-9:
+                break
+            chosen = np.concatenate([chosen, pool[best : best + 1]])
     if len(chosen) < n:
         raise InputError(
             f"machine {machine.name} reaches only {len(chosen)} of {n} poses of a first campaign",
@@ -181,58 +194,42 @@ def _poses(machine: Hexapod, menu: Menu, n: int, rng: Generator) -> FloatArray:
     return chosen
 
 
-def _images_of(machine: Hexapod, upright: FloatArray, levels: Sequence[float], menu: Menu) -> FloatArray:
-    """(3, 6) a vertical pose off the axis, at a middle height, and its two images, if the machine reaches such."""
-    middle = levels[len(levels) // 2]
+def _images(machine: Hexapod, upright: FloatArray, height: float, menu: Menu) -> FloatArray:
+    """(3, 6) a vertical pose off the axis, near that height, and its two images, if the machine reaches such."""
     off = np.hypot(upright[:, 0], upright[:, 1])
-    candidates = upright[(off > 0.4 * menu.radius)]
-    order = np.lexsort((-off[off > 0.4 * menu.radius], np.abs(candidates[:, 2] - middle)))
-    for index in order:
-        three = images(candidates[index])
-        three[:, :2] = np.round(three[:, :2], 4)
-        if reachable(machine, three, 0.0).all():
-            return three
+    candidates = upright[off > 0.4 * menu.radius]
+    angles = 2.0 * np.pi / IMAGES * np.arange(IMAGES)
+    for index in np.lexsort((-off[off > 0.4 * menu.radius], np.abs(candidates[:, 2] - height))):
+        x, y = candidates[index, :2]
+        turned = np.repeat(candidates[index : index + 1], IMAGES, axis=0)
+        turned[:, 0], turned[:, 1] = np.cos(angles) * x - np.sin(angles) * y, np.sin(angles) * x + np.cos(angles) * y
+        turned[:, :2] = np.round(turned[:, :2], 4)
+        if reachable(machine, turned, 0.0).all():
+            return turned
     return np.zeros((0, 6))
 
 
-def _spread(chosen: FloatArray, pool: FloatArray, count: int, scale: FloatArray) -> FloatArray:
-    """The chosen poses and more from the pool, each the farthest from all before it."""
-    while len(chosen) < count and len(pool):
-        if len(chosen):
-            apart = np.linalg.norm((pool[:, None] - chosen[None]) / scale, axis=2).min(axis=1)
-            best = int(np.argmax(apart))
-            if apart[best] < 1e-9:
-                break
-        else:
-            best = 0
-        chosen = np.concatenate([chosen, pool[best : best + 1]])
-    return chosen
+def _stops(machine: Hexapod, poses: FloatArray, menu: Menu, rng: Generator) -> tuple[AnyArray, ...]:
+    """Stops: numbers of their poses, tools' extensions, set-ups, purposes.
 
-
-def _stops(machine: Hexapod, poses: FloatArray, menu: Menu) -> list[Stop]:
-    """Stops at the poses: with longer tools, in other set-ups, clamped anew."""
+    At random within a set-up and a tool, which are changed as seldom as can be.
+    """
     n, tool, setup = len(poses), menu.tool_extensions[0], menu.setups[0]
-    stops = []
-    for k, pose in enumerate(poses):
-        stops.append((k, tool, setup, "image" if k < IMAGES else "tilted" if pose[3:].any() else "vertical"))
+    kinds = ["image" if k < IMAGES else "tilted" if pose[3:].any() else "vertical" for k, pose in enumerate(poses)]
+    stops = [(k, tool, setup, kind) for k, kind in enumerate(kinds)]
     for extension in menu.tool_extensions[1:]:
         fits = np.flatnonzero(reachable(machine, poses, extension)).tolist()
         spread = np.unique(np.linspace(0, max(len(fits) - 1, 0), max(n // LONG_TOOL_SHARE, 2)).astype(int))
         stops += [(fits[k], extension, setup, "longer tool") for k in spread[: len(fits)]]
     again = (0, n - 1)  # the first image and the last pose, which is tilted
     stops += [(k, tool, other, f"set-up {other}") for other in menu.setups[1:] for k in again]
-    return stops + [(k, tool, name, "clamped anew") for name, k, _ in product(menu.setups, again, range(1, CLAMPINGS))]
-
-
-def _visits(poses: FloatArray, stops: Sequence[Stop], menu: Menu, rng: Generator) -> Visits:
-    loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads))))
-    names, forces = (np.array(column) for column in zip(*product(AXES, loads), strict=True))
-    orders = np.array([rng.permutation(len(names)) for _ in stops])
-    pose, extension, setup, _ = (np.array(column) for column in zip(*stops, strict=True))
-    places = [stop[:3] for stop in stops]
-    repeat = np.array([places[: k + 1].count(place) for k, place in enumerate(places)])
-    time = READING_EVERY * np.arange(1.0, len(names) + 1.0)
-    return visits_of(menu, (poses[pose], extension, setup), names[orders], forces[orders], time, repeat[:, None])
+    stops += [(k, tool, name, "clamped anew") for name, k, _ in product(menu.setups, again, range(1, CLAMPINGS))]
+    number, extensions, setups, purposes = (np.array(column) for column in zip(*stops, strict=True))
+    equipped = list(dict.fromkeys(zip(extensions.tolist(), setups.tolist(), strict=True)))
+    group = np.array([equipped.index(pair) for pair in zip(extensions.tolist(), setups.tolist(), strict=True)])
+    order = rng.permutation(len(stops))
+    order = order[np.argsort(group[order], kind="stable")]
+    return number[order], extensions[order], setups[order], purposes[order]
 
 
 def _sees(
@@ -244,14 +241,13 @@ def _sees(
 ) -> dict[str, float]:
     """Gap between each effect at its usual size and nothing, the strut law refitted."""
     installed = {entry.name for entry in (*machine.effects, *machine.instruments)}
-    names = [name for name in effects if name not in installed]
-    rivals = unfitted_rivals([NONE, *names], effects, setup=visits.menu.setups[-1])
+    names = [NONE, *(name for name in effects if name not in installed)]
+    rivals = unfitted_rivals(names, effects, setup=visits.menu.setups[-1])
     rivals = [replace(rival, covariance=LAW_PRIOR**2 * np.eye(2), free=()) for rival in rivals]
-    forecasts, _, scatter = forecast_all(machine, rivals, visits.readings, effect_files)
+    (nothing, *forecasts), _, scatter = forecast_all(machine, rivals, visits.readings, effect_files)
     reading_noise = ReadingNoise(*noise, scatter)
-    everywhere = np.arange(len(visits))
     return {
-        forecast.name: pair_shares(visits, forecasts[0], forecast, reading_noise).gap(everywhere)
-        for forecast in forecasts[1:]
+        forecast.name: pair_shares(visits, nothing, forecast, reading_noise).gap(np.arange(len(visits)))
+        for forecast in forecasts
         if np.isfinite(forecast.mean).all()
     }

@@ -13,15 +13,10 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.forecasts import forecast_all
 from toolpath_stiff.planning.gaps import pair_shares
 from toolpath_stiff.planning.plan import RivalPlan, matters
-from toolpath_stiff.planning.poses import ROUND, reachable
-from toolpath_stiff.planning.visits import AXES, READING_EVERY, visits_of
+from toolpath_stiff.planning.visits import AXES, READING_EVERY, ROUND, reachable, visits_of
 
 ACROSS = 11  # points of the grid a side
-
-
 TILTS = 6  # directions of tilt
-
-
 MOST_LEVELS = 8  # heights with a panel of their own; more are put together, neighbours with neighbours
 
 
@@ -74,24 +69,23 @@ def gap_map(machine: Hexapod, plan: RivalPlan, effect_files: Sequence[str | Path
     pair, menu = top_pair(plan), plan.visits.menu
     rivals = [next(rival for rival in plan.rivals if rival.name == name) for name in pair]
     side = np.linspace(-menu.radius, menu.radius, ACROSS)
-    groups = height_groups(plan.visits.pose[list(plan.chosen), 2])
-    levels = np.array([group[len(group) // 2] for group in groups])
+    levels = np.array([group[len(group) // 2] for group in height_groups(plan.visits.pose[list(plan.chosen), 2])])
     turns = np.linspace(0.0, 2.0 * np.pi, TILTS, endpoint=False)
-    tilts = np.stack([menu.max_tilt * np.cos(turns), menu.max_tilt * np.sin(turns)], axis=1)
-    angles = np.concatenate([np.zeros((1, 2)), tilts])
+    angles = menu.max_tilt * np.array([(0.0, 0.0), *zip(np.cos(turns), np.sin(turns), strict=True)])
     poses = np.array([[x, y, z, a, b, 0.0] for a, b in angles for z, y, x in product(levels, side, side)])
     good = np.flatnonzero(reachable(machine, poses, 0.0, margin=0.0))
     varied = matters(rivals)
     setups = menu.setups if "setup" in varied else menu.setups[:1]
-    loads = tuple(dict.fromkeys((min(menu.loads), max(menu.loads)))) if "force_N" in varied else (menu.usual_load,)
+    loads = sorted({min(menu.loads), max(menu.loads)}) if "force_N" in varied else [menu.usual_load]
     gaps = np.full((len(setups), len(poses)), np.nan)
     if len(good):
         # One visit to each pose in each set-up.
         names, forces = (np.array(column) for column in zip(*product(AXES, loads), strict=True))
-        shape = (len(good) * len(setups), len(names))
-        places = np.tile(poses[good], (len(setups), 1)), np.zeros(shape[0]), np.repeat(setups, len(good))
-        time = max(menu.waits) + READING_EVERY * np.arange(1.0, len(names) + 1.0)
-        visits = visits_of(menu, places, np.broadcast_to(names, shape), np.broadcast_to(forces, shape), time)
+        count = len(good) * len(setups)
+        places = np.tile(poses[good], (len(setups), 1)), np.zeros(count), np.repeat(setups, len(good))
+        visits = visits_of(
+            menu, places, names, forces, max(menu.waits) + READING_EVERY * np.arange(1.0, len(names) + 1.0)
+        )
         forecasts, answered, scatter = forecast_all(machine, rivals, visits.readings, effect_files)
         share = pair_shares(visits, forecasts[0], forecasts[1], replace(plan.scatter, machine=scatter))
         usable = np.logical_and.reduceat(answered, visits.starts)

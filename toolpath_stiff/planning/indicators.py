@@ -3,27 +3,19 @@
 Such a visit reads the tip along X, Y, Z as others do, and at each of these loads the second indicator as well.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.planning.forecasts import Rival
 from toolpath_stiff.planning.visits import AXES, Visits
 from toolpath_stiff.readings.loops import LoopColumns
 from toolpath_stiff.readings.measurements import with_offsets
 
-if TYPE_CHECKING:
-    from toolpath_stiff.planning.forecasts import Rival
-
-
 PLACES = 40  # with an indicator: a link shows at any pose where it is loaded
-
-
+MOST_LOOPS = 4  # one strut or vertex stands for all where an effect is of all
 LOOPS_OF = {
     "tool": ("spindle",),
     "table": ("table",),
@@ -31,7 +23,6 @@ LOOPS_OF = {
     "struts": ("strut {}",),
     "frame": ("frame {} vertical", "frame {} radial"),
 }  # link -> loops across it; of a strut, a joint or a vertex
-MOST_LOOPS = 4  # one strut or vertex stands for all where an effect is of all
 
 
 def loops_between(rivals: Sequence[Rival]) -> tuple[str, ...]:
@@ -59,19 +50,26 @@ def with_indicators(machine: Hexapod, visits: Visits, loops: Sequence[str], nois
     """
     if not loops:
         return visits
-    plain = _beside_which(visits)
-    plain = plain[np.unique(np.linspace(0, len(plain) - 1, min(PLACES, len(plain))).astype(int))]
-    rows = np.array([visits.rows(int(visit)) for visit in plain])
-    taken, count = visits.readings, len(loops) * len(plain)
+    # An indicator is set beside visits that read X, Y, Z once each, under their largest load.
+    taken, names = visits.readings, np.split(visits.names[visits.members], visits.starts[1:])
+    loads = np.maximum.reduceat(taken.force[visits.members], visits.starts)
+    plain = np.array([sorted(read) == list(AXES) for read in names])
+    beside = np.flatnonzero(plain & (loads == loads[plain].max(initial=0.0)))
+    beside = beside[np.unique(np.linspace(0, len(beside) - 1, min(PLACES, len(beside))).astype(int))]
+    rows = np.array([visits.rows(int(visit)) for visit in beside])
+    count = len(loops) * len(beside)
     across = len(taken) + np.arange(count * len(AXES)).reshape(count, len(AXES))
     members = np.concatenate([np.tile(rows, (len(loops), 1)), across], axis=1)
-    owner = np.concatenate([np.arange(len(visits)), np.tile(plain, len(loops))])
+    owner = np.concatenate([np.arange(len(visits)), np.tile(beside, len(loops))])
     of_visits = {name: getattr(visits, name)[owner] for name in ("pose", "extension", "wait", "setup", "label")}
     source = np.concatenate([np.arange(len(taken)), np.tile(rows.ravel(), len(loops))])  # of which readings they are
     loop = np.concatenate([taken.loop, np.repeat(loops, rows.size)])
-    beside = LoopColumns.of(loop.tolist(), np.full(len(loop), np.nan))
-    missing = tuple(name for name in taken.missing if name != "loop")
-    readings = replace(taken.select(source), loop=loop, beside=beside, missing=missing)
+    readings = replace(
+        taken.select(source),
+        loop=loop,
+        beside=LoopColumns.of(loop.tolist(), np.full(len(loop), np.nan)),
+        missing=tuple(name for name in taken.missing if name != "loop"),
+    )
     return replace(
         visits,
         **of_visits,
@@ -80,13 +78,5 @@ def with_indicators(machine: Hexapod, visits: Visits, loops: Sequence[str], nois
         rounds=visits.rounds[source],
         members=np.concatenate([visits.members, members.ravel()]),
         starts=np.concatenate([visits.starts, len(visits.members) + members.shape[1] * np.arange(count)]),
-        loop=np.concatenate([visits.loop, np.repeat(loops, len(plain))]),
+        loop=np.concatenate([visits.loop, np.repeat(loops, len(beside))]),
     )
-
-
-def _beside_which(visits: Visits) -> IntArray:
-    """(k,) visits that read X, Y, Z once each, under their largest load: what an indicator is set beside."""
-    names = np.split(visits.names[visits.members], visits.starts[1:])
-    loads = np.maximum.reduceat(visits.readings.force[visits.members], visits.starts)
-    plain = np.array([sorted(read) == list(AXES) for read in names])
-    return np.flatnonzero(plain & (loads == loads[plain].max(initial=0.0)))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -14,39 +14,14 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import RAD_PER_DEG
 
-T = TypeVar("T")
 MINUTE = 60.0
 LOADS = (1e-3, 1e6)  # N, that a plan may ask for
-SETUP_ELSEWHERE = "table"  # the work on the bare table, where the data know only one set-up, with a name
+TABLE, RISER = "table", "riser"  # set-ups where the data know none, or only one
 
 
-@dataclass(frozen=True)
-class Costs:
-    """Minutes of work; assumed, and the user's to change.
-
-    Attributes
-    ----------
-    reading
-        One more direction or load at a visit.
-    pose
-        Moving to another pose, clamping gauge and indicator, zeroing.
-    tool
-        Another tool.
-    setup
-        Another set-up: a riser on or off.
-    indicator
-        A second indicator across a link of the load path.
-    """
-
-    reading: float = 1.0
-    pose: float = 15.0
-    tool: float = 10.0
-    setup: float = 45.0
-    indicator: float = 10.0
-
-    def __post_init__(self) -> None:
-        if not self.pose + self.reading > 0.0:
-            raise InputError("costs of a plan", expected="a pose that costs something")
+# Minutes of work; assumed, and the user's to change: one more direction or load at a visit; moving to another pose,
+# clamping gauge and indicator, zeroing; another tool; a riser on or off; a second indicator across a link.
+COSTS = {"reading": 1.0, "pose": 15.0, "tool": 10.0, "setup": 45.0, "indicator": 10.0}
 
 
 @dataclass(frozen=True)
@@ -86,7 +61,7 @@ class Menu:
     indicators
         Whether a second indicator may be set across a link.
     costs
-        Minutes of work.
+        Minutes of work, keys as of `COSTS`.
     """
 
     heights: tuple[float, ...] = ()
@@ -104,48 +79,45 @@ class Menu:
     timed: bool = True
     usual_load: float = defaults.FORCE
     indicators: bool = False
-    costs: Costs = field(default_factory=Costs)
+    costs: Mapping[str, float] = field(default_factory=lambda: COSTS)
 
     def __post_init__(self) -> None:
         if not LOADS[0] <= min(self.loads, default=0.0) <= max(self.loads) <= LOADS[1]:
             loads = ", ".join(f"{load:g}" for load in self.loads)
             raise InputError(f"a plan with loads of {loads or 'no'} N", expected=f"{LOADS[0]:g} to {LOADS[1]:g} N")
+        if not self.costs["pose"] + self.costs["reading"] > 0.0:
+            raise InputError("costs of a plan", expected="a pose that costs something")
 
-    def with_options(self, **changes: Any) -> Menu:
+    def with_options(self, **options: Any) -> Menu:
         """The menu with those options that are given. Who names the heights knows how low a set-up may be used."""
-        lists: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in changes.items()}
-        given: dict[str, Any] = {name: value for name, value in lists.items() if value is not None and value != ()}
+        given: Any = {
+            name: tuple(v) if isinstance(v, list) else v for name, v in options.items() if v not in (None, (), [])
+        }
         return replace(self, **given | ({"floors": {}} if "heights" in given else {}))
 
     @classmethod
-    def of(cls, data: Readings) -> Menu:
-        """The menu after some measurements: also their poses, set-ups, tools and loads."""
+    def of(cls, data: Readings | None) -> Menu:
+        """The menu after some measurements: also their poses, set-ups, tools and loads; before any, of a riser too."""
+        if data is None:
+            return cls(setups=(TABLE, RISER))
         poses = np.concatenate([data.position, data.angles], axis=1)
-        _, first = np.unique(np.round(poses, 6), axis=0, return_index=True)
-        first = np.sort(first)
-        setups = _by_last_use(map(str, data.setup))
+        first = np.sort(np.unique(np.round(poses, 6), axis=0, return_index=True)[1])
+        # What was used last is on the machine now.
+        setups = list(dict.fromkeys(data.setup[::-1].tolist()))
         if len(setups) == 1 and setups[0]:
-            setups = (*setups, SETUP_ELSEWHERE if setups[0] != SETUP_ELSEWHERE else "riser")
-        tools = _by_last_use(map(float, np.round(data.tool_extension, 6)))
-        counted = np.unique(data.force, return_counts=True)
+            setups.append(TABLE if setups[0] != TABLE else RISER)
+        measured = {name: data.position[data.setup == name, 2] for name in setups}
+        loads, counts = np.unique(data.force, return_counts=True)
         return cls(
-            loads=tuple(sorted({*cls.loads, *data.force.tolist()})) if "force_N" not in data.missing else cls.loads,
-            tool_extensions=tuple(dict.fromkeys((*tools, *cls.tool_extensions))),
-            setups=setups,
+            loads=tuple(sorted({*cls.loads, *loads.tolist()})) if "force_N" not in data.missing else cls.loads,
+            tool_extensions=tuple(
+                dict.fromkeys([*np.round(data.tool_extension[::-1], 6).tolist(), *cls.tool_extensions])
+            ),
+            setups=tuple(setups),
             measured=poses[first],
             labels=tuple(data.point[first].tolist()),
-            floors={name: _lowest(data, name) for name in setups},
+            # In a set-up that was never used, the lowest of all.
+            floors={n: float((z if len(z) else data.position[:, 2]).min()) for n, z in measured.items()},
             timed="time_min" not in data.missing,
-            usual_load=float(counted[0][np.argmax(counted[1])]),
+            usual_load=float(loads[np.argmax(counts)]),
         )
-
-
-def _by_last_use(values: Iterable[T]) -> tuple[T, ...]:
-    """Distinct values, the one of the last reading first."""
-    return tuple(dict.fromkeys(reversed(list(values))))
-
-
-def _lowest(data: Readings, setup: str) -> float:
-    """Lowest tool tip measured in a set-up; in one that was never used, the lowest of all."""
-    there = data.setup == setup
-    return float(data.position[there if there.any() else slice(None), 2].min())

@@ -18,21 +18,29 @@ from pathlib import Path
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.inference.noise import LEAST
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.planning.choice import Pair, choose, in_order, why_of
 from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all
-from toolpath_stiff.planning.gaps import GapShares, ReadingNoise, pair_shares, repeat_and_clamping
+from toolpath_stiff.planning.gaps import (
+    Expectation,
+    GapShares,
+    ReadingNoise,
+    expected_outcome,
+    pair_shares,
+    repeat_and_clamping,
+)
 from toolpath_stiff.planning.indicators import loops_between, with_indicators
 from toolpath_stiff.planning.menu import Menu
-from toolpath_stiff.planning.outlook import SETTLED, Expectation, expected_outcome, percent
 from toolpath_stiff.planning.visits import Visits, possible_visits
+from toolpath_stiff.units import min_from_s
 
+Pair = tuple[str, str]  # names of two rivals
+SETTLED = 0.95  # probability of one rival at which visits are enough: on the safe side of a diagnosis's `NAMED`
 MOST_RIVALS = 6  # a plan that separates more would separate none well
 MOST_VISITS, MOST_REPEATS = 200, 64
 LEAST_GAP = 1.0  # standard deviations after all visits: below, tip stiffness cannot tell the two apart
@@ -111,8 +119,14 @@ class RivalPlan:
 
     @cached_property
     def chosen(self) -> tuple[int, ...]:
-        """Numbers of the chosen visits, in measuring order."""
-        return in_order(self.visits, self.picked, self.seed)
+        """Numbers of the chosen visits, in measuring order: set-up by set-up, tool by tool, at random within.
+
+        So a drift over the day looks like no pose.
+        """
+        visits, setups, tools = self.visits, self.visits.menu.setups, self.visits.menu.tool_extensions
+        order = np.random.default_rng([self.seed, 1]).permutation(len(self.picked))
+        drawn = [self.picked[k] for k in order]
+        return tuple(sorted(drawn, key=lambda v: (setups.index(visits.setup[v]), tools.index(visits.extension[v]))))
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -122,7 +136,26 @@ class RivalPlan:
     @property
     def why(self) -> tuple[str, ...]:
         """The purpose of each chosen visit, a sentence."""
-        return tuple(why_of(self.visits, visit, self.shares) for visit in self.chosen)
+        return tuple(self._purpose(visit) for visit in self.chosen)
+
+    def _purpose(self, visit: int) -> str:
+        visits, rows = self.visits, self.visits.rows(visit)
+        tilt, extension, wait, rounds = visits.tilt(visit), visits.extension[visit], visits.wait[visit], visits.rounds
+        parts = [f"tilted {np.degrees(tilt):.3g} deg" if tilt > 1e-6 else "vertical"]
+        if extension:
+            parts.append(f"tool {1e3 * abs(extension):.4g} mm {'longer' if extension > 0 else 'shorter'}")
+        if visits.setup[visit]:
+            parts.append(f"set-up {visits.setup[visit]}")
+        parts.append("at " + " and ".join(f"{load:g} N" for load in np.unique(visits.readings.force[rows])))
+        if wait > visits.menu.waits[0]:
+            parts.append(f"{min_from_s(wait):.3g} minutes after zeroing")
+        if rounds[rows].max() > 1:
+            parts.append("each reading twice")
+        if visits.loop[visit]:
+            parts.append(f"a second indicator: {visits.loop[visit]}")
+        gaps = {pair: share.gap([visit]) for pair, share in self.shares.items()}
+        first, second = max(gaps, key=lambda pair: gaps[pair])
+        return f"{', '.join(parts)}: {gaps[first, second]:.1f} sigma between {first} and {second}"
 
     @property
     def minutes(self) -> float:
@@ -255,6 +288,13 @@ class RivalPlan:
         }
 
 
+def percent(share: float) -> str:
+    """Never "100 %" or "0 %" for what is only expected."""
+    if share > 0.99:
+        return "more than 99 %"
+    return "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
+
+
 def plan_measurements(
     machine: Hexapod,
     rivals: Sequence[Rival],
@@ -318,6 +358,27 @@ def plan_measurements(
     shares = {(f.name, g.name): pair_shares(visits, f, g, noise) for f, g in combinations(forecasts, 2)}
     picked = choose(visits, usable, shares, {f.name: f.weight for f in forecasts}, n)
     return RivalPlan(visits, usable, picked, seed, ranked, tuple(forecasts), noise, shares, tuple(notes))
+
+
+def choose(
+    visits: Visits, usable: BoolArray, shares: Mapping[Pair, GapShares], weights: Mapping[str, float], n: int
+) -> tuple[int, ...]:
+    """Up to `n` usable visits, one after another, each the one that lowers the bound most per minute."""
+
+    def log_bound(gaps: Mapping[Pair, FloatArray]) -> FloatArray:
+        terms = [0.5 * np.log(weights[i] * weights[j]) - gap**2 / 4.0 for (i, j), gap in gaps.items()]
+        return np.asarray(np.logaddexp.reduce(terms, axis=0))
+
+    chosen: list[int] = []
+    free = usable.copy()
+    now = float(log_bound({pair: np.zeros(()) for pair in shares}))
+    while free.any() and len(chosen) < n:
+        after = log_bound({pair: share.gaps_with(chosen) for pair, share in shares.items()})
+        best = int(np.argmax(np.where(free, (now - after) / visits.further_minutes(chosen), -np.inf)))
+        chosen.append(best)
+        now = float(after[best])
+        free &= ~visits.same_place(best)
+    return tuple(chosen)
 
 
 def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:

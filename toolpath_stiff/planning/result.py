@@ -1,16 +1,19 @@
-"""A plan: what to measure next, or first, and what that is expected to show."""
+"""A plan: what to measure next, or first, and what that is expected to show; a measurement file to fill in."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
+from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import Document, certain, to_dict
-from toolpath_stiff.files import Content
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.evidence import Problem
@@ -18,21 +21,23 @@ from toolpath_stiff.inference.judgement import Judgement, judge
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.planning.campaign import RISER, TABLE, Campaign, first_campaign
+from toolpath_stiff.planning.campaign import Campaign, first_campaign
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
 from toolpath_stiff.planning.rivals import errors_so_far, fitted_rivals, rivals_of, unfitted_rivals
-from toolpath_stiff.planning.rows import PlanRow, plan_rows, visit_entries
-from toolpath_stiff.planning.tables import TABLES
+from toolpath_stiff.planning.visits import AXES, Visits
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.results import FolderResult
+from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.catalogue import known_effects
+from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PLAN_POSES, CAMPAIGN_POSES = 6, 24
 CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a plan without data; assumed
+POSE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+PlanRow = dict[str, float | str]  # a reading, by the columns of a measurement file
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,41 +74,101 @@ class Plan(FolderResult):
     @property
     def visits(self) -> list[Document]:
         """One entry a clamping: where, how, what is read, why."""
-        choice = self.choice
-        return visit_entries(choice.visits, choice.chosen, self.rows, choice.kinds, choice.why)
+        choice, first = self.choice, {row["clamp"]: row for row in reversed(self.rows)}
+        visits, entries = choice.visits, list[Document]()
+        for clamp, (visit, kind, why) in enumerate(zip(choice.chosen, choice.kinds, choice.why, strict=True), 1):
+            taken = visits.rows(visit)
+            entries.append(
+                {key: first[clamp][key] for key in ("clamp", "point", *POSE, "tool_extension_mm")}
+                | {
+                    "setup": str(visits.setup[visit]),
+                    "forces_N": sorted(set(map(_round, visits.readings.force[taken]))),
+                    "directions": list(dict.fromkeys(visits.names[taken].tolist())),
+                    "loops": list(dict.fromkeys(filter(None, visits.readings.loop[taken].tolist()))),
+                    "kind": kind,
+                    "why": why,
+                }
+            )
+        return entries
 
     def to_dict(self) -> dict[str, Any]:
         """The content of plan.json."""
-        document: dict[str, Any] = certain(
-            to_dict(
-                {
-                    **self.choice.head(),
-                    "text": self.choice.sentences,
-                    "notes": self.choice.notes,
-                    "visits": self.visits,
-                    "machine": self.machine.name,
-                    "data": self.names,
-                    "seed": self.seed,
-                    "costs_minutes": self.choice.visits.menu.costs,
-                    "command": self.line,
-                }
-            )
+        document = to_dict(
+            {
+                **self.choice.head(),
+                "text": self.choice.sentences,
+                "notes": self.choice.notes,
+                "visits": self.visits,
+                "machine": self.machine.name,
+                "data": self.names,
+                "seed": self.seed,
+                "costs_minutes": self.choice.visits.menu.costs,
+                "command": self.line,
+            }
         )
-        return document
+        return dict(certain(document))
 
     def to_frame(self) -> pd.DataFrame:
         """One row a reading, as in `plan.csv`: a measurement file with the stiffness left empty."""
-        import pandas as pd
-
-        return pd.DataFrame(self.rows)
-
-    def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps plan`."""
-        return self._files(plots, () if isinstance(self.choice, RivalPlan) else (TABLES,))
+        return frame_of(self.rows)
 
     def _short(self) -> str:
         kind = "rivals" if isinstance(self.choice, RivalPlan) else "campaign"
         return f"{kind}, {len(self.choice.chosen)} clampings"
+
+
+def plan_rows(visits: Visits, chosen: Sequence[int], taken: Collection[str] = ()) -> list[PlanRow]:
+    """Rows of a measurement file in shop units, in measuring order.
+
+    Parameters
+    ----------
+    visits, chosen
+        The visits in measuring order; each is one clamping.
+    taken
+        Names of points that new points must not have.
+    """
+    readings, planned = visits.readings, np.concatenate([visits.rows(visit) for visit in chosen])
+    timed, beside = not np.isnan(readings.time).any(), bool((readings.loop[planned] != "").any())
+    axes_only = set(visits.names[planned].tolist()) <= set(AXES)
+    named = bool((visits.setup[list(chosen)] != "").any())
+    fresh = (name for name in map("plan {}".format, count(1)) if name not in taken)
+    points: dict[bytes, str] = {}  # one name a pose: the one that it had before, or a new one
+    rows = list[PlanRow]()
+    for clamp, visit in enumerate(chosen, 1):
+        pose = visits.pose[visit]
+        if pose.tobytes() not in points:
+            points[pose.tobytes()] = str(visits.label[visit]) or next(fresh)
+        for row in visits.rows(visit):
+            name, shop = str(visits.names[row]), [*mm_from_m(pose[:3]), *deg_from_rad(pose[3:])]
+            # Files allow vectors of any length: directions in whole numbers.
+            direction = {"direction": name} if axes_only else {f"d{axis.lower()}": int(axis in name) for axis in AXES}
+            rows.append(
+                {
+                    **dict(zip(POSE, map(_round, shop), strict=True)),
+                    **direction,
+                    "stiffness_N_per_mm": "",
+                    **({"loop": str(readings.loop[row]), "displacement_um": ""} if beside else {}),
+                    "force_N": _round(readings.force[row]),
+                    **({"setup": str(visits.setup[visit])} if named else {}),
+                    "clamp": clamp,
+                    "repeat": int(visits.rounds[row]),
+                    "point": points[pose.tobytes()],
+                    **({"time_min": _round(min_from_s(readings.time[row]))} if timed else {}),
+                    "tool_extension_mm": _round(mm_from_m(visits.extension[visit])),
+                }
+            )
+    return rows
+
+
+def _round(value: float) -> float:
+    """To ten digits after the unit's point at most: 0.30000000000000004 is 0.3 to whoever keys it in."""
+    return round(float(value), 6) + 0.0
+
+
+def plan_csv(rows: Sequence[PlanRow]) -> str:
+    """The rows as CSV."""
+    cells = [[value if isinstance(value, str) else f"{value:.10g}" for value in row.values()] for row in rows]
+    return csv_text(rows[0], cells)
 
 
 def plan(
@@ -126,7 +191,7 @@ def plan(
     machine, data
         The model; n readings, or None for a plan before any.
     menu
-        What may vary, and what it costs; None: the usual, and what the data have (`usual_menu`).
+        What may vary, and what it costs; None: the usual, and what the data have (`Menu.of`).
     between
         Effects to be told apart, or `none`; empty: what a diagnosis leaves standing, or a first campaign.
     n
@@ -148,7 +213,7 @@ def plan(
     >>> len(found.choice.chosen), found.choice.separable
     (2, True)
     """
-    menu, effects = menu or usual_menu(data), known_effects(effect_files)
+    menu, effects = menu or Menu.of(data), known_effects(effect_files)
     planned_for: float | tuple[float, float] = CAMPAIGN_NOISE if noise is None else noise
     if data is None and not between:
         poses = CAMPAIGN_POSES if n is None else n
@@ -182,8 +247,3 @@ def plan(
     )  # fmt: skip
     choice = replace(choice, notes=(*notes, *choice.notes), verdict=verdict, errors=errors)
     return Plan(machine, data, choice, tuple(effect_files), seed)
-
-
-def usual_menu(data: Readings | None) -> Menu:
-    """The menu unless anyone says otherwise: what the data have, before any a bare table and a riser."""
-    return Menu(setups=(TABLE, RISER)) if data is None else Menu.of(data)

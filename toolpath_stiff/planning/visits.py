@@ -1,4 +1,4 @@
-"""Visits that could be made next: to poses, all reachable, and what each costs.
+"""Visits that could be made next: to poses, all reachable and in round figures, and what each costs.
 
 A visit is one pose with one tool in one set-up, clamped once: the indicator is zeroed and readings are taken along
 some directions under one load or two. Visits are what costs time; further directions and loads at the same visit are
@@ -14,24 +14,22 @@ from numpy.random import Generator
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.kinematics import solve_struts
+from toolpath_stiff.machine.limits import reach
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.menu import MINUTE, Menu
-from toolpath_stiff.planning.poses import ROUND, draw_poses, reachable
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.units import min_from_s
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.units import RAD_PER_DEG, min_from_s
 
 AXES = ("X", "Y", "Z")
 DIAGONALS = ("XY", "XZ", "YZ")
-VECTORS: dict[str, tuple[float, float, float]] = {
-    "X": (1.0, 0.0, 0.0),
-    "Y": (0.0, 1.0, 0.0),
-    "Z": (0.0, 0.0, 1.0),
-    "XY": (0.5**0.5, 0.5**0.5, 0.0),
-    "XZ": (0.5**0.5, 0.0, 0.5**0.5),
-    "YZ": (0.0, 0.5**0.5, 0.5**0.5),
-}
 READING_EVERY = 1.0 * MINUTE  # s between readings after zeroing; assumed
 MOST_PLACES = 400  # places with their tool, set-up and waiting; more would cost time and change little
+MARGIN = 0.02  # share of each limit's span that planned poses keep clear of it; assumed
+ROUND, ROUND_ANGLE = 5e-3, 0.5 * RAD_PER_DEG  # planned poses are round figures, which a person keys in
+UPRIGHT_SHARE = 0.25  # share of the poses with a vertical spindle
+STEEP_SHARE = 0.5  # share of the others with the largest tilt
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ class Visits:
     readings
         The m readings that the visits are made of, stiffness empty.
     names, rounds
-        (m,) direction of each reading, a key of `VECTORS`; which reading it is of its kind.
+        (m,) direction of each reading, of `AXES` or `DIAGONALS`; which reading it is of its kind.
     members
         Indices into `readings`, visit after visit.
     starts
@@ -88,7 +86,7 @@ class Visits:
 
     def tilt(self, visit: int) -> float:
         """Angle of the spindle from the vertical, rad."""
-        return float(np.arccos(np.clip(np.cos(self.pose[visit, 3]) * np.cos(self.pose[visit, 4]), -1.0, 1.0)))
+        return float(tilts(self.pose[visit]))
 
     def same_place(self, visit: int) -> BoolArray:
         """(v,) visits to the same pose with the same tool in the same set-up: other readings there are no new pose."""
@@ -118,9 +116,9 @@ class Visits:
             there in equipped or (there[0] not in setups and there[1] == tool)
             for there in zip(self.setup.tolist(), self.extension.tolist(), strict=True)
         ]
-        minutes = costs.pose + costs.reading * self.counts + min_from_s(self.wait)
-        minutes = minutes + costs.indicator * (self.loop != "") + costs.setup * ~np.isin(self.setup, setups)
-        return np.asarray(minutes + costs.tool * ~np.array(known))
+        minutes = costs["pose"] + costs["reading"] * self.counts + min_from_s(self.wait)
+        minutes = minutes + costs["indicator"] * (self.loop != "") + costs["setup"] * ~np.isin(self.setup, setups)
+        return np.asarray(minutes + costs["tool"] * ~np.array(known))
 
     def minutes(self, chosen: Sequence[int]) -> float:
         """Minutes of work for the chosen visits."""
@@ -158,21 +156,18 @@ def possible_visits(machine: Hexapod, menu: Menu, matters: Collection[str], rng:
         )
     which, extension, setup, wait = (np.array(column) for column in zip(*places, strict=True))
     loads, every_round = menu.loads if "force_N" in matters else (menu.usual_load,), range(1, menu.rounds + 1)
-    directions = AXES + DIAGONALS if menu.oblique else AXES
-    rounds, names, forces = (np.array(column) for column in zip(*product(every_round, directions, loads), strict=True))
+    named = [AXES, AXES + DIAGONALS] if menu.oblique else [AXES]
+    rounds, names, forces = (np.array(column) for column in zip(*product(every_round, named[-1], loads), strict=True))
     axes = np.isin(names, AXES)
     groups = [np.flatnonzero((rounds == last) & (axes == first)) for last, first in product(every_round, (True, False))]
     slots = np.empty((len(places), len(names)))
     for place in range(len(places)):
         slots[place, np.concatenate([rng.permutation(group) for group in groups])] = np.arange(1, len(names) + 1)
-    load_choices: list[tuple[float, ...]] = [(load,) for load in loads]
-    load_choices += [(min(loads), max(loads))] if len(loads) > 1 else []
-    named = [AXES, directions] if menu.oblique else [AXES]
+    under = [(load,) for load in loads] + ([(min(loads), max(loads))] if len(loads) > 1 else [])
     choices = [
-        np.flatnonzero(np.isin(names, some) & np.isin(forces, under) & (rounds <= last))
-        for some, under, last in product(named, load_choices, every_round)
+        np.flatnonzero(np.isin(names, some) & np.isin(forces, load) & (rounds <= last))
+        for some, load, last in product(named, under, every_round)
     ]
-    names, forces = np.broadcast_to(names, slots.shape), np.broadcast_to(forces, slots.shape)
     time = wait[:, None] + slots * READING_EVERY
     visits = visits_of(menu, (poses[which], extension, setup), names, forces, time, rounds, choices)
     labels, owner = np.array([*menu.labels, *[""] * len(new)], dtype=str), np.repeat(range(len(places)), len(choices))
@@ -186,7 +181,7 @@ def visits_of(
     force: FloatArray,
     time: FloatArray,
     rounds: IntArray | int = 1,
-    choices: Sequence[IntArray] | None = None,
+    choices: Sequence[IntArray] = (),
 ) -> Visits:
     """Visits to p places with k readings each, or with some of these.
 
@@ -197,16 +192,42 @@ def visits_of(
     places
         Poses (p, 6), tools' extensions and set-ups (p,).
     names, force, time
-        (p, k) directions, N, s (or (k,)).
+        (p, k) or (k,): directions, N, s.
     rounds
         (p, k) or (k,): which reading it is of its kind.
     choices
-        Each place is a visit for every choice of its readings; None: one with all of them.
+        Each place is a visit for every choice of its readings; without any, one with all of them.
     """
     pose, extension, setup = places
-    p, k = names.shape
+    p, k = len(pose), np.shape(names)[-1]
     choices = choices or [np.arange(k)]
     place, counts = np.repeat(np.arange(p), len(choices)), np.tile([len(choice) for choice in choices], p)
+    names, force, time, rounds = (np.broadcast_to(array, (p, k)).ravel() for array in (names, force, time, rounds))
+    pose_read = np.repeat(pose, k, axis=0)
+    direction = np.stack([np.char.find(names, axis) >= 0 for axis in AXES], axis=1).astype(float)
+    empty, nothing = np.full(p * k, ""), np.full(p * k, np.nan)
+    missing = {"sd_N_per_mm", "clamp", "repeat", "point", "loop", "temperature_C"}
+    missing |= (set() if menu.timed else {"time_min"}) | (set() if (setup != "").any() else {"setup"})
+    readings = Readings(
+        position=pose_read[:, :3],
+        angles=pose_read[:, 3:],
+        direction=direction * np.sqrt(1.0 / direction.sum(axis=1, keepdims=True)),
+        stiffness=nothing,
+        force=force.astype(float),
+        sd=nothing,
+        tool_extension=np.repeat(extension, k).astype(float),
+        time=time if menu.timed else nothing,
+        temperature=nothing,
+        setup=np.repeat(setup, k),
+        loop=empty,
+        repeat=empty,
+        point=empty,
+        clamp=empty,
+        file=empty,
+        line=np.zeros(p * k, dtype=np.int64),
+        extra={},
+        missing=tuple(sorted(missing)),
+    )
     return Visits(
         menu=menu,
         pose=pose[place],
@@ -215,65 +236,68 @@ def visits_of(
         setup=setup[place],
         label=np.full(len(place), ""),
         loop=np.full(len(place), ""),
-        readings=planned_readings(
-            np.repeat(pose, k, axis=0),
-            names.ravel(),
-            force.ravel(),
-            np.repeat(extension, k),
-            np.repeat(setup, k),
-            np.broadcast_to(time, (p, k)).ravel() if menu.timed else np.full(p * k, np.nan),
-        ),
-        names=names.ravel(),
-        rounds=np.broadcast_to(rounds, (p, k)).ravel(),
+        readings=readings,
+        names=names,
+        rounds=rounds,
         members=(k * np.arange(p)[:, None] + np.concatenate(choices)).ravel(),
         starts=np.cumsum(counts) - counts,
     )
 
 
-def planned_readings(
-    pose: FloatArray,
-    names: TextArray,
-    force: FloatArray,
-    extension: FloatArray,
-    setup: TextArray,
-    time: FloatArray,
-    loop: TextArray | None = None,
-) -> Readings:
-    """Readings that have not been taken.
+def draw_poses(machine: Hexapod, menu: Menu, count: int, rng: Generator) -> FloatArray:
+    """(m, 6) round, reachable poses with the reference tool, m <= count; a quarter of them with a vertical spindle."""
+    levels = np.array(menu.heights or axis_levels(machine))
+    drawn: list[FloatArray] = []
+    for batch in range(8):
+        radius, azimuth = menu.radius * np.sqrt(rng.random(count)), rng.uniform(0.0, 2.0 * np.pi, count)
+        # The largest tilts mostly tell the most.
+        tilt, about = menu.max_tilt * np.sqrt(rng.uniform(0.16, 1.0, count)), rng.uniform(0.0, 2.0 * np.pi, count)
+        tilt[rng.random(count) < STEEP_SHARE] = menu.max_tilt
+        tilt[rng.random(count) < UPRIGHT_SHARE] = 0.0
+        # Toward zero: rounding never tilts further than allowed.
+        lean = np.stack([tilt * np.cos(about), tilt * np.sin(about)], axis=1)
+        place = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth)], axis=1)
+        poses = np.zeros((count, 6))
+        poses[:, :2] = np.trunc(place / ROUND) * ROUND + 0.0
+        poses[:, 2] = rng.choice(levels, count)
+        poses[:, 3:5] = np.trunc(lean / ROUND_ANGLE + 1e-9 * np.sign(lean)) * ROUND_ANGLE + 0.0
+        if batch == 0:
+            poses[: len(levels)] = np.outer(levels, np.arange(6) == 2)[:count]
+        drawn += list(poses[reachable(machine, poses, 0.0)])
+        if len(drawn) >= count:
+            break
+    return np.array(drawn[:count]).reshape(-1, 6)
 
-    Parameters
-    ----------
-    pose
-        (m, 6) m and rad.
-    names
-        (m,) directions, keys of `VECTORS`.
-    force, extension, setup, time
-        (m,) N, m, names, s.
-    loop
-        (m,) names of loops; None: of the tip.
+
+def axis_levels(machine: Hexapod) -> tuple[float, ...]:
+    """Five heights in m, from the lowest to the highest that the tip reaches on the machine's axis, its base frame's Z.
+
+    They begin a tenth of the way from each end.
     """
-    m = len(pose)
-    empty, nothing = np.full(m, ""), np.full(m, np.nan)
-    missing = {"sd_N_per_mm", "clamp", "repeat", "point", "loop", "temperature_C"}
-    missing |= {"time_min"} if np.isnan(time).any() else set()
-    missing |= set() if (setup != "").any() else {"setup"}
-    return Readings(
-        position=pose[:, :3],
-        angles=pose[:, 3:],
-        direction=np.array([VECTORS[str(name)] for name in names]).reshape(m, 3),
-        stiffness=nothing,
-        force=force.astype(float),
-        sd=nothing,
-        tool_extension=extension.astype(float),
-        time=time,
-        temperature=nothing,
-        setup=setup,
-        loop=empty if loop is None else loop,
-        repeat=empty,
-        point=empty,
-        clamp=empty,
-        file=empty,
-        line=np.zeros(m, dtype=np.int64),
-        extra={},
-        missing=tuple(sorted(missing)),
-    )
+    low, high = machine.limits.workspace[:, 2]
+    if not np.isfinite(high - low):
+        middle, size = machine.limits.neutral_pose[2], float(np.ptp(machine.frame_joints[:, 2]))
+        size = max(size, 0.2 * float(np.abs(machine.frame_joints[:, :2]).max()))
+        low, high = middle - size, middle + size
+    tries = np.linspace(low, high, 200)
+    good = tries[reachable(machine, np.outer(tries, np.arange(6) == 2), 0.0)]
+    if not len(good):
+        raise InputError(
+            f"machine {machine.name} reaches no pose on its axis with a vertical spindle",
+            hint="give the heights of the plan",
+        )
+    ends = good[0] + 0.1 * np.ptp(good), good[-1] - 0.1 * np.ptp(good)
+    return tuple((np.round(np.linspace(*ends, 5) / (2.0 * ROUND)) * 2.0 * ROUND).tolist())
+
+
+def reachable(machine: Hexapod, pose: FloatArray, tool_extension: float, margin: float = MARGIN) -> BoolArray:
+    """(n,) whether the machine takes poses (n, 6) with such a tool, clear of its limits and of a strut law at zero."""
+    rotation = rotation_matrices(pose[:, 3:])
+    struts = solve_struts(machine, pose[:, :3], rotation, machine.reference_tool_length + tool_extension)
+    stiff = (machine.strut_law.stiffness(struts.lengths) > 0.0).all(axis=1)
+    return np.asarray(stiff & (reach(machine, pose[:, :3], struts, rotation).margin >= margin))
+
+
+def tilts(pose: FloatArray) -> FloatArray:
+    """(...) angle of the spindle from the vertical at poses (..., 6), rad."""
+    return np.asarray(np.arccos(np.clip(np.cos(pose[..., 3]) * np.cos(pose[..., 4]), -1.0, 1.0)))

@@ -8,14 +8,11 @@ is put in the place of the named effect, the strut law refitted, and those that 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import candidates_of
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.portrait.choice import ROUGH, Leading, fewest, summed
-from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.portrait.selection import Selection
 from toolpath_stiff.stiffness.term_effect import CATALOGUE_LINKS
 from toolpath_stiff.stiffness.terms import Term
@@ -23,11 +20,7 @@ from toolpath_stiff.stiffness.terms import Term
 # Odds beyond which what fits worse is not the same (strong evidence: Kass and Raftery 1995). A term that is one of many
 # constants or places must fit better than the plainest ones by as much as its prior weight is smaller.
 AS_WELL = float(np.log(20.0))
-
-
 ITSELF = 0.99  # correlation from which a term of the same link is the named effect itself
-
-
 MOST_TOLD, TOLD = 6, 0.03  # terms that are told, and the least share of one
 
 
@@ -63,23 +56,30 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
     if len(named.candidates) != 1:  # no single term stands for two effects
         return None
     selection = Selection(problem, base, noise, seed)
-    if not len(selection.dictionary):
+    if not selection.dictionary.terms:
         return None
     # Both under the scatter of the named fit, so that wild readings count alike.
     start = selection.start
     start = replace(start, fit=replace(start.fit, scatter=named.scatter))
-    entries = selection.finalists(selection.scores(start))
-    if not entries:
+    priors = selection.finalists(start)
+    if not priors:
         return None
-    terms = [entry.term for entry in entries]
+    terms, prior = list(priors), np.array(list(priors.values()))
+    columns = np.array([selection.ground.column(term) for term in terms])
     sizes = selection.together(start, terms)
     squares = float(start.fit.scatter.precision.squares(named.residual))
-    reached = -0.5 * (squares + float(named.law @ named.law) / LAW_PRIOR**2) - _freedom(problem, named)
-    prior = np.array([entry.log_prior for entry in entries])
+    # Less what it gains by its further sizes (Schwarz 1978) and by a choice, which a term has not.
+    data = problem.predictor.data
+    choices = len(candidates_of(named.candidates[0].effect, data))
+    freedom = 0.5 * (len(named.free) - 1) * float(np.log(len(data))) + float(np.log(max(choices, 1)))
+    reached = -0.5 * (squares + float(named.law @ named.law) / LAW_PRIOR**2) - freedom
     plainest = float(selection.dictionary.log_prior.max())
     same = (sizes.posterior + prior - plainest >= reached - AS_WELL) & (np.abs(sizes.size[:, -1]) > 0.0)
+    # A term is the named effect itself where it does what that does, in its own link.
     change = np.exp(named.residual - problem.observed) - problem.predictor.strut_part(named.law) - problem.rest
-    same &= ~_itself(selection.ground, terms, named, change)
+    alike = columns @ change > ITSELF * np.linalg.norm(columns, axis=1) * np.linalg.norm(change)
+    link = named.candidates[0].effect.link
+    same &= ~(alike & np.array([CATALOGUE_LINKS.get(term.link, term.link) == link for term in terms]))
     if not same.any():
         return None
     rows = np.flatnonzero(same)
@@ -87,36 +87,11 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
     weights = np.exp(logs - logs.max())
     order = np.argsort(-weights, kind="stable")
     shares = weights[order] / weights.sum()
-    sized = [terms[i].sized(_size(selection, terms[i], float(sizes.size[i, -1]))) for i in rows[order].tolist()]
-    leading = [(term, share, True) for term, share in zip(sized, shares.tolist(), strict=True)]
+    size = sizes.size[:, -1] / np.sqrt(np.mean((columns / selection.compliance) ** 2, axis=1))
+    ranked = zip(rows[order].tolist(), shares.tolist(), strict=True)
+    leading = [(terms[i].sized(float(size[i])), share, True) for i, share in ranked]
     links, variables = (fewest(summed(leading, of)) for of in (lambda term: term.link, lambda term: term.variable))
     return Alike(_told(leading), links, variables)
-
-
-def _freedom(problem: Problem, named: Fit) -> float:
-    """Log likelihood that an effect gains by its further sizes (Schwarz 1978) and by a choice, which a term has not."""
-    data = problem.predictor.data
-    choices = len(candidates_of(named.candidates[0].effect, data))
-    return 0.5 * (len(named.free) - 1) * float(np.log(len(data))) + float(np.log(max(choices, 1)))
-
-
-def _size(selection: Selection, term: Term, scaled: float) -> float:
-    """SI size of a term from its rms change of compliance."""
-    return scaled / float(np.sqrt(np.mean((selection.ground.column(term) / selection.compliance) ** 2)))
-
-
-def _itself(ground: Ground, terms: list[Term], named: Fit, change: FloatArray) -> NDArray[np.bool_]:
-    """(G,) whether a term is what the named effect does, in its own link; `change` (n,) m/N is what it adds."""
-    links = {candidate.effect.link for candidate in named.candidates}
-    in_link = [CATALOGUE_LINKS.get(term.link, term.link) in links for term in terms]
-    return np.array(
-        [mine and _correlation(ground.column(t), change) > ITSELF for t, mine in zip(terms, in_link, strict=True)]
-    )
-
-
-def _correlation(first: FloatArray, second: FloatArray) -> float:
-    norm = float(np.linalg.norm(first) * np.linalg.norm(second))
-    return float(first @ second) / norm if norm > 0.0 else 0.0
 
 
 def _told(leading: list[Leading]) -> tuple[tuple[Term, float], ...]:

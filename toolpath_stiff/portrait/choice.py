@@ -10,39 +10,24 @@ one, and all that could stand in its place.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.left_out import HeldOut, held_out
-from toolpath_stiff.portrait.dictionary import Entry, crossed
+from toolpath_stiff.inference.left_out import held_out
+from toolpath_stiff.portrait.dictionary import crossed
 from toolpath_stiff.portrait.selection import Description, Selection
 from toolpath_stiff.stiffness.terms import Term
 
 MOST_TERMS, POINTS_EACH = 3, 6  # and points for each term but the first
-
-
 LEADS = 0.01  # probability by chance below which the first term is taken for something
-
-
 BETTER = 0.98  # share of the rms at left-out points to which a further term must bring it
-
-
 BEGINNINGS = 3  # further links at which the search begins
-
-
 # By how much likelihoods are flattened: the true shape is none of the dictionary's, so that what fits a little better
 # is not that much likelier. Of a large effect the shape's error counts, which grows with the gain; assumed.
 ROUGH, SHAPE = 2.5, 0.0015
-
-
 HELD = 0.90  # probability that a set of links or variables adds up to
-
-
 FAINT = 0.02  # share below which a description, or a term as the leading one of it, is left out of the sums
-
-
 Leading = tuple[Term, float, bool]  # may be the leading term; its probability; whether it was tried in the chosen one
 
 
@@ -60,110 +45,72 @@ def fewest(summed: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]
     return tuple(summed[:count])
 
 
-@dataclass(frozen=True)
-class Chosen:
-    """What was chosen.
+def choose(selection: Selection) -> tuple[Description | None, list[Leading], float]:
+    """One to three terms, none where nothing stands out from chance; what may lead; how often chance does as much.
 
-    Attributes
-    ----------
-    description
-        The terms, the leading one first.
-    leading
-        What else may be the leading term, with posterior probabilities, the likeliest first.
-    held
-        Errors at left-out points.
+    The leading term is the first one. What else may be is told with posterior probabilities, the likeliest first.
     """
-
-    description: Description
-    leading: list[Leading]
-    held: HeldOut
-
-
-def choose(selection: Selection) -> tuple[Chosen | None, float]:
-    """One to three terms, none where nothing stands out from chance; and how often chance does as much."""
     start = selection.start
-    if not len(selection.dictionary):
-        return None, 1.0
-    gains = selection.scores(start)
-    chance, threshold = selection.chance(start, float(gains.max(initial=0.0)))
+    if not selection.dictionary.terms:
+        return None, [], 1.0
+    chance, threshold = selection.chance(start, float(selection.scores(start).max(initial=0.0)))
     begun = selection.grown(start)
     if chance > LEADS or begun is None:
-        return None, chance
+        return None, [], chance
     descriptions = [_completed(selection, begun, threshold)]
     if _searched(descriptions[0]) > 1:
         others = _other_beginnings(selection, start, descriptions[0].terms[0])
         descriptions += [_completed(selection, other, threshold) for other in others]
-    descriptions = _different(sorted(descriptions, key=lambda description: -_worth(description, threshold)))
-    descriptions = [_leading_first(selection, description) for description in descriptions]
-    leading = weigh(selection, descriptions, threshold)
-    return Chosen(descriptions[0], leading, _held(selection, descriptions[0])), chance
+    # Less what chance would gain by further terms and second variables.
+    descriptions.sort(key=lambda whole: -(whole.posterior - 0.5 * threshold * (_searched(whole) - 1)))
+    descriptions = [_leading_first(selection, description) for description in _different(descriptions)]
+    return descriptions[0], weigh(selection, descriptions, threshold), chance
 
 
 def _completed(selection: Selection, begun: Description, threshold: float) -> Description:
-    """With further terms as long as they join."""
-    points = len(set(selection.problem.predictor.data.point.tolist()))
-    description = _multiplied(selection, begun, 0, threshold)
-    while len(description.terms) < min(MOST_TERMS, points // POINTS_EACH):
-        more = _one_more(selection, description, threshold)
-        if more is None:
+    """With a second variable of its term, and further terms as long as they join."""
+    points = selection.problem.predictor.data.point
+
+    def helps(more: Description | None, before: Description) -> bool:
+        """Whether it does more than chance, and at left-out points too."""
+        if more is None or 2.0 * (more.posterior - before.posterior) <= threshold:
+            return False
+        return held_out(more.fit, points).rms <= BETTER * held_out(before.fit, points).rms
+
+    description = begun
+    if begun.terms[0].times is None:
+        more = selection.multiplied(selection.without(begun, 0), begun, 0)
+        description = more if more is not None and helps(more, begun) else begun
+    while len(description.terms) < min(MOST_TERMS, len(np.unique(points)) // POINTS_EACH):
+        more = selection.grown(description) if selection.scores(description).max() > threshold else None
+        if more is None or 2.0 * (more.posterior - description.posterior) <= threshold:
+            break
+        # The first term once more the best beside the others: it was chosen without them.
+        again = selection.grown(selection.without(more, 0))
+        more = again if again is not None and again.posterior > more.posterior else more
+        if not helps(more, description):
             break
         description = more
     return description
 
 
-def _one_more(selection: Selection, before: Description, threshold: float) -> Description | None:
-    """With a further term, where it does more than chance and helps at left-out points."""
-    if selection.scores(before).max() <= threshold:
-        return None
-    more = selection.grown(before)
-    if more is None or 2.0 * (more.posterior - before.posterior) <= threshold:
-        return None
-    more = _swapped(selection, more)
-    return more if _held(selection, more).rms <= BETTER * _held(selection, before).rms else None
-
-
-def _multiplied(selection: Selection, description: Description, k: int, threshold: float) -> Description:
-    """The k-th term times a shape of a second variable, under what is asked of a further term."""
-    if description.terms[k].times is not None:
-        return description
-    before = selection.without(description, k)
-    more = selection.multiplied(before, description, k)
-    if more is None or 2.0 * (more.posterior - description.posterior) <= threshold:
-        return description
-    return more if _held(selection, more).rms <= BETTER * _held(selection, description).rms else description
-
-
-def _swapped(selection: Selection, description: Description) -> Description:
-    """The first term once more the best beside the others: it was chosen without them."""
-    again = selection.grown(selection.without(description, 0))
-    return again if again is not None and again.posterior > description.posterior else description
-
-
 def _other_beginnings(selection: Selection, start: Description, first: Term) -> list[Description]:
     """Single terms of other links than that of `first` that promise most together with a further term."""
-    entries = selection.finalists(selection.scores(start))
-    posterior = selection.together(start, [entry.term for entry in entries]).posterior
+    terms = list(selection.finalists(start))
+    posterior = selection.together(start, terms).posterior
     seen: set[tuple[str, str]] = set()
-    outlook: list[tuple[float, Entry, Description]] = []
-    for i in np.argsort(-posterior, kind="stable").tolist():
-        entry = entries[i]
-        kinds = {("link", entry.local.link), ("variable", entry.variable)}
-        if entry.local.link == first.link or kinds <= seen:
+    outlook: list[tuple[float, Description]] = []
+    for term in (terms[i] for i in np.argsort(-posterior, kind="stable").tolist()):
+        kinds = {("link", term.link), ("variable", term.variable)}
+        if term.link == first.link or kinds <= seen:
             continue
         seen |= kinds
-        begun = selection.extended(start, entry.term)
-        gain = float(selection.scores(begun).max(initial=0.0))
-        outlook.append((begun.posterior + 0.5 * gain, entry, begun))
-    outlook.sort(key=lambda prospect: -prospect[0])
+        begun = selection.extended(start, term)
+        outlook.append((begun.posterior + 0.5 * float(selection.scores(begun).max(initial=0.0)), begun))
     links: dict[str, Description] = {}
-    for _, entry, begun in outlook:
-        links.setdefault(entry.local.link, begun)
+    for _, begun in sorted(outlook, key=lambda prospect: -prospect[0]):
+        links.setdefault(begun.terms[0].link, begun)
     return [selection.settled(start, begun) for begun in list(links.values())[:BEGINNINGS]]
-
-
-def _worth(description: Description, threshold: float) -> float:
-    """Log posterior less what chance would gain by further terms and second variables."""
-    return description.posterior - 0.5 * threshold * (_searched(description) - 1)
 
 
 def _searched(description: Description) -> int:
@@ -190,24 +137,17 @@ def _leading_first(selection: Selection, description: Description) -> Descriptio
     """Terms by what their absence would cost."""
     if len(description.terms) < 2:
         return description
-    return selection.only(description, np.argsort(-_costs(selection, description), kind="stable").tolist())
-
-
-def _held(selection: Selection, description: Description) -> HeldOut:
-    return held_out(description.fit, selection.problem.predictor.data.point)
-
-
-def temper(selection: Selection, description: Description, gain: float) -> float:
-    """By how much less a likelihood is to be trusted where shapes are rough, for a gain in log likelihood."""
-    squares = float(description.fit.scatter.precision.squares(description.fit.residual))
-    left = squares / max(len(selection.compliance) - 2 - len(description.terms), 1)
-    return ROUGH * max(left, 1.0) + SHAPE * max(gain, 0.0)
+    order = np.argsort(-_costs(selection, description), kind="stable").tolist()
+    return selection.refitted(description, [description.terms[k] for k in order])
 
 
 def weigh(selection: Selection, descriptions: Sequence[Description], threshold: float) -> list[Leading]:
     """What may be the leading term, over descriptions, the chosen one first; with posterior probabilities."""
     costs = [_costs(selection, description) for description in descriptions]
-    flat = temper(selection, descriptions[0], float(costs[0].max()))
+    # By how much less a likelihood is to be trusted where shapes are rough, for a gain in log likelihood.
+    fit, free = descriptions[0].fit, len(selection.compliance) - 2 - len(descriptions[0].terms)
+    left = float(fit.scatter.precision.squares(fit.residual)) / max(free, 1)
+    flat = ROUGH * max(left, 1.0) + SHAPE * max(float(costs[0].max()), 0.0)
     worths = np.array([whole.posterior / flat - 0.5 * threshold * _searched(whole) for whole in descriptions])
     leading: list[tuple[Term, float, bool]] = []
     for number, (description, cost) in enumerate(zip(descriptions, costs, strict=True)):
@@ -229,9 +169,7 @@ def weigh(selection: Selection, descriptions: Sequence[Description], threshold: 
 def _in_place(selection: Selection, description: Description, k: int, flat: float) -> tuple[list[Term], FloatArray]:
     """Terms in the place of the k-th one, beside the others, with their flattened log posterior."""
     others = selection.scattered(selection.without(description, k), description)
-    entries = selection.finalists(selection.scores(others)) + crossed(description.terms[k], selection.ground)
-    entries = list({entry.term: entry for entry in entries}.values())
-    sizes = selection.together(others, [entry.term for entry in entries])
-    posterior = sizes.posterior + description.fit.scatter.log_price
-    logs = posterior / flat + np.array([entry.log_prior for entry in entries])
-    return [entry.term for entry in entries], np.where(np.abs(sizes.size[:, -1]) > 0.0, logs, -np.inf)
+    priors = selection.finalists(others) | crossed(description.terms[k], selection.ground)
+    sizes = selection.together(others, list(priors))
+    logs = (sizes.posterior + description.fit.scatter.log_price) / flat + np.array(list(priors.values()))
+    return list(priors), np.where(np.abs(sizes.size[:, -1]) > 0.0, logs, -np.inf)

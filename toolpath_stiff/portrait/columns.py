@@ -30,23 +30,11 @@ from toolpath_stiff.stiffness.terms import (
 )
 
 Shape = tuple[str, Constants]  # and its constants
-
-
 Shapes = tuple[tuple[Shape, ...], FloatArray]  # shape and constants; (s, n) or (s, n, 6) values
-
-
 BUMPS, MOST_EDGES = 5, 5
-
-
 SHORTEST_PITCH = 8e-3  # m, period in a strut's length: screws of mills have leads of 5 to 40 mm
-
-
 MOST_TURNS = 5  # of a wave over a place: clamps and grooves of a table
-
-
 TURNED = 0.1  # rms change of stiffness at which a resistance to turning is looked for: it is not linear in its size
-
-
 PHASES = 3  # of half a turn; the other half is the other sign's
 
 
@@ -74,11 +62,10 @@ def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "")
         shapes += [("slope", (("power", power), ("reference", reference))) for power in (-1.0, -1.0 / 3.0)]
         held = [low + share * (high - low) for share in (0.05, 0.15, 0.3)] if many > 2 else [0.5 * low, 0.9 * low]
         shapes += [("threshold", (("beyond", force),)) for force in held]
-        play = held if variable == "strut force" and not signed else []
-        shapes += [("threshold", (("within", force),)) for force in play]
+        if variable == "strut force" and not signed:
+            shapes += [("threshold", (("within", force),)) for force in held]
     # Straight lines over the range, and from its middle on.
-    bent = [low, high] if signed else [high, low]
-    bent = bent if many > 4 else []
+    bent = ([low, high] if signed else [high, low]) if many > 4 else []
     if signed:
         shapes.append(("slope", (("start", middle), ("end", high))))
         shapes += [("threshold", (("from", middle), ("end", end))) for end in bent]
@@ -88,9 +75,9 @@ def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "")
     if many == 2:
         return shapes
     # Squares about the middle of the range, and of a place about the machine's axis.
-    centres = [middle, *([0.0] if low < 0.0 < high and place else [])]
-    shapes += [("square", (("centre", c), ("reach", max(high - c, c - low)))) for c in centres]
-    shapes += [("square", (("centre", 0.0), ("reach", high)))] if column in SWINGS else []
+    squares = [(c, max(high - c, c - low)) for c in [middle, *([0.0] if low < 0.0 < high and place else [])]]
+    squares += [(0.0, high)] if column in SWINGS else []
+    shapes += [("square", (("centre", centre), ("reach", reach))) for centre, reach in squares]
     edges = [0.0] if column in AXES else _edges(different, MOST_EDGES if place else 3)
     shapes += [("threshold", (("edge", edge), ("side", side))) for edge in edges for side in sides]
     if place and many > 4:
@@ -138,7 +125,7 @@ def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
         moves["crest"] = constants["crest"] + finer * constants["period"] / (2 * PHASES) * about
     begins = "from" if "from" in constants else "start"
     if "end" in constants:  # where it begins; its end is a matter of scale
-        if begins == "start" and len(term.signs) > 1:
+        if begins == "start" and term.signed:
             return []
         moves = {begins: np.clip(moves[begins], low - step, high + step)}
     near = []
@@ -202,7 +189,6 @@ class Ground:
 
     def _share(self, term: Term) -> FloatArray:
         path = self.path
-        plain = replace(term, variable="constant", shape="offset", times=None)
         if term.action in (*IN_SERIES, "turning"):
             each = self.forces[:, :6] ** 2
             if term.action == "turning":
@@ -223,7 +209,7 @@ class Ground:
             index = 3 * (strut + 6 * (term.column == "platform")) + axis
             return np.asarray(-self.compliance * self.predictor.joint_columns[:, index])
         if term.action in ("reading factor", "reading shift"):
-            share = reading_share(plain, path)
+            share = reading_share(replace(term, variable="constant", shape="offset", times=None), path)
             return np.asarray(share * (self.compliance if term.action == "reading factor" else 1.0 / self.data.force))
         rows = carriers(term, path)
         return np.asarray((np.einsum("nkj,nj->nk", rows, self.forces) ** 2).sum(axis=1))

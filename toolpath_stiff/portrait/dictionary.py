@@ -21,20 +21,10 @@ from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Term
 
 WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
-
-
 ONCE = ("constant", "direction")  # variables whose every place stands in the dictionary as it is
-
-
 ALL_STRUTS, ALL_VERTICES = (None, 1, 2, 3, 4, 5, 6), (None, 1, 2, 3)
-
-
 ALONE = ("coupling", "joint offset")  # actions that depend on nothing
-
-
 SIDE = 0.2  # prior weight of what a link could do by a way round: a frame does not feel where the tip is
-
-
 NOTHING = 1e-4  # rms change of stiffness by the largest size below which a term does nothing to these readings
 
 
@@ -71,8 +61,7 @@ class Local:
 
 def locals_of(extra: Iterable[str]) -> list[Local]:
     """Every link with its places and directions; `extra`: names of further columns, which instruments may feel."""
-    further = tuple(extra)
-    whole = (*WHOLE, *further)
+    whole = (*WHOLE, *extra)
     base, turning = ("X", "Y", "Z", "horizontal", "all"), ("X", "Y", "all", "tangential")
     return [
         Local("instrument", "reading factor", "reading", None, (*PLACE, *whole[1:], "tilt")),
@@ -97,65 +86,46 @@ def locals_of(extra: Iterable[str]) -> list[Local]:
     ]
 
 
-def _of_head(link: str, whole: tuple[str, ...]) -> Iterator[Local]:
+def _of_head(link: str, whole: tuple[str, ...]) -> list[Local]:
     """Tool or platform: gives across and along its axis, and tips about the middle of the joints."""
-    for direction in ("radial", "axial", "X", "Y", "all"):
-        yield Local(link, "give", direction, None, (*whole, "tilt"))
-    for direction in ("radial", "X", "Y"):
-        yield Local(link, "tilting", direction, None, ("constant", "load", "tilt"))
+    return [
+        *(Local(link, "give", direction, None, (*whole, "tilt")) for direction in ("radial", "axial", "X", "Y", "all")),
+        *(Local(link, "tilting", direction, None, ("constant", "load", "tilt")) for direction in ("radial", "X", "Y")),
+    ]
 
 
 def _of_vertices(link: str, directions: Iterable[str], variables: tuple[str, ...]) -> Iterator[Local]:
     """The vertices of frame or platform, all together or one alone."""
-    for direction in directions:
-        for where in ALL_VERTICES:
-            variables_here = ("constant", "load") if where else variables
-            yield Local(link, "vertex", direction, where, variables_here, crossed=variables if where else ())
+    for direction, where in product(directions, ALL_VERTICES):
+        if where is None:
+            yield Local(link, "vertex", direction, where, variables)
+        else:
+            yield Local(link, "vertex", direction, where, ("constant", "load"), crossed=variables)
 
 
 def _of_joints(whole: tuple[str, ...]) -> Iterator[Local]:
     """Joints: they give along their strut or along a pin of their cross, resist turning, or stand off their place."""
+    forces = ("strut force", "force sign")
     for where in ALL_STRUTS:
-        forces = ("strut force", "force sign")
         variables = ("constant", "load", "temperature", *forces) if where else (*whole, *forces, "tilt")
         yield Local("joints", "strut", "along the struts", where, variables, crossed=(*whole, *forces, "tilt"))
         turning = ("constant",) if where else ("constant", "load", "tilt")
         yield Local("joints", "turning", "all", where, turning, crossed=(*whole, "tilt"))
         for action, direction in product(PINS, ("radial", "tangential")):
             yield Local("joints", action, direction, where, ("constant",), crossed=variables)
-    for axis in "XYZ":
-        for where in ALL_STRUTS[1:]:
-            for end in ("frame", "platform"):
-                yield Local("joints", "joint offset", axis, where, ("constant",), column=end)
+    for axis, where, end in product("XYZ", ALL_STRUTS[1:], ("frame", "platform")):
+        yield Local("joints", "joint offset", axis, where, ("constant",), column=end)
 
 
-def _of_struts(whole: tuple[str, ...]) -> Iterator[Local]:
+def _of_struts(whole: tuple[str, ...]) -> list[Local]:
     """Struts: their own share of the strut law, all together or one alone, and what couples two of them."""
-    variables = (*whole[1:], "strut length", "strut force", "force sign", *PLACE)
-    yield Local("struts", "strut factor", "along the struts", None, (*variables, "tilt"))
-    for first, second in combinations(range(1, 7), 2):
-        constants = (("first", float(first)), ("second", float(second)))
-        yield Local("struts", "coupling", "along the struts", None, ("constant",), constants=constants)
-    for where in ALL_STRUTS[1:]:
-        yield Local("one strut", "strut factor", "along the struts", where, ("constant", *variables))
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One term of the dictionary, not yet made: what it is, and its share of the prior."""
-
-    local: Local
-    variable: str
-    column: str
-    shape: str
-    constants: Constants
-    log_prior: float
-    times: Term | None = None
-
-    @property
-    def term(self) -> Term:
-        """The term."""
-        return self.local.term(self.variable, self.shape, self.constants, self.column, self.times)
+    variables, along = (*whole[1:], "strut length", "strut force", "force sign", *PLACE), "along the struts"
+    pairs = [(("first", float(first)), ("second", float(second))) for first, second in combinations(range(1, 7), 2)]
+    return [
+        Local("struts", "strut factor", along, None, (*variables, "tilt")),
+        *(Local("struts", "coupling", along, None, ("constant",), constants=pair) for pair in pairs),
+        *(Local("one strut", "strut factor", along, where, ("constant", *variables)) for where in ALL_STRUTS[1:]),
+    ]
 
 
 @dataclass(frozen=True)
@@ -164,60 +134,47 @@ class Dictionary:
 
     Attributes
     ----------
-    entries
-        The terms.
+    terms
+        Without sizes.
     columns
         (N, n) change of compliance over the compliance, scaled to an rms of 1.
-    scale
-        (N,) rms of that change per SI unit of size.
     log_prior
         (N,) weights.
     signed
         (N,) whether the size may go to both sides.
     """
 
-    entries: tuple[Entry, ...]
+    terms: tuple[Term, ...]
     columns: FloatArray
-    scale: FloatArray
     log_prior: FloatArray
     signed: NDArray[np.bool_]
-
-    def __len__(self) -> int:
-        return len(self.entries)
 
 
 def dictionary_of(ground: Ground) -> Dictionary:
     """Every term that does something to these readings."""
-    entries: list[Entry] = []
-    blocks: list[FloatArray] = []
-    limits: list[float] = []
-    signs: list[bool] = []
+    terms, blocks, logs = list[Term](), list[FloatArray](), list[float]()
     for local, priors in place_priors(ground):
         plain = local.term("constant", "offset", ())
-        share, signed = ground.share(plain), len(plain.signs) > 1
-        limit = max(abs(bound) for bound in plain.bounds) * plain.si
+        share = ground.share(plain)
         for variable in local.variables:
             columns = columns_of(variable, ground, local.link == "joints")
             for column in columns:
-                named, values = ground.shapes(variable, column, signed, local.where)
+                named, values = ground.shapes(variable, column, plain.signed, local.where)
                 if not named:
                     continue
                 blocks.append(ground.columns(plain, share, values))
+                terms += [local.term(variable, shape, constants, column) for shape, constants in named]
                 kinds = Counter(shape for shape, _ in named)
                 log = priors[variable] - float(np.log(len(kinds) * len(columns)))
-                entries += [
-                    Entry(local, variable, column, shape, constants, log - float(np.log(kinds[shape])))
-                    for shape, constants in named
-                ]
-                limits += [limit] * len(named)
-                signs += [signed] * len(named)
+                logs += [log - float(np.log(kinds[shape])) for shape, _ in named]
     relative = np.concatenate(blocks) / ground.compliance
     scale = np.sqrt((relative**2).mean(axis=1))
+    limits = np.array([max(map(abs, term.bounds)) * term.si for term in terms])
     # A term that changes every reading alike is the strut law's affair.
-    kept = (scale * np.array(limits) > NOTHING) & (relative.std(axis=1) > 1e-6 * scale)
-    chosen = [entries[i] for i in np.flatnonzero(kept).tolist()]
-    log_prior = np.array([entry.log_prior for entry in chosen])
-    return Dictionary(tuple(chosen), relative[kept] / scale[kept, None], scale[kept], log_prior, np.array(signs)[kept])
+    kept = np.flatnonzero((scale * limits > NOTHING) & (relative.std(axis=1) > 1e-6 * scale))
+    chosen = tuple(terms[i] for i in kept.tolist())
+    signed = np.array([term.signed for term in chosen], dtype=bool)
+    return Dictionary(chosen, relative[kept] / scale[kept, None], np.array(logs)[kept], signed)
 
 
 def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:
@@ -249,22 +206,23 @@ def place_priors(ground: Ground) -> list[tuple[Local, dict[str, float]]]:
     return [(local, {name: prior(local, name) for name in (*local.variables, *local.crossed)}) for local in every]
 
 
-def crossed(term: Term, ground: Ground) -> list[Entry]:
-    """The same variable and shape, constants included, at every other link, place and direction that may feel it."""
+def crossed(term: Term, ground: Ground) -> dict[Term, float]:
+    """The same variable and shape, constants included, at every other link, place and direction that may feel it.
+
+    With the log prior weight of each.
+    """
     if term.variable in ONCE:
-        return []
-    entries: list[Entry] = []
+        return {}
+    felt = (term,) if term.times is None else (term, term.times)
+    swings = any(part.column in SWINGS for part in felt)
+    terms: dict[Term, float] = {}
     for local, priors in place_priors(ground):
-        felt = (term,) if term.times is None else (term, term.times)
-        swings = any(part.column in SWINGS for part in felt) and local.link != "joints"
-        if swings or local.action in ALONE or not all(part.variable in priors for part in felt):
-            continue
-        signed, log = len(local.term("constant", "offset", ()).signs) > 1, priors[term.variable]
-        entries += [
-            Entry(local, term.variable, term.column, shape, constants, log, term.times)
-            for shape, constants in _translated(term, signed, ground)
-        ]
-    return entries
+        able = local.action not in ALONE and all(part.variable in priors for part in felt)
+        if able and not (swings and local.link != "joints"):
+            for shape, constants in _translated(term, local.term("constant", "offset", ()).signed, ground):
+                moved = local.term(term.variable, shape, constants, term.column, term.times)
+                terms[moved] = priors[term.variable]
+    return terms
 
 
 def products(term: Term, ground: Ground) -> list[Term]:
@@ -272,23 +230,22 @@ def products(term: Term, ground: Ground) -> list[Term]:
     if term.times is not None or term.action in ALONE:
         return []
     place = (term.link, term.action, term.direction, term.where)
-    every = locals_of(ground.data.extra)
-    (local,) = (other for other in every if (other.link, other.action, other.direction, other.where) == place)
-    terms = []
+    every = {(local.link, local.action, local.direction, local.where): local for local in locals_of(ground.data.extra)}
+    local, terms = every[place], list[Term]()
     for variable in dict.fromkeys((*local.variables, *local.crossed)):
         if variable in (*ONCE, term.variable):
             continue
         for column in columns_of(variable, ground, local.link == "joints"):
-            named = ground.shapes(variable, column, False, local.where)[0]
-            kinds = [(shape, constants) for shape, constants in named if shape != "periodic"]
-            terms += [term.with_second(variable, shape, constants, column) for shape, constants in kinds]
+            for shape, constants in ground.shapes(variable, column, False, local.where)[0]:
+                if shape != "periodic":
+                    terms.append(term.with_second(variable, shape, constants, column))
     return terms
 
 
 def _translated(term: Term, signed: bool, ground: Ground) -> list[tuple[str, Constants]]:
     """A shape for links that give only, or whose stiffness may change to both sides, as it says the same there."""
     constants = term.constants
-    if (len(term.signs) > 1) == signed or "power" in constants:
+    if term.signed == signed or "power" in constants:
         return [(term.shape, term.at)]
     if term.shape == "slope" and signed:  # it begins where it is 0
         return [("threshold", (("from", constants["start"]), ("end", constants["end"])))]

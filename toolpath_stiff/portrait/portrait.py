@@ -16,22 +16,15 @@ from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.gates import simulate
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.portrait.choice import Chosen, choose, fewest, summed
+from toolpath_stiff.portrait.choice import Leading, choose, fewest, summed
 from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.portrait.selection import Description, Selection
 from toolpath_stiff.stiffness.terms import Term
 
 MOST_LINKS, MOST_VARIABLES, MOST_ALIKE = 4, 3, 4
-
-
 SHOWN = 0.03  # probability from which another term is told
-
-
 FLOOR_DRAWS = 40
-
-
-MOST_SEARCHED = 1000  # readings on which the dictionary is searched: more tell no more of which term to fit
+MOST_READINGS = 1000  # of more no portrait is drawn: every term of the dictionary is searched on every reading
 
 
 @dataclass(frozen=True)
@@ -96,30 +89,27 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portr
     seed
         Of the simulated campaigns.
     """
+    if len(base.residual) > MOST_READINGS:
+        return Portrait(look_elsewhere=np.nan, before=base.residual, after=base.residual)
     selection = Selection(problem, base, noise, seed)
-    start = selection.start
-    if len(base.residual) > MOST_SEARCHED:
-        chosen, chance = _chosen_from_fewer(selection)
-    else:
-        chosen, chance = choose(selection)
-    points = problem.predictor.data.point
-    if chosen is None:
+    start, points = selection.start, problem.predictor.data.point
+    description, leads, chance = choose(selection)
+    if description is None:
         return Portrait(
             look_elsewhere=chance, error=float(start.fit.errors.mean()),
             held_out_rms=held_out(start.fit, points).rms, noise_floor=noise_floor(selection, start),
             before=base.residual, after=start.fit.residual,
         )  # fmt: skip
-    description = chosen.description
-    leading = description.terms[0]
+    leading, links = description.terms[0], fewest(summed(leads, lambda term: term.link))
     values = selection.ground.values(leading.variable, leading.column)
     return Portrait(
         terms=tuple(_sized(selection.ground, description, k) for k in range(len(description.terms))),
-        links=_honest(summed(chosen.leading, lambda term: term.link), MOST_LINKS),
-        variables=_honest(summed(chosen.leading, lambda term: term.variable), MOST_VARIABLES, cut=True),
-        alike=_alike(selection, chosen),
+        links=links if len(links) <= MOST_LINKS else (),
+        variables=fewest(summed(leads, lambda term: term.variable))[:MOST_VARIABLES],
+        alike=_alike(selection, description, leads),
         explained=_explained(selection, start, description),
         error=float(description.fit.errors.mean()),
-        held_out_rms=chosen.held.rms,
+        held_out_rms=held_out(description.fit, points).rms,
         noise_floor=noise_floor(selection, description),
         look_elsewhere=chance,
         before=start.fit.residual,
@@ -129,46 +119,20 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portr
     )
 
 
-def _chosen_from_fewer(whole: Selection) -> tuple[Chosen | None, float]:
-    """The search on readings spread over the campaign, what it has chosen fitted to all."""
-    base, noise = whole.base, whole.noise
-    rows = np.unique(np.linspace(0, len(base.residual) - 1, MOST_SEARCHED).round().astype(np.int64))
-    full = whole.problem.predictor
-    predictor = Predictor(full.machine, full.data.select(rows), full.effect_files)
-    problem = Problem.of(predictor, noise.select(rows))
-    residual = base.residual[rows]
-    scatter = problem.scatter.with_wild(residual)
-    fewer = replace(base, residual=residual, jacobian=base.jacobian[rows], scatter=scatter)
-    chosen, chance = choose(Selection(problem, fewer, noise.select(rows), whole.seed))
-    if chosen is None:
-        return None, chance
-    description = whole.start
-    for term in chosen.description.terms:
-        description = whole.extended(description, term)
-    return replace(chosen, description=description, held=held_out(description.fit, full.data.point)), chance
-
-
 def _sized(ground: Ground, description: Description, k: int, probability: float | None = None) -> Sized:
-    term, deviation = description.terms[k], float(description.deviations[k])
+    term, scale = description.terms[k], float(description.scale[k])
     low, high = (bound * term.si for bound in term.bounds)
-    reach = defaults.NORMAL_95 * deviation
+    reach = defaults.NORMAL_95 * float(np.sqrt(max(description.fit.covariance[2 + k, 2 + k], 0.0))) / scale
     interval = max(term.size - reach, low), min(term.size + reach, high)
-    return Sized(term, interval, abs(term.size) * float(description.scale[k]), probability)
+    return Sized(term, interval, abs(term.size) * scale, probability)
 
 
-def _honest(summed: Sequence[tuple[str, float]], most: int, cut: bool = False) -> tuple[tuple[str, float], ...]:
-    """The fewest that hold most of the probability; where these are more than `most`, none, or the first if `cut`."""
-    names = fewest(summed)
-    return names[:most] if cut or len(names) <= most else ()
-
-
-def _alike(selection: Selection, chosen: Chosen) -> tuple[Sized, ...]:
+def _alike(selection: Selection, description: Description, leads: Sequence[Leading]) -> tuple[Sized, ...]:
     """Other terms in the place of the leading one, the best of each link, place, direction and variable."""
-    description = chosen.description
     others = selection.scattered(selection.without(description, 0), description)
     seen = {_kind(description.terms[0])}
     alike: list[Sized] = []
-    for term, weight, here in chosen.leading:
+    for term, weight, here in leads:
         if weight < SHOWN or len(alike) == MOST_ALIKE:
             break
         if not here or _kind(term) in seen:
@@ -199,9 +163,10 @@ def noise_floor(selection: Selection, description: Description) -> float:
     weighted = precision.times(jacobian.T)
     inverse = np.linalg.pinv(weighted @ jacobian + law_prior(len(weighted)), hermitian=True)
     points = selection.problem.predictor.data.point
-    squares = []
-    for draw in draws:
+
+    def left_out(draw: FloatArray) -> FloatArray:
         moved = inverse @ (weighted @ draw)
         fit = replace(description.fit, residual=draw - jacobian @ moved, law=moved[:2])
-        squares.append(float(np.mean(held_out(fit, points).residual ** 2)))
-    return float(np.sqrt(np.mean(squares)))
+        return held_out(fit, points).residual
+
+    return float(np.sqrt(np.mean([np.mean(left_out(draw) ** 2) for draw in draws])))

@@ -5,7 +5,6 @@ best are fitted with the compliances added up, c = c_struts(law) + rest + sum si
 series.
 """
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,30 +18,16 @@ from toolpath_stiff.inference.gates import set_wild_aside, simulate
 from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.noise import Noise, Scatter
 from toolpath_stiff.portrait.columns import Ground, shapes_near
-from toolpath_stiff.portrait.dictionary import Dictionary, Entry, crossed, dictionary_of, products
+from toolpath_stiff.portrait.dictionary import crossed, dictionary_of, products
 from toolpath_stiff.stiffness.terms import Term
 
 DRAWS = 200  # simulated campaigns
-
-
 JOINS = 0.02  # probability by chance below which a further term is taken for something
-
-
 TIE = 0.5  # of log likelihood: so near, the place with the larger prior is taken
-
-
-FINALISTS, EACH = 40, 1  # terms that are fitted in full: the best of all, and of every link and variable
-
-
+FINALISTS = 40  # terms that are fitted in full: the best of all; and the best of every link and variable
 STEPS, SETTLED = 5, 0.02  # Gauss-Newton; standard deviations
-
-
 NOT_LINEAR, AT_SIZE = ("turning",), 3  # actions that are not linear in their size, and fits at the size of the last
-
-
 FINER = (1.0, 0.4)  # shares of a grid's spacing, for constants about those of a term
-
-
 ROUNDS = 2  # searches for wild readings
 
 
@@ -86,11 +71,6 @@ class Description:
     fit: Fit
     posterior: float
 
-    @cached_property
-    def deviations(self) -> FloatArray:
-        """(p,) standard deviations of the sizes, SI."""
-        return np.asarray(np.sqrt(np.maximum(np.diag(self.fit.covariance)[2:], 0.0)) / self.scale)
-
 
 class Selection:
     """The search on one set of readings, beside a base fit.
@@ -106,8 +86,8 @@ class Selection:
     ----------
     compliance, rest
         (n,) m/N of the base fit; what of it the struts do not contribute.
-    ground
-        What columns are made from.
+    ground, dictionary
+        What columns are made from; all terms.
     """
 
     def __init__(self, problem: Problem, base: Fit, noise: Noise, seed: int) -> None:
@@ -115,11 +95,7 @@ class Selection:
         self.compliance = np.exp(base.residual - problem.observed)
         self.rest = self.compliance - problem.predictor.strut_part(base.law)
         self.ground = Ground(problem.predictor, self.compliance, base.law)
-
-    @cached_property
-    def dictionary(self) -> Dictionary:
-        """All terms."""
-        return dictionary_of(self.ground)
+        self.dictionary = dictionary_of(self.ground)
 
     @property
     def start(self) -> Description:
@@ -188,13 +164,13 @@ class Selection:
         )
         return Description(sized, columns, scale, fit, float(sizes.posterior[0]) + scatter.log_price)
 
-    def only(self, description: Description, rows: Sequence[int]) -> Description:
-        """Some terms of a description, in this order, refitted."""
-        return self.described([description.terms[k] for k in rows], description.fit.law, description.fit.scatter)
+    def refitted(self, before: Description, terms: Sequence[Term]) -> Description:
+        """A description with these terms, from where another one is."""
+        return self.described(terms, before.fit.law, before.fit.scatter)
 
-    def without(self, description: Description, k: int) -> Description:
+    def without(self, before: Description, k: int) -> Description:
         """A description less one of its terms, refitted."""
-        return self.only(description, [j for j in range(len(description.terms)) if j != k])
+        return self.refitted(before, before.terms[:k] + before.terms[k + 1 :])
 
     def scores(self, before: Description) -> FloatArray:
         """(N,) twice the gain in log likelihood of each term beside a description, linearised."""
@@ -220,22 +196,21 @@ class Selection:
         slope = -set_wild_aside(projected.times(residuals), projected)[0] @ columns.T
         weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
         root = inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
-        information = self._squares - ((columns @ (weighted.T @ root)) ** 2).sum(axis=1)
+        alone = self._squares
+        information = alone - ((columns @ (weighted.T @ root)) ** 2).sum(axis=1)
         allowed = self.dictionary.signed | (slope > 0.0)
-        seen = information > 1e-6 * self._squares
+        seen = information > 1e-6 * alone
         return np.asarray(np.where(allowed & seen, slope**2 / np.where(seen, information, 1.0), 0.0))
 
-    def finalists(self, gains: FloatArray) -> list[Entry]:
-        """The best of all terms, and of every link and variable."""
-        count: Counter[tuple[str, str]] = Counter()
-        chosen = []
+    def finalists(self, before: Description) -> dict[Term, float]:
+        """The best terms beside a description, and the best of every link and variable, with their log priors."""
+        chosen, kinds, gains = dict[Term, float](), set[tuple[str, str]](), self.scores(before)
         order = np.argsort(-gains, kind="stable")
         for rank, i in enumerate(order[gains[order] > 0.0].tolist()):
-            entry = self.dictionary.entries[i]
-            kind = (entry.local.link, entry.variable)
-            if rank < FINALISTS or count[kind] < EACH:
-                chosen.append(entry)
-                count[kind] += 1
+            term = self.dictionary.terms[i]
+            if rank < FINALISTS or (term.link, term.variable) not in kinds:
+                chosen[term] = float(self.dictionary.log_prior[i])
+                kinds.add((term.link, term.variable))
         return chosen
 
     def together(self, before: Description, terms: Sequence[Term]) -> Sizes:
@@ -248,27 +223,21 @@ class Selection:
 
         limits = zip(self.limits(before.terms, before.scale), self.limits(terms, scale), strict=True)
         low, high = (beside(shared, each) for shared, each in limits)
-        every = beside(before.columns, columns)
-        return self.fitted(every, low, high, before.fit.law, before.fit.scatter.precision)
+        return self.fitted(beside(before.columns, columns), low, high, before.fit.law, before.fit.scatter.precision)
 
     def grown(self, before: Description) -> Description | None:
         """A description with the best further term, its constants settled; None where none has a size."""
-        entries = self.finalists(self.scores(before))
-        if not entries:
+        terms = list(self.finalists(before))
+        if not terms:
             return None
-        sizes = self.together(before, [entry.term for entry in entries])
-        # Under the law of few places for many constants, the likelier of two that fit alike.
-        best = entries[int(np.argmax(sizes.posterior))].term
-        return self._best_place(before, self.settled(before, self.extended(before, best)))
-
-    def _best_place(self, before: Description, grown: Description) -> Description:
-        """The last term's variable and shape where they fit best."""
-        entries = crossed(grown.terms[-1], self.ground)
-        if len(entries) < 2:
+        best = terms[int(np.argmax(self.together(before, terms).posterior))]
+        grown = self.settled(before, self.extended(before, best))
+        # The same variable and shape where they fit best.
+        places = crossed(grown.terms[-1], self.ground)
+        if len(places) < 2:
             return grown
-        sizes = self.together(self.scattered(before, grown), [entry.term for entry in entries])
-        logs = sizes.posterior + np.array([entry.log_prior for entry in entries])
-        best = entries[int(np.argmax(logs))].term
+        sizes = self.together(self.scattered(before, grown), list(places))
+        best = list(places)[int(np.argmax(sizes.posterior + np.array(list(places.values()))))]
         if best == grown.terms[-1]:
             return grown
         better = self.extended(before, best)
@@ -280,9 +249,9 @@ class Selection:
 
     def extended(self, before: Description, term: Term) -> Description:
         """A description with a term more, all refitted."""
-        grown = self.described((*before.terms, term), before.fit.law, before.fit.scatter)
+        grown = self.refitted(before, (*before.terms, term))
         for _ in range(AT_SIZE if any(sized.action in NOT_LINEAR for sized in grown.terms) else 0):
-            grown = self.described(grown.terms, grown.fit.law, grown.fit.scatter)
+            grown = self.refitted(grown, grown.terms)
         return grown
 
     def _scaled(self, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray]:
@@ -297,34 +266,33 @@ class Selection:
         for finer in FINER:
             near = shapes_near(grown.terms[-1], self.ground, finer)
             if not near:
-                return grown
-            grown = self._likelier(before, self.scattered(before, grown), near, grown)[0]
+                break
+            grown = self._likeliest(before, grown, near)
         return grown
 
     def multiplied(self, before: Description, whole: Description, k: int) -> Description | None:
         """The k-th term of a whole, which `before` lacks, times the best shape of a second variable; None without."""
-        others = self.scattered(before, whole)
         terms = products(whole.terms[k], self.ground)
         if not terms:
             return None
-        best, _ = self._likelier(before, others, terms)
-        second = best.terms[-1].times
-        assert second is not None
+        others = self.scattered(before, whole)
+        best = self.extended(before, terms[int(np.argmax(self.together(others, terms).posterior))])
         for finer in FINER:
-            near = shapes_near(second, self.ground, finer)
+            term = best.terms[-1]
+            assert term.times is not None
+            near = shapes_near(term.times, self.ground, finer)
             if not near:
-                return best
-            best, i = self._likelier(before, others, [replace(best.terms[-1], times=term) for term in near], best)
-            second = second if i is None else near[i]
+                break
+            best = self._likeliest(before, best, [replace(term, times=factor) for factor in near], others)
         return best
 
-    def _likelier(
-        self, before: Description, others: Description, terms: Sequence[Term], known: Description | None = None
-    ) -> tuple[Description, int | None]:
-        """The likeliest of some further terms, refitted, and which it is; None where `known` is likelier."""
-        i = int(np.argmax(self.together(others, terms).posterior))
-        better = self.extended(before, terms[i])
-        return (better, i) if known is None or better.posterior > known.posterior else (known, None)
+    def _likeliest(
+        self, before: Description, grown: Description, terms: Sequence[Term], others: Description | None = None
+    ) -> Description:
+        """The likeliest of some further terms, refitted, or what has grown, if that is likelier."""
+        beside = self.scattered(before, grown) if others is None else others
+        better = self.extended(before, terms[int(np.argmax(self.together(beside, terms).posterior))])
+        return better if better.posterior > grown.posterior else grown
 
 
 def _bounded_step(

@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from toolpath_stiff.documents import Document, json_number
 from toolpath_stiff.portrait.alike import Alike
-from toolpath_stiff.portrait.portrait import Portrait, Sized
+from toolpath_stiff.portrait.portrait import MOST_READINGS, Portrait, Sized
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.stiffness.terms import PINS, SWINGS, Term
 from toolpath_stiff.units import RAD_PER_DEG
@@ -23,29 +25,17 @@ SAID: dict[str, tuple[str, float, str]] = {
     "order": ("the order of the readings", 0.01, "% of the campaign"),
     "temperature": ("the temperature", 1.0, "deg C"),
 }
-
-
 GIVES = {
     "X": "along X", "Y": "along Y", "Z": "along Z", "horizontal": "sideways, alike along X and Y",
     "all": "alike in all directions", "radial": "radially",
     "tangential": "tangentially", "axial": "along the tool axis", "along the struts": "along the struts",
 }  # fmt: skip
-
-
 ROCKS = {
     "X": "rocks about Y", "Y": "rocks about X", "all": "rocks about X and Y", "tangential": "turns about Z",
 }  # fmt: skip
-
-
 OF_HEAD = {"X": "along the platform's X", "Y": "along the platform's Y", "radial": "across the tool axis"}
-
-
 PINNED = {"radial": "radially", "tangential": "tangentially"}
-
-
 TIPS = {"X": "tips about the platform's Y", "Y": "tips about the platform's X", "radial": "tips"}
-
-
 # Way of acting -> what gives way.
 CAUSES = {
     "reading factor": "deflections{along} are read too {large} by a share",
@@ -61,8 +51,6 @@ CAUSES = {
     "tilting": "the {link} {tips} under the load's moment",
     "give": "the {link} gives way {way}",
 }
-
-
 # Constant of a shape that is not in those after it, or "signed" of a straight line to both sides -> how it varies.
 COURSES = {
     "power": "{power}, the size given at {reference})",
@@ -75,14 +63,12 @@ COURSES = {
     "edge": " where {name} is {side} {edge}",
     "end": " where {name} is {side} {from}, in full at {end}",
 }
-
-
 MOST_SAID = 3  # terms in a sentence on what else would look the same; a document has more
 
 
 def term_words(term: Term) -> str:
     """What gives way and what it varies with: a clause, without its size."""
-    clause = f"{_cause(term)}{_with(term, len(term.signs) > 1)}"
+    clause = f"{_cause(term)}{_with(term, term.signed)}"
     if term.times is None:
         return clause
     return f"{clause}, and this {_with(term.times, signed=False).removeprefix(',').strip()}"
@@ -100,17 +86,16 @@ def _cause(term: Term) -> str:
         "column": term.column,
         "axis": direction,
         "large": "large" if more else "small",
-    }
-    words |= {"along": f" along {direction}" if direction in ("X", "Y", "Z") else "", "way": ways.get(direction, "")}
-    words |= {
+        "along": f" along {direction}" if direction in ("X", "Y", "Z") else "",
+        "way": ways.get(direction, ""),
         "of": f" of {strut}" if single else "",
         "rocks": ROCKS.get(direction, ""),
         "tips": TIPS.get(direction, ""),
+        "softer": f"{strut} {'is' if single else 'are'} {'softer' if more else 'stiffer'}",
+        "pin": f"{term.action.removesuffix(' pin')} {joint} of {strut} {give}",
+        "pinned": PINNED.get(direction, ""),
+        "vertex": f"{vertex} {give} way {GIVES.get(direction, '')}",
     }
-    words["softer"] = f"{strut} {'is' if single else 'are'} {'softer' if more else 'stiffer'}"
-    words["pin"] = f"{term.action.removesuffix(' pin')} {joint} of {strut} {give}"
-    words["pinned"] = PINNED.get(direction, "")
-    words["vertex"] = f"{vertex} {give} way {GIVES.get(direction, '')}"
     return CAUSES[term.action].format(**words, **term.constants)
 
 
@@ -150,6 +135,8 @@ def size_words(sized: Sized) -> str:
 
 def portrait_text(portrait: Portrait) -> str:
     """One paragraph: what is missing as far as the data support it, and what else would look the same."""
+    if not portrait.terms and np.isnan(portrait.look_elsewhere):
+        return f"No description: it is made of {MOST_READINGS} readings at most."
     if not portrait.terms:
         return (
             "No description: no single link and variable stands out from what chance would do among all that were "
@@ -163,20 +150,13 @@ def portrait_text(portrait: Portrait) -> str:
         f"This takes {100.0 * portrait.explained:.0f} % of the misfit; rms error at points left out "
         f"{100.0 * portrait.held_out_rms:.2f} % (noise alone {100.0 * portrait.noise_floor:.2f} %)."
     )
-    parts.append(_sets(portrait))
+    links, variables = _named(portrait.links), _named(portrait.variables)
+    unknown = f"Which link it is cannot be told; it varies with {variables}."
+    parts.append(f"Link: {links}; varies with: {variables}." if portrait.links else unknown)
     if portrait.alike:
         alike = [f"{term_words(sized.term)} ({100.0 * (sized.probability or 0.0):.0f} %)" for sized in portrait.alike]
         parts.append(f"The same would be seen if {'; or if '.join(alike)}.")
     return " ".join(parts)
-
-
-def _sets(portrait: Portrait) -> str:
-    """Which links and variables the data leave."""
-    links = _named(portrait.links)
-    variables = _named(portrait.variables)
-    if not portrait.links:
-        return f"Which link it is cannot be told; it varies with {variables}."
-    return f"Link: {links}; varies with: {variables}."
 
 
 def _named(names: Sequence[tuple[str, float]]) -> str:

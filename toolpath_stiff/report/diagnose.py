@@ -6,8 +6,8 @@ import numpy as np
 from markupsafe import Markup
 
 from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.diagnosis.examination import percent_of
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.diagnosis.rows import percent_of
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why
 from toolpath_stiff.documents import json_number, number
 from toolpath_stiff.inference.errors import deviation_percent
@@ -220,7 +220,7 @@ def _noise(diagnosis: Diagnosis) -> list[Part]:
 
 def residuals_csv(diagnosis: Diagnosis) -> str:
     """One row a reading: measured, modelled as given, with the law refitted, with the best explanation."""
-    data, residuals = diagnosis.data, (diagnosis.before, diagnosis.base.residual, diagnosis.after)
+    data, residuals = diagnosis.data, (diagnosis.as_given.residual, diagnosis.base.residual, diagnosis.after)
     models = ("as_given", "law_refitted", "after")
     head = [
         "file", "line", "point", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz",

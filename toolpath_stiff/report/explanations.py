@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from toolpath_stiff.diagnosis.examination import SHOWN, FittedSize, HypothesisRow, percent_of
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.diagnosis.rows import SHOWN, FittedSize, HypothesisRow, percent_of
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, next_steps, verdict_text, why
 from toolpath_stiff.documents import Document, json_number, number
 from toolpath_stiff.hints import parted
@@ -221,7 +221,7 @@ def _would_show(diagnosis: Diagnosis) -> str:
 def _next_readings(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.next_measurements:
         return []
-    reasons = list(dict.fromkeys(reading["why"] for reading in diagnosis.next_measurements))
+    reasons = list(dict.fromkeys(str(reading["why"]) for reading in diagnosis.next_measurements))
     more = [f"{len(reasons) - FEW_REASONS} more in the file"] if len(reasons) > FEW_REASONS else []
     listed = "; ".join([*reasons[:FEW_REASONS], *more])
     return [f"{counted(len(diagnosis.next_measurements), 'reading')} proposed in diagnose.json: {listed}"]

@@ -1,9 +1,7 @@
 """A plan in text, and its files."""
 
 from toolpath_stiff.planning.plan import RivalPlan
-from toolpath_stiff.planning.result import Plan
-from toolpath_stiff.planning.rows import plan_csv
-from toolpath_stiff.planning.tables import TABLES, tables_of
+from toolpath_stiff.planning.result import Plan, plan_csv
 
 
 def text(plan: Plan) -> str:
@@ -30,9 +28,4 @@ def _rows(plan: Plan) -> str:
     return plan_csv(plan.rows)
 
 
-def _tables(plan: Plan) -> bytes:
-    assert isinstance(plan.choice, RivalPlan)
-    return tables_of(plan.choice)
-
-
-DATA = {"plan.csv": _rows, "plan.json": Plan.to_json, TABLES: _tables}
+DATA = {"plan.csv": _rows, "plan.json": Plan.to_json}

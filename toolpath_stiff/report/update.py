@@ -3,14 +3,10 @@
 from collections.abc import Mapping
 from textwrap import fill
 
-import numpy as np
-
-from toolpath_stiff.correction.document import residuals_csv
-from toolpath_stiff.correction.outcome import FORCED, NOTHING, REFUSED, UPDATED
-from toolpath_stiff.correction.result import Update
+from toolpath_stiff.correction.result import FORCED, NOTHING, REFUSED, UPDATED, Update, residuals_csv
 from toolpath_stiff.correction.steps import LadderStep
 from toolpath_stiff.correction.strut_law import bar_curve_csv
-from toolpath_stiff.diagnosis.rows import FittedSize, percent_of
+from toolpath_stiff.diagnosis.examination import FittedSize, percent_of
 from toolpath_stiff.documents import number
 from toolpath_stiff.report.pages import Hints, Section, page_of, readings_head
 from toolpath_stiff.report.tables import ShownTable
@@ -138,7 +134,7 @@ def _support(update: Update) -> ShownTable:
         (
             support.effect,
             "yes" if support.supported else "no",
-            f"{support.gain_in_se:+.1f} se" if np.isfinite(support.gain_in_se) else "-",
+            "-" if support.held_out_gain_in_se is None else f"{support.held_out_gain_in_se:+.1f} se",
             f"{number(support.likelihood_gain, 1)} (chance: {number(support.threshold, 1)})",
             "; ".join(support.reasons),
         )

@@ -215,9 +215,9 @@ class Term:
         return SIZES[self.action].bounds
 
     @property
-    def signs(self) -> tuple[float, ...]:
-        """To which sides the size may go."""
-        return (1.0,) if self.bounds[0] >= 0.0 else (-1.0, 1.0)
+    def signed(self) -> bool:
+        """Whether the size may go to both sides."""
+        return self.bounds[0] < 0.0
 
     @property
     def unseen(self) -> tuple[str, ...]:
@@ -278,7 +278,7 @@ def shaped(term: Term, values: Callable[[str, str], FloatArray]) -> FloatArray:
     `values` gives those of a variable and column. What varies from strut to strut belongs to a single strut where the
     term has one.
     """
-    first = shape_values(term.shape, values(term.variable, term.column), term.constants, len(term.signs) > 1)
+    first = shape_values(term.shape, values(term.variable, term.column), term.constants, term.signed)
     if (other := term.times) is None:
         return first
     second = shape_values(other.shape, values(other.variable, other.column), other.constants, signed=False)
@@ -291,7 +291,7 @@ def shaped(term: Term, values: Callable[[str, str], FloatArray]) -> FloatArray:
 def formula(term: Term, size: str) -> str:
     """What a term adds, its size and its constants by name."""
     along = f" along {term.direction}" if term.link == "instrument" and term.direction in AXES else ""
-    return f"{EQUATIONS[term.action].format(size)}{along}, s = {_share_formula(term, len(term.signs) > 1)}"
+    return f"{EQUATIONS[term.action].format(size)}{along}, s = {_share_formula(term, term.signed)}"
 
 
 def _share_formula(term: Term, signed: bool) -> str:

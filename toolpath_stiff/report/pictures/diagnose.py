@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from toolpath_stiff.comparison.residuals import directions
+from toolpath_stiff.diagnosis.examination import HypothesisRow
 from toolpath_stiff.diagnosis.result import Diagnosis
-from toolpath_stiff.diagnosis.rows import HypothesisRow
 from toolpath_stiff.documents import json_number
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, deviation_percent
 from toolpath_stiff.inference.judgement import NONE
@@ -182,7 +182,7 @@ def fits(diagnosis: Diagnosis) -> Figure:
     word = "best of the catalogue:" if diagnosis.verdict == "unexplained" else "with"
     last = f"{word} {plain(best.label)}" if best else LAW_REFITTED
     held_out, refitted = (best or base).held_out_error_percent, base.mean_abs_error_percent if best else None
-    return before_after(diagnosis.data, (diagnosis.before, diagnosis.after), last, held_out, refitted)
+    return before_after(diagnosis.data, (diagnosis.as_given.residual, diagnosis.after), last, held_out, refitted)
 
 
 PICTURES = {"ladder.png": ladder, "portrait.png": looks, "before_after.png": fits}
