@@ -12,7 +12,7 @@ import pytest
 
 from tests.browser import needs_browser, opened, run_in
 from tests.report.factory import make_analysis, short, spiral
-from toolpath_stiff.nc.moves import Unsupported, ToolUse
+from toolpath_stiff.nc.moves import Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.documents import number
 from toolpath_stiff.report import analysis_page as page_module

@@ -23,9 +23,9 @@ from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
 from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import ORIGIN_WINS, ZERO, Request
 from toolpath_stiff.nc.state import START, State
-from toolpath_stiff.nc.tables import read_tool_table, Offsets, ToolEntry, read_offsets
-from toolpath_stiff.units import Pose, mm_per_min_from_m_per_s, pose_in_si
+from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.poses import Pose, pose_in_si
+from toolpath_stiff.units import mm_per_min_from_m_per_s
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
 

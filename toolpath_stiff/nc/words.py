@@ -69,7 +69,9 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
         return Block(line, ())
     if compact == "%":
         return Block(line, (), percent=True)
-    check_length(compact, place)
+    if len(compact) > LONGEST_BLOCK:
+        problem = f"a block of {len(compact)} characters without comments and blanks"
+        raise place.fail(problem, f"at most {LONGEST_BLOCK}")
     slash, start, rest, switch = compact.find("/"), 0, None, 1
     if slash > 0 and EXPRESSION.search(compact):  # a quotient
         slash = -1
@@ -96,14 +98,6 @@ def block_delete(compact: str, slash: int, columns: Sequence[int], place: Place)
         problem = f"block-delete switch {compact[slash : min(end, slash + 20)]!r}"
         raise place.fail(problem, "/ or /1 to /9", column=columns[slash])
     return end, switch
-
-
-def check_length(compact: str, place: Place) -> None:
-    """Refuse a block that no control reads."""
-    if len(compact) > LONGEST_BLOCK:
-        raise place.fail(
-            f"a block of {len(compact)} characters without comments and blanks", f"at most {LONGEST_BLOCK}"
-        )
 
 
 def program_number(compact: str, column: int, place: Place) -> Block:

@@ -63,7 +63,8 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
         raise block.fail(word, "is a feed move before any feed", f"F above 0{hint}")
     if state.feed_mode == "G93":
         feed, state.feed = state.feed, None  # every move needs its own
-        return feed * length_of_move(start, end, arc)
+        # Of the rotary axes alone, the degrees of the one that turns most.
+        return feed * (_length(start, end, arc) or max(abs(e - s) for s, e in zip(start[3:], end[3:], strict=True)))
     if state.feed_mode == "G95":
         if state.feed * state.speed < SLOWEST:
             raise block.fail(None, f"feed per revolution (G95) with the spindle at S{state.speed:g}", "S above 0")
@@ -74,11 +75,6 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
 def rotary_feed(state: State, feed: Numbers) -> Numbers:
     """G94's feed of the rotary axes alone, deg/min: degrees are degrees in inch programs too."""
     return feed / (MM_PER_INCH if state.inch else 1.0)
-
-
-def length_of_move(start: list[float], end: list[float], arc: Arc | None) -> float:
-    """Millimetres of a move or, of the rotary axes alone, degrees of the one that turns most."""
-    return _length(start, end, arc) or max(abs(e - s) for s, e in zip(start[3:], end[3:], strict=True))
 
 
 def _length(start: list[float], end: list[float], arc: Arc | None) -> float:
