@@ -12,9 +12,9 @@ import pytest
 
 from tests.browser import needs_browser, opened, run_in
 from tests.report.factory import make_analysis, short, spiral
+from toolpath_stiff.documents import number
 from toolpath_stiff.nc.moves import Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
-from toolpath_stiff.documents import number
 from toolpath_stiff.report import analysis_page as page_module
 from toolpath_stiff.report.analysis_page import NONE, OUT_OF_REACH, PLUNGE, page, page_rows
 from toolpath_stiff.report.pages import json_pieces

@@ -42,7 +42,7 @@ from toolpath_stiff.nc.program import Reading
 from toolpath_stiff.options import arguments_of
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, json_text
-from toolpath_stiff.rig.exercise import MACHINE as EXERCISE_MACHINE, MEASUREMENTS, blind_case, measured_again, new_exercise, reveal
+from toolpath_stiff.rig import exercise as rig
 from toolpath_stiff.stiffness.active import read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 

@@ -4,10 +4,10 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.machine_check import BEYOND, MACHINING_CENTRE, ROBOT, MachineCheck
 from toolpath_stiff.analysis.poses import PoseStiffness
 from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.stiffness.model import acting_names, condition_warnings
-from toolpath_stiff.units import n_per_mm_from_n_per_m, n_per_um_from_n_per_m, pose_in_mm, um_from_m, mm_from_m
-from toolpath_stiff.poses import pose_in_mm
+from toolpath_stiff.units import n_per_mm_from_n_per_m, n_per_um_from_n_per_m, um_from_m
 
 
 def text(check: MachineCheck) -> str:
