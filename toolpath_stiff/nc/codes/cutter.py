@@ -81,8 +81,9 @@ def _diameter(state: State, block: CurrentBlock, code: str) -> float:
     tool = number or state.tool  # D0: of the tool in the spindle
     entry = (state.tools or {}).get(tool)
     if entry is None or math.isnan(entry.diameter):
-        hint = "give it in a tool table (--tools FILE), or G41.1 D"
-        raise block.fail(word, f"needs the diameter of tool {tool}", hint=hint)
+        raise block.fail(
+            word, f"needs the diameter of tool {tool}", hint="give it in a tool table (--tools FILE), or G41.1 D"
+        )
     return entry.diameter
 
 

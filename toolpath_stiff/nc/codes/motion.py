@@ -88,8 +88,9 @@ def know_height(state: State, block: CurrentBlock, word: Word | None) -> None:
     """Refuse what depends on the present height, if that is lost."""
     if state.height_lost:
         reason = "the tool length changed between the last move and M6, and LinuxCNC's interpreter forgets that"
-        problem = "a cut before any Z" if word is None else "takes the present height"
-        raise block.fail(word, problem, f"G0 with Z before it: {reason}")
+        raise block.fail(
+            word, "a cut before any Z" if word is None else "takes the present height", f"G0 with Z before it: {reason}"
+        )
 
 
 def know_position(state: State, block: CurrentBlock, word: Word, axes: Collection[int]) -> None:
@@ -163,8 +164,10 @@ def _center(
             raise geometry.ArcError("an arc with R and without an end point", "an axis word of the plane")
         return geometry.center_from_radius(start, end, radius * state.length_scale, clockwise)
     if offsets == [None, None] or (state.arc_absolute and None in offsets):
-        expected = f"{in_plane[0]} and {in_plane[1]}, or R"
-        raise geometry.ArcError("an arc without a centre, or with one word of an absolute one (G90.1)", expected)
+        raise geometry.ArcError(
+            "an arc without a centre, or with one word of an absolute one (G90.1)",
+            f"{in_plane[0]} and {in_plane[1]}, or R",
+        )
     a, b = ((offset or 0.0) * state.length_scale for offset in offsets)
     return (a, b) if state.arc_absolute else (start[0] + a, start[1] + b)
 
