@@ -231,16 +231,12 @@ def read_controller(path: str | Path, dialect: str | None = None) -> Controller:
     >>> controller.label, controller.offsets.table[0].axes
     ('haas', [100.0, 0.0, -20.0, 0.0, 0.0, 0.0])
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".var", ".tbl"):
-        return _controller(TomlReader.read(path, "the controller file", ProgramError), dialect)
-    base = Controller(dialect_named(dialect or "linuxcnc"))
+    suffix, base = Path(path).suffix.lower(), Controller(dialect_named(dialect or "linuxcnc"))
     if suffix == ".var":
         return replace(base, offsets=read_offsets(path))
-    return replace(base, tools=read_tool_table(path))
-
-
-def _controller(toml: TomlReader, dialect: str | None) -> Controller:
+    if suffix == ".tbl":
+        return replace(base, tools=read_tool_table(path))
+    toml = TomlReader.read(path, "the controller file", ProgramError)
     toml.only("", toml.data, KEYS)
     given = toml.data
 
@@ -248,10 +244,10 @@ def _controller(toml: TomlReader, dialect: str | None) -> Controller:
         return toml.choice(key, given.get(key, choices[0]), choices, " or ".join(choices))
 
     name = choice("dialect", *DIALECTS)
-    base = dialect_named(dialect or name)
+    control = dialect_named(dialect or name)
     absolute = choice("arc_centers", "incremental", "absolute") == "absolute"
     by_g70 = choice("inch_metric", "G20 G21", "G70 G71") == "G70 G71"
-    aliases = {**base.aliases, **INCH_METRIC} if by_g70 else base.aliases
+    aliases = {**control.aliases, **INCH_METRIC} if by_g70 else control.aliases
     setup, feed, folder = given.get("setup"), given.get("feed_mm_per_min"), given.get("subprograms")
     if setup is not None and not is_text(setup):
         raise toml.error(f"setup = {setup!r}", "the name of a set-up", where="setup")
@@ -263,7 +259,7 @@ def _controller(toml: TomlReader, dialect: str | None) -> Controller:
             raise toml.error(f"subprograms = {folder!r}", "a folder beside this file", where="subprograms")
         folder = str(beside)
     return Controller(
-        replace(base, arc_absolute=base.arc_absolute or absolute, aliases=aliases),
+        replace(control, arc_absolute=control.arc_absolute or absolute, aliases=aliases),
         _switches(toml),
         offsets_of(toml),
         tools_of(toml),

@@ -1,5 +1,6 @@
 """Courses of moves: lengths, frames of arcs, points and tangents along them. SI units, but where mm are said."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -29,6 +30,16 @@ def move_lengths(moves: Moves) -> FloatArray:
         sweep = moves.arc_sweep[arc]
         chord[arc] = np.sqrt((radius * sweep) ** 2 + frame.climb**2 + (frame.radius_end - frame.radius_start) ** 2)
     return np.asarray(chord)
+
+
+def length_of_move(start: Sequence[float], end: Sequence[float], arc: Arc | None) -> float:
+    """Millimetres of a move, an arc's as `move_lengths` has it: so G93's F is one over the move's time."""
+    if arc is None:
+        return math.dist(start[:3], end[:3])
+    climb = sum((e - s) * n for s, e, n in zip(start, end, arc.normal, strict=False))
+    first = math.dist(start[:3], arc.center)
+    last = math.sqrt(max(math.dist(end[:3], arc.center) ** 2 - climb**2, 0.0))
+    return math.hypot(arc.sweep * (first + last) / 2.0, climb, last - first)
 
 
 class ArcFrame:

@@ -118,8 +118,11 @@ def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
     # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
     if before is not None and (before == name or "G80" not in (before, name)):
         group = code.group.removeprefix("M ")
-        problem = f"and {before} are both of the modal group {group!r}, or act once in their block"
-        raise block.fail(word, problem, "one of them in a block")
+        raise block.fail(
+            word,
+            f"and {before} are both of the modal group {group!r}, or act once in their block",
+            "one of them in a block",
+        )
     if before is None or name != "G80":
         block.groups[code.group] = name
         block.codes[name] = word

@@ -204,8 +204,12 @@ class ProgramRun:
         if self._levels:
             raise self._unended(block.line - 1)
         if (numbered or len(self.state.recorder)) and self.state.dialect.name != "linuxcnc":
-            problem = f"{block.words[0].text} begins another program before the first one has ended"
-            raise self._fail(block.line - 1, problem, "M30 or M2 before it", column=block.words[0].column)
+            raise self._fail(
+                block.line - 1,
+                f"{block.words[0].text} begins another program before the first one has ended",
+                "M30 or M2 before it",
+                column=block.words[0].column,
+            )
 
     def _unended(self, row: int) -> InputError:
         level = self._levels[-1]
@@ -239,8 +243,12 @@ class ProgramRun:
 
     def _begin(self, level: Subprogram, row: int, column: int) -> None:
         if len(self._levels) == DEEPEST:
-            problem = f"more than {DEEPEST} subprograms within each other, {level.name} the last one"
-            raise self._fail(row, problem, "calls that end", column=column)
+            raise self._fail(
+                row,
+                f"more than {DEEPEST} subprograms within each other, {level.name} the last one",
+                "calls that end",
+                column=column,
+            )
         self._levels.append(level)
 
     def _jump(self, row: int, to: int) -> int:
@@ -275,8 +283,12 @@ class ProgramRun:
             return to if to > row else None
         level = self._levels.pop()
         if level.again or to < level.back:
-            problem = f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram"
-            raise self._fail(row, problem, "a block after the call, which is not repeated", column=flow.column)
+            raise self._fail(
+                row,
+                f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram",
+                "a block after the call, which is not repeated",
+                column=flow.column,
+            )
         return to
 
     def _leave(self, row: int) -> int:
@@ -298,9 +310,12 @@ class ProgramRun:
         known = [meaning for meaning in sorted(meanings) if meaning[0] in heads]
         if not known:
             names = " or ".join(f"O{number}" for number, _ in sorted(meanings))
-            hint = "put the subprogram into the file, after the main program's M30"
-            problem = f"M98 calls {names}, and the file has no such subprogram"
-            raise self._fail(row, problem, hint=hint, column=call.column)
+            raise self._fail(
+                row,
+                f"M98 calls {names}, and the file has no such subprogram",
+                hint="put the subprogram into the file, after the main program's M30",
+                column=call.column,
+            )
         if len(known) > 1:
             raise self._fail(
                 row,

@@ -102,8 +102,9 @@ def read(request: Request) -> ReadProgram:
     native = request.interpreter == "linuxcnc"
     if looks_like_cutter_location(lines, name):
         if native:
-            problem = "LinuxCNC's interpreter reads no cutter-location files"
-            raise ProgramError(problem, expected="--interpreter builtin", file=name)
+            raise ProgramError(
+                "LinuxCNC's interpreter reads no cutter-location files", expected="--interpreter builtin", file=name
+            )
         return _with_feed(cutter_location.read(request), request)
     refused = foreign_program(lines, name) if native else refused_program(lines, name, request.controller.dialect)
     if refused is not None:
@@ -122,9 +123,13 @@ def read(request: Request) -> ReadProgram:
         try:
             return on_the_part(linuxcnc.read(request), request)
         except InputError as second:
-            hint = f"LinuxCNC's interpreter does not read it either: {second}"
             raise ProgramError(
-                error.found, expected=error.expected, hint=hint, file=error.file, line=error.line, column=error.column
+                error.found,
+                expected=error.expected,
+                hint=f"LinuxCNC's interpreter does not read it either: {second}",
+                file=error.file,
+                line=error.line,
+                column=error.column,
             ) from None
 
 

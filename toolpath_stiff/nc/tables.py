@@ -134,8 +134,11 @@ def tools_of(toml: TomlReader) -> dict[int, ToolEntry] | None:
     if isinstance(given, str):
         return read_tool_table(Path(toml.file).parent / given)
     if not isinstance(given, list) or not all(isinstance(tool, dict) for tool in given):
-        expected = "[[tools]] with number, length_mm, ..., or the name of a file"
-        raise toml.error("tools is not a list of tables", expected, where="tools")
+        raise toml.error(
+            "tools is not a list of tables",
+            "[[tools]] with number, length_mm, ..., or the name of a file",
+            where="tools",
+        )
     tools: dict[int, ToolEntry] = {}
     for place, row in enumerate(given, 1):
         where = f"tools[{place}]"
@@ -188,8 +191,9 @@ def _linuxcnc_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
             continue
         words = {key.upper(): value for key, value in TOOL_WORD.findall(content)}
         if re.fullmatch(r"[0-9]{1,9}", words.get("T", "")) is None:
-            expected = "T<number> P<pocket> Z<length mm> D<diameter mm> ;remark"
-            raise Place(file, line).fail(f"{content.strip()[:40]!r} is not a tool", expected)
+            raise Place(file, line).fail(
+                f"{content.strip()[:40]!r} is not a tool", "T<number> P<pocket> Z<length mm> D<diameter mm> ;remark"
+            )
         try:
             length, diameter = (_number(words[key], key) if key in words else math.nan for key in "ZD")
         except ProgramError as error:
@@ -255,8 +259,11 @@ def _offsets_in(toml: TomlReader, table: Mapping[str, object], before: str) -> O
         if number in offsets.additional:
             raise toml.error(f"{where!r} is there twice: G54.1 and G154 name the same offsets", where=where)
         if name not in (*WORK_OFFSETS, *HOMES) and number is None:
-            expected = f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)'
-            raise toml.error(f"{where} is not an offset", expected, where=where)
+            raise toml.error(
+                f"{where} is not an offset",
+                f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)',
+                where=where,
+            )
         most = 6 if name in HOMES else 7
         if not isinstance(values, list) or not 1 <= len(values) <= most:
             raise toml.error(f"{where} = {values!r}", f"1 to {most} numbers: x, y, z, a, b, c, r", where=where)

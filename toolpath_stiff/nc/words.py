@@ -69,7 +69,10 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
         return Block(line, ())
     if compact == "%":
         return Block(line, (), percent=True)
-    check_length(compact, place)
+    if len(compact) > LONGEST_BLOCK:
+        raise place.fail(
+            f"a block of {len(compact)} characters without comments and blanks", f"at most {LONGEST_BLOCK}"
+        )
     slash, start, rest, switch = compact.find("/"), 0, None, 1
     if slash > 0 and EXPRESSION.search(compact):  # a quotient
         slash = -1
@@ -93,17 +96,10 @@ def block_delete(compact: str, slash: int, columns: Sequence[int], place: Place)
         end += 1
     switch = int(compact[slash + 1 : end] or 1) if end < slash + 3 else 0
     if not 1 <= switch <= 9:
-        problem = f"block-delete switch {compact[slash : min(end, slash + 20)]!r}"
-        raise place.fail(problem, "/ or /1 to /9", column=columns[slash])
-    return end, switch
-
-
-def check_length(compact: str, place: Place) -> None:
-    """Refuse a block that no control reads."""
-    if len(compact) > LONGEST_BLOCK:
         raise place.fail(
-            f"a block of {len(compact)} characters without comments and blanks", f"at most {LONGEST_BLOCK}"
+            f"block-delete switch {compact[slash : min(end, slash + 20)]!r}", "/ or /1 to /9", column=columns[slash]
         )
+    return end, switch
 
 
 def program_number(compact: str, column: int, place: Place) -> Block:
@@ -185,8 +181,9 @@ def _tokens(
         if letter != "N":
             words.append(Word(letter, value, column, original))
         elif words:
-            problem = f"line number {original!r} after another word"
-            raise place.fail(problem, "N at the beginning of the line", column=column)
+            raise place.fail(
+                f"line number {original!r} after another word", "N at the beginning of the line", column=column
+            )
     return words
 
 
@@ -205,7 +202,8 @@ def check_numbers(words: Sequence[Word], place: Place) -> None:
     for letter, value, column, text in words:
         decimals = NUMBERED.get(letter)
         if decimals is not None and (value < 0.0 or value != round(value, decimals)):
-            expected = (
-                f"a code such as {letter}1 or {letter}59.3" if decimals else "a whole number that is not negative"
+            raise place.fail(
+                f"word {text!r} cannot be read",
+                f"a code such as {letter}1 or {letter}59.3" if decimals else "a whole number that is not negative",
+                column=column,
             )
-            raise place.fail(f"word {text!r} cannot be read", expected, column=column)

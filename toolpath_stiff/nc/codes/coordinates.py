@@ -47,8 +47,11 @@ def _take_additional(state: State, block: CurrentBlock, word: Word, code: str, n
     if number is None or number > ADDITIONAL_OFFSETS[code]:
         raise block.fail(word, "needs the number of its offset", f"P1 to P{ADDITIONAL_OFFSETS[code]}")
     if number not in state.frames.offsets.additional:
-        hint = f'give it in the controller file: [offsets] "{code} P{number}" = [x, y, z]'
-        raise block.fail(word, f"is {code} P{number}, an offset that nothing defines", hint=hint)
+        raise block.fail(
+            word,
+            f"is {code} P{number}, an offset that nothing defines",
+            hint=f'give it in the controller file: [offsets] "{code} P{number}" = [x, y, z]',
+        )
     _take_offset(state, block, word, len(WORK_OFFSETS) + number - 1)
 
 
@@ -77,8 +80,9 @@ def set_offsets(state: State, block: CurrentBlock, code: str) -> None:
         largest = {2: 6, 10: 999, 20: max(ADDITIONAL_OFFSETS[name] for name in state.dialect.additional)}
     level, number = block.take("L"), block.take("P")
     if level not in largest:
-        expected = f"L{', L'.join(map(str, largest))}"
-        raise block.fail(code, f"with L{level:g}" if level is not None else "without L", expected)
+        raise block.fail(
+            code, f"with L{level:g}" if level is not None else "without L", f"L{', L'.join(map(str, largest))}"
+        )
     if number is None or number != int(number) or not (1 if fanuc else 0) <= number <= largest[level]:
         raise block.fail(code, f"L{level:g} needs the number of a tool or a work offset", f"P up to {largest[level]}")
     if level in (1, 10):

@@ -40,8 +40,11 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     if not given and not any(block.has(letter) for letter in POINT_WORDS):
         return
     if code == "G76" and not state.dialect.increments:
-        problem = "is a lathe's threading cycle on LinuxCNC, fine boring on Fanuc's and Haas' controls"
-        raise block.fail(code, problem, hint="name the control with --dialect, or leave threading out")
+        raise block.fail(
+            code,
+            "is a lathe's threading cycle on LinuxCNC, fine boring on Fanuc's and Haas' controls",
+            hint="name the control with --dialect, or leave threading out",
+        )
     elsewhere = code in TAPS and state.plane != "G17" and not state.dialect.increments
     block.refuse_if(elsewhere, None, f"{code} in {state.plane}: LinuxCNC's rs274 taps along another axis", "G17")
     normal = geometry.PLANES[state.plane][2]
@@ -109,8 +112,11 @@ def _keep_heights(state: State, block: CurrentBlock, code: str, normal: int) -> 
     if len(renewed) == 2 or keeps is False:
         return
     if keeps is None or renewed:
-        problem = f"{code} after a change between G90 and G91: controls differ in whether the hole keeps its heights"
-        raise block.fail(None, problem, f"R and {AXES[normal]} in the block, or --dialect")
+        raise block.fail(
+            None,
+            f"{code} after a change between G90 and G91: controls differ in whether the hole keeps its heights",
+            f"R and {AXES[normal]} in the block, or --dialect",
+        )
     level = state.sticky["level"]
     heights = (retract, bottom) if state.absolute else (retract - level, bottom - retract)
     state.sticky["R"], state.sticky["Z"] = heights

@@ -1,9 +1,8 @@
 """Feed, speed and time: F and S, G93 G94 G95, G96 G97, the feed of a move; G4 and words of time. mm/min, s inside."""
 
-import math
-
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes, holds_anyway
 from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
+from toolpath_stiff.nc.courses import length_of_move
 from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
@@ -63,32 +62,20 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
         raise block.fail(word, "is a feed move before any feed", f"F above 0{hint}")
     if state.feed_mode == "G93":
         feed, state.feed = state.feed, None  # every move needs its own
-        return feed * length_of_move(start, end, arc)
+        # Of the rotary axes alone, the degrees of the one that turns most.
+        return feed * (
+            length_of_move(start, end, arc) or max(abs(e - s) for s, e in zip(start[3:], end[3:], strict=True))
+        )
     if state.feed_mode == "G95":
         if state.feed * state.speed < SLOWEST:
             raise block.fail(None, f"feed per revolution (G95) with the spindle at S{state.speed:g}", "S above 0")
         return state.feed * state.speed
-    return state.feed if _length(start, end, arc) else rotary_feed(state, state.feed)
+    return state.feed if length_of_move(start, end, arc) else rotary_feed(state, state.feed)
 
 
 def rotary_feed(state: State, feed: Numbers) -> Numbers:
     """G94's feed of the rotary axes alone, deg/min: degrees are degrees in inch programs too."""
     return feed / (MM_PER_INCH if state.inch else 1.0)
-
-
-def length_of_move(start: list[float], end: list[float], arc: Arc | None) -> float:
-    """Millimetres of a move or, of the rotary axes alone, degrees of the one that turns most."""
-    return _length(start, end, arc) or max(abs(e - s) for s, e in zip(start[3:], end[3:], strict=True))
-
-
-def _length(start: list[float], end: list[float], arc: Arc | None) -> float:
-    """Millimetres of a move, an arc's as `courses.move_lengths` has it: so G93's F is one over the move's time."""
-    if arc is None:
-        return math.dist(start[:3], end[:3])
-    climb = sum((e - s) * n for s, e, n in zip(start, end, arc.normal, strict=False))
-    first = math.dist(start[:3], arc.center)
-    last = math.sqrt(max(math.dist(end[:3], arc.center) ** 2 - climb**2, 0.0))
-    return math.hypot(arc.sweep * (first + last) / 2.0, climb, last - first)
 
 
 def dwells_by(state: State, block: CurrentBlock) -> str:

@@ -8,8 +8,11 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
     """M98 P L: run a subprogram; M97 P L (Haas): from that N number. The block's moves first."""
     word = block.codes[code]
     if code == "M97" and not state.dialect.local_calls:
-        hint = "give --dialect haas if it is that, or make it a subprogram (O number, M98, M99)"
-        raise block.fail(word, "is Haas' call of a block by its N number", hint=hint)
+        raise block.fail(
+            word,
+            "is Haas' call of a block by its N number",
+            hint="give --dialect haas if it is that, or make it a subprogram (O number, M98, M99)",
+        )
     block.refuse_if(
         block.groups.get("non-modal") in ("G4", "G10"), word, "beside a code that uses the P word too", "two blocks"
     )

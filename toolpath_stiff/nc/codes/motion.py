@@ -9,9 +9,9 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.center_path import offset_move
 from toolpath_stiff.nc.codes.code import FANUC, Code, g_codes
 from toolpath_stiff.nc.codes.corner import cut_corner
-from toolpath_stiff.nc.codes.cutter import offset_move
 from toolpath_stiff.nc.codes.feeds import feed_of_move
 from toolpath_stiff.nc.codes.points import (
     XY,
@@ -23,6 +23,7 @@ from toolpath_stiff.nc.codes.points import (
     know_place,
     point_words,
     refuse_while_rotated,
+    target,
 )
 from toolpath_stiff.nc.frames import standing
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Move
@@ -88,8 +89,9 @@ def know_height(state: State, block: CurrentBlock, word: Word | None) -> None:
     """Refuse what depends on the present height, if that is lost."""
     if state.height_lost:
         reason = "the tool length changed between the last move and M6, and LinuxCNC's interpreter forgets that"
-        problem = "a cut before any Z" if word is None else "takes the present height"
-        raise block.fail(word, problem, f"G0 with Z before it: {reason}")
+        raise block.fail(
+            word, "a cut before any Z" if word is None else "takes the present height", f"G0 with Z before it: {reason}"
+        )
 
 
 def know_position(state: State, block: CurrentBlock, word: Word, axes: Collection[int]) -> None:
@@ -104,11 +106,10 @@ def straight(state: State, block: CurrentBlock, code: str) -> None:
     """G0, G1: straight to the point that the axis words name."""
     motion = RAPID if code == "G0" else FEED
     if any(block.has(letter) for letter in POINT_WORDS):
-        words = point_words(state, block)
-        target = control_point(state, block, state.frames.to_program(state.frames.position), words)
+        point, words = target(state, block)
         if state.corner is not None and code == "G1":
-            cut_corner(state, block, target)
-        record(state, block, motion, target, words)
+            cut_corner(state, block, point)
+        record(state, block, motion, point, words)
     elif "motion" in block.groups and state.beside is not None:  # to the programmed point, as LinuxCNC does
         record(state, block, motion, list(state.frames.position))
     elif "motion" in block.groups and code == "G1" and state.height_lost:  # rs274 moves then
@@ -125,8 +126,8 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
     frames, clockwise = state.frames, code == "G2"
     here = frames.to_program(frames.position)
     words = point_words(state, block)
-    target = destination(state, block, here, words)
-    start, end = (here[first], here[second]), (target[first], target[second])
+    there = destination(state, block, here, words)
+    start, end = (here[first], here[second]), (there[first], there[second])
     turns = block.whole("P", block.block.words[0]) or 1
     block.refuse_if(turns > MOST_TURNS, "P", "is not a number of turns", f"a whole number from 1 to {MOST_TURNS}")
     center = _center(state, block, start, end, clockwise, words)
@@ -155,16 +156,19 @@ def _center(
         block.take(off_plane)  # posts write all three
     block.refuse_if(block.has(off_plane), off_plane, f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
     offsets = [block.take(letter) for letter in in_plane]
-    if state.polar is not None and offsets != [None, None]:
-        raise geometry.ArcError("an arc with I, J or K in polar mode (G16)", "R")
+    geometry.refuse_arc_if(
+        state.polar is not None and offsets != [None, None], "an arc with I, J or K in polar mode (G16)", "R"
+    )
     if radius is not None:
         block.refuse_if(offsets != [None, None], "R", "and a centre (I, J, K) are both given", "one of them")
-        if not {first, second} & words.keys():
-            raise geometry.ArcError("an arc with R and without an end point", "an axis word of the plane")
+        ends = {first, second} & words.keys()
+        geometry.refuse_arc_if(not ends, "an arc with R and without an end point", "an axis word of the plane")
         return geometry.center_from_radius(start, end, radius * state.length_scale, clockwise)
     if offsets == [None, None] or (state.arc_absolute and None in offsets):
-        expected = f"{in_plane[0]} and {in_plane[1]}, or R"
-        raise geometry.ArcError("an arc without a centre, or with one word of an absolute one (G90.1)", expected)
+        raise geometry.ArcError(
+            "an arc without a centre, or with one word of an absolute one (G90.1)",
+            f"{in_plane[0]} and {in_plane[1]}, or R",
+        )
     a, b = ((offset or 0.0) * state.length_scale for offset in offsets)
     return (a, b) if state.arc_absolute else (start[0] + a, start[1] + b)
 

@@ -73,6 +73,12 @@ def control_point(state: State, block: CurrentBlock, here: list[float], words: d
     return point
 
 
+def target(state: State, block: CurrentBlock) -> tuple[list[float], dict[int, float]]:
+    """Control coordinates of the point that a block names, and the words that name it."""
+    words = point_words(state, block)
+    return control_point(state, block, state.frames.to_program(state.frames.position), words), words
+
+
 def _at_radius_and_angle(state: State, block: CurrentBlock) -> dict[int, float]:
     """LinuxCNC's polar words: @ the radius, ^ the angle about the program zero, of the XY plane."""
     word = block.values["@" if block.has("@") else "^"]

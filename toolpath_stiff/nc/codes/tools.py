@@ -100,15 +100,20 @@ def _length_in_table(state: State, block: CurrentBlock, code: str) -> float:
     if number == 0 and state.dialect.increments:
         return math.nan
     if number == 0 and state.dialect.name != "linuxcnc":
-        problem = "is no offset on some controls, on LinuxCNC that of the tool"
-        raise block.fail("H", problem, "H or G49", "name the control with --dialect")
+        raise block.fail(
+            "H",
+            "is no offset on some controls, on LinuxCNC that of the tool",
+            "H or G49",
+            "name the control with --dialect",
+        )
     other = not number and (state.renamed or state.named_length not in (None, state.tool))
     problem = "without H after M61, or after another H: controls differ in whose length it takes"
     block.refuse_if(other, code, problem, f"G43 H{state.tool}, or T and M6")
     tool = number or state.tool  # LinuxCNC's H0 too (find_tool_pocket(0))
     if state.tools is None:
-        problem = f"needs the length of tool {tool}, and there is no tool table"
-        raise block.fail(code, problem, hint=tool_table_hint(tool))
+        raise block.fail(
+            code, f"needs the length of tool {tool}, and there is no tool table", hint=tool_table_hint(tool)
+        )
     length = tool_of(state.tools, tool).length
     block.refuse_if(math.isnan(length), code, f"needs the length of tool {tool}", hint=ADD_IT)
     return length
