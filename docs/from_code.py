@@ -20,8 +20,7 @@ if __name__ == "__main__":
 
 import toolpath_stiff
 from toolpath_stiff.nc.codes.code import EVERYWHERE, Code, holds_anyway
-from toolpath_stiff.nc.codes.refused import REFUSED
-from toolpath_stiff.nc.codes.registry import ALIASES, CODES
+from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.cutter_location.vocabulary import DOUBTFUL, LISTED, READ, WORDS
 from toolpath_stiff.nc.cutter_location.vocabulary import REFUSED as REFUSED_WORD
 from toolpath_stiff.rig.unknowns import UNKNOWNS
@@ -57,7 +56,7 @@ def rows(*lines: Iterable[str]) -> Iterator[str]:
 NOT_THERE = "has none"
 # LinuxCNC's, and in no program whose path is compared with LinuxCNC's. The others are in such programs: the random ones
 # of `benchmarks/hunt.md`, or those of the tests against rs274 (`tests/nc/test_code_registry.py` looks them up).
-WITHOUT_WITNESS = ("M7", "M19", "M53", "M71")
+WITHOUT_WITNESS = ("M7", "M19", "M53")
 
 
 def codes_table() -> str:
@@ -66,8 +65,6 @@ def codes_table() -> str:
         (code.name, code.group, f"{code.meaning} (listed: {code.listed})" if code.listed else code.meaning,
          _function(code), _controls(code.controls), code.source, _witness(code))
         for code in CODES.values()
-    ] + [
-        (a.name, f"as {a.code}", a.meaning, "", _controls(a.controls), a.source, NOT_THERE) for a in ALIASES.values()
     ]  # fmt: skip
     refused = [(code.name, code.what, code.hint, code.source) for code in REFUSED.values()]
     heading = ("code", "group", "meaning", "function in `nc/codes`", "dialects", "source", "against LinuxCNC")

@@ -15,8 +15,7 @@ import pytest
 
 import toolpath_stiff
 from toolpath_stiff.cli.main import MODULES as COMMANDS
-from toolpath_stiff.nc.codes.refused import REFUSED
-from toolpath_stiff.nc.codes.registry import CODES
+from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.cutter_location.vocabulary import WORDS
 from toolpath_stiff.stiffness.catalogue import packaged_effects
 

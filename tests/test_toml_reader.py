@@ -66,7 +66,7 @@ letter = "A"
         ('"haas"', '"hass"', "1: dialect = 'hass'; expected generic or linuxcnc or fanuc or haas"),
         ("[1, 2, 3]", '[1, "2"]', "8: offsets.G54.1 P1 = '2'; expected a number within"),
         ("number = 2", "number = 1", "6: tools[2]: tool 1 appears twice"),
-        ("number = 2", "number = true", "6: tools[2].number = True; expected a whole number"),
+        ("number = 2", "number = true", "5: tools[2]: tool number True; expected a whole number"),
         ("head =", "hand =", "12: kinematics.hand is not known in the type 'table'; expected type, tcp"),
         ("[1.0]", "[1.0", "10:1: the controller file is not TOML: "),
     ],

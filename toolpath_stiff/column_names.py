@@ -64,14 +64,6 @@ def converted(cell: str, unit: str, wanted: str) -> str:
         return cell
 
 
-def entry(name: str, heading: str, unit: str = "") -> str:
-    """An entry of a mapping: this column from that heading, in that unit or in the column's own."""
-    quantity, own = parted(name)
-    quoted = f'"{heading}"' if re.search(r'[,:="]', heading) else heading
-    unit = unit if same_quantity(unit, own) else own
-    return f"{quantity}={quoted}:{unit}" if unit else f"{quantity}={quoted}"
-
-
 def columns_option(entries: Sequence[str]) -> str:
     """A mapping as an option to paste."""
     text = ", ".join(entries)

@@ -1,4 +1,4 @@
-"""Results as plain data: dataclasses as JSON has them."""
+"""Results as plain data: dataclasses as JSON has them; numbers as they are written."""
 
 import math
 from collections.abc import Mapping
@@ -9,6 +9,7 @@ from typing import Any
 # Of any figure of a document that rests on a search: two CPUs differ in the tenth. Decimals at most: what is left of a
 # difference of like figures has fewer digits that are certain.
 CERTAIN, DECIMALS = 7, 8
+DIGITS = 5  # significant digits of a fitted figure
 Document = Mapping[str, Any]  # what a JSON file holds, or a part of it, by the file's own keys
 
 
@@ -41,3 +42,16 @@ def certain(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return replace(value, **{field.name: certain(getattr(value, field.name)) for field in fields(value)})
     return [certain(part) for part in value] if isinstance(value, list | tuple) else value
+
+
+def number(value: float | None, digits: int = 0) -> str:
+    """A figure with thin groups of thousands ("45 123"), "-" where there is none."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    text = f"{value:,.{digits}f}".replace(",", " ")
+    return text.replace("-", "", 1) if float(text.replace(" ", "")) == 0.0 else text
+
+
+def json_number(value: float, digits: int = DIGITS) -> float | None:
+    """A float of some significant digits; None for what JSON cannot hold."""
+    return float(f"{value:.{digits}g}") if math.isfinite(value) else None

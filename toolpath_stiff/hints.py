@@ -4,16 +4,15 @@ A hint is a sentence and, on a line of its own that no page or terminal breaks, 
 is one text: the sentence, a colon, a line feed, the command.
 """
 
-import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import PurePath
 
 from toolpath_stiff import defaults
 
 PROGRAM = "tps"
-NUMBERED = re.compile(r"-updated(?:-(\d+))?$")
 
 
 def command_line(*words: object) -> str:
@@ -92,17 +91,13 @@ class Asked:
         """A name for the machine file that an update of this one writes: beside it, and never its own."""
         path = PurePath(self.machine)
         stem = path.stem if path.suffix == ".toml" else path.name
-        before = NUMBERED.search(stem)
-        number = int(before[1] or 1) + 1 if before else 1
-        name = NUMBERED.sub("", stem) + "-updated" + (f"-{number}" if number > 1 else "") + ".toml"
-        return str(path.with_name(name))
+        return str(path.with_name(f"{stem}-updated.toml"))
 
     def new_effect(self, stem: str = "my_effect", ending: str = ".py") -> str:
         """A name for a file with an effect of the user's own that is not among the given ones."""
-        taken, number = {PurePath(file).name for file in self.effects}, 1
-        while (name := f"{stem}{f'_{number}' if number > 1 else ''}{ending}") in taken:
-            number += 1
-        return name
+        taken = {PurePath(file).name for file in self.effects}
+        names = (f"{stem}{f'_{number}' if number > 1 else ''}{ending}" for number in count(1))
+        return next(name for name in names if name not in taken)
 
 
 def percent(share: float) -> str:

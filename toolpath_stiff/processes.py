@@ -47,10 +47,7 @@ class ProcessPool(Executor):
     def __init__(self, jobs: int) -> None:
         self._pool: Any = pebble.ProcessPool(jobs, initializer=_prepare, context=get_context("spawn"))
         self._calls: list[Future[Any]] = []
-        self._threads_before = {name: os.environ.get(name) for name in THREADS}
-        os.environ.update(
-            dict.fromkeys(THREADS, "1")
-        )  # of the processes, which take these variables over as they start
+        os.environ.update(dict.fromkeys(THREADS, "1"))  # which the processes take over as they start
         with _signals_blocked():  # in the pool's threads and in the processes that they start
             if not self._pool.active:
                 raise RuntimeError("the processes cannot be started")
@@ -77,9 +74,6 @@ class ProcessPool(Executor):
         for call in cancelled:
             call.cancel()
         self._pool.join()
-        for name, setting in self._threads_before.items():
-            os.environ.pop(name, None)
-            os.environ.update({} if setting is None else {name: setting})
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
@@ -94,10 +88,7 @@ def death(error: pebble.ProcessExpired) -> str:
     """How the process of a call ended, for a message."""
     if error.exitcode >= 0:
         return f"its process ended by itself, exit code {error.exitcode}"
-    try:
-        name = signal.Signals(-error.exitcode).name
-    except ValueError:
-        name = f"signal {-error.exitcode}"
+    name = signal.Signals(-error.exitcode).name
     return f"its process was ended by {name}" + (" (out of memory?)" if name == "SIGKILL" else "")
 
 

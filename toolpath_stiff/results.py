@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -79,7 +80,7 @@ class Result(ABC):
 
     def _repr_html_(self) -> str:
         """For notebooks."""
-        return notebook_text(str(self))
+        return f"<pre>{html.escape(str(self))}</pre>"
 
     def to_json(self) -> str:
         """`to_dict()` as text, as the command writes it.
@@ -233,7 +234,7 @@ class TextFile(Result):
     def _short(self) -> str:
         return f"{self.name}, {len(self.text.splitlines())} lines"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Name, text and notes."""
         return {"name": self.name, "text": self.text, "notes": self.notes}
 
@@ -249,13 +250,6 @@ class TextFile(Result):
         'mill.toml'
         """
         return write_atomically(file, self.text)
-
-
-def notebook_text(text: str) -> str:
-    """Text as a notebook shows it."""
-    import html
-
-    return f"<pre>{html.escape(text)}</pre>"
 
 
 def json_text(document: Any) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from toolpath_stiff.column_names import columns_option, converted, entry, heading_key, parted, same_quantity
+from toolpath_stiff.column_names import columns_option, converted, heading_key, parted, same_quantity
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import decoded, read_bytes
 from toolpath_stiff.workbooks import Rows, is_workbook, sheet_rows, split_name
@@ -127,14 +127,16 @@ def parse_table(text: str, file: str, columns: Columns) -> Table:
 
 def _table(rows: Rows, file: str, columns: Columns, separator: str, remarks: list[str]) -> Table:
     rows = [(line, [_stripped(cell) for cell in cells]) for line, cells in rows]
-    rows = [(line, cells) for line, cells in rows if any(cells) and not _is_comment(cells[0])]
+    # A row that begins like a comment may begin with an error of the spreadsheet.
+    rows = [(n, row) for n, row in rows if any(row) and (row[0][:1] != "#" or SPREADSHEET_ERROR.fullmatch(row[0]))]
     if not rows:
         raise InputError("the file is empty", expected="a heading and rows below it", file=file)
     (line, written), *body = rows
     while not written[-1]:
         written.pop()
-    heading, units = _named(written, columns, file, line)
-    body = [(n, _fitted(cells, len(heading), not separator)) for n, cells in body]
+    heading = _named(written, columns, file, line)
+    units = {i: pair for i, cell in enumerate(written) if (pair := _units(cell, heading[i], columns))}
+    body = [(n, _fitted(row, len(heading), not separator)) for n, row in body]
     numbers = [i for i, name in enumerate(heading) if name not in columns.texts]
     if separator in ";\t" and separator and _has_commas(heading, body, numbers, file):
         remarks.append("numbers are read with decimal commas")
@@ -148,7 +150,7 @@ def _table(rows: Rows, file: str, columns: Columns, separator: str, remarks: lis
     ] + [f"{name} = {text}" for name, text in constants.items()]
     if read:
         remarks.insert(0, f"read {', '.join(read)}")
-    table_rows = tuple((n, tuple(cells)) for n, cells in body)
+    table_rows = tuple((n, tuple(row)) for n, row in body)
     return Table(file, (*heading, *constants), line, table_rows, tuple(remarks), constants)
 
 
@@ -161,11 +163,6 @@ def _stripped(cell: str) -> str:
     return text[1:] if text[:2] in ("'=", "'+", "'-", "'@") else text
 
 
-def _is_comment(cell: str) -> bool:
-    """Whether a row begins a comment; an error of the spreadsheet begins like one."""
-    return cell.startswith("#") and not SPREADSHEET_ERROR.fullmatch(cell)
-
-
 def _fitted(cells: list[str], width: int, pad: bool) -> list[str]:
     """Without empty cells beyond the heading; those of a sheet are as long as the heading."""
     while len(cells) > width and not cells[-1]:
@@ -173,61 +170,61 @@ def _fitted(cells: list[str], width: int, pad: bool) -> list[str]:
     return cells + [""] * (width - len(cells)) if pad else cells
 
 
-def _named(
-    written: Sequence[str], columns: Columns, file: str, line: int
-) -> tuple[list[str], dict[int, tuple[str, str]]]:
-    """Names of the headings; place -> unit and the column's own of those to be converted."""
+def _named(written: Sequence[str], columns: Columns, file: str, line: int) -> list[str]:
+    """Names of the headings; those that are not known stay as they are. Raises `InputError`."""
     sources = columns.sources or {}
     mapped = {source.heading: name for name, source in sources.items() if source.heading}
     known = {heading_key(name): name for name in (*columns.numbers, *columns.texts)}
     heading = [mapped.get(cell) or known.get(heading_key(cell), cell) for cell in written]
-    absent = next((cell for cell in mapped if cell not in written), None)
-    if absent is not None:
-        shown = ", ".join(repr(cell) for cell in written if cell)
-        raise InputError(f"no column {absent!r}", expected=f"one of {shown}", file=file, line=line)
-    twice = next((name for name in heading if name and heading.count(name) > 1), None)
-    if twice is not None:
-        raise InputError(f"column {twice} stands twice", file=file, line=line)
-    absent_names = [name for name in known.values() if name not in (*heading, *sources)]
-    slips = {cell: name for cell in heading if cell not in known.values() for name in _meant(cell, absent_names)[:1]}
+    for cell in mapped:
+        if cell not in written:
+            shown = ", ".join(repr(cell) for cell in written if cell)
+            raise InputError(f"no column {cell!r}", expected=f"one of {shown}", file=file, line=line)
+    absent = [name for name in known.values() if name not in (*heading, *sources)]
+    for name in heading:
+        if name and heading.count(name) > 1:
+            raise InputError(f"column {name} stands twice", file=file, line=line)
+    slips = {name: meant for name in heading if name not in known.values() and (meant := _meant(name, absent))}
     if slips:
-        cell, name = next(iter(slips.items()))
-        hint = f"did you mean {name}? Otherwise give it another name"
+        name, meant = next(iter(slips.items()))
+        hint = f"did you mean {meant}? Otherwise give it another name"
         if columns.sources is not None:
-            entries = [entry(name, cell, parted(cell)[1]) for cell, name in slips.items()]
+            entries = [f"{parted(of)[0]}={theirs}:{parted(theirs)[1] or parted(of)[1]}" for theirs, of in slips.items()]
             hint += f", or say its unit: {columns_option(entries)}"
-        raise InputError(f"column {cell!r}", expected=name, hint=hint, file=file, line=line)
-    units: dict[int, tuple[str, str]] = {}
-    for i, (cell, name) in enumerate(zip(written, heading, strict=True)):
-        own = parted(name)[1]
-        stated = (sources[name].unit, parted(cell)[1]) if cell in mapped else ()
-        unit = next((unit for unit in stated if same_quantity(unit, own)), own)
-        units |= {i: (unit, own)} if unit != own else {}
-    return heading, units
+        raise InputError(f"column {name!r}", expected=meant, hint=hint, file=file, line=line)
+    return heading
 
 
-def _meant(cell: str, absent: Sequence[str]) -> list[str]:
-    """Known columns that are not there, and that a heading seems to mean: in another unit, in none, or with a slip."""
+def _units(written: str, name: str, columns: Columns) -> tuple[str, str] | None:
+    """Unit of a column that is mapped and the one that it is to have; None where they are the same."""
+    source, unit = (columns.sources or {}).get(name), parted(name)[1]
+    if source is None or source.heading != written:
+        return None
+    stated = next((stated for stated in (source.unit, parted(written)[1]) if same_quantity(stated, unit)), unit)
+    return None if stated == unit else (stated, unit)
+
+
+def _meant(cell: str, absent: Sequence[str]) -> str:
+    """The absent column that a heading seems to mean: in another unit, in none, or with a slip; "" where none."""
+    near = difflib.get_close_matches(heading_key(cell), [heading_key(n) for n in absent if len(n) > 2], 1, ALIKE)
     quantity = parted(cell)[0]
-    keys = {heading_key(name): name for name in absent if len(name) > 2}
-    near = difflib.get_close_matches(heading_key(cell), keys, n=1, cutoff=ALIKE)
-    return [name for name in absent if parted(name)[1] and parted(name)[0] == quantity] + [keys[k] for k in near]
+    alike = [name for name in absent if parted(name)[1] and parted(name)[0] == quantity]
+    return next(iter(alike + [name for name in absent if heading_key(name) in near]), "")
 
 
 def _has_commas(heading: Sequence[str], rows: Rows, numbers: Sequence[int], file: str) -> bool:
     """Whether numbers have decimal commas. Raises `InputError` where that can be read in two ways."""
     cells = [(line, heading[i], row[i]) for line, row in rows for i in numbers if i < len(row)]
     marked = [cell for cell in cells if MARKED.fullmatch(cell[2])]
-    commas = [cell for cell in marked if "," in cell[2]]
-    doubtful = marked if all(LIKE_THOUSANDS.fullmatch(text) for _, _, text in marked) else []
-    if 0 < len(commas) < len(marked):
-        doubtful = [commas[0]] if "," not in marked[0][2] else [next(cell for cell in marked if "," not in cell[2])]
-    if doubtful:
-        line, name, text = doubtful[0]
+    commas = ["," in text for _, _, text in marked]
+    if not marked:
+        return False
+    if all(LIKE_THOUSANDS.fullmatch(text) for _, _, text in marked) or len(set(commas)) == 2:
+        line, name, text = marked[commas.index(not commas[0]) if len(set(commas)) == 2 else 0]
         raise InputError(
             f"{name} = {text!r} could be {text.replace(',', '.')} or {re.sub('[.,]', '', text)}",
             expected="decimal commas in the whole file, or decimal points, and no thousands separators",
             file=file,
             line=line,
         )
-    return bool(commas)
+    return commas[0]

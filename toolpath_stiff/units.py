@@ -2,23 +2,18 @@
 
 Everything inside the package is SI; everything that a user reads or writes is in the shop's units.
 The functions take and return scalars or numpy arrays alike; they only multiply, so this module
-costs nothing at start-up. What is written is rounded here too (`number`, `json_number`).
+costs nothing at start-up.
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     import numpy as np
     from numpy.typing import NDArray
 
 T = TypeVar("T", float, "NDArray[np.float64]")
-Pose = tuple[float, float, float, float, float, float]  # x, y, z in m, roll, pitch, yaw (or A, B, C) in rad
-ShopPose = tuple[float, float, float, float, float, float]  # the same in mm and degrees
 
 MM_PER_INCH = 25.4  # exact: international inch, 1959
 PI = 3.141592653589793
@@ -105,33 +100,3 @@ def rad_per_s_from_deg_per_min(feed: T) -> T:
 def mm_per_min_from_m_per_s(feed: T) -> T:
     """mm/min from m/s."""
     return feed * 60e3
-
-
-def pose_in_mm(pose: Iterable[float]) -> ShopPose:
-    """A pose in m and rad, in mm and degrees."""
-    x, y, z, a, b, c = pose
-    return (mm_from_m(x), mm_from_m(y), mm_from_m(z), deg_from_rad(a), deg_from_rad(b), deg_from_rad(c))
-
-
-def pose_in_si(pose: ShopPose) -> Pose:
-    """A pose in mm and degrees, in m and rad."""
-    x, y, z, a, b, c = pose
-    return (m_from_mm(x), m_from_mm(y), m_from_mm(z), rad_from_deg(a), rad_from_deg(b), rad_from_deg(c))
-
-
-# Sums run in another order on another CPU, and searches stop within a tolerance: digits beyond these are not certain.
-
-DIGITS = 5  # significant digits of a fitted figure
-
-
-def number(value: float | None, digits: int = 0) -> str:
-    """A figure with thin groups of thousands ("45 123"), "-" where there is none."""
-    if value is None or not math.isfinite(value):
-        return "-"
-    text = f"{value:,.{digits}f}".replace(",", " ")
-    return text.replace("-", "", 1) if float(text.replace(" ", "")) == 0.0 else text
-
-
-def json_number(value: float, digits: int = DIGITS) -> float | None:
-    """A float of some significant digits; None for what JSON cannot hold."""
-    return float(f"{value:.{digits}g}") if math.isfinite(value) else None

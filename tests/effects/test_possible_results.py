@@ -12,10 +12,9 @@ import pytest
 import toolpath_stiff as tps
 from tests.effects.test_own_effects import BODY, FORM, own, use, with_machine
 from tests.stiffness.cases import nist
-from toolpath_stiff.analysis.document import required_stiffness_missed
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.poses import evaluate_poses
-from toolpath_stiff.analysis.results import analyze
+from toolpath_stiff.analysis.results import analyze, required_stiffness_missed
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.nc.reader import parse_program
@@ -25,8 +24,8 @@ from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.core import compliance_along
 from toolpath_stiff.stiffness.effects.frame_compliance import FrameCompliance
 from toolpath_stiff.stiffness.effects.joint_compliance import JointCompliance
+from toolpath_stiff.stiffness.exact import is_compliance
 from toolpath_stiff.stiffness.model import build_model
-from toolpath_stiff.stiffness.possible import is_compliance
 
 PART = "G21 G90\nG0 X0 Y0 Z0\nG1 X10 F100\nM2\n"
 TIP = np.linspace([0.0, 0.0, 0.8], [0.2, 0.1, 0.9], 3)

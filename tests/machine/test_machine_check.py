@@ -1,16 +1,14 @@
-"""`tps machine new` and `check`: a neutral template; slips are found, machines without symmetry are left in peace."""
+"""`tps machine new` and `check`: a neutral template; slips are found."""
 
-from __future__ import annotations
+from contextlib import suppress
+from itertools import product
 
-import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from toolpath_stiff.analysis.machine_check import check_machine
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
-from toolpath_stiff.machine.symmetry import find_symmetry
 from toolpath_stiff.stiffness.model import build_model
 
 NIST = packaged_machines()["nist"].read_text()
@@ -58,7 +56,7 @@ def test_the_template_is_neutral(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize("name", packaged_machines())
 def test_the_packaged_machines_are_clean(name):
     found = check_machine(build_model(load_machine(name)))
-    assert found.good and not found.doubtful and found.symmetry.kind
+    assert found.good and not found.doubtful
 
 
 @pytest.mark.parametrize(
@@ -71,10 +69,8 @@ def test_the_packaged_machines_are_clean(name):
         (changed("min_mm = 2200.0", "min_mm = 2900.0"), 1, "the neutral pose is out of reach: strut2 min length needs"),
         (changed("default_origin_mm = [0.0, 0.0, 800.0]", "default_origin_mm = [0.0, 0.0, 3000.0]"), 1,
          "the default origin is out of reach"),
-        (changed("[304.77, 30.0, 296.97]", "[304.77, 30.0, -296.97]"), 0, "platform joint 1 stands at (263.9, 152.4, "
-         "-297) mm; the three-fold symmetry of the others puts it at (263.9, 152.4, 297) mm, 593.9 mm away (the sign"),
-        (changed("[304.77, 30.0, 296.97]", "[304.77, 150.0, 296.97]"), 0, "the sign of x looks flipped"),
-        (changed("[2080.72, 60.0, 3313.35]", "[2080.72, 90.0, 3313.35]"), 0, "frame joint 2 stands at (0, 2080.7,"),
+        (changed("[304.77, 30.0, 296.97]", "[304.77, 30.0, -296.97]"), 0, "strut 1 is 3"),
+        (changed("[2080.72, 60.0, 3313.35]", "[2080.72, 90.0, 3313.35]"), 0, "strut 2 is"),
         (changed("length_mm = [2561.6, 3213.2]", "length_mm = [2000, 2500]"), 1, "outside the lengths of [strut_law]"),
         (NIST, 0, "1000 N move the tool by 18.2 um along X, 18.2 um along Y, 8.08 um along Z"),
         (NIST, 0, "the file is good"),
@@ -84,50 +80,18 @@ def test_what_check_says(check, text, code, told):
     assert told in check(text, code)
 
 
-@pytest.mark.parametrize("name", packaged_machines())
-@pytest.mark.parametrize("body", BODIES)
-@pytest.mark.parametrize("axis", range(3))
-def test_a_flipped_sign_is_found_at_its_joint(name, body, axis):
-    machine = load_machine(name)
-    for joint in range(6):
-        joints = getattr(machine, body).copy()
-        if abs(joints[joint, axis]) < 1e-3:
-            continue
-        joints[joint, axis] *= -1.0
-        (stray,) = find_symmetry(machine.with_changes(**{body: joints})).strays
-        assert f"{stray.body}_joints" == body and joint in (stray.joint, stray.instead_of)
-        if stray.joint == joint:
-            assert stray.expected == pytest.approx(getattr(machine, body)[joint], abs=1e-4)
-            assert stray.slip == f"the sign of {'xyz'[axis]} looks flipped"
-
-
-@settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 10**6))
-def test_a_machine_without_symmetry_is_left_in_peace(seed):
-    generator = np.random.default_rng(seed)
-    machine = load_machine("nist").with_changes(
-        frame_joints=generator.uniform(-2.0, 2.0, (6, 3)), platform_joints=generator.uniform(-0.4, 0.4, (6, 3))
-    )
-    assert not find_symmetry(machine).strays
-
-
-@settings(max_examples=15, deadline=None)
-@given(seed=st.integers(0, 10**6), name=st.sampled_from(sorted(packaged_machines())))
-def test_calibrated_joints_are_no_strays(seed, name):
-    """Joints as a calibration finds them, 0.3 mm off at random, and a mill set up a metre off the machine's zero."""
-    generator = np.random.default_rng(seed)
-    machine = load_machine(name)
-    moved = {body: getattr(machine, body) + generator.normal(0.0, 3e-4, (6, 3)) + [1.0, -0.5, 0.2] for body in BODIES}
-    found = find_symmetry(machine.with_changes(**moved))
-    assert found.kind and not found.strays
-
-
-def test_a_singular_machine_names_the_joint_that_may_be_why(check):
-    # Strut 1 put onto strut 3: two struts in one line hold nothing twice.
-    text = changed("[2414.61, 60.0, 3013.45]", "[2414.61, 180.0, 3013.45]")
-    text = text.replace("[304.77, 30.0, 296.97]", "[304.77, 150.0, 296.97]", 1)
-    told = check(text, 2)
-    assert "singular there" in told and "Frame joint 1 stands at" in told and "platform joint 1 stands at" in told
+def test_most_flipped_signs_are_found_at_their_strut():
+    named = slips = 0
+    for machine in map(load_machine, packaged_machines()):
+        for body, joint, axis in product(BODIES, range(6), range(3)):
+            joints = getattr(machine, body).copy()
+            joints[joint, axis] *= -1.0
+            if abs(joints[joint, axis]) > 1e-3:
+                slips += 1
+                with suppress(InputError):  # singular, which is said
+                    doubtful = check_machine(build_model(machine.with_changes(**{body: joints}))).doubtful
+                    named += any(text.startswith(f"strut {joint + 1} is") for text in doubtful)
+    assert named > 0.8 * slips
 
 
 ENTRIES = '\n[[effect]]\nname = "joint_compliance"\ncompliance_nm_per_N = 1.0\n\n'

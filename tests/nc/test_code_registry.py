@@ -12,12 +12,11 @@ from benchmarks.hunt import codes_of, program_of
 from docs.from_code import codes_table
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import EVERYWHERE
-from toolpath_stiff.nc.codes.refused import REFUSED
-from toolpath_stiff.nc.codes.registry import ALIASES, CODES, UNDERSTOOD, code_meaning
+from toolpath_stiff.nc.codes.registry import CODES, REFUSED, UNDERSTOOD, code_meaning
 from toolpath_stiff.nc.controller import DIALECTS, Controller
-from toolpath_stiff.nc.groups import STEPS
-from toolpath_stiff.nc.plain_moves import MODE_NAMES
+from toolpath_stiff.nc.plain_lines import MODE_NAMES
 from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.nc.state import STEPS
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
 
 
@@ -59,9 +58,9 @@ def test_the_controls_of_a_row_are_those_of_the_dialects():
     for name in ADDITIONAL_OFFSETS:
         assert set(CODES[name].controls) == {d.name for d in DIALECTS.values() if name in d.additional}
     assert set(CODES["M97"].controls) == {d.name for d in DIALECTS.values() if d.local_calls}
-    assert set(ALIASES["G70"].controls) == {d.name for d in DIALECTS.values() if d.inch_metric}
-    assert set(ALIASES["G234"].controls) == {d.name for d in DIALECTS.values() if d.holds_tip == "G234"}
-    assert set(CODES["G43.4"].controls) == {d.name for d in DIALECTS.values() if d.holds_tip == "G43.4"}
+    for name in ("G70", "G71", "G234"):
+        assert set(CODES[name].controls) == {d.name for d in DIALECTS.values() if name in d.aliases}
+    assert set(CODES["G43.4"].controls) == {d.name for d in DIALECTS.values() if "G234" not in d.aliases}
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
@@ -88,14 +87,13 @@ def test_the_table_names_every_code_once():
     assert len(CODES) == len(UNDERSTOOD)
     cells = [line.split("|")[1] for line in codes_table().splitlines() if line.startswith("| ")]
     names = [name for cell in cells for name in cell.split() if name != "code" and not set(name) <= {"-"}]
-    assert sorted(names) == sorted([*CODES, *REFUSED, *ALIASES])
+    assert sorted(names) == sorted([*CODES, *REFUSED])
 
 
 # Codes whose lines the hunt leaves out, because only the dialect linuxcnc has them, or for want of a subprogram: in
 # programs that the tests hold against rs274.
 IN_TESTS = {
     "M98": "test_nc_language_subprograms.py", "M99": "test_nc_language_subprograms.py",
-    **dict.fromkeys(("M70", "M72", "M73", "G33", "G33.1"), "test_compensation.py"),
 }  # fmt: skip
 
 

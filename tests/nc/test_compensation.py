@@ -1,8 +1,9 @@
-"""Cutter compensation, saved modes, synchronised moves: by hand, by distance to the contour, and against rs274."""
+"""Cutter compensation: by hand, by distance to the contour, and against rs274."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ SQUARE = "G1 X0 Y-20\nX20\nY20\nX-20\nY-20\nX1\n"
 
 
 def read(text: str):
-    return parse_program(f"G21 G90 F600\n{text}\nM2\n", tools=TOOLS, controller=LINUXCNC)
+    return parse_program(f"G21 G90 F600\n{text}\nM2\n", controller=replace(LINUXCNC, tools=TOOLS))
 
 
 def ends(text: str) -> list[list[float]]:
@@ -90,11 +91,8 @@ def test_the_centre_keeps_the_radius_from_the_contour(seed):
         ("G41.1 D6\nG1 X10\nX[#5420 + 1]", 4, "cutter compensation"),
         ("G41.1 D6\nG1 X10\nG40\nG2 X20 I5", 5, "first move after cutter compensation"),
         ("G19\nG41.1 D6", 3, "G19"),
-        ("M72", 2, "nothing was saved"),
-        ("M70 G90", 2, "own"),
-        ("M70\nG43 H1\nM72", 4, "tool length"),
-        ("G33 Z5", 2, "pitch"),
-        ("G33 Z5 K1", 2, "spindle at S0"),
+        ("M72", 2, "modes saved"),
+        ("G33 Z5 K1", 2, "synchronised"),
         ("G71.1 Q1", 2, "lathe cycle"),
         ("G12.1", 2, "polar coordinates"),
         ("G150 P1", 2, "pocket"),
@@ -124,19 +122,6 @@ def test_a_program_beside_its_contour_is_not_rewritten():
     program = read("G41.1 D6\nG1 X10\nY10\nG40")
     with pytest.raises(InputError, match="cutter compensation"):
         rewrite_program(program, (0.1, 0, 0, 0, 0, 0.3), (0.0,) * 6)
-
-
-def test_saved_modes_come_back():
-    text = "M70\nG20 G91 F5 G55\nG0 X1\nM72\nG1 X50\no1 sub\nM73\nG91\nX5\no1 endsub\no1 call\nX7"
-    moves = read(text).moves
-    assert (moves.end[:, 0] * 1e3).round(6).tolist() == [25.4, 50, 55, 7]
-    assert (moves.feed[1:] * 6e4).round(6).tolist() == [600] * 3
-
-
-def test_synchronised_moves_feed_by_the_turn():
-    moves = read("S200 M3\nG33 Z-5 K1.5\nG33.1 X3 Z-9 K2\nG1 Z0").moves
-    assert (moves.end[:, [0, 2]] * 1e3).round(6).tolist() == [[0, -5], [3, -9], [0, -5], [0, 0]]
-    assert (moves.feed * 6e4).round(6).tolist() == [300, 400, 400, 600]
 
 
 @pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")

@@ -40,7 +40,7 @@ def test_sample_has_the_lengths_of_its_geometry():
     lean = np.degrees(np.arccos(rotation_matrices(moves.end[wall, 3:])[:, 2, 2]))
     np.testing.assert_allclose(lean, 12, atol=1e-3)
     assert not program.warnings and [tool.number for tool in program.tools] == [8, 9, 10]
-    np.testing.assert_allclose([tool.length for tool in program.tools], [0.12, 0.095, 0.13])
+    np.testing.assert_allclose([tool.length for tool in program.tools], [120.0, 95.0, 130.0])
 
 
 def test_long_files_give_the_same_moves(monkeypatch):
@@ -65,7 +65,7 @@ def test_operations_are_those_of_the_file():
     assert [row.name for row in operations(nx).rows] == ["FACE_1", "POCKET_2"]
     other = parse_program(path.format("A") + path.format("B").replace("D10", "D6"), "part.cls")
     assert other.tools[0].remark == "several tools without numbers"
-    assert nx.tools[0].remark == "MILL_D10" and nx.tools[0].diameter == pytest.approx(0.01)
+    assert nx.tools[0].remark == "MILL_D10" and nx.tools[0].diameter == pytest.approx(10.0)
 
 
 def test_commands_take_it(tmp_path, capsys):

@@ -9,6 +9,7 @@ import pytest
 
 from tests.nc.cutter_location import MM, START, read, refused
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.cutter_location.vocabulary import TABLE, WORDS
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.tables import ToolEntry
@@ -53,7 +54,7 @@ def test_inches():
     )
     moves = program.moves
     assert moves.end[0, 0] == pytest.approx(0.0254) and moves.feed[0] == pytest.approx(0.254 / 60)
-    assert moves.tool_length[0] == pytest.approx(0.0508) and program.tools[0].diameter == pytest.approx(0.0127)
+    assert moves.tool_length[0] == pytest.approx(0.0508) and program.tools[0].diameter == pytest.approx(12.7)
     # The tip stands, the tool turns: the feed's mm count as degrees, whatever the unit of the file.
     assert moves.feed[-1] == pytest.approx(math.radians(254) / 60)
 
@@ -68,9 +69,9 @@ def test_tools_lengths_and_pauses():
     np.testing.assert_allclose(program.moves.tool_length, [0.08, math.nan])
     assert program.moves.dwell[0] == pytest.approx(2.5)
     assert any("LENGTH of LOADTL" in text for text in program.assumptions)
-    tabled = read(text, tools={3: ToolEntry(3, 120.0, 6.0), 4: ToolEntry(4, 90.0)})
+    tabled = read(text, controller=Controller(tools={3: ToolEntry(3, 120.0, 6.0), 4: ToolEntry(4, 90.0)}))
     np.testing.assert_allclose(tabled.moves.tool_length, [0.12, 0.09])
-    assert [tool.number for tool in tabled.tools] == [3, 4] and tabled.tools[0].diameter == pytest.approx(0.006)
+    assert [tool.number for tool in tabled.tools] == [3, 4] and tabled.tools[0].diameter == pytest.approx(6.0)
 
 
 def test_lines_columns_and_labels():
@@ -225,7 +226,7 @@ def test_a_diameter_is_that_of_its_tool():
     program = read(
         f"{START}CUTTER/10\nLOADTL/1\n{cut}LOADTL/2\nCUTTER/8\n{cut}LOADTL/3\n{cut}CUTTER/6\nLOADTL/4\n{cut}"
     )
-    np.testing.assert_allclose([tool.diameter for tool in program.tools], [0.01, 0.008, math.nan, 0.006])
+    np.testing.assert_allclose([tool.diameter for tool in program.tools], [10.0, 8.0, math.nan, 6.0])
 
 
 def test_no_cut_is_an_error():

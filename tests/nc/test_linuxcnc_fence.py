@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.controller import ALL_SWITCHES, Controller
 from toolpath_stiff.nc.linuxcnc import reader, runner
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program, read_program
@@ -232,10 +233,10 @@ def test_a_file_beside_the_program_is_not_run(call, tmp_path, monkeypatch):
     other.write_text(f"o<other> sub\n;py,open('{marker}','w').close()\no<other> endsub\n")
     program = call.format(other.with_suffix(""))
     with pytest.raises(InputError, match=r"path|begins with a number"):
-        parse_program(program, interpreter="linuxcnc", block_delete=True)
+        parse_program(program, interpreter="linuxcnc", controller=Controller(switches=ALL_SWITCHES))
     with pytest.raises(InputError):  # by its name alone, from beside the program
         monkeypatch.chdir(tmp_path)
-        parse_program(call.format("other"), interpreter="linuxcnc", block_delete=True)
+        parse_program(call.format("other"), interpreter="linuxcnc", controller=Controller(switches=ALL_SWITCHES))
     assert not marker.exists()
 
 

@@ -13,9 +13,12 @@ from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import TABLE_OURS, Writer, cycle_program
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.controller import ALL_SWITCHES, Controller
+from toolpath_stiff.nc.lines import split_lines
 from toolpath_stiff.nc.linuxcnc import runner
 from toolpath_stiff.nc.moves import Moves
-from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.nc.reader import parse_program, read, read_program
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, WorkOffset, read_tool_table
 
 needs_rs274 = pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
@@ -68,7 +71,8 @@ def test_random_programs_read_the_same(seed, write, tmp_path):
     table = tmp_path / "ours.tbl"
     table.write_text(TABLE_OURS)
     text, tools = write(seed), read_tool_table(table)
-    assert_same(parse_program(text, tools=tools).moves, linuxcnc(text, tools=tools).moves)
+    control = Controller(tools=tools)
+    assert_same(parse_program(text, controller=control).moves, linuxcnc(text, controller=control).moves)
 
 
 @needs_rs274
@@ -85,9 +89,10 @@ def test_a_length_that_changes_just_before_a_tool_change(after):
     """rs274 forgets at M6 what the change did to Z's number."""
     tools = {number: ToolEntry(number, 25.0 * number, 6.0) for number in (1, 2, 3)}
     text = f"G21 G90 F100\nG0 X1 Z40\nG43 H3\nG1 X2\nG49\nT2 M6\n{after}\nG1 X9\n"
-    assert_same(parse_program(text, tools=tools).moves, linuxcnc(text, tools=tools).moves)
+    control = Controller(tools=tools)
+    assert_same(parse_program(text, controller=control).moves, linuxcnc(text, controller=control).moves)
     with pytest.raises(InputError, match="the tool length changed between the last move and M6"):
-        linuxcnc(text.replace("T2 M6", "T2 M6\nG91 G0 Z5\nG90"), tools=tools)
+        linuxcnc(text.replace("T2 M6", "T2 M6\nG91 G0 Z5\nG90"), controller=control)
 
 
 @needs_rs274
@@ -122,7 +127,7 @@ def test_variables_loops_and_subprograms():
 def test_cutter_compensation_goes_beside_the_contour_and_keeps_its_lines():
     """Round a square of 20 mm on the outside with a tool of 6 mm: sides 3 mm off, quarter circles at the corners."""
     text = "G21 G90 G17 F100\nT3 M6\nG0 X-20 Y-10\nG41 D3 G1 X0 Y0\nY20\nX20\nY0\nX0\nG40 G1 X-20 Y-10\nM2\n"
-    moves = linuxcnc(text, tools={3: ToolEntry(3, 50.0, 6.0)}).moves
+    moves = linuxcnc(text, controller=Controller(tools={3: ToolEntry(3, 50.0, 6.0)})).moves
     arcs = moves.arc_sweep != 0.0
     np.testing.assert_allclose(moves.arc_sweep[arcs][-3:], -math.pi / 2, atol=1e-4)
     np.testing.assert_allclose(moves.arc_center[arcs][-3:] * 1e3, [[0, 20, 0], [20, 20, 0], [20, 0, 0]], atol=1e-3)
@@ -142,7 +147,8 @@ def test_tables_are_in_mm_whatever_the_unit_of_the_program():
     offsets.home_g30 = [7.0, 8.0, 9.0, 0.0, 0.0, 0.0]
     text = "{} G90 F10\nT1 M6\nG43 H1\nG0 X0 Y0 Z0\nG49\nG55 G1 X0 Y0 Z0 C0\nG54\nG30\n"
     for unit in ("G20", "G21"):
-        moves = linuxcnc(text.format(unit), offsets=offsets, tools={1: ToolEntry(1, 76.2, 6.0)}).moves
+        control = Controller(offsets=offsets, tools={1: ToolEntry(1, 76.2, 6.0)})
+        moves = linuxcnc(text.format(unit), controller=control).moves
         assert moves.tool_length[0] == pytest.approx(0.0762, abs=1e-8)
         np.testing.assert_allclose(moves.start[0, :3] * 1e3, [0, 0, -76.2], atol=1e-3)
         np.testing.assert_allclose(moves.end[-2, :3] * 1e3, [100, 20, 5], atol=3e-3)
@@ -156,7 +162,8 @@ def test_work_offsets_that_are_turned(text):
     offsets = Offsets()
     offsets.table[0] = WorkOffset([30.0, 0.0, 0.0, 0.0, 0.0, 0.0], 25.0, given=True)
     offsets.table[1] = WorkOffset([100.0, 20.0, 5.0, 0.0, 0.0, 0.0], -60.0, given=True)
-    assert_same(parse_program(text, offsets=offsets).moves, linuxcnc(text, offsets=offsets).moves)
+    control = Controller(offsets=offsets)
+    assert_same(parse_program(text, controller=control).moves, linuxcnc(text, controller=control).moves)
 
 
 @needs_rs274
@@ -223,7 +230,7 @@ def test_feeds_of_every_kind():
 def test_refusals_name_their_line(text, line, what):
     tools = {1: ToolEntry(1, 50.0, 6.0), 2: ToolEntry(2, 60.0, 6.0)}
     with pytest.raises(InputError, match=what) as error:
-        linuxcnc(text, tools=tools)
+        linuxcnc(text, controller=Controller(tools=tools))
     assert (error.value.file, error.value.line) == ("part.nc", line)
 
 
@@ -240,7 +247,7 @@ def test_both_readers_give_the_same_tool_table_to_copy(words, tool):
 def test_block_delete_percent_and_what_follows_the_end():
     text = "%\nG1 X1 F100\n/ X2\n/3 X3\n%\nX4\n"
     np.testing.assert_allclose(linuxcnc(text).moves.end[:, 0] * 1e3, [1, 2, 3])
-    np.testing.assert_allclose(linuxcnc(text, block_delete=True).moves.end[:, 0] * 1e3, [1])
+    np.testing.assert_allclose(linuxcnc(text, controller=Controller(switches=ALL_SWITCHES)).moves.end[:, 0] * 1e3, [1])
 
 
 def test_where_it_is_missing_the_message_says_how_to_get_it(monkeypatch, tmp_path, capsys):
@@ -297,7 +304,7 @@ def test_without_bubblewrap_it_is_refused_unless_that_is_wanted(monkeypatch):
         InputError, match=r"bubblewrap.* is not there or may not work\. Install bubblewrap .*--unconfined"
     ):
         linuxcnc(text)
-    assert_same(confined, linuxcnc(text, unconfined=True).moves)
+    assert_same(confined, read(Request(split_lines(text, "p"), "p", interpreter="linuxcnc", unconfined=True)).moves)
 
 
 @needs_rs274

@@ -6,6 +6,7 @@ import pytest
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
+from toolpath_stiff.nc.program import Program
 from toolpath_stiff.nc.reader import parse_program
 
 
@@ -43,7 +44,7 @@ def test_an_offsets_file_may_hold_them(tmp_path):
 
     file = tmp_path / "offsets.txt"
     file.write_text("G54 = [1]\nG54.1 P2 = [5, 6, 7]\n")
-    assert ends_mm("G54.1 P2\nG1 X1 F100\n", offsets=read_offsets(file)) == [(5.0, 0.0, 0.0)]
+    assert ends_mm("G54.1 P2\nG1 X1 F100\n", controller=Controller(offsets=read_offsets(file))) == [(5.0, 0.0, 0.0)]
 
 
 @pytest.mark.parametrize(
@@ -141,22 +142,23 @@ SWITCHED = "G1 X1 F100\n/X2\n/1 X3\n/2 X4\n/ 3 X5\nM30\n"
 
 @pytest.mark.parametrize(
     ("switches", "kept"),
-    [(False, [1, 2, 3, 4, 5]), (True, [1]), ({1}, [1, 4, 5]), ({2, 3}, [1, 2, 3]), (set(), [1, 2, 3, 4, 5])],
+    [(False, [1, 2, 3, 4, 5]), (True, [1]), ({1}, [1, 4, 5]), ({2, 3}, [1, 2, 3]), ((), [1, 2, 3, 4, 5])],
 )
 def test_block_delete_by_switches(switches, kept):
-    chosen = switches if isinstance(switches, bool) else frozenset(switches)
-    assert [x for x, _, _ in ends_mm(SWITCHED, block_delete=chosen)] == kept
+    program = Program.from_text(SWITCHED, block_delete=switches)
+    assert [round(x) for x in program.to_frame()["end_x_mm"]] == kept
 
 
 def test_switches_that_are_asked_for_win_over_the_controller_file(tmp_path):
     given = control(tmp_path, "block_delete = [2]\n")
     assert [x for x, _, _ in ends_mm(SWITCHED, controller=given)] == [1, 2, 3, 5]
-    assert [x for x, _, _ in ends_mm(SWITCHED, controller=given, block_delete=frozenset({3}))] == [1, 2, 3, 4]
+    program = Program.from_text(SWITCHED, controller=tmp_path / "control.toml", block_delete=[3])
+    assert [round(x) for x in program.to_frame()["end_x_mm"]] == [1, 2, 3, 4]
 
 
 def test_single_switches_are_not_for_linuxcnc():
     with pytest.raises(InputError, match="single block-delete switches"):
-        parse_program(SWITCHED, block_delete=frozenset({2}), interpreter="linuxcnc")
+        parse_program(SWITCHED, controller=Controller(switches=frozenset({2})), interpreter="linuxcnc")
 
 
 @pytest.mark.parametrize(

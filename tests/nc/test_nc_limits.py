@@ -33,7 +33,7 @@ HEAD = "G21 G90 F600\nG1 X5\n"
         ("G43 H99999999999999999999", "3:5", "beyond any number"),
         ("G68 X0 Y0 R1e308", "3:11", "beyond any number"),
         ("O" + "1" * 100, "3:1", "a program number of 100 digits"),
-        ("M98 P" + "1" * 300, "3:5", "a number of 300 characters"),
+        ("M98 P" + "1" * 150, "3:5", "is beyond any number"),
         ("/" + "1" * 100 + " G1 X1", "3:1", "block-delete switch"),
         ("O" + "1" * 5000, "3", "a block of 5001 characters"),
         ("G1 " + "X1" * 3000, "3", "a block of 6002 characters"),

@@ -9,7 +9,7 @@ from tests.nc import rs274
 from tests.nc.test_nc_against_rs274 import TABLE_OURS, TABLE_RS274, assert_same_path
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.checking import check
-from toolpath_stiff.nc.controller import Controller, dialect_named
+from toolpath_stiff.nc.controller import ALL_SWITCHES, Controller, dialect_named
 from toolpath_stiff.nc.languages import lathe_program
 from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import RAPID
@@ -124,8 +124,8 @@ def test_other_axes_are_still_refused(block):
 def test_a_slash_in_the_middle_of_a_block():
     text = f"{HEAD}G1 X1. / Y2.\nN10 /2 X3.\nX4. /3 M8 Y7.\nM30\n"
     assert cuts(parse_program(text)) == [[1, 2, 5], [3, 2, 5], [4, 7, 5]]
-    assert cuts(parse_program(text, block_delete=True)) == [[1, 0, 5], [4, 0, 5]]
-    assert cuts(parse_program(text, block_delete=frozenset({2}))) == [[1, 2, 5], [4, 7, 5]]
+    assert cuts(parse_program(text, controller=Controller(switches=ALL_SWITCHES))) == [[1, 0, 5], [4, 0, 5]]
+    assert cuts(parse_program(text, controller=Controller(switches=frozenset({2})))) == [[1, 2, 5], [4, 7, 5]]
     block = read_block("G1 X1. /3 M8", 1, "p.nc")
     assert (block.optional, block.switch, block.rest) == (False, 3, 2)
     with pytest.raises(InputError, match=r"p\.nc:1:4: block-delete switch '/12'"):

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from toolpath_stiff.nc.controller import ALL_SWITCHES, Controller
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.nc.tables import read_offsets
 
 
 def moves_of(text: str, **options):
@@ -84,7 +86,7 @@ def test_encodings_and_line_ends(tmp_path):
 def test_block_delete():
     text = "G1 F100 X1\n/X2\n/1 X3\nX4\n"
     assert len(moves_of(text)) == 4
-    assert ends_mm(text, block_delete=True) == [[1, 0, 0], [4, 0, 0]]
+    assert ends_mm(text, controller=Controller(switches=ALL_SWITCHES)) == [[1, 0, 0], [4, 0, 0]]
 
 
 def test_radius_arcs_take_the_short_and_the_long_way():
@@ -143,7 +145,7 @@ def test_tool_length_and_offsets_file(tmp_path):
     offsets.write_text("# fixture\nG55 = [100, 0, 0]\nG54 = [1, 2, 3]\n")
     program = tmp_path / "part.nc"
     program.write_text("T5 M6\nG43 H5\nG0 X0 Y0 Z10\nG1 F100 Z1\nG49\nG55 G1 X0 Y0 Z1\n")
-    read = read_program(program, tool_table=table, offsets_file=offsets)
+    read = read_program(program, tool_table=table, controller=Controller(offsets=read_offsets(offsets)))
     np.testing.assert_allclose(read.moves.tool_length[:2], 0.1205)
     assert np.isnan(read.moves.tool_length[-1])
     assert read.origin[:3] == pytest.approx((0.001, 0.002, 0.003))

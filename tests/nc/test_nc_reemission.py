@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from tests.nc import emission, rs274
 from tests.nc.emission import Style, Writer
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
@@ -42,7 +43,7 @@ def written(steps, style: Style) -> tuple[str, np.ndarray]:
 def read(text: str, **options) -> Moves | None:
     """Its moves; None if none cuts."""
     try:
-        moves = parse_program(text, "part.nc", tools=TOOLS, **options).moves
+        moves = parse_program(text, "part.nc", controller=Controller(tools=TOOLS), **options).moves
     except InputError as error:
         assert error.found == "no cutting move", f"{error}\n{text}"
         return None
@@ -98,7 +99,7 @@ def test_random_modal_programs_are_read_the_same_by_both(steps, style):
     one = read(text)
     if one is None:
         return
-    two = parse_program(text, "part.nc", tools=TOOLS, interpreter="linuxcnc").moves
+    two = parse_program(text, "part.nc", controller=Controller(tools=TOOLS), interpreter="linuxcnc").moves
     two = two.take((np.abs(two.end - two.start).max(axis=1) > 3 * PRINTED_M) | (two.arc_sweep != 0.0))
     np.testing.assert_array_equal(one.line, two.line)
     np.testing.assert_array_equal(one.motion, two.motion)

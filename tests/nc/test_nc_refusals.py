@@ -6,6 +6,7 @@ import pytest
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.reader import parse_program, read_program
+from toolpath_stiff.nc.tables import read_offsets
 
 REFUSALS = [
     ("G77 X1", 1, 1, "not a G code"),
@@ -116,7 +117,7 @@ def test_missing_file_and_folder(tmp_path):
         ("tool,length\n1,5", "expected length_mm"),
         ("tool,diameter_mm\n1,5", "missing"),
         ("tool,length_mm\n1,abc", "length_mm = 'abc'"),
-        ("tool,length_mm\n1.5,10", "tool = 1.5; expected a whole number"),
+        ("tool,length_mm\n1.5,10", "tool number 1.5; expected a whole number"),
         ("tool,length_mm\n1,10\n1,20", "appears twice"),
         ("T1 P1 Z5 D6\nnonsense", "not a tool"),
         ("T1 Z1e9", "Z = "),
@@ -146,7 +147,5 @@ def test_bad_tool_tables(tmp_path, table, words):
 def test_bad_offset_files(tmp_path, offsets, words):
     path = tmp_path / "offsets.toml"
     path.write_text(offsets)
-    program = tmp_path / "part.nc"
-    program.write_text("G1 F100 X1\n")
     with pytest.raises(InputError, match=words):
-        read_program(program, offsets_file=path)
+        read_offsets(path)

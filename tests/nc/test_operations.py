@@ -369,7 +369,7 @@ def test_names(text: str, expected: list[str]) -> None:
 
 def test_a_tool_without_comment_has_its_remark_from_the_tool_table() -> None:
     tools = {3: ToolEntry(3, remark="face mill"), 4: ToolEntry(4)}
-    assert names("T3 M6\nG1 X1 F100\nT4 M6\nG1 X2\n", tools=tools) == ["T3 face mill", "T4"]
+    assert names("T3 M6\nG1 X1 F100\nT4 M6\nG1 X2\n", controller=Controller(tools=tools)) == ["T3 face mill", "T4"]
 
 
 def test_marks_take_the_place_of_comments() -> None:

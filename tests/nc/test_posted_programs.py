@@ -435,7 +435,7 @@ def test_the_same_part_posted_with_and_without_g43_4(control):
 
 
 def test_g43_4_without_kinematics_is_refused_as_before(control):
-    with pytest.raises(InputError, match=r"G43.4 is tool centre point control .*kinematics"):
+    with pytest.raises(InputError, match=r"G43.4 is tool centre point control.*kinematics"):
         parse_program("G43.4 H1\nG1 F100 X1\n")
 
 
@@ -445,7 +445,7 @@ def test_haas_says_g234(control):
     fanuc, haas = (control(f'dialect = "{name}"\n{AC}{table}') for name in ("fanuc", "haas"))
     ours, theirs = parse_program(text, controller=fanuc), parse_program(text.replace("43.4", "234"), controller=haas)
     np.testing.assert_array_equal(ours.moves.end, theirs.moves.end)
-    with pytest.raises(InputError, match="not a G code that is known"):
+    with pytest.raises(InputError, match="of Haas"):
         parse_program(text.replace("43.4", "234"), controller=fanuc)
 
 

@@ -17,6 +17,7 @@ from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
+from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.path.placing import place
@@ -57,8 +58,8 @@ def placed_there(name: str, there):
 def differences(name: str, there, **options) -> dict[str, float]:
     """Relative differences of mean, range and minimum after a round trip."""
     program, origin, placed = placed_there(name, there)
-    rewritten = rewrite_program(program, there, origin, tools=tools_for(name), **options)
-    return rewriting_differences(placed, rewritten, origin, tools=tools_for(name))
+    rewritten = rewrite_program(program, there, origin, control=Controller(tools=tools_for(name)), **options)
+    return rewriting_differences(placed, rewritten, origin, control=Controller(tools=tools_for(name)))
 
 
 @pytest.mark.parametrize(
@@ -114,7 +115,7 @@ def test_chords_cost_little(name, there):
 @pytest.mark.parametrize("name", SHORT)
 def test_placed_where_it_is_nothing_changes(name):
     program = reading(name)
-    rewritten = rewrite_program(program, program.origin, program.origin, tools=tools_for(name))
+    rewritten = rewrite_program(program, program.origin, program.origin, control=Controller(tools=tools_for(name)))
     assert rewritten.content == (PROGRAMS / name).read_bytes()
 
 
@@ -131,7 +132,9 @@ def without_words(text: str) -> list[str]:
 @pytest.mark.parametrize("name", SHORT)
 def test_everything_but_the_numbers_stays(name):
     program = reading(name, origin=placement(180.0))
-    rewritten = rewrite_program(program, placement(180.0), reading(name).origin, tools=tools_for(name))
+    rewritten = rewrite_program(
+        program, placement(180.0), reading(name).origin, control=Controller(tools=tools_for(name))
+    )
     original = (PROGRAMS / name).read_text()
     senses = str.maketrans("23", "__") if name in OFF_PLANE else {}  # a half turn turns the axes of G18 and G19 round
     assert [s.translate(senses) for s in without_words(rewritten.text)] == [

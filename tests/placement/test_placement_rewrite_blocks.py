@@ -14,6 +14,7 @@ from tests.nc.test_nc_against_rs274 import TABLE_RS274, TOOLS, Writer, cycle_pro
 from tests.nc.test_nc_against_rs274 import assert_same_path as assert_linuxcnc_agrees
 from tests.placement.rewriting import assert_same_path, cutting_moves
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.controller import ALL_SWITCHES, Controller
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import Offsets, ToolEntry, WorkOffset
 from toolpath_stiff.rewriting.program import rewrite_program
@@ -30,9 +31,9 @@ def at(x=0.0, y=0.0, z=0.0, turn=0.0, a=0.0, b=0.0):
 def rewrite(text: str, there, origin=HERE, **options):
     """Rewrite, assert that the path is the placed one, return the lines."""
     tools = options.pop("tools", None)
-    program = parse_program(text, origin=there, tools=tools)
-    rewritten = rewrite_program(program, there, origin, tools=tools, **options)
-    again = parse_program(rewritten.text, origin=origin, tools=tools)
+    program = parse_program(text, origin=there, controller=Controller(tools=tools))
+    rewritten = rewrite_program(program, there, origin, control=Controller(tools=tools), **options)
+    again = parse_program(rewritten.text, origin=origin, controller=Controller(tools=tools))
     if options.get("linearise") is None:
         unit = 10.0 ** -(options.get("decimals") or 4) * (25.4 if "G20" in text else 1.0)
         assert_same_path(program, there, again, origin, unit)
@@ -131,9 +132,9 @@ def test_offsets_of_a_file_are_taken_into_account():
     offsets.table[1] = WorkOffset([10.0, 20.0, 30.0, 0.0, 0.0, 0.0], rotation=30.0, given=True)
     there = at(1, 2, 3, 45)
     text = START + "G55 G0 X0 Y0 Z0\nG1 X5\nG3 Y10 J5\nM2\n"
-    program = parse_program(text, origin=there, offsets=offsets)
-    rewritten = rewrite_program(program, there, HERE, offsets=offsets)
-    assert_same_path(program, there, parse_program(rewritten.text, offsets=offsets), HERE, 1e-4)
+    program = parse_program(text, origin=there, controller=Controller(offsets=offsets))
+    rewritten = rewrite_program(program, there, HERE, control=Controller(offsets=offsets))
+    assert_same_path(program, there, parse_program(rewritten.text, controller=Controller(offsets=offsets)), HERE, 1e-4)
 
 
 @pytest.mark.parametrize("turn", [30.0, 90.0, 211.0])
@@ -195,9 +196,9 @@ def test_a_tolerance_below_the_rounding_is_refused():
 
 def test_blocks_left_out_are_refused_and_taken_ones_noted():
     text = START + "/G1 X5\nG1 X6\n"
-    program = parse_program(text, origin=at(10), block_delete=True)
+    program = parse_program(text, origin=at(10), controller=Controller(switches=ALL_SWITCHES))
     with pytest.raises(InputError, match="block-delete") as caught:
-        rewrite_program(program, at(10), HERE, block_delete=True)
+        rewrite_program(program, at(10), HERE, control=Controller(switches=ALL_SWITCHES))
     assert caught.value.line == 3
     rewritten = rewrite_program(parse_program(text), at(10), HERE)
     assert any("switch off" in note for note in rewritten.notes)
@@ -333,10 +334,10 @@ def test_any_small_program_keeps_its_path(text, shift, turn, decimals):
 def test_linuxcnc_reads_random_rewritten_programs_as_we_do(seed, tmp_path):
     """What rs274 makes of the written text is what we make of it; that this is the placed path is tested above."""
     text, there = Writer(seed).program(12), at(30, -20, 0, turn=180.0 if seed % 2 else 0.0)
-    program = parse_program(text, origin=there, tools=TOOL_TABLE)
-    rewritten = rewrite_program(program, there, HERE, tools=TOOL_TABLE, linearise=1e-4)
+    program = parse_program(text, origin=there, controller=Controller(tools=TOOL_TABLE))
+    rewritten = rewrite_program(program, there, HERE, control=Controller(tools=TOOL_TABLE), linearise=1e-4)
     path = tmp_path / "written.ngc"
     path.write_bytes(rewritten.content)
     canon = rs274.run(path, tmp_path, TABLE_RS274)
     assert not canon.error, canon.error
-    assert_linuxcnc_agrees(parse_program(rewritten.text, tools=TOOL_TABLE), canon)
+    assert_linuxcnc_agrees(parse_program(rewritten.text, controller=Controller(tools=TOOL_TABLE)), canon)

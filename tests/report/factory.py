@@ -7,7 +7,8 @@ import numpy as np
 from tests.moves_factory import make_moves
 from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.nc.moves import RAPID, ReadProgram, ToolUse, Unsupported
+from toolpath_stiff.nc.moves import RAPID, ReadProgram, Unsupported
+from toolpath_stiff.nc.tables import ToolEntry
 
 
 def make_analysis(
@@ -16,7 +17,7 @@ def make_analysis(
     name: str = "part.nc",
     source: list[str] | None = None,
     warnings: tuple[str, ...] = (),
-    tools: tuple[ToolUse, ...] = (),
+    tools: tuple[ToolEntry, ...] = (),
     unsupported: tuple[Unsupported, ...] = (),
     **options: object,
 ) -> Analysis:
@@ -54,7 +55,7 @@ def spiral_moves(turns: int = 5, radius: float = 0.25, per_turn: int = 36) -> li
 
 
 def spiral(**options: object) -> Analysis:
-    tools = (ToolUse(1, np.nan, 0.01, "end mill"), ToolUse(2, np.nan, 0.006, "ball nose"))
+    tools = (ToolEntry(1, np.nan, 10.0, "end mill"), ToolEntry(2, np.nan, 6.0, "ball nose"))
     return make_analysis(spiral_moves(), **{"tools": tools, "name": "spiral.nc", **options})  # type: ignore[arg-type]
 
 

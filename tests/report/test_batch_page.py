@@ -52,7 +52,7 @@ def test_a_program_that_only_plunges_does_not_set_the_scale():
     drill = outcome("drill.nc", 210e3, 215e3, 220e3, **PLUNGING)
     text = batch_page([SOFT, drill, STIFF])
     assert bars(text) == bars(batch_page([SOFT, STIFF]))
-    assert "210 000 to 220 000 →" in text and "only plunges" in text
+    assert "210 000" in text and "only plunges" in text
 
 
 def test_programs_that_only_plunge_set_the_scale_among_themselves():

@@ -12,11 +12,12 @@ import pytest
 
 from tests.browser import needs_browser, opened, run_in
 from tests.report.factory import make_analysis, short, spiral
-from toolpath_stiff.nc.moves import ToolUse, Unsupported
+from toolpath_stiff.documents import number
+from toolpath_stiff.nc.moves import Unsupported
+from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.report import analysis_page as page_module
 from toolpath_stiff.report.analysis_page import NONE, OUT_OF_REACH, PLUNGE, page, page_rows
 from toolpath_stiff.report.pages import json_pieces
-from toolpath_stiff.units import number
 
 EVIL = "</script><script>alert(1)</script>"
 VOID = {"meta", "input", "br", "hr", "img", "link"}
@@ -80,7 +81,7 @@ def evil_analysis():
         [{"end": (0.1, 0.0, 0.0), "tool": 1}, {"end": (0.1, 0.05, 0.0), "tool": 2}],
         name=f"a{EVIL}&\"'\u2028.nc",
         source=[f"G1 X100 ({EVIL})", "G1 Y50 ; <img src=x onerror=alert(2)> {{script}} \udc80 \u2029"],
-        tools=(ToolUse(1, np.nan, np.nan, f"<b>mill</b>{EVIL}"),),
+        tools=(ToolEntry(1, np.nan, np.nan, f"<b>mill</b>{EVIL}"),),
         warnings=(f"line 1: {EVIL}",),
         unsupported=(Unsupported(1, 9, EVIL, f"<i>{EVIL}"),),
     )

@@ -14,8 +14,8 @@ from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.effects.platform_flexibility import TIP, platform_nodes
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.stiffness.truss import TIP, platform_nodes
 
 FloatArray = NDArray[np.float64]
 AXES = ("x", "y", "z")

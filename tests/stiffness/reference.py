@@ -2,7 +2,7 @@
 
 As plain as can be, one pose at a time: struts and bars are pin-jointed truss elements (Armenakas 1991; the paper's
 equations 2 and 3). Assemble, apply a force at the tool tip, solve by Gaussian elimination, k = F / x (equation 4). It
-knows neither effects nor batches. Nodes as in `stiffness.truss`.
+knows neither effects nor batches. Nodes as in `platform_flexibility`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness.truss import TIP, platform_bars, platform_nodes
+from toolpath_stiff.stiffness.effects.platform_flexibility import TIP, platform_bars, platform_nodes
 
 
 def structure_stiffness(machine: Hexapod, position: ArrayLike, rotation: ArrayLike) -> FloatArray:

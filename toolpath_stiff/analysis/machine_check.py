@@ -1,4 +1,4 @@
-"""Slips in a machine file: whether struts, neutral pose and joints are plausible, each joint against the others."""
+"""Slips in a machine file: whether struts, neutral pose and joints are plausible."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate_poses
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.machine.symmetry import Symmetry, describe_stray, find_symmetry
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
-from toolpath_stiff.units import Pose, mm_from_m, n_per_um_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
 
 # N/um of a strut: screws, bearings and joints in series. Below, it is no machine's; above, no screw's.
 STRUT_SOFTEST, STRUT_STIFFEST = 1.0, 1000.0
+ODD_STRUT, MOST_ODD = 0.005, 2  # of the usual length: no other strut is nearer to one that a slip has moved
 # N/um at the tool: "usually less than 1" for articulated robots, "very often greater than 50" for machining centres
 # (Pan, Zhang, Zhu, Wang 2006, J. Mater. Process. Technol. 173, 301).
 ROBOT, MACHINING_CENTRE, BEYOND = 1.0, 50.0, 1000.0
@@ -39,8 +40,6 @@ class MachineCheck(Result):
         What may be meant but should be looked at.
     neutral, origin
         Stiffness and reach at the neutral pose and at the default origin.
-    symmetry
-        Of the joints.
 
     Examples
     --------
@@ -48,8 +47,8 @@ class MachineCheck(Result):
     >>> found = tps.Machine.load("nist").check()
     >>> found.good, found.to_dict()["wrong"], found.warnings, len(found.to_frame())
     (True, [], [], 0)
-    >>> found.file, found.symmetry.kind
-    ('nist', 'three-fold')
+    >>> found.file
+    'nist'
     >>> type(found.plot()).__name__
     'Figure'
     """
@@ -63,7 +62,6 @@ class MachineCheck(Result):
     doubtful: list[str]
     neutral: PoseStiffness
     origin: PoseStiffness
-    symmetry: Symmetry
 
     @property
     def good(self) -> bool:
@@ -110,15 +108,20 @@ def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
         Its effects give no stiffness at the neutral pose or the default origin.
     """
     machine = model.given or model.machine
-    neutral, origin = (_at(model, pose) for pose in (machine.limits.neutral_pose, machine.default_origin))
-    symmetry = find_symmetry(machine)
+    neutral, origin = (
+        evaluate_poses(model, np.array([pose[:3]]), np.array([pose[3:]]))
+        for pose in (machine.limits.neutral_pose, machine.default_origin)
+    )
     wrong = _struts(machine)
     for name, report in (("neutral pose", neutral), ("default origin", origin)):
         if not report.reach.reachable[0]:
             wrong.append(f"the {name} is out of reach: {report.reach.describe(0)}")
-    doubtful = [describe_stray(stray, symmetry.kind) for stray in symmetry.strays]
+    doubtful = _odd_struts(neutral.strut_lengths[0])
     if neutral.reach.reachable[0]:
-        doubtful += _stiffness(neutral)
+        softest = n_per_um_from_n_per_m(float(neutral.softest_stiffness[0]))
+        if not ROBOT <= softest <= BEYOND:
+            beside = "less than a robot arm has" if softest < ROBOT else "more than any machine tool has"
+            doubtful.append(f"at the neutral pose the softest direction has {softest:.3g} N/um at the tool, {beside}")
     if neutral.extrapolated[0]:
         lengths = ", ".join(f"{mm_from_m(float(v)):.0f}" for v in neutral.strut_lengths[0])
         doubtful.append(f"at the neutral pose the struts ({lengths} mm) lie outside the lengths of [strut_law]")
@@ -126,34 +129,27 @@ def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
     if same:
         sections = ", ".join(f"[{section}]" for section in same)
         doubtful.append(f"the remark of {sections} still says {TEMPLATE_REMARK!r}: say where its figures are from")
-    return MachineCheck(file, model, wrong, doubtful, neutral, origin, symmetry)
-
-
-def _at(model: StiffnessModel, pose: Pose) -> PoseStiffness:
-    values = np.array([pose])
-    return evaluate_poses(model, values[:, :3], values[:, 3:])
+    return MachineCheck(file, model, wrong, doubtful, neutral, origin)
 
 
 def _struts(machine: Hexapod) -> list[str]:
-    """Stiffnesses of a strut that no strut has, at the lengths that the file gives, else at the ends of the travel."""
-    law = machine.strut_law
-    ends = [(x, float(law.stiffness(np.array(x)))) for x in machine.limits.strut_length if np.isfinite(x)]
-    return _implausible("[strut_law]", law.points) or _implausible("the strut law at an end of the travel", ends)
-
-
-def _implausible(where: str, struts: list[tuple[float, float]]) -> list[str]:
-    values = [(mm_from_m(length), n_per_um_from_n_per_m(stiffness)) for length, stiffness in struts]
+    """Stiffnesses of a strut that no strut has, at the lengths that the file gives."""
+    struts = [(mm_from_m(length), n_per_um_from_n_per_m(stiffness)) for length, stiffness in machine.strut_law.points]
     return [
-        f"{where}: a strut of {length:g} mm with {value:g} N/um; expected {STRUT_SOFTEST:g} to {STRUT_STIFFEST:g} N/um"
-        + ("; is it in N/mm?" if value > STRUT_STIFFEST else "; is it in kN/um?")
-        for length, value in values
+        f"[strut_law]: a strut of {length:g} mm with {value:g} N/um; expected {STRUT_SOFTEST:g} to "
+        f"{STRUT_STIFFEST:g} N/um; is it in {'N/mm' if value > STRUT_STIFFEST else 'kN/um'}?"
+        for length, value in struts
         if not STRUT_SOFTEST <= value <= STRUT_STIFFEST
     ]
 
 
-def _stiffness(report: PoseStiffness) -> list[str]:
-    softest = n_per_um_from_n_per_m(float(report.softest_stiffness[0]))
-    if ROBOT <= softest <= BEYOND:
-        return []
-    beside = "less than a robot arm has" if softest < ROBOT else "more than any machine tool has"
-    return [f"at the neutral pose the softest direction has {softest:.3g} N/um at the tool, {beside}"]
+def _odd_struts(lengths: FloatArray) -> list[str]:
+    """Struts whose length m no other one comes near: machines have a few lengths, alike by threes or sixes."""
+    apart = np.abs(lengths[:, None] - lengths) + np.diag(np.full(len(lengths), np.inf))
+    usual = float(np.median(lengths))
+    odd = np.flatnonzero(apart.min(axis=1) > ODD_STRUT * usual)
+    return [
+        f"strut {i + 1} is {mm_from_m(float(lengths[i])):.0f} mm long at the neutral pose, most are about "
+        f"{mm_from_m(usual):.0f} mm: is a sign of one of its joints flipped, or are two numbers exchanged?"
+        for i in (odd if len(odd) <= MOST_ODD else [])
+    ]

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,8 +16,8 @@ from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.machine.model import EffectEntry, StrutLaw
+from toolpath_stiff.stiffness.active import read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect
-from toolpath_stiff.stiffness.parameters import read_parameters
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 
@@ -53,7 +52,7 @@ class Preview:
         *,
         strut_law: bool = True,
         near: Mapping[str, Document] | None = None,
-    ) -> dict[str, Any]:
+    ) -> Document:
         """Errors in per cent with these effects beside those of the machine file.
 
         Parameters

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.options import Option, numbers
-from toolpath_stiff.units import Pose, pose_in_si
+from toolpath_stiff.options import Option, number_in, numbers
+from toolpath_stiff.poses import Pose, pose_in_si
 
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 FARTHEST_DEG = 360.0
@@ -23,10 +23,7 @@ Linearised = Annotated[float | None, Option("--linearise", "mm", above=0, at_mos
 
 def finite(name: str, value: Any) -> float:
     """A number that is neither infinite nor nan: of a command, a call and a page alike. Raises `InputError`."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
+    number = number_in(value)
     if not math.isfinite(number):
         raise InputError(f"{name} {str(value)[:40]!r}".strip(), expected="a finite number")
     return number
@@ -38,8 +35,7 @@ def pose_si(name: str, pose: Sequence[float]) -> Pose:
     if len(values) not in (3, 6):
         raise InputError(f"{name} of {len(values)} numbers", expected="X, Y, Z or X, Y, Z, A, B, C in mm and degrees")
     x, y, z, a, b, c = (*values, 0.0, 0.0, 0.0)[:6]
-    near = max(abs(x), abs(y), abs(z)) <= FARTHEST_MM and max(abs(a), abs(b), abs(c)) <= FARTHEST_DEG
-    if not near:
+    if max(abs(x), abs(y), abs(z)) > FARTHEST_MM or max(abs(a), abs(b), abs(c)) > FARTHEST_DEG:
         raise InputError(
             f"{name} {values}",
             expected=f"positions within +-{FARTHEST_MM:g} mm and angles within +-{FARTHEST_DEG:g} degrees",

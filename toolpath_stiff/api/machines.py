@@ -26,12 +26,13 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_text
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import Option, checked
+from toolpath_stiff.poses import pose_in_mm, pose_in_si
 from toolpath_stiff.results import Result, TextFile, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import NO_SETUP, StiffnessModel, build_model, check_setup
 from toolpath_stiff.stiffness.trial import failures, own_effects, refuse_failing
-from toolpath_stiff.units import mm_from_m, pose_in_mm, pose_in_si
+from toolpath_stiff.units import mm_from_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -353,7 +354,7 @@ class Machine(Result):
         """
         return str(self.view.text(self.model.machine, self.standing(pose_mm_deg)[2]))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Name, title, source, effects, and its figures as `to_frame` has them, each with its unit and origin.
 
         Examples

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
@@ -32,9 +32,8 @@ from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import work_path
-from toolpath_stiff.placement.placing import place_again, place_program
-from toolpath_stiff.placement.result import Placement
-from toolpath_stiff.placement.task import PlacementTask, Rewriting
+from toolpath_stiff.placement.placing import place_program
+from toolpath_stiff.placement.result import Placement, PlacementTask
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
@@ -64,8 +63,6 @@ def place(
     objective: Annotated[str, Option("--objective", choices=tuple(OBJECTIVES))] = "balanced",
     points: Annotated[int, Option("--points", at_least=2, at_most=MOST_FRONT_POINTS)] = 60,
     seed: Annotated[int, Option("--seed", at_least=0)] = 1,
-    pick: Annotated[int | None, Option("--pick")] = None,
-    earlier: Placement | str | Path | Mapping[str, Any] | None = None,
     origin_mm_deg: Origin = None,
     load: LoadDirection = LOAD,
     step_mm: Step = 1.0,
@@ -75,7 +72,7 @@ def place(
     linearise_mm: Linearised = None,
     progress: Progress | None = None,
 ) -> Placement:
-    r"""Search where the work should sit, or take another point of an earlier search.
+    r"""Search where the work should sit.
 
     Parameters
     ----------
@@ -99,11 +96,6 @@ def place(
         Most points of the front.
     seed
         Of the search.
-    pick
-        Take this point (its number in placements.csv) of the front of an earlier search, without searching again.
-        Everything else has to be as it was.
-    earlier
-        That search as its result, its document or the file `placement.json`.
     origin_mm_deg
         The present placement, X, Y, Z or X, Y, Z, A, B, C of program zero; unless given, where the program's G10 says,
         else the machine's default.
@@ -137,41 +129,29 @@ def place(
     >>> found.worse
     []
     """
+    if write is None and not (decimals is None and linearise_mm is None):
+        raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     on, part = machine_from(machine), program_from(program)
-    model = on.running(part)
+    model, origin = on.running(part), origin_si(origin_mm_deg)
     default = model.machine.default_origin
-    origin = origin_si(origin_mm_deg)
     read = part.moves(origin, default)
     task = PlacementTask(
         model=model,
         program=read,
         present=origin or (read.origin if read.origin_source == "program" else default),
-        read=lambda origin: part.moves(origin, default),
+        read=lambda other: part.moves(other, default),
         bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
         rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
         load=parse_load(load),
         step=m_from_mm(step_mm),
         force=force_N,
-        rewriting=_rewriting(part, write, decimals, linearise_mm),
+        write="" if write is None else str(write),
+        decimals=decimals,
+        linearise=None if linearise_mm is None else m_from_mm(linearise_mm),
+        control=part.request.controller,
     )
-    if pick is None:
-        placed = place_program(task, counter(progress, f"{part.name}: search"))
-    else:
-        placed = place_again(task, earlier, pick)
+    placed = place_program(task, counter(progress, f"{part.name}: search"))
     return replace(placed, inputs=(*part.inputs, *on.inputs))
-
-
-def _rewriting(
-    part: Program, write: str | Path | None, decimals: int | None, linearise_mm: float | None
-) -> Rewriting | None:
-
-    if write is not None:
-        chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-        return Rewriting(str(write), decimals, chord, part.read_as)
-    if decimals is not None or linearise_mm is not None:
-        option = "decimals" if decimals is not None else "linearise"
-        raise InputError(f"--{option} without --write", hint="say with --write FILE where the program goes")
-    return None
 
 
 def _keep_out(text: str) -> KeepOut:
@@ -188,19 +168,15 @@ def _bounds(
 ) -> Bounds:
     """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
     heights = sorted(set(map(float, heights_mm)))
-    sides = [None if side is None else _pair(side) for side in box]
-    if heights:
-        sides[2] = (heights[0], heights[-1])
+    sides = [*box[:2], (heights[0], heights[-1]) if heights else box[2]]
     workspace = mm_from_m(machine.limits.workspace).T.tolist()
-    for i, (low, high) in enumerate(workspace):
-        if sides[i] is None and not np.isfinite(high - low):
-            raise InputError(f"the machine file bounds no workspace in {'xyz'[i]}", hint=f"give --{'xyz'[i]} LO:HI")
-    lengths = np.array([side or reach for side, reach in zip(sides, workspace, strict=True)])
+    for axis, side, reach in zip("xyz", sides, workspace, strict=True):
+        if side is None and not np.isfinite(reach).all():
+            raise InputError(f"the machine file bounds no workspace in {axis}", hint=f"give --{axis} LO:HI")
+    lengths = np.array([_pair(reach if side is None else side) for side, reach in zip(sides, workspace, strict=True)])
     angles = np.array([_pair(turn) for turn in turns])
-    if not np.abs(lengths).max() <= FARTHEST_MM:
-        raise InputError("bounds beyond 100 m", expected="mm")
-    if not np.abs(angles).max() <= FARTHEST_TURN_DEG:
-        raise InputError(f"a turn or tilt beyond {FARTHEST_TURN_DEG:g} degrees", expected="at most two whole turns")
+    if not np.abs(lengths).max() <= FARTHEST_MM or not np.abs(angles).max() <= FARTHEST_TURN_DEG:
+        raise InputError("bounds beyond reason", expected=f"within 100 m and {FARTHEST_TURN_DEG:g} degrees")
     low, high = np.concatenate([m_from_mm(lengths), rad_from_deg(angles)]).T
     return Bounds(low, high, tuple(m_from_mm(z) for z in heights))
 
@@ -233,10 +209,10 @@ class PlacementTrial:
     def at(self, origin_mm_deg: Sequence[float]) -> dict[str, float | None]:
         """Mean, range and weakest in N/mm, margins as shares of a limit's span; None where a cut is out of reach."""
         figures = self._evaluator.figures(np.array([pose_si("origin", origin_mm_deg)]))
-        names = {"mean_N_per_mm": figures.mean, "range_N_per_mm": figures.spread, "min_N_per_mm": figures.lowest}
-        values = {name: float(n_per_mm_from_n_per_m(value[0])) for name, value in names.items()}
-        values |= {"margin": float(figures.margin[0]), "rapid_margin": float(figures.rapid_margin[0])}
-        return {name: value if np.isfinite(value) else None for name, value in values.items()}
+        sizes = {"mean_N_per_mm": figures.mean, "range_N_per_mm": figures.spread, "min_N_per_mm": figures.lowest}
+        values = {name: n_per_mm_from_n_per_m(size) for name, size in sizes.items()}
+        values |= {"margin": figures.margin, "rapid_margin": figures.rapid_margin}
+        return {name: float(value[0]) if np.isfinite(value[0]) else None for name, value in values.items()}
 
 
 @checked
@@ -261,11 +237,8 @@ def try_placement(
     """
     on, part = machine_from(machine), program_from(program)
     model, direction = on.running(part), parse_load(load)
-    default = model.machine.default_origin
-    read = part.moves(None, default)
-    present = read.origin if read.origin_source == "program" else default
-    path = work_path(read, m_from_mm(step_mm), direction, present, lambda origin: part.moves(origin, default))
-    return PlacementTrial(read, Evaluator(model, path, direction, force_N))
+    read = part.moves(None, model.machine.default_origin)
+    return PlacementTrial(read, Evaluator(model, work_path(read, m_from_mm(step_mm), direction), direction, force_N))
 
 
 @checked
@@ -309,4 +282,6 @@ def rewrite(
     part = program_from(program)
     new, old = pose_si("placement", to_mm_deg), pose_si("present placement", from_mm_deg)
     chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-    return rewrite_program(part.moves(new), new, old, decimals=decimals, linearise=chord, **part.read_as)
+    return rewrite_program(
+        part.moves(new), new, old, decimals=decimals, linearise=chord, control=part.request.controller
+    )

@@ -101,16 +101,14 @@ def pose(pose_mm_deg: ArrayLike, machine: Machine | str | Path = "nist", *, forc
     on = machine_from(machine)
     try:
         given = np.asarray(pose_mm_deg, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"a pose {shortened(pose_mm_deg)}", expected="numbers X Y Z or X Y Z A B C") from error
-    if given.ndim not in (1, 2) or given.shape[-1] not in (3, 6):
-        count = f"of {given.shape[0]} numbers" if given.ndim == 1 else f"of shape {given.shape}"
-        raise InputError(f"a pose {count}", expected="X Y Z or X Y Z A B C")
-    single = given.ndim == 1
-    rows = np.atleast_2d(given)
+    except (TypeError, ValueError):
+        given = np.zeros(0)
+    shaped = given.ndim in (1, 2) and given.shape[-1] in (3, 6)
+    if not shaped or not np.abs(given).max(initial=0.0) <= FARTHEST:
+        expected = f"X Y Z or X Y Z A B C, numbers within +-{FARTHEST:g}"
+        raise InputError(f"a pose {shortened(pose_mm_deg)}", expected=expected)
+    single, rows = given.ndim == 1, np.atleast_2d(given)
     poses = np.concatenate([rows, np.zeros((len(rows), 6 - rows.shape[1]))], axis=1)
-    if not np.abs(poses).max(initial=0.0) <= FARTHEST:
-        raise InputError(f"a pose of {np.abs(poses).max():g} mm or degrees", expected=f"numbers within +-{FARTHEST:g}")
     stiffness = evaluate_poses(on.running(), m_from_mm(poses[:, :3]), rad_from_deg(poses[:, 3:]), force=force_N)
     stiffness = replace(stiffness, pose_mm_deg=poses, single=single)
     if single and not stiffness.reach.reachable[0]:

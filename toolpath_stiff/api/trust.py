@@ -17,10 +17,7 @@ FOLDER = "tps/agreed-effects"
 def _record(content: bytes) -> Path:
     """Where it is recorded that this user agreed to the content of a file."""
     chosen = Path(os.environ.get("XDG_CONFIG_HOME", ""))  # a relative one does not count (XDG base directories)
-    try:
-        base = chosen if chosen.is_absolute() else Path.home() / ".config"
-    except RuntimeError:
-        base = Path()
+    base = chosen if chosen.is_absolute() else Path.home() / ".config"
     if not base.is_absolute():  # it would lie in whatever folder is the present one, as a case that brings its own
         raise InputError("this user has no home folder", hint="set XDG_CONFIG_HOME to a folder of yours")
     return base / FOLDER / hashlib.sha256(content).hexdigest()

@@ -30,7 +30,7 @@ from toolpath_stiff.case.files import (
     without_lines,
 )
 from toolpath_stiff.case.findings import find
-from toolpath_stiff.case.state import CASE_FILE, READING, TABLES, CaseState, Step, call, case_text, read_steps
+from toolpath_stiff.case.state import CASE_FILE, READING, TABLES, Step, call, case_text, read_steps
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
@@ -42,10 +42,9 @@ from toolpath_stiff.nc.program import Reading
 from toolpath_stiff.options import arguments_of
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, json_text
-from toolpath_stiff.rig.exercise import MACHINE as EXERCISE_MACHINE
-from toolpath_stiff.rig.exercise import MEASUREMENTS, blind_case, measured_again, new_exercise, reveal
+from toolpath_stiff.rig import exercise as rig
+from toolpath_stiff.stiffness.active import read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
-from toolpath_stiff.stiffness.parameters import read_parameters
 
 
 class Case(Contents):
@@ -124,11 +123,9 @@ class Case(Contents):
     def __repr__(self) -> str:
         return f"<Case {self.folder.name}: {len(self.history)} steps>"
 
-    def record(
-        self, kind: str, text: str, command: str, python: str, state: CaseState | None = None, result: str = ""
-    ) -> None:
-        """Add a step that leads to this state (default: it changes nothing) and write the case."""
-        self._write([*self.history, Step(kind, text, command, python, state or self.state, result)])
+    def record(self, kind: str, text: str, command: str, python: str, result: str = "", **change: Any) -> None:
+        """Add a step that changes these attributes of the state, and write the case."""
+        self._write([*self.history, Step(kind, text, command, python, replace(self.state, **change), result)])
 
     def undo(self) -> Step | None:
         """Take back the last step that changed something, and what was found since; None where there is none."""
@@ -168,10 +165,11 @@ class Case(Contents):
         name = copied(self.folder, packaged_machines().get(str(machine), machine), "machines")
         with kept_if_read(self.folder, [name]):
             self.machine_of(name)
-        begun = f"case = tps.Case.open({self.folder.resolve().name!r}, {str(machine)!r})"
-        python = call("set_machine", machine) if self.history else begun
-        state = replace(self.state, machine=name, on={})
-        self.record("machine", f"machine {Path(machine).name}", command_line("machine", "check", name), python, state)
+        python = call("set_machine", machine)
+        if not self.history:
+            python = f"case = tps.Case.open({self.folder.resolve().name!r}, {str(machine)!r})"
+        line = command_line("machine", "check", name)
+        self.record("machine", f"machine {Path(machine).name}", line, python, machine=name, on={})
 
     def _check_effect(self, name: str) -> None:
         if name not in self.state.effects:
@@ -206,9 +204,7 @@ class Case(Contents):
         on = {name: keys for name, keys in state.on.items() if name in known_effects(paths)}
         text = f"own effects of {Path(file).name}{', edited' if instead_of else ''}"
         python = call("add_effects", file, instead_of=instead_of)
-        self.record(
-            "effects", text, command_line("effects", "check", new), python, replace(state, effects=effects, on=on)
-        )
+        self.record("effects", text, command_line("effects", "check", new), python, effects=effects, on=on)
 
     def add_data(self, *files: str | Path) -> None:
         """Add measurement files; the case keeps copies, and nothing is kept of a file that cannot be used.
@@ -224,11 +220,12 @@ class Case(Contents):
         (('data/nist-table1.csv',), 42, ['tps', 'compare'])
         """
         names = [copied(self.folder, file, "data", measurements_csv(file, self.machine)) for file in files]
-        state = replace(self.state, data=(*self.state.data, *names))
+        state = self.state
         with kept_if_read(self.folder, names):
-            count = len(tps.Measurements(list(map(self.path, state.data))).on(self.machine))
+            count = len(tps.Measurements([*map(self.path, (*state.data, *names))]).on(self.machine))
         text = f"{', '.join(Path(file).name for file in files)} added: {counted(count, 'reading')} in all"
-        self.record("data", text, state.question("compare"), call("add_data", *files), state)
+        command = state.question("compare", files=(*state.data_files, *names))
+        self.record("data", text, command, call("add_data", *files), data=(*state.data, *names))
 
     def set_aside(self, file: str, line: int, back: bool = False) -> None:
         """Leave out the readings of a line of a measurement file of the case; `back`: use them again."""
@@ -243,9 +240,9 @@ class Case(Contents):
             used[file] = free_name(self.folder, f"used/{Path(file).name}")
             write_atomically(self.folder / used[file], without_lines(self.folder / file, lines))
         aside = (*(other for other in state.aside if other != entry), *([] if back else [entry]))
-        state = replace(state, aside=aside, used=used)
+        command = state.question("compare", files=[used.get(name, name) for name in state.data])
         text = f"{file} line {line} {'used again' if back else 'set aside'}"
-        self.record("aside", text, state.question("compare"), call("set_aside", file, line, back=back), state)
+        self.record("aside", text, command, call("set_aside", file, line, back=back), aside=aside, used=used)
 
     def switch(self, effect: str, values: Document | None) -> None:
         """Switch an effect on with these values (keys as in a machine file), or off with None.
@@ -275,7 +272,7 @@ class Case(Contents):
             name = free_name(self.folder, "machines/by-hand.toml")
             self.machine_with(on).save(self.folder / name)
         command = state.question("compare", name) if state.data else command_line("machine", "check", name)
-        self.record("switch", text, command, call("switch", effect, values), replace(state, on=on))
+        self.record("switch", text, command, call("switch", effect, values), on=on)
 
     def accept(self, file: str | Path) -> None:
         """Go on with the machine file that an update of this case wrote.
@@ -293,8 +290,7 @@ class Case(Contents):
         name = free_name(self.folder, f"machines/{Path(self.state.machine).stem.removesuffix('-updated')}-updated.toml")
         write_atomically(self.folder / name, read_bytes(file, "the machine file"))
         command = next((f"{step.command} -o {name}" for step in reversed(self.history) if step.kind == "update"), "")
-        state = replace(self.state, machine=name, on={})
-        self.record("accept", f"goes on with {name}", command, call("accept", file), state)
+        self.record("accept", f"goes on with {name}", command, call("accept", file), machine=name, on={})
 
     def add_program(self, file: str | Path | None = None, **reading: Unpack[Reading]) -> None:
         r"""Use an NC program or cutter-location file; without one, read the present one otherwise.
@@ -338,25 +334,24 @@ class Case(Contents):
             program = self._program(state)
             if state.program:
                 program.moves()
-        words = [] if file is None else [file]
-        self.record("program", text, state.program_line(), call("add_program", *words, **reading), state)
+        python = call("add_program", *([] if file is None else [file]), **reading)
+        self.record("program", text, state.program_line(), python, **vars(state))
 
     def place_at(self, origin_mm_deg: Sequence[float]) -> None:
         """Put program zero somewhere: X, Y, Z, A, B, C in machine coordinates."""
         pose_si("origin", origin_mm_deg)
         origin = tuple(round(float(value), 6) for value in origin_mm_deg)
         text = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", origin, strict=False))
-        state = replace(self.state, origin=origin)
-        self.record("place_at", f"program zero at {text}", state.program_line(), call("place_at", origin), state)
+        line = self.state.program_line(origin_mm_deg=origin)
+        self.record("place_at", f"program zero at {text}", line, call("place_at", origin), origin=origin)
 
     def require(self, stiffness_N_per_mm: float) -> None:
         """Ask a stiffness of every cut; 0: none."""
         required = finite("required", stiffness_N_per_mm)
         if required:
             arguments_of(tps.analyze)["require_N_per_mm"].check(required)
-        state = replace(self.state, require=required)
-        text = f"{required:g} N/mm required"
-        self.record("require", text, state.program_line(), call("require", stiffness_N_per_mm), state)
+        line = self.state.program_line(require_N_per_mm=required or None)
+        self.record("require", f"{required:g} N/mm required", line, call("require", required), require=required)
 
     def find(self, kind: str, progress: Progress | None = None, **given: Any) -> Any:
         """A result as a step, kept in results/: of analyze, compare, diagnose, update, plan, place, draft, set_up.
@@ -379,7 +374,7 @@ class Case(Contents):
         """
         result = self.next_result(kind)
         kept, command = find(self, kind, result, progress, **given)
-        self.record(kind, repr(kept).strip("<>"), command, call("find", kind, **given), result=result)
+        self.record(kind, repr(kept).strip("<>"), command, call("find", kind, **given), result)
         if kind == "draft" and kept.text:
             self.add_effects(self.folder / result / f"{kept.name}.toml")
         return kept
@@ -390,38 +385,38 @@ class Case(Contents):
         `hidden` and `layout` as of `tps rig new`.
         """
         folder = free_name(self.folder, "exercise")
-        new_exercise(self.folder / folder, blind_case(seed, layout, hidden))
+        rig.new_exercise(self.folder / folder, rig.blind_case(seed, layout, hidden))
         drawn = options(seed=seed, out=folder, hidden=hidden, layout=layout if layout != "tilted" else None)
-        state = replace(
-            self.state,
-            machine=f"{folder}/{EXERCISE_MACHINE}",
-            data=(f"{folder}/{MEASUREMENTS}",),
+        self.record(
+            "exercise",
+            f"blind exercise, seed {seed}",
+            command_line("rig", "new", *drawn),
+            call("start_exercise", seed, hidden=hidden, layout=layout),
+            machine=f"{folder}/{rig.MACHINE}",
+            data=(f"{folder}/{rig.MEASUREMENTS}",),
             aside=(),
             used={},
             on={},
             exercise=folder,
         )
-        python = call("start_exercise", seed, hidden=hidden, layout=layout)
-        self.record("exercise", f"blind exercise, seed {seed}", command_line("rig", "new", *drawn), python, state)
 
     def measure(self, plan_file: str | Path) -> None:
         """Measure the exercise's machine at the poses of a plan; the readings are added."""
         name = free_name(self.folder, "data/measured.csv")
         visit = 1 + sum(step.kind == "measure" for step in self.history)
-        readings, count = measured_again(self.folder / self.state.exercise, str(plan_file), visit)
+        readings, count = rig.measured_again(self.folder / self.state.exercise, str(plan_file), visit)
         write_atomically(self.folder / name, readings)
         line = command_line("rig", "measure", self.state.exercise, *options(at=plan_file, out=name, visit=visit))
-        state = replace(self.state, data=(*self.state.data, name))
-        text = f"{counted(count, 'reading')} measured"
-        self.record("measure", text, line, call("measure", plan_file), state)
+        text, data = f"{counted(count, 'reading')} measured", (*self.state.data, name)
+        self.record("measure", text, line, call("measure", plan_file), data=data)
 
     def claim(self, effects: str) -> Document:
         """Open the seal of the exercise and score a claim: names of effects with commas, "none" or "outside"."""
-        score = reveal(self.folder / self.state.exercise, effects)
+        score = rig.reveal(self.folder / self.state.exercise, effects)
         result = self.next_result("reveal")
         write_atomically(self.folder / result / "reveal.json", json_text(score))
         line = command_line("rig", "reveal", self.state.exercise, *options(claim=effects))
-        self.record("reveal", f"claimed {effects}: {score['verdict']}", line, call("claim", effects), None, result)
+        self.record("reveal", f"claimed {effects}: {score['verdict']}", line, call("claim", effects), result)
         return score
 
 

@@ -73,10 +73,9 @@ class CaseState:
 
     def program_line(self, name: str = "analyze", machine: str = "", **given: Any) -> str:
         """The command line that asks this of the program; "" without one."""
-        if name == "analyze":
-            given |= {"partial": True, "require_N_per_mm": self.require or None}
-        given = {"origin_mm_deg": self.origin or None, **given}
-        words = [*words_of(tps.Program.read, self.reading), *words_of(getattr(tps, name), given)]
+        stated = {"origin_mm_deg": self.origin or None, "require_N_per_mm": self.require or None}
+        stated |= {"partial": name == "analyze", **given}
+        words = [*words_of(tps.Program.read, self.reading), *words_of(getattr(tps, name), stated)]
         return self.question(name, machine, *words, files=[self.program]) if self.program else ""
 
 

@@ -17,9 +17,9 @@ from typing import Annotated
 
 import toolpath_stiff as tps
 from toolpath_stiff.api.effects import effect_name
+from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import DATA, JSON, REPLACE, command
-from toolpath_stiff.cli.run import call, show, write_single
-from toolpath_stiff.hints import command_line, hint, options
+from toolpath_stiff.hints import options
 from toolpath_stiff.options import Option, arguments_of
 from toolpath_stiff.report.effects import describe_effect, effect_details
 from toolpath_stiff.stiffness.catalogue import find_effect
@@ -32,23 +32,22 @@ File = Annotated[str, Option("FILE.py", help="file with your own physical effect
 @command("effects list", EFFECTS, JSON)
 def list_effects(args: Namespace) -> int:
     """All effects, in the order of the load path."""
-    return show(args, tps.effects(args.effects))
+    return run.show(args, tps.effects(args.effects))
 
 
 @command("effects show", EFFECTS, JSON)
 def show_effect(args: Namespace, name: Annotated[str, Option("NAME", help="name of the effect")]) -> int:
     """Equation, parameters, units, bounds, typical values and their source."""
     effect = find_effect(name, args.effects)
-    return show(args, effect_details(effect), document=lambda: describe_effect(effect))
+    return run.show(args, effect_details(effect), document=lambda: describe_effect(effect))
 
 
 @command("effects new", REPLACE)
 def new_effect(args: Namespace, file: File) -> int:
     """Write a commented, working example of an effect."""
     name = effect_name(file)
-    write_single(args, {Path(file): tps.effect_template(name).text}, fresh=True)
-    print(f"wrote {file}\n{hint('read it back', command_line('effects', 'show', name, *options(effects=file)))}")
-    return 0
+    text, show_it = tps.effect_template(name).text, ("effects", "show", name, *options(effects=file))
+    return run.write_text(args, file, text, "read it back", *show_it, fresh=True)
 
 
 @command("effects draft", DATA, "Machine.load", "Measurements.read", "draft_effect", REPLACE, JSON)
@@ -57,17 +56,17 @@ def draft_effect(
     output: Annotated[str, Option("-o --output", "FILE.toml", help="file to write")] = "missing.toml",
 ) -> int:
     """Write what a diagnosis leaves unexplained as an effect to edit."""
-    draft = call(args, tps.draft_effect, file=output)
+    draft = run.call(args, tps.draft_effect, file=output)
     if not draft.text:
-        return show(args, draft)
-    write_single(args, {Path(output): draft.text}, fresh=True)
+        return run.show(args, draft)
+    run.write_single(args, {Path(output): draft.text}, fresh=True)
     lines = [draft.diagnosis.to_dict()["portrait"]["text"], f"wrote {output}", *draft.next]
-    return show(args, "\n".join(lines), document=draft.to_dict)
+    return run.show(args, "\n".join(lines), document=draft.to_dict)
 
 
 @command("effects check", MACHINE, JSON)
 def check_effects(args: Namespace, file: File) -> int:
     """Try the effects of a file against the contract; exit code 1 if one fails."""
     check = tps.check_effects(file, args.machine)
-    show(args, check)
+    run.show(args, check)
     return 0 if check.passed else CHECK_FAILED

@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Annotated
 
 import toolpath_stiff as tps
+from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, command
-from toolpath_stiff.cli.run import call, given, run_to_folder, show, tell, write_single, written_text
 from toolpath_stiff.correction.geometry import recovery_text
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import command_line, hint
+from toolpath_stiff.hints import command_line
 from toolpath_stiff.options import Option, finite_number, numbers
 
 OUT_OF_REACH = NOT_GOOD = 1  # exit codes
@@ -52,12 +52,12 @@ def pose(
     if (csv is None) == (not pose):
         raise InputError("give either a pose or --csv FILE", expected="tps pose X Y Z [A B C], or tps pose --csv FILE")
     if csv is None:
-        return show(args, call(args, tps.pose, pose_mm_deg=pose))
+        return run.show(args, run.call(args, tps.pose, pose_mm_deg=pose))
     table, notes = tps.read_poses(csv)
-    tell("note", notes)
-    stiffness = call(args, tps.pose, pose_mm_deg=table)
+    run.tell("note", notes)
+    stiffness = run.call(args, tps.pose, pose_mm_deg=table)
     sys.stdout.write(stiffness.to_json() if args.json else stiffness.csv())
-    tell("warning", (*stiffness.warnings, *stiffness.out_of_reach(MOST_NAMED)))
+    run.tell("warning", (*stiffness.warnings, *stiffness.out_of_reach(MOST_NAMED)))
     return 0 if stiffness.reachable.all() else OUT_OF_REACH
 
 
@@ -81,7 +81,7 @@ def map(
         Several heights, mm.
     """
     heights = {"z_mm": slices} if slices else {}
-    return run_to_folder(args, tps.map_stiffness, tps.StiffnessMap, [args.machine], **heights)
+    return run.to_folder(args, tps.map_stiffness, tps.StiffnessMap, [args.machine], **heights)
 
 
 @command("machine list", JSON)
@@ -90,7 +90,7 @@ def list_machines(args: Namespace) -> int:
     machines = [tps.Machine.load(name).to_dict() for name in tps.Machine.names()]
     listed = [{key: machine[key] for key in ("name", "title", "source")} for machine in machines]
     text = "\n".join("{name:<16} {title}\n{0:<16} {source}".format("", **entry) for entry in listed)
-    return show(args, text, document=lambda: listed)
+    return run.show(args, text, document=lambda: listed)
 
 
 Picture = Annotated[str | None, Option("--out", "FILE.png", help="the picture (default: in reports)")]
@@ -108,8 +108,9 @@ def show_machine(
 ) -> int:
     """Figures of a machine with their origin, and a picture of it."""
     shown = tps.Machine.load(machine)
-    written = write_single(args, {_picture_file(out, shown.name): shown.picture(pose)} if out or not args.json else {})
-    show(args, shown.text(pose), written_text(written), document=lambda: shown.to_dict()["figures"])
+    picture = {_picture_file(out, shown.name): shown.picture(pose)} if out or not args.json else {}
+    written = run.written_text(run.write_single(args, picture))
+    run.show(args, shown.text(pose), written, document=lambda: shown.to_dict()["figures"])
     return 0 if shown.standing(pose)[2].reachable[0] else OUT_OF_REACH
 
 
@@ -128,18 +129,18 @@ def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Pi
         template = command_line("machine", "new", file)
         raise InputError(f"cannot read machine file {file!r}", hint=f"`{template}` writes a template")
     target = _picture_file(out, f"{Path(file).stem}_machine")
-    check = tps.Machine.load(Path(file), **given(args, tps.Machine.load)).check()
-    written = write_single(args, {target: check.picture()} if out or not args.json else {})
-    show(args, check, written_text(written))
+    check = tps.Machine.load(Path(file), **run.given(args, tps.Machine.load)).check()
+    written = run.write_single(args, {target: check.picture()} if out or not args.json else {})
+    run.show(args, check, run.written_text(written))
     return 0 if check.good else NOT_GOOD
 
 
 @command("machine new", REPLACE)
 def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     """Write a commented template."""
-    written = write_single(args, {Path(file): tps.machine_template(file).text}, fresh=True)
-    print(written_text(written), hint("edit it, then", command_line("machine", "check", file)), sep="\n")
-    return 0
+    return run.write_text(
+        args, file, tps.machine_template(file).text, "edit it, then", "machine", "check", file, fresh=True
+    )
 
 
 @command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
@@ -152,17 +153,15 @@ def from_linuxcnc(
 ) -> int:
     """Read the genhexkins pins of a LinuxCNC HAL file."""
     machine_file = tps.machine_from_linuxcnc(file, args.units)
+    run.tell("note", machine_file.notes)
     if out:
-        written = write_single(args, {Path(out): machine_file.text})
-        print(written_text(written), hint("next", command_line("machine", "check", out)), sep="\n")
-    else:
-        sys.stdout.write(str(machine_file))
-    tell("note", machine_file.notes)
+        return run.write_text(args, out, machine_file.text, "next", "machine", "check", out)
+    sys.stdout.write(machine_file.text)
     return 0
 
 
 @command("machine recover", "recover_geometry", JSON)
 def recover(args: Namespace) -> int:
     """Fit the NIST geometry to the paper's Table 1 anew."""
-    recovery = call(args, tps.recover_geometry)
-    return show(args, recovery_text(recovery), document=lambda: recovery)
+    recovery = run.call(args, tps.recover_geometry)
+    return run.show(args, recovery_text(recovery), document=lambda: recovery)

@@ -9,8 +9,8 @@ import sys
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
+from io import TextIOWrapper
 from pathlib import Path
-from types import FrameType
 from typing import Any, TextIO, cast
 
 from toolpath_stiff.cli.parser import COMMANDS, Command, nearest
@@ -23,15 +23,13 @@ GROUPS = {
         "analyze": "stiffness along the path of NC programs: samples, summary, pictures, page",
         "path": "the sampled path alone, without a machine",
         "check": "what a program uses, what is not understood, extents, times, reach",
+        "place": "where the work should sit: Pareto front and one recommended placement",
+        "case-study": "the paper's four regions: one path at two heights, displaced and turned",
     },
     "machine": {
         "pose": "stiffness, softest and stiffest direction, strut lengths at single poses",
         "map": "stiffness over planes of the workspace: picture, table, 3-D page",
         "machine": "list, show, check, make and import machine files",
-    },
-    "placement": {
-        "place": "where the work should sit: Pareto front and one recommended placement",
-        "case-study": "the paper's four regions: one path at two heights, displaced and turned",
     },
     "measurements": {
         "reduce": "raw force and displacement records to measured stiffnesses, lost motion, loops",
@@ -152,25 +150,12 @@ def _ended(text: str, code: int) -> int:
     return code
 
 
-SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-REPORT = "if that does not explain it, report this line"
-
-
 def last_resort(error: Exception) -> str:
     """What no command foresaw, in one line: memory, recursion, the file system, a defect of this package."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f", {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
     words = " ".join(str(error).split()) or "no more is known"
-    if isinstance(error, MemoryError):
-        words += ": take a larger --step, fewer --jobs or fewer data"
-    return f"an error that should not be ({type(error).__name__}{place}): {words}; {REPORT}"
-
-
-def stop(number: int, frame: FrameType | None) -> None:
-    """A signal handler that ends the run as Ctrl-C does; no other signal of its kind disturbs the clearing up."""
-    for other in SIGNALS:
-        signal.signal(other, signal.SIG_IGN)
-    raise KeyboardInterrupt
+    return f"an error that should not be ({type(error).__name__}{place}): {words}; report this line"
 
 
 def entry() -> None:
@@ -178,10 +163,8 @@ def entry() -> None:
     os.environ.update(dict.fromkeys(THREADS, "1"))
     # Further processes would look for modules in the present folder first: in a case, or wherever programs came from.
     os.environ["PYTHONSAFEPATH"] = "1"
-    for number in SIGNALS:
-        if signal.getsignal(number) == signal.SIG_DFL:  # one that is ignored (nohup) stays so
-            signal.signal(number, stop)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # a terminal that cannot show a letter shows a question mark
+        if isinstance(stream, TextIOWrapper):  # a terminal that cannot show a letter shows a question mark
             stream.reconfigure(errors="replace")
     sys.exit(main())

@@ -6,17 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 import toolpath_stiff as tps
+from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import DATA, FILES, FOLDER, JSON, NO_PLOTS, REPLACE, command
-from toolpath_stiff.cli.run import (
-    call,
-    check_single,
-    destination,
-    run_to_folder,
-    show,
-    tell,
-    write_single,
-    written_text,
-)
 from toolpath_stiff.options import Option
 from toolpath_stiff.workbooks import split_name
 
@@ -60,11 +51,11 @@ def reduce(
     first = Path(split_name(raw[0])[0])
     name = first.stem if first.is_file() else first.resolve().name
     target = Path(out or f"{name or 'raw'}_measurements.csv")
-    written = [str(file) for file in write_single(args, reduction.files(target, plots=not args.no_plots))]
-    tell("read", reduction.read_as)
-    tell("note", reduction.notes)
+    written = [str(file) for file in run.write_single(args, reduction.files(target, plots=not args.no_plots))]
+    run.tell("read", reduction.read_as)
+    run.tell("note", reduction.notes)
     document = {**reduction.to_dict(), "files": written}
-    return show(args, reduction, f"\nwrote {' and '.join(written)}", document=lambda: document)
+    return run.show(args, reduction, f"\nwrote {' and '.join(written)}", document=lambda: document)
 
 
 @command("compare", DATA, "Machine.load", "compare", *FOLDER)
@@ -81,7 +72,7 @@ def compare(args: Namespace) -> int:
     Files written to --out: compare.json, residuals.csv, report.html, measured_modelled.png, machine.png,
     variables.png.
     """
-    return run_to_folder(args, tps.compare, tps.Comparison, args.data)
+    return run.to_folder(args, tps.compare, tps.Comparison, args.data)
 
 
 @command("diagnose", DATA, "Machine.load", "Machine.under", "diagnose", "Program.read", *FOLDER)
@@ -98,7 +89,7 @@ def diagnose(args: Namespace) -> int:
     missing that no effect of the catalogue describes). Files written to --out: diagnose.json, residuals.csv,
     ladder.png, portrait.png, before_after.png, report.html.
     """
-    return run_to_folder(args, tps.diagnose, tps.Diagnosis, args.data)
+    return run.to_folder(args, tps.diagnose, tps.Diagnosis, args.data)
 
 
 @command("update", DATA, "Machine.load", "update", *FOLDER)
@@ -121,13 +112,13 @@ def update(
     place), before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
     """
     args.replace |= args.force
-    check_single(args, output)
-    folder, rules = destination(args, tps.Update, args.data, () if output is None else ("machine.toml",))
-    fitted = call(args, tps.update, machine_file=output or folder / "machine.toml")
+    run.check_single(args, output)
+    folder, rules = run.destination(args, tps.Update, args.data, () if output is None else ("machine.toml",))
+    fitted = run.call(args, tps.update, machine_file=output or folder / "machine.toml")
     written = fitted.save(folder, plots=not args.no_plots, rules=rules, machine=output is None)
     if output and fitted.accepted:
-        written += write_single(args, {Path(output): fitted.machine_text()})
-    return show(args, fitted, written_text(written), *(["", *fitted.next] if fitted.next else []))
+        written += run.write_single(args, {Path(output): fitted.machine_text()})
+    return run.show(args, fitted, run.written_text(written), *(["", *fitted.next] if fitted.next else []))
 
 
 @command("plan", "Machine.load", "plan", *FOLDER)
@@ -156,5 +147,5 @@ def plan(
     if next is not None:
         visit = tps.next_visit(next, data, columns=args.columns)
         written = visit.save()
-        return show(args, visit, *([written_text(written)] if written else []))
-    return run_to_folder(args, tps.plan, tps.Plan, data or [args.machine], minutes=dict(args.minutes or ()))
+        return run.show(args, visit, *([run.written_text(written)] if written else []))
+    return run.to_folder(args, tps.plan, tps.Plan, data or [args.machine], minutes=dict(args.minutes or ()))

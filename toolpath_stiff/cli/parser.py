@@ -21,17 +21,13 @@ from toolpath_stiff.options import PARAMETERS, SWITCHES, Argument, Option, argum
 NEGATIVE_VALUE = re.compile(r"^-(\d|\.\d|inf|nan)")
 
 
-def switch(name: str, text: str) -> Argument:
-    """A switch that several commands have."""
-    return Argument(name.replace("-", "_"), Option(f"--{name}"), text, bool, False)
-
-
 PROGRAM = Argument("program", Option("PROGRAM"), "NC program or cutter-location file", required=True)
 FILES = "measurement files (CSV, or FILE.xlsx[#SHEET]), or nist-table1"
 DATA = Argument("data", Option("DATA", count="+"), FILES, required=True)
-REPLACE = switch("replace", "replace existing files that the tool did not write; the old ones are kept as NAME.old")
-NO_PLOTS = switch("no-plots", "tables and figures in numbers only, no pictures")
-JSON = switch("json", "print JSON to standard output and nothing else")
+KEPT = "replace existing files that the tool did not write; the old ones are kept as NAME.old"
+REPLACE = Argument("replace", Option("--replace"), KEPT, bool, False)
+NO_PLOTS = Argument("no_plots", Option("--no-plots"), "tables and figures in numbers only, no pictures", bool, False)
+JSON = Argument("json", Option("--json"), "print JSON to standard output and nothing else", bool, False)
 OUT = Argument("out", Option("--out", "DIR"), "folder of the results (default: one in reports, named after the input)")
 FOLDER = (OUT, REPLACE, NO_PLOTS, JSON)
 

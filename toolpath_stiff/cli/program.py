@@ -1,4 +1,4 @@
-"""The commands on a program: analyze, path, check."""
+"""The commands on a program: analyze, path, check, place, case-study."""
 
 import sys
 from argparse import Namespace
@@ -9,20 +9,10 @@ from typing import Annotated, Any
 
 import toolpath_stiff as tps
 from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table
+from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FOLDER, JSON, PROGRAM, REPLACE, command
-from toolpath_stiff.cli.run import (
-    call,
-    destination,
-    given,
-    machine_for,
-    progress_line,
-    show,
-    tell,
-    write_single,
-    written_text,
-)
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.options import Option
+from toolpath_stiff.options import Option, numbers
 from toolpath_stiff.report.analysis import other_samples
 from toolpath_stiff.report.batch.programs import find_programs
 
@@ -92,24 +82,24 @@ def analyze(
         'toolpath-stiff[cluster]').
     """
     files, counts = find_programs(programs)
-    saving: dict[str, Any] = {"plots": not args.no_plots, "table": table, "show_plunges": show_plunges}
+    plots = not args.no_plots
     if counts or len(files) > 1 or cluster:
-        options = given(args, tps.analyze, tps.Program.read) | saving | {"jobs": jobs, "replace": args.replace}
+        options = run.given(args, tps.analyze, tps.Program.read)
+        options |= {"plots": plots, "table": table, "show_plunges": show_plunges, "jobs": jobs, "replace": args.replace}
         executor = _executor(cluster) if cluster else None
-        with progress_line() as progress:
+        with run.progress_line() as progress:
             analyses = tps.analyze_many(
-                programs, machine_for(args), args.out or "reports", executor=executor, progress=progress, **options
+                programs, run.machine_for(args), args.out or "reports", executor=executor, progress=progress, **options
             )
         if counts and not args.json:
             print(*counts, sep="\n")
-        show(args, analyses, written_text(analyses.written))
-        if not analyses.complete:
-            return INCOMPLETE
-        return BELOW_REQUIRED if analyses.below_required else 0
+        run.show(args, analyses, run.written_text(analyses.written))
+        return (BELOW_REQUIRED if analyses.below_required else 0) if analyses.complete else INCOMPLETE
     file = files[0].file
-    folder, rules = destination(args, tps.Analysis, [file], other_samples(table))
-    analysis = call(args, tps.analyze, program=tps.Program.read(file, **given(args, tps.Program.read)))
-    show(args, analysis, written_text(analysis.save(folder, rules=rules, **saving)))
+    folder, rules = run.destination(args, tps.Analysis, [file], other_samples(table))
+    analysis = run.call(args, tps.analyze, program=tps.Program.read(file, **run.given(args, tps.Program.read)))
+    written = analysis.save(folder, plots=plots, rules=rules, table=table, show_plunges=show_plunges)
+    run.show(args, analysis, run.written_text(written))
     if analysis.below_required:
         return BELOW_REQUIRED
     return 0 if analysis.complete else INCOMPLETE
@@ -146,13 +136,13 @@ def path(
     the rotary axes a_deg,b_deg,c_deg in machine coordinates, feed_mm_per_min (empty for rapids). Program zero lies at
     0,0,0 unless --origin or the program's own G10 says otherwise. Every move has samples at both of its ends.
     """
-    sampled = call(args, tps.sample_path)
+    sampled = run.call(args, tps.sample_path)
     if out:
-        write_single(args, {Path(out): sampled.csv()})
+        run.write_single(args, {Path(out): sampled.csv()})
     else:
         sys.stdout.writelines(piece.decode() for piece in sampled.csv())
-    tell("warning", (f"{sampled.name}: {warning}" for warning in sampled.warnings))
-    tell("note", sampled.unsupported)
+    run.tell("warning", (f"{sampled.name}: {warning}" for warning in sampled.warnings))
+    run.tell("note", sampled.unsupported)
     return 0
 
 
@@ -169,7 +159,6 @@ def check(
     for example:
       tps check part.nc
       tps check part.nc --dialect fanuc --json
-      tps check part.nc --strut-speed 5000         warn of cuts in which a strut is faster, mm/min
       tps check part.nc --machine none             the program alone, no reach and no strut speeds
       tps check part.ngc --interpreter auto        by LinuxCNC's interpreter where ours does not read it to its end
 
@@ -177,6 +166,80 @@ def check(
     extents, lengths and times is then that of the blocks that could be read. Extents are those of the tool tip in
     program coordinates of G54, mm and degrees. Exit code 1 if there is any error.
     """
-    findings = call(args, tps.check, machine=None if machine == NO_MACHINE else machine)
-    show(args, findings)
+    findings = run.call(args, tps.check, machine=None if machine == NO_MACHINE else machine)
+    run.show(args, findings)
     return 1 if findings.errors else 0
+
+
+@command("place", PROGRAM, "place", *READ, *FOLDER)
+def place(args: Namespace) -> int:
+    """Where the work should sit: Pareto front and one recommended placement.
+
+    for example:
+      tps place programs/pocket.nc --x -300:300 --y -300:300 --z 400:1250
+      tps place programs/pocket.nc --z-values 400,600,800 --rotate 0 --objective mean
+      tps place programs/pocket.nc --keep-out vice:100,100,0,300,300,900
+      tps place programs/pocket.nc --rotate 0 --write placed.nc
+      tps place programs/pocket.nc --x 40 --y 25.5 --z 900 --rotate 0 --write placed.nc
+
+    The recommended placement is never worse than the present one in mean, range or weakest place, if one such can be
+    found.
+
+    A placement is where program zero sits and how the work is turned about it: the numbers of --origin. Files written
+    to --out: placements.csv (the front), placement.json, setup.pdf, report.html
+    (click a placement of the front, see the path there).
+    """
+    run.check_single(args, args.write)
+    folder, rules = run.destination(args, tps.Placement, [args.program])
+    placement = run.call(args, tps.place)
+    written = placement.save(folder, plots=not args.no_plots, rules=rules)
+    if args.write and not placement.refusal:
+        written += run.write_single(args, {Path(args.write): placement.program_bytes})
+    run.show(args, placement, run.written_text(written))
+    if placement.refusal:
+        raise InputError(
+            f"{args.write} was not written; the search is kept in {folder}: {placement.refusal}",
+            hint=f"place it there without a search by {placement.fixed}",
+        )
+    return 0
+
+
+def _region(text: str) -> tuple[str, tuple[float, ...]]:
+    name, _, place = text.rpartition(":")
+    values = numbers(place)
+    if not name or len(values) not in (3, 4):
+        raise ValueError("NAME:X,Y,Z or NAME:X,Y,Z,TURN")
+    return name, values
+
+
+Region = tuple[str, tuple[float, ...]]
+
+
+@command("case-study", "case_study", *READ, *FOLDER)
+def case_study(
+    args: Namespace,
+    program: Annotated[str | None, Option("PROGRAM")] = None,
+    region: Annotated[Sequence[Region], Option("--region", "NAME:X,Y,Z[,TURN]", read=_region, count="append")] = (),
+) -> int:
+    """The paper's four regions: one path at two heights, displaced and turned.
+
+    for example:
+      tps case-study
+      tps case-study programs/pocket.nc
+      tps case-study programs/pocket.nc --region left:-200,0,800 --region right:200,0,800,90
+
+    Writes case_study.csv, case_study.json, case_study.md, regions.png and heights.png: one tool path at two heights,
+    displaced and turned, as the paper's Figure 10; its three conclusions checked one by one; where they stop holding.
+
+    Parameters
+    ----------
+    program
+        NC program or cutter-location file (default: the contour of a 200 mm square).
+    region
+        Where program zero sits, mm, and how far the path is turned about it, degrees; once for each region (default:
+        four of the reference machine).
+    """
+    named = dict(region)
+    if len(named) < len(region):
+        raise InputError("--region: a name is given twice", expected="a name of its own for each region")
+    return run.to_folder(args, tps.case_study, tps.CaseStudy, [program or args.machine], regions=named or None)

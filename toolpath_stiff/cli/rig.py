@@ -11,10 +11,11 @@ The rig shares no stiffness code with the model that it tests. The seal is a bli
 
 from argparse import Namespace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
+from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import JSON, REPLACE, command
-from toolpath_stiff.cli.run import rules_of, show, write_single
+from toolpath_stiff.documents import Document
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.options import Option
 from toolpath_stiff.rig.exercise import FILES, blind_case, measured_again, new_exercise, reveal
@@ -55,9 +56,8 @@ def new(
         Nominal machine.
     """
     case = blind_case(seed, layout, hidden, noise / 100.0, machine, at)
-    count = new_exercise(out, case, rules_of(args, fresh=True))
-    print(f"{out}: {count} measurements, the nominal machine and the sealed truth")
-    print(hint("next", _diagnose(out)))
+    count = new_exercise(out, case, run.rules_of(args, fresh=True))
+    print(f"{out}: {count} measurements, the nominal machine and the sealed truth", _diagnose(out), sep="\n")
     return 0
 
 
@@ -81,9 +81,8 @@ def measure(
         Another number draws clamping and noise anew.
     """
     text, count = measured_again(folder, at, visit)
-    write_single(args, {Path(out): text}, *(Path(folder) / name for name in FILES))
-    print(f"{out}: {count} measurements")
-    print(hint("next", _diagnose(folder, out)))
+    run.write_single(args, {Path(out): text}, *(Path(folder) / name for name in FILES))
+    print(f"{out}: {count} measurements", _diagnose(folder, out), sep="\n")
     return 0
 
 
@@ -97,28 +96,23 @@ def reveal_truth(args: Namespace, folder: Exercise, claim: Annotated[str, Option
         What is hidden; `none`, or `outside` the catalogue.
     """
     truth = reveal(folder, claim)
-    return show(args, _wording(truth), document=lambda: truth)
+    return run.show(args, _wording(truth), document=lambda: truth)
 
 
 def _diagnose(folder: str, *more: str) -> str:
     """The diagnosis of an exercise, all measurements together."""
-    place = Path(folder)
-    files = dict.fromkeys((str(place / "measurements.csv"), *more))
-    return Asked(tuple(files), str(place / "machine.toml")).command("diagnose")
+    files = dict.fromkeys((str(Path(folder, "measurements.csv")), *more))
+    return hint("next", Asked(tuple(files), str(Path(folder, "machine.toml"))).command("diagnose"))
 
 
-def _wording(truth: dict[str, Any]) -> str:
+def _wording(truth: Document) -> str:
     """What was hidden, in lines."""
     lines = [f"claim {', '.join(truth['claim'])}: {truth['verdict']}"]
-    if not truth["effects"]:
-        lines.append("nothing was hidden")
     for effect in truth["effects"]:
-        values = ", ".join(
-            f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
-            for key, value in effect["parameters"].items()
-        )
-        size = 100 * effect["size"]
-        lines.append(f"hidden: {effect['effect']} ({values}); changes the readings by {size:.1f} % (rms)")
+        values = (f"{value:.4g}" if isinstance(value, float) else value for value in effect["parameters"].values())
+        sizes = ", ".join(f"{key} {value}" for key, value in zip(effect["parameters"], values, strict=True))
+        change = f"changes the readings by {100 * effect['size']:.1f} % (rms)"
+        lines.append(f"hidden: {effect['effect']} ({sizes}); {change}")
         if "links" in effect:
             lines.append(f"it is in: {' or '.join(effect['links'])}; varies with: {' or '.join(effect['variables'])}")
-    return "\n".join(lines)
+    return "\n".join(lines if truth["effects"] else [*lines, "nothing was hidden"])

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import toolpath_stiff as tps
 from toolpath_stiff.errors import InputError, harmless
 from toolpath_stiff.files import Content, check_outputs, old_name, write_atomically
+from toolpath_stiff.hints import command_line, hint
 from toolpath_stiff.options import arguments_of
 from toolpath_stiff.results import FolderResult, json_text
 from toolpath_stiff.results_folder import Rules, check_folder
@@ -146,6 +147,13 @@ def write_single(
     return [*contents]
 
 
+def write_text(args: Namespace, file: str, text: str, sentence: str, *words: str, fresh: bool = False) -> int:
+    """Write a file, and say so and which command comes next; the exit code of success. Raises as `write_single`."""
+    written = write_single(args, {Path(file): text}, fresh=fresh)
+    print(written_text(written), hint(sentence, command_line(*words)), sep="\n")
+    return 0
+
+
 def destination(
     args: Namespace, kind: type[FolderResult], sources: Sequence[str], omit: Collection[str] = ()
 ) -> tuple[Path, Rules]:
@@ -164,7 +172,7 @@ def destination(
     return folder, rules
 
 
-def run_to_folder(
+def to_folder(
     args: Namespace,
     function: Callable[..., FolderResult],
     kind: type[FolderResult],

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import Annotated, cast
 
 from toolpath_stiff.api.machines import Machine
+from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FILES, command
-from toolpath_stiff.cli.run import given
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import Option, arguments_of
 from toolpath_stiff.studio.run import opened_case, serve
@@ -56,7 +56,7 @@ def studio(
     no_browser
         Print the address, open nothing.
     """
-    reading = {name: value for name, value in given(args, Program.read).items() if value not in (None, False)}
+    reading = {name: value for name, value in run.given(args, Program.read).items() if value not in (None, False)}
     opened = opened_case(case, trust, machine, exercise)
     for file in args.effects:
         opened.add_effects(file)

@@ -8,11 +8,11 @@ from toolpath_stiff.correction.steps import Support
 from toolpath_stiff.correction.strut_law import StrutLawSearch
 from toolpath_stiff.correction.words import assumptions, text
 from toolpath_stiff.diagnosis.rows import held_errors, percent_of, rounded_errors
-from toolpath_stiff.documents import Document, to_dict
+from toolpath_stiff.documents import Document, json_number, to_dict
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.inference.left_out import error_falls, gain_in_standard_errors
 from toolpath_stiff.machine.model import Uncertainty
-from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
 
 
 def document_of(update: UpdateOutcome) -> Document:

@@ -11,13 +11,13 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.rows import FittedSize, interval, percent_of, rounded_errors
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, json_number
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import HeldOut, held_out, of_readings
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.machine.model import StrutLaw
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.units import json_number, mm_from_m, n_per_um_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ from toolpath_stiff.stiffness.model import build_model
 
 if TYPE_CHECKING:
     from toolpath_stiff.nc.moves import ReadProgram
-    from toolpath_stiff.units import Pose
+    from toolpath_stiff.poses import Pose
 
 
 FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect and a few to spare

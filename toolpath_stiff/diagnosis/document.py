@@ -7,13 +7,13 @@ import numpy as np
 from toolpath_stiff.diagnosis.examination import Examination
 from toolpath_stiff.diagnosis.rows import HypothesisRow, HypothesisRows, percent_of, rounded_errors
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why, would_tell
-from toolpath_stiff.documents import Document, certain, to_dict
+from toolpath_stiff.documents import Document, certain, json_number, to_dict
 from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.judgement import Judgement
 from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.portrait.words import alike_entry, portrait_entry
-from toolpath_stiff.units import json_number, mm_from_m, n_per_um_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 FIGURES = ("probability", "log_evidence", "words")
 

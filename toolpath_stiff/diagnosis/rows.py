@@ -9,6 +9,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.examination import Examination
+from toolpath_stiff.documents import DIGITS, json_number
 from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.errors import AS_GIVEN, error_figures
 from toolpath_stiff.inference.evidence import Fit
@@ -16,7 +17,6 @@ from toolpath_stiff.inference.hypotheses import Family, averaged_interval
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.stiffness.sizes import joined
-from toolpath_stiff.units import DIGITS, json_number
 
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import json_number
 from toolpath_stiff.inference.covariances import inverse_root
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.hypotheses import Family
-from toolpath_stiff.units import json_number
 
 CONFOUNDED = 0.95  # canonical correlation above which two effects cannot be told apart by these data
 

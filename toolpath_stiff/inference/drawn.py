@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, json_number
 from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import held_out
@@ -27,7 +27,6 @@ from toolpath_stiff.inference.noise import Scatter
 from toolpath_stiff.readings.measurements import Readings, reading_marks
 from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.sizes import joined
-from toolpath_stiff.units import json_number
 
 CONFIRMS = 3.0  # log probability that new readings must gain: odds of 20 to 1, strong evidence (Kass and Raftery 1995)
 

@@ -21,18 +21,10 @@ from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import EffectEntry, Hexapod, Limits, StrutLaw
 from toolpath_stiff.machine.schema import MachineToml, Sections, read_sections
-from toolpath_stiff.machine.symmetry import describe_stray, find_symmetry
 from toolpath_stiff.machine.uncertainty import read_uncertainty
+from toolpath_stiff.poses import Pose, pose_in_si
 from toolpath_stiff.toml_reader import LARGEST_BYTES, shortened
-from toolpath_stiff.units import (
-    Pose,
-    m_from_mm,
-    m_per_s_from_mm_per_min,
-    mm_from_m,
-    n_per_m_from_n_per_um,
-    pose_in_si,
-    rad_from_deg,
-)
+from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
 
 CLOSEST_LENGTHS = 1e-6  # m, of a strut law: nobody measures closer, and the slope between them stays a number
 # Smallest singular value of the six strut screws (arms in units of the platform's size) that is no singularity.
@@ -142,9 +134,7 @@ def _check_neutral_pose(toml: MachineToml, machine: Hexapod) -> None:
     size = max(float(np.linalg.norm(arms, axis=1).mean()), 1e-9)
     screws = np.concatenate([directions, np.cross(arms, directions) / size], axis=1)
     if not np.isfinite(screws).all() or np.linalg.svd(screws)[1][-1] < SINGULAR:
-        symmetry = find_symmetry(machine)
-        strays = "; ".join(describe_stray(stray, symmetry.kind) for stray in symmetry.strays)
-        hint = strays or "check the joints as well: similar hexagons without a twist are singular everywhere"
+        hint = "check the joints as well: similar hexagons without a twist are singular everywhere"
         mistake, expected = ": the machine is singular there", "a pose in the middle of the workspace"
         raise toml.fault("limits.joint_angle", "neutral_pose_mm_deg", mistake, expected, hint)
 

@@ -19,7 +19,8 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
-from toolpath_stiff.units import Pose, n_per_m_from_n_per_um
+from toolpath_stiff.poses import Pose
+from toolpath_stiff.units import n_per_m_from_n_per_um
 
 Derived = TypeVar("Derived")
 ORIGINS = ("published", "recovered", "assumed", "fitted")

@@ -9,7 +9,8 @@ import numpy as np
 
 from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m, pose_in_mm
+from toolpath_stiff.poses import pose_in_mm
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m
 
 # `tps machine new` puts it in every section; what still has it was not replaced.
 TEMPLATE_REMARK = "value of the template, not of this machine"

@@ -5,24 +5,15 @@ With `--interpreter linuxcnc`, what LinuxCNC's interpreter says of the program, 
 
 import copy
 import re
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning
-from toolpath_stiff.nc.controller import plain
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
-from toolpath_stiff.nc.findings import (
-    ERROR,
-    NOTE,
-    Checked,
-    Finding,
-    UsedCode,
-    findings_of,
-    in_order,
-)
 from toolpath_stiff.nc.languages import foreign_program, looks_like_cutter_location, refused_program
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
@@ -31,10 +22,95 @@ from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun, Tally
 from toolpath_stiff.nc.reader import INTERPRETERS, on_the_part, program_of, read
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import WORK_OFFSETS
 
 CODE = re.compile(r"([GM])(\d+\.?\d*)")
+ERROR, WARNING, NOTE = "error", "warning", "note"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One finding about a program.
+
+    Attributes
+    ----------
+    line, column
+        Where, from 1; 0: of the program as a whole.
+    code
+        What kind of finding it is, a short word; of used and unsupported words the word itself.
+    text
+        One sentence.
+    severity
+        "error": the program is refused for it; "warning": to be checked; "note": for the record.
+    """
+
+    line: int
+    column: int
+    code: str
+    text: str
+    severity: str
+
+
+@dataclass(frozen=True)
+class UsedCode(Finding):
+    """A G or M code of the program: where it stands first, how often, and what it is taken for."""
+
+    count: int
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found without a machine.
+
+    Attributes
+    ----------
+    program
+        What was read; after an error the moves of the blocks that could be read.
+    complete
+        Whether the whole program was read.
+    used
+        Codes in the order of their first appearance.
+    findings
+        In the order of lines.
+    start, end
+        Modal state before the first block and after the last one, names to words.
+    """
+
+    program: ReadProgram
+    complete: bool
+    used: tuple[UsedCode, ...]
+    findings: tuple[Finding, ...]
+    start: dict[str, str] = field(default_factory=dict)
+    end: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def unsupported(self) -> tuple[Finding, ...]:
+        """Words that were read and not acted upon."""
+        return tuple(Finding(word.line, word.column, word.word, word.reason, NOTE) for word in self.program.unsupported)
+
+
+def findings_of(errors: Iterable[InputError], program: ReadProgram) -> tuple[Finding, ...]:
+    """All findings about a program, in the order of lines."""
+    return in_order(
+        [
+            *(finding_of(error) for error in errors),
+            *(Finding(remark.line, 0, "warning", remark.text, WARNING) for remark in program.warnings),
+            *(Finding(0, 0, "assumption", text, NOTE) for text in program.assumptions if text != START),
+        ]
+    )
+
+
+def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Findings in the order of lines."""
+    return tuple(sorted(findings, key=lambda finding: (finding.line, finding.column)))
+
+
+def finding_of(error: InputError) -> Finding:
+    """What could not be read."""
+    text = error.found + (f"; expected {error.expected}" if error.expected else "")
+    text += f". {error.hint[0].upper()}{error.hint[1:]}" if error.hint else ""
+    return Finding(error.line or 0, error.column or 0, "not read", text, ERROR)
 
 
 def check(request: Request) -> Checked:
@@ -62,7 +138,7 @@ def check(request: Request) -> Checked:
     if looks_like_cutter_location(request.lines, request.name):
         return _check_cutter_location(request)
     ours = _check_built_in(request)
-    if request.interpreter == "builtin" or ours.complete or not plain(request.block_delete, request.controller):
+    if request.interpreter == "builtin" or ours.complete or not request.controller.plain:
         return ours
     theirs = _check_by_linuxcnc(replace(request, interpreter="linuxcnc"), may_lack=True)
     why = next(finding for finding in ours.findings if finding.severity == ERROR)
@@ -76,7 +152,12 @@ def check(request: Request) -> Checked:
 
 
 def _check_built_in(request: Request) -> Checked:
-    run, start, errors, ending = _checked_run(request)
+    run = ProgramRun(request, Tally())
+    start = modal_state(run.state)
+    errors, ending = _run_to_the_end(run)
+    if errors and uses_variables(request.lines):  # once more with their values, from the start
+        run = ParametricRun(request, Tally())
+        errors, ending = _run_to_the_end(run)
     state, tally = run.state, run.tally
     assert tally is not None
     program = program_of(run, request, ending)
@@ -97,20 +178,6 @@ def _check_built_in(request: Request) -> Checked:
         start=start,
         end=modal_state(state),
     )
-
-
-def _checked_run(request: Request) -> tuple[ProgramRun, dict[str, str], list[InputError], list[Remark]]:
-    """The run, the modes at its start, its errors, the warnings of its end.
-
-    A program with variables is run again with their values, from the start.
-    """
-    run = ProgramRun(request, Tally())
-    start = modal_state(run.state)
-    errors, warnings = _run_to_the_end(run)
-    if errors and uses_variables(request.lines):
-        run = ParametricRun(request, Tally())
-        errors, warnings = _run_to_the_end(run)
-    return run, start, errors, warnings
 
 
 def _run_to_the_end(run: ProgramRun) -> tuple[list[InputError], list[Remark]]:

@@ -16,7 +16,7 @@ the two is longer by the tool's radius.
 import math
 from dataclasses import dataclass, field
 
-from toolpath_stiff.nc.geometry import ArcError, Point2
+from toolpath_stiff.nc.geometry import Point2, arc_sweep, refuse_arc_if
 from toolpath_stiff.nc.moves import Move
 
 CORNER = 0.05  # rad; less than this is no corner (LinuxCNC's TOLERANCE_CONCAVE_CORNER)
@@ -46,6 +46,10 @@ class OffsetArc:
     turn: int
     turns: int = 1
     programmed: float = 0.0
+
+    def sweep_to(self, start: Point2, end: Point2) -> float:
+        """Signed angle from one point to another, rad."""
+        return arc_sweep(start, end, self.center, self.turn < 0, self.turns)
 
 
 @dataclass
@@ -99,7 +103,17 @@ class Cutter:
     def center(self) -> Point2:
         """Tool centre in the plane."""
         assert self.position is not None
-        return self.position[self.axes[0]], self.position[self.axes[1]]
+        return self.in_plane(self.position)
+
+    def in_plane(self, point: list[float]) -> Point2:
+        """A point's two coordinates of the plane."""
+        return point[self.axes[0]], point[self.axes[1]]
+
+    def moved(self, point: list[float], to: Point2) -> list[float]:
+        """A point with other coordinates in the plane."""
+        point = list(point)
+        point[self.axes[0]], point[self.axes[1]] = to
+        return point
 
 
 @dataclass(frozen=True)
@@ -126,13 +140,14 @@ def enter(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) 
     [10.0, 3.0]
     """
     if cutter.straight:
-        if arc is not None:
-            raise ArcError("an arc as the first move of cutter compensation", "G0 or G1")
+        refuse_arc_if(arc is not None, "an arc as the first move of cutter compensation", "G0 or G1")
         cutter.entering = True
         return CenterMove(target), (0.0, 0.0)
-    if math.dist(start, target) <= cutter.radius:
-        problem = f"the entry move of cutter compensation is {math.dist(start, target):.4f} mm long in its plane"
-        raise ArcError(problem, f"more than the tool's radius of {cutter.radius:g} mm")
+    refuse_arc_if(
+        math.dist(start, target) <= cutter.radius,
+        f"the entry move of cutter compensation is {math.dist(start, target):.4f} mm long in its plane",
+        f"more than the tool's radius of {cutter.radius:g} mm",
+    )
     if arc is not None:
         return _enter_arc(cutter, start, target, arc.center, arc.turn), (0.0, 0.0)
     across = _angle(start, target) + cutter.side * math.pi / 2.0
@@ -161,15 +176,17 @@ def _enter_arc(cutter: Cutter, start: Point2, target: Point2, center: Point2, tu
     end = _beside(target, cutter.radius, _angle(target, center) if inside else _angle(center, target))
     inward = _angle(end, center)
     cosine = math.cos(_angle(end, start) - inward)
-    if abs(cosine) < FLAT:
-        raise ArcError("an entry arc that the tool's radius makes straight", SMALLER)
+    refuse_arc_if(abs(cosine) < FLAT, "an entry arc that the tool's radius makes straight", SMALLER)
     return CenterMove(end, center=_beside(end, math.dist(start, end) / 2.0 / cosine, inward))
 
 
 def _check_fits(cutter: Cutter, radius: float) -> None:
     """Raise `ArcError` for an arc that the tool, inside it, cannot follow."""
-    if radius <= cutter.radius:
-        raise ArcError(f"an inside arc of radius {radius:.4f} mm", f"more than the tool's radius, {cutter.radius:g} mm")
+    refuse_arc_if(
+        radius <= cutter.radius,
+        f"an inside arc of radius {radius:.4f} mm",
+        f"more than the tool's radius, {cutter.radius:g} mm",
+    )
 
 
 def _go_straight(cutter: Cutter, start: Point2, target: Point2, least: float = CORNER) -> CenterMove:
@@ -214,8 +231,7 @@ def _go_round(
     if inside:
         _check_fits(cutter, radius)
     end = _beside(target, cutter.radius, _angle(target, center) if inside else _angle(center, target))
-    straight_back = abs(corner - math.pi) < CORNER and not inside
-    if corner < -least or corner > math.pi + least or straight_back:
+    if corner < -least or corner > math.pi + least or (abs(corner - math.pi) < CORNER and not inside):
         arc = cutter.pending[0].arc
         if arc is not None:
             return CenterMove(end, trim=_arc_meets_arc(cutter, arc, center, turn, radius))
@@ -227,8 +243,7 @@ def _go_round(
 
 def _within(value: float) -> float:
     """The sine or cosine of where two offset moves meet."""
-    if not -1.0 <= value <= 1.0:
-        raise ArcError(GOUGE, SMALLER)
+    refuse_arc_if(not -1.0 <= value <= 1.0, GOUGE, SMALLER)
     return value
 
 
@@ -239,8 +254,7 @@ def _arc_meets_line(cutter: Cutter, arc: OffsetArc, start: Point2, along: float)
     side = 1 if cutter.side * arc.turn > 0 else -1  # the tool is inside the arc
     normal = along + arc.turn * math.pi / 2.0
     far = (radius + side * cutter.radius) * math.cos(normal - _angle(start, arc.center))
-    if radius == 0.0:
-        raise ArcError(GOUGE, SMALLER)
+    refuse_arc_if(radius == 0.0, GOUGE, SMALLER)
     back = math.acos(_within((far - side * cutter.radius) / radius))
     return _beside(arc.center, radius, normal + math.pi - side * arc.turn * back)
 
@@ -259,8 +273,7 @@ def _arc_meets_arc(cutter: Cutter, arc: OffsetArc, center: Point2, turn: int, ra
     old = math.dist(arc.center, (end[cutter.axes[0]], end[cutter.axes[1]]))
     new = radius - cutter.radius if cutter.side * turn > 0 else radius + cutter.radius
     apart = math.dist(arc.center, center)
-    if old == 0.0 or apart == 0.0:
-        raise ArcError("a corner between two arcs of one centre", "arcs of different centres")
+    refuse_arc_if(old == 0.0 or apart == 0.0, "a corner between two arcs of one centre", "arcs of different centres")
     back = math.acos(_within((old * old + apart * apart - new * new) / (2.0 * old * apart)))
     inside = cutter.side * arc.turn > 0
     return _beside(arc.center, old, _angle(arc.center, center) + (turn if inside else -turn) * back)
@@ -273,18 +286,25 @@ def go_on(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) 
     along = _heading(start, start, target, arc)
     beside = _beside_contour(start, cutter, along)
     if cutter.entering:
-        if len(cutter.pending) > 1:
-            raise ArcError("a move along the tool right after the first move of cutter compensation", "it before G41")
+        refuse_arc_if(
+            len(cutter.pending) > 1,
+            "a move along the tool right after the first move of cutter compensation",
+            "it before G41",
+        )
         cutter.entering = False
         return CenterMove(_end(cutter, start, target, arc), trim=beside)
     before = _angle(start, cutter.center) - cutter.side * math.pi / 2.0
     turn = math.remainder(along - before, math.tau)
     if abs(turn) <= TURNED:
         return CenterMove(_end(cutter, start, target, arc))
-    if len(cutter.pending) > 1:
-        raise ArcError("a move along the tool in a corner of cutter compensation", "it where the contour is smooth")
-    if abs(turn) > math.pi - TURNED:
-        raise ArcError("a contour under cutter compensation that turns back on itself", "another contour")
+    refuse_arc_if(
+        len(cutter.pending) > 1,
+        "a move along the tool in a corner of cutter compensation",
+        "it where the contour is smooth",
+    )
+    refuse_arc_if(
+        abs(turn) > math.pi - TURNED, "a contour under cutter compensation that turns back on itself", "another contour"
+    )
     if turn * cutter.side > 0.0:
         return _go(cutter, start, target, arc, TURNED)  # an inside corner, as LinuxCNC has it
     return _outside(cutter, _end(cutter, start, target, arc), (before, turn), beside, arc)

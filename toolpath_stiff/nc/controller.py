@@ -12,6 +12,7 @@ machine that programs were posted for), `setup` (the name of the clamping arrang
 belong to one). LinuxCNC's own parameter file (.var) and tool table (.tbl) are read as controller files too.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -37,6 +38,7 @@ UNITS_OR_CYCLE = (
     "inch or metric units on some controls, a cycle on others",
     'write G20 or G21, or give a controller file with inch_metric = "G70 G71"',
 )
+INCH_METRIC = {"G70": "G20", "G71": "G21"}
 HOLE_PATTERN = ("a pattern of holes", "post the holes one by one")
 
 
@@ -65,16 +67,16 @@ class Dialect:
         Whether `;` begins a comment; else it ends the block, and nothing may follow it.
     arc_absolute
         Whether I, J, K are absolute at the start (G90.1).
-    g70, inch_metric
-        Why G70 and G71 are refused; whether they are inch and metric units.
+    aliases
+        Its other names of codes.
+    g70
+        Why G70 and G71 are refused, where they are no such names.
     additional
         The codes that take additional work offsets.
     local_calls
         Whether M97 calls a block by its N number.
     feed_needs_point
         Units in which F without a decimal point depends on a parameter, and is refused.
-    holds_tip
-        Its code for tool centre point control.
     """
 
     name: str
@@ -87,11 +89,10 @@ class Dialect:
     semicolon: bool = True
     arc_absolute: bool = False
     g70: tuple[str, str] = UNITS_OR_CYCLE
-    inch_metric: bool = False
+    aliases: Mapping[str, str] = field(default_factory=dict)
     additional: tuple[str, ...] = ("G54.1", "G154")
     local_calls: bool = False
     feed_needs_point: tuple[str, ...] = ()
-    holds_tip: str = "G43.4"
 
 
 GENERIC = Dialect("generic")
@@ -109,7 +110,7 @@ DIALECTS = {
             repeats_in_p=True,
             cycle_repeats="KL",
             semicolon=False,
-            inch_metric=True,
+            aliases=INCH_METRIC,
             additional=("G54.1",),
             feed_needs_point=("inch",),
         ),
@@ -125,7 +126,7 @@ DIALECTS = {
             additional=("G154",),
             local_calls=True,
             feed_needs_point=("mm", "inch"),
-            holds_tip="G234",
+            aliases={"G234": "G43.4"},
         ),
     )
 }
@@ -195,48 +196,23 @@ class Controller:
         """Whether LinuxCNC's interpreter reads numbers, switches and codes in the same way."""
         return self.dialect in (GENERIC, DIALECTS["linuxcnc"]) and self.switches in (frozenset(), ALL_SWITCHES)
 
+    def check_plain(self) -> None:
+        """Raise `InputError` if LinuxCNC's interpreter would read a program differently from the control."""
+        if not self.plain:
+            raise ProgramError(
+                f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {self.dialect.name!r}, "
+                "or it has single block-delete switches",
+                hint="use the built-in interpreter (--interpreter builtin)",
+            )
+
     @property
     def label(self) -> str:
         """The dialect's name, and whether a controller file changes it."""
         name = self.dialect.name
-        unchanged = self.dialect == DIALECTS[name] and not self.switches
-        return name if unchanged else f"{name}, changed by the controller file"
+        return name if self.dialect == DIALECTS[name] else f"{name}, changed by the controller file"
 
 
 UNKNOWN_CONTROL = Controller()
-Switches = bool | frozenset[int]  # block-delete switches that are on; True: all, False: those of the controller file
-
-
-def switches_on(block_delete: Switches, controller: Controller) -> frozenset[int]:
-    """The block-delete switches that are on: those asked for, else the controller file's.
-
-    Examples
-    --------
-    >>> switches_on(frozenset({1, 3}), UNKNOWN_CONTROL) == {1, 3}
-    True
-    >>> len(switches_on(True, UNKNOWN_CONTROL))
-    9
-    """
-    if isinstance(block_delete, bool):
-        return ALL_SWITCHES if block_delete else controller.switches
-    if not block_delete <= ALL_SWITCHES:
-        raise ProgramError(f"block-delete switches {sorted(block_delete)}", expected="1 to 9")
-    return block_delete
-
-
-def plain(block_delete: Switches, controller: Controller) -> bool:
-    """Whether LinuxCNC's interpreter would read the program as the control does: it has one switch and its dialect."""
-    return controller.plain and switches_on(block_delete, controller) in (frozenset(), ALL_SWITCHES)
-
-
-def check_plain(block_delete: Switches, controller: Controller) -> None:
-    """Raise `InputError` if LinuxCNC's interpreter would read the program differently from the control."""
-    if not plain(block_delete, controller):
-        raise ProgramError(
-            f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {controller.dialect.name!r}, "
-            "or it has single block-delete switches",
-            hint="use the built-in interpreter (--interpreter builtin)",
-        )
 
 
 def read_controller(path: str | Path, dialect: str | None = None) -> Controller:
@@ -275,6 +251,7 @@ def _controller(toml: TomlReader, dialect: str | None) -> Controller:
     base = dialect_named(dialect or name)
     absolute = choice("arc_centers", "incremental", "absolute") == "absolute"
     by_g70 = choice("inch_metric", "G20 G21", "G70 G71") == "G70 G71"
+    aliases = {**base.aliases, **INCH_METRIC} if by_g70 else base.aliases
     setup, feed, folder = given.get("setup"), given.get("feed_mm_per_min"), given.get("subprograms")
     if setup is not None and not is_text(setup):
         raise toml.error(f"setup = {setup!r}", "the name of a set-up", where="setup")
@@ -286,7 +263,7 @@ def _controller(toml: TomlReader, dialect: str | None) -> Controller:
             raise toml.error(f"subprograms = {folder!r}", "a folder beside this file", where="subprograms")
         folder = str(beside)
     return Controller(
-        replace(base, arc_absolute=base.arc_absolute or absolute, inch_metric=base.inch_metric or by_g70),
+        replace(base, arc_absolute=base.arc_absolute or absolute, aliases=aliases),
         _switches(toml),
         offsets_of(toml),
         tools_of(toml),
@@ -303,5 +280,4 @@ def _switches(toml: TomlReader) -> frozenset[int]:
         return ALL_SWITCHES if value else frozenset()
     if isinstance(value, list) and all(type(v) is int and v in ALL_SWITCHES for v in value):
         return frozenset(value)
-    expected = "true, false, or a list of switches 1 to 9"
-    raise toml.error(f"block_delete = {value!r}", expected, where="block_delete")
+    raise toml.error(f"block_delete = {value!r}", "true, false, or a list of switches 1 to 9", where="block_delete")

@@ -41,8 +41,7 @@ class ArcFrame:
         self.climb = np.einsum("ni,ni->n", to_end, normal) - lift
         in_plane = from_center - lift[:, None] * normal
         self.radius_start = np.linalg.norm(in_plane, axis=1)
-        end_in_plane = to_end - (lift + self.climb)[:, None] * normal
-        self.radius_end = np.linalg.norm(end_in_plane, axis=1)
+        self.radius_end = np.linalg.norm(to_end - (lift + self.climb)[:, None] * normal, axis=1)
         self.e1 = in_plane / self.radius_start[:, None]
         self.e2 = np.cross(normal, self.e1)
         self.lift = lift
@@ -70,14 +69,12 @@ def points_along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArra
     start, end = moves.start[:, :3], moves.end[:, :3]
     chord = end - start
     length = np.linalg.norm(chord, axis=1)
-    direction = chord / np.where(length > 0.0, length, 1.0)[:, None]
-    tangent = direction.take(move, axis=0)
+    tangent = (chord / np.where(length > 0.0, length, 1.0)[:, None]).take(move, axis=0)
     position = start.take(move, axis=0)  # of most samples in a program of short moves: they are ends
     last = np.flatnonzero(u == 1.0)
     position[last] = end[move[last]]
     inner = np.flatnonzero((u != 0.0) & (u != 1.0))
-    of = move[inner]
-    position[inner] += u[inner, None] * chord[of]
+    position[inner] += u[inner, None] * chord[move[inner]]
     arcs = np.flatnonzero(moves.arc_sweep != 0.0)
     if len(arcs):
         frame = arc_frame(moves, arcs)
@@ -97,7 +94,6 @@ def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray
     e1, e2, normal = frame.e1[arc], frame.e2[arc], frame.normal[arc]
     outward = np.cos(angle) * e1 + np.sin(angle) * e2
     around = -np.sin(angle) * e1 + np.cos(angle) * e2
-    height = (frame.lift[arc] + u * frame.climb[arc])[:, None]
-    position = frame.center[arc] + radius * outward + height * normal
+    position = frame.center[arc] + radius * outward + (frame.lift[arc] + u * frame.climb[arc])[:, None] * normal
     velocity = radius * sweep[arc][:, None] * around + growth * outward + frame.climb[arc][:, None] * normal
     return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)

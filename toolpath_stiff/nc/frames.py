@@ -6,21 +6,16 @@ offsets are numbers; the set-up frame of `Moves` is the control frame shifted so
 motion) is zero; the machine frame places that at the origin.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.units import ShopPose
+from toolpath_stiff.poses import ShopPose
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-Numbers = TypeVar("Numbers", float, "NDArray[np.float64]")
+Numbers = TypeVar("Numbers", float, FloatArray)
 STILL = 1e-12  # of a coordinate, or of 1 mm if that is more: what frames' sums leave of an axis that stands
 Rotation = tuple[float, float, float]  # of G68: centre X, Y in program coordinates, angle in degrees
 
@@ -142,21 +137,18 @@ class Frames:
 
     def to_setup(self, control: list[float]) -> list[float]:
         """Set-up coordinates of a point in control coordinates."""
-        reference = self.fix_reference()
-        return [*(c - r for c, r in zip(control[:3], reference, strict=True)), *control[3:]]
+        return [*(c - r for c, r in zip(control[:3], self.fix_reference(), strict=True)), *control[3:]]
 
     def from_setup(self, setup: list[float]) -> list[float]:
         """Control coordinates of a point in set-up coordinates."""
-        reference = self.fix_reference()
-        return [*(s + r for s, r in zip(setup[:3], reference, strict=True)), *setup[3:]]
+        return [*(s + r for s, r in zip(setup[:3], self.fix_reference(), strict=True)), *setup[3:]]
 
     def machine_position(self) -> list[float]:
         """The spindle's place in machine coordinates, as a control shows it: without the tool length in force."""
         point = self.to_setup(self.position)
         point[2] += self.tool
         origin = self.origin
-        turned = _rotate(_matrix(origin), point[:3])
-        return [*(t + o for t, o in zip(turned, origin[:3], strict=True)), *point[3:]]
+        return [*(t + o for t, o in zip(_rotate(_matrix(origin), point[:3]), origin[:3], strict=True)), *point[3:]]
 
     def control_of_machine(self, machine: list[float]) -> list[float]:
         """Control coordinates of a point in machine coordinates."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -51,6 +51,12 @@ class ArcError(Exception):
         self.found, self.expected = problem, expected
 
 
+def refuse_arc_if(wrong: object, problem: str, expected: str) -> None:
+    """Raise `ArcError` where something is wrong."""
+    if wrong:
+        raise ArcError(problem, expected)
+
+
 def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: bool) -> Point2:
     """Centre of an arc given by R; a negative radius takes the longer way. Raises `ArcError`.
 
@@ -59,17 +65,17 @@ def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: boo
     >>> center_from_radius((0.0, 0.0), (20.0, 0.0), 10.0, clockwise=False)
     (10.0, 0.0)
     """
-    if start == end:
-        raise ArcError("an arc with R that ends where it starts", "another end point, or I, J, K for a full circle")
-    if radius == 0.0:
-        raise ArcError("an arc of radius 0", "R other than 0")
+    refuse_arc_if(
+        start == end, "an arc with R that ends where it starts", "another end point, or I, J, K for a full circle"
+    )
+    refuse_arc_if(radius == 0.0, "an arc of radius 0", "R other than 0")
     chord = math.dist(start, end)
     half, size = chord / 2.0, abs(radius)
-    if half - size > RADIUS_FORMAT_TOLERANCE:
-        raise ArcError(
-            f"an arc whose radius {size:g} mm cannot reach its end {chord:.4f} mm away",
-            f"a radius of at least {half:.4f} mm",
-        )
+    refuse_arc_if(
+        half - size > RADIUS_FORMAT_TOLERANCE,
+        f"an arc whose radius {size:g} mm cannot reach its end {chord:.4f} mm away",
+        f"a radius of at least {half:.4f} mm",
+    )
     height = math.sqrt(max(size * size - half * half, 0.0))
     # The centre lies left of the chord for a short counter-clockwise arc.
     side = 1.0 if (radius > 0.0) != clockwise else -1.0
@@ -92,16 +98,19 @@ def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) 
     toolpath_stiff.nc.geometry.ArcError: an arc of radius 0
     """
     first, last = math.dist(start, center), math.dist(end, center)
-    if first < SMALLEST_RADIUS or last < SMALLEST_RADIUS:
-        raise ArcError("an arc of radius 0", "a centre apart from the start and the end point")
+    refuse_arc_if(
+        first < SMALLEST_RADIUS or last < SMALLEST_RADIUS,
+        "an arc of radius 0",
+        "a centre apart from the start and the end point",
+    )
     difference, least = abs(first - last), INCH_TOLERANCE if inch else MM_TOLERANCE
     allowed = min(max(least, RELATIVE_TOLERANCE * max(first, last)), MOST_TOLERANCES * least)
-    if difference > allowed:
-        raise ArcError(
-            f"an arc whose end lies {difference:.4f} mm off its circle (radius {first:.4f} mm at the start, "
-            f"{last:.4f} mm at the end)",
-            f"radii that agree within {allowed:.4f} mm",
-        )
+    refuse_arc_if(
+        difference > allowed,
+        f"an arc whose end lies {difference:.4f} mm off its circle (radius {first:.4f} mm at the start, "
+        f"{last:.4f} mm at the end)",
+        f"radii that agree within {allowed:.4f} mm",
+    )
 
 
 def check_bulge(radius: float, sweep: float) -> None:
@@ -112,10 +121,11 @@ def check_bulge(radius: float, sweep: float) -> None:
     >>> check_bulge(1e9, 1e-7)
     """
     away = 2.0 * radius * math.sin(min(abs(sweep), math.pi) / 2.0)
-    if away > LARGEST_MM:
-        raise ArcError(
-            f"an arc of radius {radius:g} mm that goes {away:g} mm away from its start", f"at most {LARGEST_MM:g} mm"
-        )
+    refuse_arc_if(
+        away > LARGEST_MM,
+        f"an arc of radius {radius:g} mm that goes {away:g} mm away from its start",
+        f"at most {LARGEST_MM:g} mm",
+    )
 
 
 def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns: int) -> float:
@@ -151,30 +161,6 @@ def turn_between(first: float, last: float, clockwise: bool) -> float:
     return -sweep if clockwise else sweep
 
 
-def arc_sweeps(start: FloatArray, end: FloatArray, center: FloatArray, clockwise: BoolArray) -> FloatArray:
-    """(n,) `arc_sweep` of n arcs (n, 2) of one turn, digit for digit.
-
-    Examples
-    --------
-    >>> start, end, center = np.array([[10.0, 0.0]]), np.array([[0.0, 10.0]]), np.zeros((1, 2))
-    >>> np.degrees(arc_sweeps(start, end, center, np.array([True])))
-    array([-270.])
-    """
-    # `math`, as numpy's own arc tangent differs in the last digit between processors.
-    first, last = (
-        map(math.atan2, (point - center)[:, 1].tolist(), (point - center)[:, 0].tolist()) for point in (start, end)
-    )
-    return np.array(list(map(turn_between, first, last, clockwise.tolist())), dtype=float)
-
-
-def radii_clearly_agree(start: FloatArray, end: FloatArray, center: FloatArray, inch: bool) -> BoolArray:
-    """(n,) whether arcs (n, 2) are so far within `check_radii` and `check_bulge` that rounding does not matter."""
-    first, last = (np.sqrt(((point - center) ** 2).sum(axis=1)) for point in (start, end))
-    least = INCH_TOLERANCE if inch else MM_TOLERANCE
-    small = np.maximum(first, last) < LARGEST_MM / 2.0  # wherever it goes, `check_bulge` allows it
-    return np.asarray((np.minimum(first, last) > 2.0 * SMALLEST_RADIUS) & (np.abs(first - last) < 0.5 * least) & small)
-
-
 def corner(
     begin: Sequence[float], vertex: Sequence[float], end: Sequence[float], normal: Vector, size: float, rounded: bool
 ) -> tuple[Vector, Vector, Vector, float] | None:
@@ -192,19 +178,22 @@ def corner(
     here, z = np.asarray(vertex, dtype=float), np.array(normal)
     before, after = here - begin, np.asarray(end, dtype=float) - here
     lengths = float(np.linalg.norm(before)), float(np.linalg.norm(after))
-    if min(lengths) == 0.0 or max(abs(before @ z), abs(after @ z)) > SAME_HEIGHT_MM:
-        raise ArcError("a corner between moves that do not lie in the plane, or have no length", "two moves in it")
+    refuse_arc_if(
+        min(lengths) == 0.0 or max(abs(before @ z), abs(after @ z)) > SAME_HEIGHT_MM,
+        "a corner between moves that do not lie in the plane, or have no length",
+        "two moves in it",
+    )
     u, v = before / lengths[0], after / lengths[1]
     turn = math.atan2(float(np.cross(u, v) @ z), float(u @ v))
     if abs(turn) < CORNER_ANGLE:
         return None
-    if math.pi - abs(turn) < CORNER_ANGLE:
-        raise ArcError("a corner of a path that goes straight back", "another direction")
+    refuse_arc_if(math.pi - abs(turn) < CORNER_ANGLE, "a corner of a path that goes straight back", "another direction")
     along = size * math.tan(abs(turn) / 2.0) if rounded else size
-    if along > min(lengths):
-        raise ArcError(
-            f"a corner that takes {along:.4f} mm of moves of {lengths[0]:.4f} and {lengths[1]:.4f} mm", "a smaller one"
-        )
+    refuse_arc_if(
+        along > min(lengths),
+        f"a corner that takes {along:.4f} mm of moves of {lengths[0]:.4f} and {lengths[1]:.4f} mm",
+        "a smaller one",
+    )
     left = math.copysign(size, turn) * np.cross(z, u)
     first = here - along * u
     return _vector(first), _vector(here + along * v), _vector(first + left), turn
@@ -233,5 +222,4 @@ def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:
     (-30.0, 0.0)
     """
     across = math.hypot(i, k)
-    pitch = math.degrees(math.atan2(i, k)) if across else 0.0
-    return math.degrees(math.atan2(-j, across)), pitch
+    return math.degrees(math.atan2(-j, across)), math.degrees(math.atan2(i, k)) if across else 0.0

@@ -7,21 +7,20 @@ The meaning of each code is a function in `codes`, found in the table of `codes.
 from toolpath_stiff.nc.codes.code import Code, code_name
 from toolpath_stiff.nc.codes.cutter import check_block
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
-from toolpath_stiff.nc.codes.increments import read_numbers
+from toolpath_stiff.nc.codes.increments import increments_hint, read_numbers
 from toolpath_stiff.nc.codes.motion import homes_standing
 from toolpath_stiff.nc.codes.passive import m_parameters
-from toolpath_stiff.nc.codes.refused import REFUSED
-from toolpath_stiff.nc.codes.registry import CODES, INCH_METRIC
-from toolpath_stiff.nc.codes.tool_length import HOLDS_TIP
+from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.codes.tools import list_numbers
-from toolpath_stiff.nc.groups import LAST_MODE
+from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Flow, State, Then
+from toolpath_stiff.nc.state import LAST_MODE, POINT_WORDS, CurrentBlock, Flow, Group, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
 
 COORDINATES = frozenset((*AXES, "@"))
 WORDS_THAT_ACT = ("F", "S", "T")
+TAKERS: tuple[Group, ...] = ("non-modal", "rotation", "tool length")  # groups whose codes may take the axis words
 
 
 def execute(state: State, block: Block) -> Then:
@@ -49,14 +48,15 @@ def finish(state: State, block: CurrentBlock) -> Then:
     for code in _in_order(block, ahead=False):
         code.act(state, block, code.name)
     pending = state.corner
-    _move(state, block)
+    try:
+        _move(state, block)
+    except ArcError as error:
+        raise block.fail(None, error.found, error.expected, increments_hint(state)) from None
     for letter in CORNERS:
         if block.has(letter):
             CODES[letter].act(state, block, letter)
     if pending is not None and state.corner is pending:
-        raise block.fail(
-            None, f"line {pending.line} makes a corner ({pending.letter}) with this block", "a feed move (G1)"
-        )
+        raise block.fail(None, f"line {pending.line} makes a corner with this block", "a feed move (G1)")
     list_numbers(state, block)
     for letter in sorted(block.free):
         raise block.fail(letter, "is not used by any code of its block", hint="remove it")
@@ -96,18 +96,13 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
 
 
 def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
-    name, dialect = code_name(word.letter, word.value), state.dialect
-    if name == dialect.holds_tip:
-        name = HOLDS_TIP
-    if name in INCH_METRIC:
-        if not dialect.inch_metric:
-            raise block.fail(word, f"is {dialect.g70[0]}, which is not supported", hint=dialect.g70[1])
-        name = INCH_METRIC[name]
+    written, dialect = code_name(word.letter, word.value), state.dialect
+    name = dialect.aliases.get(written, written)
     if name in REFUSED:
         raise block.fail(word, f"is {REFUSED[name].what}, which is not supported", hint=REFUSED[name].hint)
     code = CODES.get(name)
-    if code is None and word.letter == "G":
-        raise block.fail(word, "is not a G code that is known", hint="check the program, or post it without it")
+    unknown = code is None and word.letter == "G"
+    block.refuse_if(unknown, word, "is not a G code that is known", hint="check the program, or post it without it")
     if code is None:  # it may run anything, a change of kinematics included; its parameters go with it
         state.note(block.line, word, "an M code of one control, not acted upon")
         state.warnings.append(Remark(f"what {word.text} does on its control is not known", block.line))
@@ -115,36 +110,31 @@ def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
             if other.letter in "PQE":
                 state.note(block.line, other, f"parameter of {word.text}")
         return
-    if code.listed and word.letter == "G" and dialect.name not in code.controls:
-        raise block.fail(word, f"is not a code of the dialect {dialect.name}", " or ".join(code.controls))
+    foreign = code.listed and word.letter == "G" and dialect.name not in code.controls
+    block.refuse_if(foreign, word, f"is not a code of the dialect {dialect.name}", " or ".join(code.controls))
     if code.listed:
         state.note(block.line, word, code.listed)
     before = block.groups.get(code.group)
-    if before is not None:
-        # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
-        if name == "G80" != before:
-            return
-        if before != "G80" or name == "G80":
-            group = code.group.removeprefix("M ")
-            problem = f"and {before} are both of the modal group {group!r}, or act once in their block"
-            raise block.fail(word, problem, "one of them in a block")
-    block.groups[code.group] = name
-    block.codes[name] = word
+    # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
+    if before is not None and (before == name or "G80" not in (before, name)):
+        group = code.group.removeprefix("M ")
+        problem = f"and {before} are both of the modal group {group!r}, or act once in their block"
+        raise block.fail(word, problem, "one of them in a block")
+    if before is None or name != "G80":
+        block.groups[code.group] = name
+        block.codes[name] = word
 
 
 def _check_axis_words(block: CurrentBlock) -> None:
     """Two codes that use the axis words of their block are an error."""
-    present = [
-        name for group in ("non-modal", "rotation", "tool length") if (name := block.groups.get(group)) is not None
-    ]
-    takers = [name for name in present if CODES[name].takes_axes]
+    present = [block.groups.get(group) for group in TAKERS]
+    takers = [name for name in present if name is not None and CODES[name].takes_axes]
     moving = block.groups.get("motion")
     if takers in (["G28"], ["G30"]) and moving in ("G0", "G1"):  # it homes, and that motion mode holds afterwards
         return
     if len(takers) > 1 or (takers and moving and moving != "G80"):
         other = moving if moving and len(takers) == 1 else takers[0]
-        word = block.codes[takers[-1]]
-        raise block.fail(word, f"and {other} both use the axis words of their block", "two blocks")
+        raise block.fail(block.codes[takers[-1]], f"and {other} both use the axis words of their block", "two blocks")
 
 
 def _move(state: State, block: CurrentBlock) -> None:
@@ -162,10 +152,10 @@ def _move(state: State, block: CurrentBlock) -> None:
     instead = once if once is not None and CODES[once].when == "motion" else None  # G53
     if state.motion is None:
         for letter in POINT_WORDS:
-            if block.has(letter):
-                raise block.fail(letter, "has no motion mode to move in", "G0, G1, G2, G3 or a cycle before it")
-        if instead is not None:
-            raise block.fail(instead, "without G0 or G1")
+            block.refuse_if(
+                block.has(letter), letter, "has no motion mode to move in", "G0, G1, G2, G3 or a cycle before it"
+            )
+        block.refuse_if(instead is not None, instead, "without G0 or G1")
     else:
         mode = instead or state.motion
         CODES[mode].act(state, block, mode)

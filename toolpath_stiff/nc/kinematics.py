@@ -76,11 +76,6 @@ class RotaryAxis:
         """Its place among A, B, C."""
         return LETTERS.index(self.letter)
 
-    def describe(self) -> str:
-        """A few words: "A turns the table about (1, 0, 0)"."""
-        direction = ", ".join(f"{v:.6g}" for v in self.direction)
-        return f"{self.letter} turns the {self.turns} about ({direction})"
-
 
 @dataclass(frozen=True)
 class PostedKinematics:
@@ -119,7 +114,9 @@ class PostedKinematics:
 
     def assumption(self, *, switched: bool = False) -> str:
         """What was made of X Y Z A B C, in one sentence; `switched`: tool centre point control came and went."""
-        axes = ", ".join(axis.describe() for axis in self.axes)
+        directions = [", ".join(f"{v:.6g}" for v in axis.direction) for axis in self.axes]
+        turns = zip(self.axes, directions, strict=True)
+        axes = ", ".join(f"{axis.letter} turns the {axis.turns} about ({direction})" for axis, direction in turns)
         where = "the tip on the part (tool centre point control)" if self.tcp else "the machine's axes"
         where += ", of the tip on the part from G43.4 on to G43 or G49" if switched and not self.tcp else ""
         return (
@@ -135,8 +132,10 @@ def read_kinematics(toml: TomlReader) -> PostedKinematics | None:
     if given is None:
         return None
     table = toml.table("kinematics", given, "a table [kinematics] with type, tcp and the rotary axes")
-    kind = toml.needed("kinematics", table, "type", f"one of {', '.join(TYPES)}")
-    toml.choice("kinematics.type", kind, TYPES, ", ".join(TYPES))
+    known_types = ", ".join(TYPES)
+    kind = toml.choice(
+        "kinematics.type", toml.needed("kinematics", table, "type", f"one of {known_types}"), TYPES, known_types
+    )
     parts = TYPES[kind]
     known = ("type", "tcp", "points", "tolerance_mm", *(key for key, _ in parts))
     toml.only("kinematics", table, known, f" in the type {kind!r}")
@@ -154,8 +153,7 @@ def read_kinematics(toml: TomlReader) -> PostedKinematics | None:
     where = "kinematics.tolerance_mm"
     tolerance = toml.number(where, table.get("tolerance_mm", TOLERANCE_MM), LARGEST_MM)
     if not LEAST_TOLERANCE_MM <= tolerance <= LARGEST_TOLERANCE_MM:
-        bounds = f"{LEAST_TOLERANCE_MM:g} to {LARGEST_TOLERANCE_MM:g}"
-        raise toml.error(f"{where} = {tolerance:g}", bounds, where=where)
+        raise toml.error(f"{where} = {tolerance:g}", f"{LEAST_TOLERANCE_MM:g} to {LARGEST_TOLERANCE_MM:g}", where=where)
     return PostedKinematics(kind, axes, tcp, points, m_from_mm(tolerance))
 
 

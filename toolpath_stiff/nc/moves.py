@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
+from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.units import (
-    Pose,
     deg_from_rad,
     m_from_mm,
     m_per_s_from_mm_per_min,
@@ -139,18 +140,6 @@ class Unsupported:
     reason: str
 
 
-@dataclass(frozen=True)
-class ToolUse:
-    """A tool of the tool table: number; length, diameter, stick-out in m (nan: not given); remark, material."""
-
-    number: int
-    length: float
-    diameter: float
-    remark: str = ""
-    stick_out: float = math.nan
-    material: str = ""
-
-
 @dataclass(frozen=True, repr=False)
 class ReadProgram:
     r"""A program that was read to its end.
@@ -173,7 +162,7 @@ class ReadProgram:
     unsupported, warnings, assumptions
         What was read but not acted upon; what should be checked; what was assumed; each one sentence.
     tools
-        The tools that the program used.
+        The tools that the program used, lengths in mm.
     interpreter
         Who read it: "builtin" or "linuxcnc".
     dialect
@@ -209,7 +198,7 @@ class ReadProgram:
     unsupported: tuple[Unsupported, ...] = ()
     warnings: tuple[Remark, ...] = ()
     assumptions: tuple[str, ...] = ()
-    tools: tuple[ToolUse, ...] = field(default=())
+    tools: tuple[ToolEntry, ...] = ()
     interpreter: str = "builtin"
     dialect: str = "generic"
     kinematics: str = ""
@@ -346,20 +335,14 @@ def in_si(moves: Moves) -> Moves:
 
 
 def _joined(parts: list[Moves]) -> Moves:
-    """All parts; each is let go once it is copied, so that no move is held twice."""
-    n, first = sum(map(len, parts)), 0
-    names = [column.name for column in fields(Moves)]
-    like = {name: getattr(parts[0], name) for name in names}
-    moves = Moves(**{name: np.zeros((n, *values.shape[1:]), values.dtype) for name, values in like.items()})
-    parts.reverse()
-    while parts:
-        part = parts.pop()
-        for name in names:
-            values = getattr(part, name)
-            if values.any():  # pages of zeros that nobody writes to take no memory
-                getattr(moves, name)[first : first + len(part)] = values
-        first += len(part)
-    return replace(moves, tool=held_once(moves.tool), tool_length=held_once(moves.tool_length))
+    """All parts, column by column."""
+    columns = {column.name: _end_to_end([getattr(part, column.name) for part in parts]) for column in fields(Moves)}
+    return replace(Moves(**columns), tool=held_once(columns["tool"]), tool_length=held_once(columns["tool_length"]))
+
+
+def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    whole = np.concatenate(parts)
+    return whole if whole.any() else np.zeros(whole.shape, whole.dtype)  # pages that nobody writes to take no memory
 
 
 def held_once(column: NDArray[Any]) -> NDArray[Any]:

@@ -9,14 +9,29 @@ functions that the interpreter calls. A line about which there is anything to sa
 that does not fit) ends the run before it: the interpreter then executes it and reports it. mm, degrees, mm/min inside.
 """
 
+import math
 from collections.abc import Sequence
 
-from toolpath_stiff.nc.codes.increments import notice_lengths
-from toolpath_stiff.nc.plain_moves import Lines
-from toolpath_stiff.nc.plain_words import BARE, POINTED, PlainWords, lex
-from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.words import read_block
+import numpy as np
 
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.feeds import SLOWEST, bare_feed_is_open, rotary_feed
+from toolpath_stiff.nc.codes.increments import ANGLES, assume_increments, increment
+from toolpath_stiff.nc.codes.motion import note_tool
+from toolpath_stiff.nc.codes.points import LINEAR
+from toolpath_stiff.nc.codes.registry import CODES
+from toolpath_stiff.nc.frames import STILL
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Moves
+from toolpath_stiff.nc.plain_words import BARE, FIRST_F, LAST_F, LETTERS, NO_CODE, NONE, PlainWords, lex
+from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
+from toolpath_stiff.nc.words import AXES
+
+MODE_NAMES = tuple(name for name, code in CODES.items() if code.many)  # by the digit that `plain_words` reads
+MODES = {name: digit for digit, name in enumerate(MODE_NAMES)}
+NO_MODE = -1
+CLOCKWISE = MODES["G2"]
 FEWEST = 8  # lines; below, one by one is as fast
 CHUNK = 8192  # lines: their words fit into a processor's cache
 
@@ -47,25 +62,14 @@ class PlainRun:
             self._pause = first + done + 4 * FEWEST
         if not done:
             return None
-        self._notice_lengths(first, words, done)
         return words.part(0, done)
-
-    def _notice_lengths(self, first: int, words: PlainWords, done: int) -> None:
-        """As `increments.read_numbers`, of all lines executed: the first of each form decides."""
-        state = self.state
-        if state.dialect.increments:
-            return
-        wanted = [form for form, known in ((BARE, state.bare), (POINTED, state.pointed)) if not known]
-        firsts = ([int(rows.argmax()) for rows in words.lengths(form, done) if rows.any()] for form in wanted)
-        for row in sorted({min(rows) + first for rows in firsts if rows}):
-            notice_lengths(state, row + 1, read_block(self.lines[row], row + 1, self.name).words)
 
 
 def _suits(state: State) -> bool:
     """Whether the modes in force leave plain words their plain meaning."""
     frames = state.frames
     return (
-        state.feed_mode in ("G93", "G94")
+        state.feed_mode == "G94"
         and state.polar is None
         and state.unsettled is None
         and state.corner is None
@@ -76,3 +80,182 @@ def _suits(state: State) -> bool:
         and not frames.bound
         and not frames.rotated
     )
+
+
+class Lines:
+    """The words of lines in columns, and what they make of the state; the line `end` is left to the interpreter."""
+
+    def __init__(self, state: State, words: PlainWords) -> None:
+        self.state, self.words = state, words
+        self.n = self.end = len(words.code)
+        self.values = {letter: words.values[letter] for letter in LETTERS if letter in words.values}
+        self.given = {letter: words.forms[letter] != NONE for letter in self.values}
+        self.counted = np.zeros(self.n, dtype=bool)  # lines with a number that counts increments
+        for letter, values in self.values.items():
+            self._stop(np.abs(values) > (LARGEST_MM if letter in AXES else LARGEST_WORD))
+        if "S" in words.values:
+            self._stop(words.values["S"] > LARGEST_WORD)
+        if state.dialect.increments:
+            self._count_increments()
+
+    def _stop(self, where: BoolArray) -> None:
+        """Leave the first such line, and all after it, to the interpreter."""
+        if where.any():
+            self.end = min(self.end, int(np.argmax(where)))
+
+    def _count_increments(self) -> None:
+        for letter in self.values:
+            bare = (self.words.forms[letter] == BARE) & (self.values[letter] != 0.0)
+            unit = increment(letter in ANGLES, self.state.inch)
+            self.values[letter] = np.where(bare, self.values[letter] * unit, self.values[letter])
+            self.counted |= bare
+
+    def execute(self, first: int) -> int:
+        """Move; returns how many lines were executed. `first`: the first one's number, from 0."""
+        self.coded = self.words.code != NO_CODE
+        before = MODES.get(self.state.motion or "", NO_MODE)
+        self.mode = np.concatenate([[before], self.words.code[self.coded]])[np.cumsum(self.coded)]
+        axes, centers = self._any(AXES), self._any(geometry.CENTER_LETTERS)
+        is_arc = self.mode >= CLOCKWISE
+        self._stop(~is_arc & centers)
+        self._stop((self.mode == NO_MODE) & axes)
+        arc = is_arc & (axes | centers | self.coded)
+        moving = (axes & (self.mode != NO_MODE)) | arc
+        self._feed_words()
+        self._stop(moving & (self.mode != MODES["G0"]) & np.isnan(self.feed))
+        if not moving[: self.end].any():
+            return self._leave(None)
+        control = self._control()
+        center, sweep = self._arcs(np.flatnonzero(arc[: self.end]), control)
+        self._record(first, control, (center, sweep), moving)
+        return self._leave(control if moving[: self.end].any() else None)
+
+    def _record(self, first: int, control: FloatArray, arc: tuple[FloatArray, FloatArray], moving: BoolArray) -> None:
+        """Hand over the moves of the lines that are done, those that go anywhere."""
+        state, done = self.state, slice(self.end)
+        setup = control - np.array([*state.frames.fix_reference(), 0.0, 0.0, 0.0])
+        start, end = setup[:-1][done], setup[1:][done]
+        # An axis that stands keeps its number (`motion.record`).
+        end = np.where(np.abs(end - start) < STILL * np.maximum(1.0, np.abs(start)), start, end)
+        center, sweep, feed = arc[0][done], arc[1][done], self.feed[done]
+        same = [start[:, axis] == end[:, axis] for axis in range(6)]
+        feed = np.where(np.logical_and.reduce(same[:3]) & (sweep == 0.0), rotary_feed(state, feed), feed)
+        rows = np.flatnonzero(moving[done] & (~np.logical_and.reduce(same) | (sweep != 0.0)))
+        motion = np.where(sweep != 0.0, ARC, np.where(self.mode[done] == MODES["G1"], FEED, RAPID))[rows]
+        vector = state.frames.turn_direction(geometry.normal_of(state.plane))
+        n = len(rows)
+        state.recorder.add_many(
+            Moves(
+                line=rows + (first + 1),
+                motion=motion,
+                start=start[rows],
+                end=end[rows],
+                arc_sweep=sweep[rows],
+                arc_center=center[rows],
+                arc_normal=np.where((motion == ARC)[:, None], vector, 0.0),
+                feed=np.where(motion == RAPID, math.nan, feed[rows]),
+                dwell=np.zeros(n),
+                tool=np.full(n, state.tool),
+                tool_length=np.full(n, state.tool_length),
+                from_machine=np.zeros((n, 2), dtype=bool),
+            )
+        )
+        if n:
+            note_tool(state)
+
+    def _any(self, letters: str) -> BoolArray:
+        columns = [self.given[letter] for letter in letters if letter in self.given]
+        return np.asarray(np.logical_or.reduce([np.zeros(self.n, dtype=bool), *columns]))
+
+    def _feed_words(self) -> None:
+        """F in force on each line."""
+        state = self.state
+        has_feed, values, bare = np.zeros(self.n, dtype=bool), np.full(self.n, math.nan), np.zeros(self.n, dtype=bool)
+        for key in (FIRST_F, LAST_F):
+            if key in self.words.forms:
+                form = self.words.forms[key]
+                self._stop(has_feed & (form != NONE))  # a second one
+                values = np.where(has_feed, values, self.words.values[key])
+                has_feed, bare = has_feed | (form != NONE), bare | (form == BARE)
+        before = math.nan if state.feed is None else state.feed
+        self.feed = np.concatenate([[before], values[has_feed] * state.feed_scale])[np.cumsum(has_feed)]
+        self._stop((self.feed < SLOWEST) | (self.feed > LARGEST_WORD))
+        if bare_feed_is_open(state):
+            self._stop(bare)
+
+    def _control(self) -> FloatArray:
+        """(n + 1, 6) control coordinates before the first line and after each (`points.control_point`)."""
+        state, frames = self.state, self.state.frames
+        control = np.empty((self.n + 1, 6))
+        for axis, letter in enumerate(AXES):
+            here = frames.position[axis]
+            if letter not in self.values:
+                control[:, axis] = here
+                continue
+            scaled = self.values[letter] * (state.length_scale if letter in LINEAR else 1.0)
+            given = self.given[letter]
+            if state.absolute:
+                named = frames.axis_to_control(axis, scaled[given])
+                control[:, axis] = np.concatenate([[here], named])[np.append(0, np.cumsum(given))]
+            else:
+                control[:, axis] = np.cumsum(np.concatenate([[here], np.where(given, scaled, 0.0)]))
+        return control
+
+    def _arcs(self, rows: IntArray, control: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n, 3) centres in the set-up frame and (n,) sweeps, 0 but for these lines; the first unfit ends the run."""
+        frames, nothing = self.state.frames, np.full(self.n, math.nan)
+        center, sweep = np.zeros((self.n, 3)), np.zeros(self.n)
+        first, second, normal = geometry.PLANES[self.state.plane]
+        centers = geometry.CENTER_LETTERS
+        letters = (AXES[first], AXES[second], centers[first], centers[second], "R", centers[normal])
+        words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()
+        points = np.stack([frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
+        for row, point, numbers in zip(rows.tolist(), points, words, strict=True):
+            start = (float(point[first]), float(point[second]))
+            try:
+                middle, sweep[row] = self._arc(start, numbers, self.mode[row] == CLOCKWISE)
+            except geometry.ArcError:
+                self.end = row
+                break
+            point[[first, second]] = middle
+        setup = np.stack([frames.axis_to_control(axis, points[:, axis]) for axis in range(3)], axis=1)
+        center[rows] = setup - np.array(frames.fix_reference())
+        return center, sweep
+
+    def _arc(self, start: geometry.Point2, words: list[float], clockwise: bool) -> tuple[geometry.Point2, float]:
+        """Centre and sweep of an arc; `words`: X, Y, I, J of the plane, R, the offset off the plane, nan for none."""
+        (x, y, i, j, radius, off_plane), scale = words, self.state.length_scale
+        by_radius = not math.isnan(radius)
+        fits = by_radius == (math.isnan(i) and math.isnan(j)) and not (by_radius and math.isnan(x) and math.isnan(y))
+        if not fits or abs(off_plane) > 0.0:
+            raise geometry.ArcError("words that do not fit", "")
+        base = (0.0, 0.0) if self.state.absolute else start
+        end = (start[0] if math.isnan(x) else base[0] + x * scale, start[1] if math.isnan(y) else base[1] + y * scale)
+        if by_radius:
+            center = geometry.center_from_radius(start, end, radius * scale, clockwise)
+        else:
+            center = (
+                start[0] + (0.0 if math.isnan(i) else i * scale),
+                start[1] + (0.0 if math.isnan(j) else j * scale),
+            )
+        return center, geometry.sweep_about(center, start, end, clockwise, self.state.inch)
+
+    def _leave(self, control: FloatArray | None) -> int:
+        """Set the state as the lines executed leave it; their number."""
+        state, last = self.state, self.end - 1
+        if last < 0:
+            return 0
+        if state.dialect.increments and self.counted[: self.end].any():
+            assume_increments(state)
+        if "S" in self.words.forms:
+            speed_rows = np.flatnonzero(self.words.forms["S"][: self.end])
+            if len(speed_rows):
+                state.speed = float(self.words.values["S"][speed_rows[-1]])
+        if self.mode[last] != NO_MODE:
+            state.motion = MODE_NAMES[self.mode[last]]
+        if not math.isnan(self.feed[last]):
+            state.feed = float(self.feed[last])
+        if control is not None:
+            state.frames.position = control[self.end].tolist()
+            state.length_changed = state.rotation_changed = False
+        return self.end

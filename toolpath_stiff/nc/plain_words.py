@@ -14,14 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.nc.geometry import CENTER_LETTERS
 from toolpath_stiff.nc.words import AXES
 
 ByteArray = NDArray[np.uint8]
 
 LETTERS = AXES + CENTER_LETTERS
-LENGTH_LETTERS = "XYZIJKR"
 # Keys of the columns of words, in the order in which a plain line has them: that of every CAM system, F in front or
 # behind, S last.
 FIRST_F, LAST_F = "F in front", "F behind"
@@ -74,16 +73,10 @@ class PlainWords:
         values = {key: self.values[key][start:end] for key in forms}
         return PlainWords(self.code[start:end], self.count[start:end], values, forms)
 
-    def lengths(self, form: int, done: int) -> list[BoolArray]:
-        """For each letter of a length, which of the first lines have one other than 0 that is written so."""
-        columns = [(self.values[key][:done], self.forms[key][:done]) for key in LENGTH_LETTERS if key in self.forms]
-        return [np.asarray((forms == form) & (values != 0.0)) for values, forms in columns]
-
 
 def lex(lines: Sequence[str]) -> tuple[PlainWords, IntArray]:
     """The words of lines, and the lines (from 0) that are not plain."""
-    text = "\n".join(lines).replace(";\n", "\n")  # the end of a block, or an empty comment
-    characters = text.encode("ascii", "replace").translate(None, b" \t")
+    characters = "\n".join(lines).replace(";\n", "\n").encode("ascii", "replace").translate(None, b" \t")
     buffer = b"%b\n%b\n" % (_BEFORE, characters)
     codes = np.frombuffer(buffer, dtype=np.uint8)
     marks = np.flatnonzero(codes - np.uint8(ord("0")) > 9)  # all characters but digits

@@ -13,7 +13,8 @@ from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.recovery import recover_moves, turns_far
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.units import Pose, m_from_mm, mm_from_m, rad_from_deg
+from toolpath_stiff.poses import Pose
+from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
 
 OWN_ZERO = (
     "G54 as the program or the controller file sets it is that of the machine that the program was posted for; it does "
@@ -63,7 +64,7 @@ def recovered(
         others = f", and {len(far) - 1} more cuts turn as far" if far[1:] else ""
         advice = f"if the control takes the shorter way, set rollover = true for {letter} in the controller file"
         warnings.append(Remark(f"{letter} turns by {degrees:.0f} degrees within one cut{others}; {advice}", line))
-    lengths = {tool.number: tool.length for tool in program.tools}
+    lengths = {tool.number: m_from_mm(tool.length) for tool in program.tools}
     on_part, of_kept = recover_moves(kept, placed, lengths, name, held[known])
     of_move = np.flatnonzero(known)[of_kept]
     return replace(

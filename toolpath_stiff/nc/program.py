@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import options
-from toolpath_stiff.nc.controller import Controller, dialect_named, read_controller
+from toolpath_stiff.nc.controller import ALL_SWITCHES, Controller, dialect_named, read_controller
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.moves import ReadProgram, move_columns
 from toolpath_stiff.nc.reader import read
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 from toolpath_stiff.options import Option, arguments_of, checked, switches
-from toolpath_stiff.units import Pose
+from toolpath_stiff.poses import Pose
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,8 +55,8 @@ class Program:
     <Program slot.nc: 5 lines>
     >>> len(program.to_frame())
     3
-    >>> program.lines[1], program.inputs, program.read_as["block_delete"]
-    ('G0 X0 Y0 Z5', (), False)
+    >>> program.lines[1], program.inputs
+    ('G0 X0 Y0 Z5', ())
     """
 
     name: str
@@ -144,16 +144,20 @@ class Program:
             if value and value != "builtin":
                 arguments[option].check(value)
                 given[option.removesuffix("_mm_per_min")] = value
-        on = reading.get("block_delete") or False
-        if not isinstance(on, bool):
-            on = frozenset(on)
-            given["block_delete"] = ",".join(map(str, sorted(on)))
-            if not on <= set(range(1, 10)):
-                raise InputError(f"block_delete {sorted(on)}", expected="switches 1 to 9, True or False")
+        switches, on = frozenset[int](), reading.get("block_delete") or False
+        if isinstance(on, bool):
+            switches = ALL_SWITCHES if on else switches
+        else:
+            switches = frozenset(on)
+            given["block_delete"] = ",".join(map(str, sorted(switches)))
+            if not switches <= ALL_SWITCHES:
+                raise InputError(f"block_delete {sorted(switches)}", expected="switches 1 to 9, True or False")
         file_of_controller, dialect = reading.get("controller"), reading.get("dialect")
         controller = Controller(dialect_named(dialect or "generic"))
         if file_of_controller:
             controller = read_controller(file_of_controller, dialect)
+        if switches:
+            controller = replace(controller, switches=switches)
         if offsets := reading.get("offsets"):
             controller = replace(controller, offsets=read_offsets(offsets))
         if tools := reading.get("tools"):
@@ -169,7 +173,6 @@ class Program:
             name,
             file or "",
             controller=controller,
-            block_delete=on,
             interpreter=reading.get("interpreter") or "builtin",
             rs274=reading.get("rs274"),
             unconfined=bool(reading.get("unconfined")),
@@ -184,12 +187,6 @@ class Program:
     def lines(self) -> tuple[str, ...]:
         """The program's lines as they stand, without line ends."""
         return read_lines(self.file) if self.file is not None else split_lines(self.text or "", self.name)
-
-    @property
-    def read_as(self) -> dict[str, Any]:
-        """Arguments of the reader of its blocks beside the text: offsets, tools, block delete."""
-        control = self.request.controller
-        return {"offsets": control.offsets, "tools": control.tools, "block_delete": self.request.block_delete}
 
     @property
     def words(self) -> list[str]:

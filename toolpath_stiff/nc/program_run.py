@@ -2,27 +2,26 @@
 
 Subprograms are those of Fanuc's controls: O numbers within the file, after the main program or before it, called by
 `M98 P1000 L2` or, with the repeats before the four digits of the number, `M98 P21000`; they end with M99. LinuxCNC
-reads the first form alike. `M97 P100` (Haas) and `M98 Q100` (Fanuc) call the block N100 of the file, up to an M99.
-Modal state goes through a call unchanged.
+reads the first form alike. `M97 P100` (Haas) calls the block N100 of the file, up to an M99. Modal state goes through a
+call unchanged.
 """
 
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
-from toolpath_stiff.nc.codes.saved import leave_level
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.moves import Jump, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.state import Call, Flow, GoTo, State, Then
-from toolpath_stiff.nc.words import Block, Word, read_block
+from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
+from toolpath_stiff.nc.words import Block, read_block
 
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
 MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
@@ -30,7 +29,6 @@ MOST_REPEATS = 9999
 MOST_ERRORS = 100  # beyond, a file is not a program for this reader
 SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
 HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
-LABEL = re.compile(r"\s*(%\s*\d+)\s*", re.ASCII)
 REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
 
 Argument = TypeVar("Argument", int, Block)
@@ -81,16 +79,6 @@ def beyond_the_end(what: str, row: int, lines: int) -> list[Remark]:
     return [Remark(f"what follows {what} is not part of the program (lines: {lines})", row + 1)] if lines else []
 
 
-def without_label(state: State, lines: tuple[str, ...]) -> tuple[str, ...]:
-    """The lines, without what stands behind the first tape mark in the dialect fanuc, whose controls skip that."""
-    first = next((index for index, line in enumerate(lines) if line.strip()), 0)
-    label = LABEL.fullmatch(lines[first]) if lines and state.dialect.name == "fanuc" else None
-    if label is None:
-        return lines
-    state.note(first + 1, Word("%", 0.0, label.start(1) + 1, label[1]), "program number")
-    return (*lines[:first], "%", *lines[first + 1 :])
-
-
 class ProgramRun:
     """Runs the blocks of a file on a control.
 
@@ -106,8 +94,8 @@ class ProgramRun:
 
     def __init__(self, request: Request, tally: Tally | None = None, fast: bool = True) -> None:
         state, lines, name = request.start(), request.lines, request.name
-        self.state, self.lines, self.name = state, without_label(state, lines), name
-        self.switches, self.tally = request.switches, tally
+        self.state, self.lines, self.name = state, lines, name
+        self.switches, self.tally = request.controller.switches, tally
         self._plain = PlainRun(state, lines, name) if fast else None
         self._levels: list[Subprogram] = []
         self._programs: dict[int, int] | None = None
@@ -118,46 +106,41 @@ class ProgramRun:
 
     def run(self) -> list[Remark]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
-        row, percent, numbered = 0, False, False
+        row, begun, numbered = 0, False, False  # from the first word on, a tape mark is the last one
         while row < len(self.lines):
-            if self._plain is not None and not self._levels:
-                words = self._plain.execute(row)
-                if words is not None:
-                    self._tally_plain(row, words)
-                    percent = percent or bool(words.count.any())
-                    row += len(words.code)
-                    continue
+            words = self._plain.execute(row) if self._plain is not None and not self._levels else None
+            if words is not None:
+                self._tally_plain(row, words)
+                begun = begun or bool(words.count.any())
+                row += len(words.code)
+                continue
             following: int | None = row + 1
             steered = self._tried(self._steered, row, following)
             if steered is not None:
                 row = steered
                 continue
             block = self._block(row)
-            if block.percent:
-                if percent:
-                    return self._end(row, "%")
-                percent = True
-            elif block.words:
-                percent = True  # from the first word on, a tape mark is the last one
-                if block.words[0].letter == "O":
-                    self._check_head(block, numbered)
-                    numbered = True
-                if not (block.optional and block.switch in self.switches):
-                    self.state.level = len(self._levels)
-                    if self.tally is not None:
-                        self.tally.add(block)
-                    on: Then = Flow.NEXT
-                    flow = self._tried(self._execute, block, on)
-                    if flow is Flow.END:
-                        return self._end(row, "the program's end", ended=True)
-                    if flow is not Flow.NEXT:
-                        to = self._enter(row, flow) if isinstance(flow, Call) else self._return(row, flow)
-                        if to is None:
-                            again = "M99 outside any subprogram starts the program again, without end: it is read once"
-                            return [Remark(again, row + 1), *self._end(row, "M99")]
-                        row = self._jump(row, to)
-                        continue
-            row += 1
+            if block.percent and begun:
+                return self._end(row, "%")
+            begun = begun or block.percent or bool(block.words)
+            if block.words and block.words[0].letter == "O":
+                self._check_head(block, numbered)
+                numbered = True
+            flow: Then = Flow.NEXT
+            if block.words and not (block.optional and block.switch in self.switches):
+                if self.tally is not None:
+                    self.tally.add(block)
+                flow = self._tried(self._execute, block, flow)
+            if flow is Flow.END:
+                return self._end(row, "the program's end", ended=True)
+            if flow is Flow.NEXT:
+                row += 1
+                continue
+            to = self._enter(row, flow) if isinstance(flow, Call) else self._return(row, flow)
+            if to is None:
+                again = "M99 outside any subprogram starts the program again, without end: it is read once"
+                return [Remark(again, row + 1), *self._end(row, "M99")]
+            row = self._jump(row, to)
         return self._end(len(self.lines) - 1, "the file")
 
     def _tried(self, act: Callable[[Argument], Outcome], argument: Argument, instead: Outcome) -> Outcome:
@@ -205,7 +188,8 @@ class ProgramRun:
 
     def _read(self, row: int) -> Block:
         block = read_block(self.lines[row], row + 1, self.name, self.state.dialect.semicolon)
-        return block if block.rest is None else block.executed(self.switches)
+        cut = block.rest is not None and block.switch in self.switches  # what stands behind a slash in its middle
+        return replace(block, words=block.words[: block.rest]) if cut else block
 
     def _fail(
         self, row: int, problem: str, expected: str = "", hint: str = "", column: int | None = None
@@ -225,8 +209,9 @@ class ProgramRun:
 
     def _unended(self, row: int) -> InputError:
         level = self._levels[-1]
-        problem = f"the subprogram {level.name}, which begins in line {level.first + 1}, has no end"
-        return self._fail(row, problem, "M99")
+        return self._fail(
+            row, f"the subprogram {level.name}, which begins in line {level.first + 1}, has no end", "M99"
+        )
 
     def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
         """A warning if anything but tape marks and the subprograms that ran follows the end."""
@@ -242,9 +227,8 @@ class ProgramRun:
     def _enter(self, row: int, call: Call) -> int:
         """The line at which the called subprogram begins."""
         if call.local:
-            code = "M97" if self.state.dialect.local_calls else "M98 Q"
-            name, repeats = f"N{call.number}", call.repeats or 1
-            first = self._block_numbered(row, f"{code} calls", call.number, call.column)
+            code, name, repeats = "M97", f"N{call.number}", call.repeats or 1
+            first = self._block_numbered(row, "M97 calls", call.number, call.column)
         else:
             number, repeats = self._target(row, call)
             code, name, first = "M98" if call.arguments is None else "a call", f"O{number}", self._heads()[number] + 1
@@ -289,21 +273,13 @@ class ProgramRun:
         to = self._block_numbered(row, "M99 P goes to", flow.number, flow.column)
         if not self._levels:
             return to if to > row else None
-        self._restore(row)
         level = self._levels.pop()
         if level.again or to < level.back:
             problem = f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram"
             raise self._fail(row, problem, "a block after the call, which is not repeated", column=flow.column)
         return to
 
-    def _restore(self, row: int) -> None:
-        """The caller's modes, where M73 has saved them."""
-        fault = leave_level(self.state, len(self._levels))
-        if fault:
-            raise self._fail(row, f"the subprogram that saved modes with M73 returns where {fault}")
-
     def _leave(self, row: int) -> int:
-        self._restore(row)
         level = self._levels[-1]
         if level.again:
             level.again -= 1
@@ -344,10 +320,9 @@ class ProgramRun:
                     break
                 started = started or bool(line.strip())
                 head = HEAD.match(line)
-                if head is None:
-                    continue
-                number = int(head[1] or 0)
+                number = int(head[1] or 0) if head else None
                 if number in self._programs:
                     raise self._fail(index, f"O{number} is in line {self._programs[number] + 1} already")
-                self._programs[number] = index
+                if number is not None:
+                    self._programs[number] = index
         return self._programs

@@ -1,14 +1,12 @@
 """An NC program or a cutter-location file, from file or text, to `ReadProgram`."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.codes.increments import increments_hint
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, check_plain, plain
+from toolpath_stiff.nc.codes.increments import point_warning
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.languages import (
     foreign_program,
@@ -19,41 +17,30 @@ from toolpath_stiff.nc.languages import (
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
 from toolpath_stiff.nc.moves import RAPID, ReadProgram, Remark
-from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
 from toolpath_stiff.nc.program_run import ProgramRun
-from toolpath_stiff.nc.request import ORIGIN_WINS, Request
+from toolpath_stiff.nc.request import ORIGIN_WINS, ZERO, Request
 from toolpath_stiff.nc.state import START, State
-from toolpath_stiff.nc.tables import Offsets, ToolEntry, read_offsets, read_tool_table
-from toolpath_stiff.units import Pose, mm_per_min_from_m_per_s, pose_in_si
+from toolpath_stiff.nc.tables import read_tool_table
+from toolpath_stiff.poses import Pose, pose_in_si
+from toolpath_stiff.units import mm_per_min_from_m_per_s
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
-
-
-class Options(TypedDict, total=False):
-    """How a program is read; see `Request` and `Controller`."""
-
-    origin: Pose | None
-    default_origin: Pose
-    offsets: Offsets
-    tools: dict[int, ToolEntry]
-    block_delete: Switches
-    interpreter: str
-    rs274: str | None
-    unconfined: bool
-    controller: Controller
 
 
 def read_program(
     path: str | Path,
     *,
-    offsets_file: str | Path | None = None,
     tool_table: str | Path | None = None,
-    **options: Unpack[Options],
+    controller: Controller = UNKNOWN_CONTROL,
+    origin: Pose | None = None,
+    default_origin: Pose = ZERO,
+    interpreter: str = "builtin",
+    rs274: str | None = None,
 ) -> ReadProgram:
-    """Read an NC program file; the two files win over `offsets` and `tools` of the further options.
+    """Read an NC program file; the tool table wins over the controller's. Further arguments as of `Request`.
 
     Examples
     --------
@@ -64,15 +51,22 @@ def read_program(
     >>> [tool.number for tool in program.tools]
     [1]
     """
-    if offsets_file:
-        options["offsets"] = read_offsets(offsets_file)
     if tool_table:
-        options["tools"] = read_tool_table(tool_table)
-    return _read_lines(read_lines(path), Path(path).name, str(path), options)
+        controller = replace(controller, tools=read_tool_table(tool_table))
+    lines, name = read_lines(path), Path(path).name
+    return read(Request(lines, name, str(path), origin, default_origin, interpreter, rs274, controller=controller))
 
 
-def parse_program(text: str, name: str = "program", **options: Unpack[Options]) -> ReadProgram:
-    r"""Read an NC program from text.
+def parse_program(
+    text: str,
+    name: str = "program",
+    *,
+    controller: Controller = UNKNOWN_CONTROL,
+    origin: Pose | None = None,
+    default_origin: Pose = ZERO,
+    interpreter: str = "builtin",
+) -> ReadProgram:
+    r"""Read an NC program from text; arguments as of `Request`.
 
     Examples
     --------
@@ -89,15 +83,7 @@ def parse_program(text: str, name: str = "program", **options: Unpack[Options]) 
         ...
     toolpath_stiff.errors.ProgramError: slot.nc:2:1: G1 is a feed move before any feed; expected F above 0, ...
     """
-    return _read_lines(split_lines(text, name), name, "", options)
-
-
-def _read_lines(lines: tuple[str, ...], name: str, path: str, options: Options) -> ReadProgram:
-    """A program, with tables in place of those of its control."""
-    values = dict[str, Any](options)
-    tables = {table: values.pop(table) for table in ("offsets", "tools") if table in values}
-    controller = replace(options.get("controller", UNKNOWN_CONTROL), **tables)
-    return read(Request(lines, name, path, **{**values, "controller": controller}))
+    return read(Request(split_lines(text, name), name, "", origin, default_origin, interpreter, controller=controller))
 
 
 def read(request: Request) -> ReadProgram:
@@ -123,7 +109,7 @@ def read(request: Request) -> ReadProgram:
     if refused is not None:
         raise refused
     if native:
-        check_plain(request.block_delete, request.controller)
+        request.controller.check_plain()
         return on_the_part(linuxcnc.read(request), request)
     try:
         return _read_built_in(request)
@@ -131,7 +117,7 @@ def read(request: Request) -> ReadProgram:
         foreign = foreign_program(lines, name, error.line)
         if foreign is not None:
             raise foreign from None
-        if request.interpreter == "builtin" or not plain(request.block_delete, request.controller):
+        if request.interpreter == "builtin" or not request.controller.plain:
             raise
         try:
             return on_the_part(linuxcnc.read(request), request)
@@ -176,7 +162,7 @@ def program_of(run: ProgramRun, request: Request, ending: Sequence[Remark]) -> R
             *warnings,
             *state.warnings,
             *lathe_warning(state.turning, moves),
-            *millimetre_warning(state, run.lines),
+            *point_warning(state, run.lines),
         ),
         assumptions=(START, *state.assumptions),
         tools=tuple(state.used_tools.values()),
@@ -205,23 +191,3 @@ def _with_feed(program: ReadProgram, request: Request) -> ReadProgram:
         return program
     assumed = f"cuts before the first feed of the program have {feed:g} mm/min, as asked for"
     return replace(program, assumptions=(*program.assumptions, assumed))
-
-
-_LENGTHS = re.compile(r"[XYZIJR]\s*[-+]?[\d.]+", re.IGNORECASE)
-_LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beginning
-
-
-def millimetre_warning(state: State, lines: Sequence[str]) -> list[Remark]:
-    """That numbers which counted increments are written as in mm: X10 beside X5.5, and nothing like `X10.`.
-
-    Where whole numbers are increments, posts end those in mm with their point.
-    """
-    hint = increments_hint(state)
-    if not hint:
-        return []
-    texts = (split_comments(line)[0] for line in lines[:_LOOKED_AT])
-    words = [word for text in texts for word in _LENGTHS.findall(text)]
-    whole = next((word for word in words if "." not in word and word.strip("XYZIJRxyzijr+-0 \t")), None)
-    if whole is None or not any("." in word for word in words) or any(word[-1] == "." for word in words):
-        return []
-    return [Remark(f"{whole} stands beside numbers with decimals, and none ends with its point: {hint}")]

@@ -4,12 +4,12 @@ import copy
 from dataclasses import dataclass
 from functools import cached_property
 
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller, Switches, switches_on
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets
-from toolpath_stiff.units import Pose, ShopPose, pose_in_mm
+from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
 
 ZERO: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 ORIGIN_WINS = Remark(
@@ -29,9 +29,6 @@ class Request:
         Where program zero (G54) sits in machine coordinates, x, y, z in m, A, B, C in rad: as asked for, and
         where neither the caller nor the program says so. Only moves in machine coordinates (G53, G28, G30) depend on
         it.
-    block_delete
-        Leave out blocks that begin with a slash: True, all of them; switches 1 to 9, those of theirs (`/` is `/1`);
-        False, those of the controller file's.
     interpreter
         "builtin"; "linuxcnc", LinuxCNC's own (`rs274`); "auto", the first and, where it refuses, the second.
     rs274
@@ -48,7 +45,6 @@ class Request:
     path: str = ""
     origin: Pose | None = None
     default_origin: Pose = ZERO
-    block_delete: Switches = False
     interpreter: str = "builtin"
     rs274: str | None = None
     unconfined: bool = False
@@ -58,11 +54,6 @@ class Request:
     def work_offsets(self) -> Offsets:
         """Work offsets before the program sets any."""
         return self.controller.offsets or Offsets()
-
-    @property
-    def switches(self) -> frozenset[int]:
-        """Block-delete switches that are on."""
-        return switches_on(self.block_delete, self.controller)
 
     @property
     def zero(self) -> tuple[ShopPose | None, ShopPose]:
@@ -77,6 +68,5 @@ class Request:
     def start(self) -> State:
         """The control as the program finds it."""
         frames = Frames(copy.deepcopy(self.work_offsets), *self.zero, posted=self.controller.kinematics)
-        state = State(self.name, frames, copy.deepcopy(self.controller.tools), self.controller.dialect)
-        state.feed = self.controller.feed
-        return state
+        control = self.controller
+        return State(self.name, frames, copy.deepcopy(control.tools), control.dialect, feed=control.feed)

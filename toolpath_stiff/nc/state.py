@@ -3,29 +3,37 @@
 mm, degrees, mm/min.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Literal, get_args
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
-from toolpath_stiff.nc.groups import Group
-from toolpath_stiff.nc.moves import Arc, Recorder, Remark, ToolUse, Unsupported
+from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.nc.words import AXES, POLAR, Block, Word
 from toolpath_stiff.units import MM_PER_INCH
 
-if TYPE_CHECKING:
-    from toolpath_stiff.nc.frames import Frames
-
-
+# Modal groups in the order in which the codes and words of a block act: both are LinuxCNC's (manual, "G-Code Overview",
+# "Modal Groups" and "Order of Execution"), because its interpreter is what the results are compared with. Groups of M
+# codes begin with "M ", since a G code may have a group of that name too. "dwell" is a step of G4 alone; F, S and T act
+# without a code.
+#
+# Units first, so that an F beside G20 is in inches; the moves last. Up to `LAST_MODE`, a group may be executed ahead of
+# the rest of the block: doing so twice changes nothing but dwells.
+Group = Literal[
+    "units", "feed mode", "F", "S", "T", "M tool change", "dwell", "plane", "polar", "tool length", "M subprogram",
+    "work offset", "path control", "exact stop", "look-ahead", "dynamic offset", "spindle mode", "distance",
+    "arc distance", "cycle return", "cutter compensation", "lathe diameter", "scaling", "mirror image", "stroke check",
+    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M rigid tapping",
+    "rotation", "non-modal", "M stop", "motion", "corner",
+]  # fmt: skip
+STEPS: dict[Group, int] = {group: place for place, group in enumerate(get_args(Group))}
+LAST_MODE = STEPS["M rigid tapping"]
 POINT_WORDS = (*AXES, *POLAR)
-
-
 LATHE_HINT = "this reads the programs of mills: post it for a mill, with X as a position"
 
 
@@ -119,14 +127,21 @@ class CurrentBlock:
         """A word with the number as written, before the decimal-point rule."""
         return next(word for word in self.block.words if word.letter == letter)
 
-    def whole(self, letter: str, word: Word) -> int | None:
-        """The count that a word beside a code gives, taken; None without it. Raises `InputError`."""
+    def whole(self, letter: str, word: Word, least: int = 1) -> int | None:
+        """The whole number that a word beside a code gives, taken; None without it. Raises `InputError`."""
         value = self.take(letter)
         if value is None:
             return None
-        if value != int(value) or value < 1:
-            raise self.fail(self.values[letter], f"beside {word.text} is not a count", "a whole number from 1")
+        if value != int(value) or value < least:
+            raise self.fail(self.values[letter], f"beside {word.text} is not a count", f"a whole number from {least}")
         return int(value)
+
+    def refuse_if(
+        self, wrong: object, culprit: Word | str | None, problem: str, expected: str = "", hint: str = ""
+    ) -> None:
+        """Raise the error of `fail` where something is wrong."""
+        if wrong:
+            raise self.fail(culprit, problem, expected, hint)
 
     def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
         """An error at a word of the block (or that of a code or letter), or at the block."""
@@ -137,35 +152,6 @@ class CurrentBlock:
 
 
 START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
-
-
-class Segment(NamedTuple):
-    """One move of a block, those of no length too: control coordinates of its ends, and its arc."""
-
-    motion: int
-    start: list[float]
-    end: list[float]
-    arc: Arc | None
-
-
-class SavedModes(NamedTuple):
-    """What M70 and M73 save: attributes of `State`; length and control of the tool must be the same at the return."""
-
-    modes: dict[str, object]
-    plane: str
-    feed: float | None
-    offset: int
-    tool: tuple[float, bool]
-    at_return: bool
-
-
-@dataclass(frozen=True)
-class Corner:
-    """A corner that waits for its second move: `,C` or `,R`, its size in mm, and the line that asks for it."""
-
-    letter: str
-    size: float
-    line: int
 
 
 @dataclass
@@ -219,18 +205,15 @@ class State:
         Tool centre point control, by the number of moves before it is switched (G43.4) on or off.
     unsupported, warnings, assumptions
         As in `Program`.
-    bare, pointed
-        The first length without a decimal point, with its line; whether any length ends with its point, as `X10.`.
     trace
-        Each move of the current block, for whoever starts the list.
+        Each move of the current block, those of no length too, with its ends in control coordinates, for whoever starts
+        the list.
     corner
-        The corner (,C or ,R) that the next block has to make with the one before it; None: there is none.
+        The block whose ,C or ,R the next block has to make with it; None: there is none.
     cutter
         Cutter compensation in force (G41, G42); None: G40.
     beside
         After G40, until the next move: from the programmed point to where the tool centre stands (6, set-up frame).
-    level, saved
-        Calls within each other that run; what M70 or M73 saved, by level.
     named_length
         H of a block without G43, which a later G43 without H may mean.
     turning
@@ -263,19 +246,15 @@ class State:
     rotation_changed: bool = False
     height_lost: bool = False
     recorder: Recorder = field(default_factory=Recorder)
-    used_tools: dict[int, ToolUse] = field(default_factory=dict)
+    used_tools: dict[int, ToolEntry] = field(default_factory=dict)
     tip_held: list[tuple[int, bool]] = field(default_factory=list)
     unsupported: list[Unsupported] = field(default_factory=list)
     warnings: list[Remark] = field(default_factory=list)
     assumptions: list[str] = field(default_factory=list)
-    bare: tuple[int, Word] | None = None
-    pointed: bool = False
-    trace: list[Segment] | None = None
-    corner: Corner | None = None
+    trace: list[Move] | None = None
+    corner: CurrentBlock | None = None
     cutter: Cutter | None = None
     beside: list[float] | None = None
-    level: int = 0
-    saved: dict[int, SavedModes] = field(default_factory=dict)
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
 

@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from toolpath_stiff.nc.moves import CYCLE, RAPID
+
 FEEDS_OUT = ("G89", "G84", "G74")
 PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
 SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
@@ -25,42 +27,29 @@ class Drilling:
     out_at_r: bool = False  # a tap feeds out to R, and from there at rapid (Fanuc, Haas); else to `clear`
 
 
-@dataclass(frozen=True)
-class Stroke:
-    """One move along the normal: to which height, at feed or rapid, how long to wait there in s."""
-
-    height: float
-    feed: bool
-    dwell: float = 0.0
-
-
-def strokes(hole: Drilling) -> Iterator[Stroke]:
-    """Moves of one hole, from the R plane.
+def strokes(hole: Drilling) -> Iterator[tuple[float, int, float]]:
+    """Moves of one hole along the normal, from the R plane: to which height, RAPID or CYCLE, how long to wait there.
 
     Examples
     --------
     >>> hole = Drilling("G83", bottom=-5.0, retract=2.0, clear=10.0, peck=4.0, dwell=0.0)
-    >>> [(stroke.height, "feed" if stroke.feed else "rapid") for stroke in strokes(hole)]
+    >>> [(height, "feed" if motion == CYCLE else "rapid") for height, motion, dwell in strokes(hole)]
     [(-2.0, 'feed'), (2.0, 'rapid'), (-1.746, 'rapid'), (-5.0, 'feed'), (10.0, 'rapid')]
     """
-    if hole.code in ("G73", "G83"):
-        yield from _pecks(hole)
-    yield Stroke(hole.bottom, feed=True, dwell=0.0 if hole.code in ("G81", "G73", "G83", "G85") else hole.dwell)
+    if hole.code in ("G73", "G83"):  # G73 breaks the chip at depth, G83 clears it at the R plane
+        for depth in _depths(hole):
+            yield depth, CYCLE, 0.0
+            if hole.code == "G83":
+                yield hole.retract, RAPID, 0.0
+            yield depth + PECK_CLEARANCE_MM, RAPID, 0.0
+    yield hole.bottom, CYCLE, 0.0 if hole.code in ("G81", "G73", "G83", "G85") else hole.dwell
     if hole.code == "G85" or hole.out_at_r:  # out to the R plane at feed, from there at rapid
-        yield Stroke(hole.retract, feed=True)
-    yield Stroke(hole.clear, feed=hole.code in FEEDS_OUT and not hole.out_at_r)
-
-
-def _pecks(hole: Drilling) -> Iterator[Stroke]:
-    """The pecks above the bottom. G73 breaks the chip at depth, G83 clears it at the R plane."""
-    for depth in _depths(hole):
-        yield Stroke(depth, feed=True)
-        if hole.code == "G83":
-            yield Stroke(hole.retract, feed=False)
-        yield Stroke(depth + PECK_CLEARANCE_MM, feed=False)
+        yield hole.retract, CYCLE, 0.0
+    yield hole.clear, CYCLE if hole.code in FEEDS_OUT and not hole.out_at_r else RAPID, 0.0
 
 
 def _depths(hole: Drilling) -> Iterator[float]:
+    """Depths of the pecks above the bottom."""
     count, depth = 1, hole.retract - (hole.first or hole.peck)
     while depth > hole.bottom + SAME_HEIGHT_MM:
         yield depth

@@ -1,21 +1,16 @@
 """Tool tables and work-offset files: LinuxCNC's own formats and plain ones. mm and degrees."""
 
-from __future__ import annotations
-
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.files import read_bytes
-from toolpath_stiff.nc.moves import ToolUse
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.tables import Columns, parse_table
 from toolpath_stiff.toml_reader import TomlReader, is_number
-from toolpath_stiff.units import m_from_mm
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
@@ -52,15 +47,6 @@ class ToolEntry:
     stick_out: float = math.nan
     material: str = ""
 
-    def in_use(self) -> ToolUse:
-        """The tool as programs report it, in SI."""
-        length, diameter, stick_out = m_from_mm(self.length), m_from_mm(self.diameter), m_from_mm(self.stick_out)
-        return ToolUse(self.number, length, diameter, self.remark, stick_out, self.material)
-
-    def __deepcopy__(self, _memo: dict[int, object]) -> ToolEntry:
-        # Every reading copies its tables, field by field at ten times the cost.
-        return replace(self)
-
 
 def tool_of(tools: dict[int, ToolEntry] | None, number: int) -> ToolEntry:
     """The tool of a number; where no table has it, one of which nothing else is known."""
@@ -74,9 +60,6 @@ class WorkOffset:
     axes: list[float] = field(default_factory=lambda: [0.0] * 6)
     rotation: float = 0.0
     given: bool = False
-
-    def __deepcopy__(self, _memo: dict[int, object]) -> WorkOffset:
-        return replace(self, axes=[*self.axes])
 
 
 @dataclass
@@ -106,13 +89,14 @@ def _text(path: str | Path, what: str) -> str:
     return text
 
 
-def _number(text: str, what: str, place: Place) -> float:
+def _number(text: str, what: str) -> float:
+    """A number of a table. Raises `ProgramError` without a place."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST_MM:
-        raise place.fail(f"{what} = {text[:40]!r}", f"a number within +-{LARGEST_MM:g}")
+        raise ProgramError(f"{what} = {text[:40]!r}", expected=f"a number within +-{LARGEST_MM:g}")
     return value
 
 
@@ -132,16 +116,14 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
     >>> tools[1].length, tools[1].diameter, tools[1].remark
     (50.0, 6.0, 'end mill')
     """
-    text = _text(path, "tool table")
+    text, file = _text(path, "tool table"), str(path)
     first = next(line for line in text.splitlines() if line.strip()).lstrip().upper()
     is_csv = "," in first and not first.startswith(("T0", "T1", ";"))
-    tools = _csv_tools(text, str(path)) if is_csv else _linuxcnc_tools(text, str(path))
-    by_number: dict[int, ToolEntry] = {}
-    for line, tool in tools:
-        if tool.number in by_number:
-            raise Place(str(path), line).fail(f"tool {tool.number} appears twice")
-        by_number[tool.number] = tool
-    return by_number
+    tools: dict[int, ToolEntry] = {}
+    for line, tool in (_csv_tools if is_csv else _linuxcnc_tools)(text, file):
+        if tools.setdefault(tool.number, tool) is not tool:
+            raise Place(file, line).fail(f"tool {tool.number} appears twice")
+    return tools
 
 
 def tools_of(toml: TomlReader) -> dict[int, ToolEntry] | None:
@@ -158,67 +140,60 @@ def tools_of(toml: TomlReader) -> dict[int, ToolEntry] | None:
     for place, row in enumerate(given, 1):
         where = f"tools[{place}]"
         toml.only(where, row, TOOL_KEYS)
-        wrong = partial(_wrong_key, toml, where)
-        tool = _tool(row, wrong)
-        if tool.number in tools:
+        try:
+            tool = _tool(row)
+        except ProgramError as error:
+            raise toml.error(f"{where}: {error.found}", error.expected, where=where) from None
+        if tools.setdefault(tool.number, tool) is not tool:
             raise toml.error(f"{where}: tool {tool.number} appears twice", where=f"{where}.number")
-        tools[tool.number] = tool
     return tools
-
-
-def _wrong_key(toml: TomlReader, where: str, key: str, value: object, expected: str) -> InputError:
-    return toml.error(f"{where}.{key} = {value!r}", expected, where=f"{where}.{key}")
 
 
 def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
     columns = ("tool", *TOOL_KEYS[1:])
     table = parse_table(text, file, Columns(columns[:4], columns[4:]))
-    unknown = [name for name in table.heading if name not in columns]
-    missing = [name for name in columns[:2] if name not in table.heading]
-    if unknown or missing:
-        problem = f"column {unknown[0]!r} is not known" if unknown else f"column {missing[0]!r} is missing"
-        raise Place(file, table.heading_line).fail(problem, f"columns {', '.join(columns)}")
+    unknown = [f"{name!r} is not known" for name in table.heading if name not in columns]
+    for problem in unknown + [f"{name!r} is missing" for name in columns[:2] if name not in table.heading]:
+        raise Place(file, table.heading_line).fail(f"column {problem}", f"columns {', '.join(columns)}")
     for line, cells in table.rows:
-        place = Place(file, line)
         try:
             row = {key: cell for key, cell in table.record(cells).items() if cell}
+            numbers = {key: _number(row[key], key) for key in columns[:4] if key in row}
+            tool = _tool({**row, **numbers, "number": numbers.get("tool")})
         except InputError as error:
             raise error.in_line(file, line) from None
-        numbers = {key: _number(row[key], key, place) for key in columns[:4] if key in row}
-        wrong = partial(_wrong_cell, place)
-        yield line, _tool({**row, **numbers, "number": numbers.get("tool")}, wrong)
+        yield line, tool
 
 
-def _wrong_cell(place: Place, key: str, value: object, expected: str) -> InputError:
-    return place.fail(f"{'tool' if key == 'number' else key} = {value!r}", expected)
-
-
-def _tool(row: Mapping[str, object], wrong: Callable[[str, object, str], InputError]) -> ToolEntry:
-    """The tool of `TOOL_KEYS`; `wrong` makes the error of a key, its value and what was expected."""
-    number, lengths = row.get("number"), list[float]()
+def _tool(row: Mapping[str, object]) -> ToolEntry:
+    """The tool of `TOOL_KEYS`. Raises `ProgramError` without a place."""
+    number, remark, material = row.get("number"), row.get("remark", ""), row.get("material", "")
+    lengths: dict[str, float] = {}
     if not is_number(number) or number != int(number) or number < 0:
-        raise wrong("number", number, "a whole number")
+        raise ProgramError(f"tool number {number!r}", expected="a whole number")
     for key in TOOL_KEYS[1:4]:
-        value = row.get(key, math.nan)
-        if not is_number(value) or abs(value) > LARGEST_MM or (key != "length_mm" and value <= 0.0):
-            raise wrong(key, value, f"a number of mm{', more than 0' if key != 'length_mm' else ''}")
-        lengths.append(float(value))
-    texts = [row.get(key, "") for key in TOOL_KEYS[4:]]
-    if not all(isinstance(text, str) for text in texts):
-        raise wrong("remark and material", texts, "texts")
-    return ToolEntry(int(number), lengths[0], lengths[1], str(texts[0]), lengths[2], str(texts[1]))
+        value, positive = row.get(key, math.nan), key != "length_mm"
+        if not is_number(value) or abs(value) > LARGEST_MM or (positive and value <= 0.0):
+            raise ProgramError(f"{key} = {value!r}", expected=f"a number of mm{', more than 0' * positive}")
+        lengths[key.removesuffix("_mm")] = float(value)
+    if not isinstance(remark, str) or not isinstance(material, str):
+        raise ProgramError(f"remark and material {remark!r}, {material!r}", expected="texts")
+    return ToolEntry(int(number), remark=remark, material=material, **lengths)
 
 
 def _linuxcnc_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
     for line, row in enumerate(text.splitlines(), 1):
-        place, (content, _, remark) = Place(file, line), row.partition(";")
+        content, _, remark = row.partition(";")
         if not content.strip() or row.startswith("#"):
             continue
         words = {key.upper(): value for key, value in TOOL_WORD.findall(content)}
         if re.fullmatch(r"[0-9]{1,9}", words.get("T", "")) is None:
             expected = "T<number> P<pocket> Z<length mm> D<diameter mm> ;remark"
-            raise place.fail(f"{content.strip()[:40]!r} is not a tool", expected)
-        length, diameter = (_number(words[key], key, place) if key in words else math.nan for key in "ZD")
+            raise Place(file, line).fail(f"{content.strip()[:40]!r} is not a tool", expected)
+        try:
+            length, diameter = (_number(words[key], key) if key in words else math.nan for key in "ZD")
+        except ProgramError as error:
+            raise error.in_line(file, line) from None
         yield line, ToolEntry(int(words["T"]), length, diameter, remark.strip())
 
 
@@ -253,17 +228,11 @@ def read_offsets(path: str | Path) -> Offsets:
     >>> offsets.at(0).axes
     [100.0, -50.0, 800.0, 0.0, 0.0, 0.0]
     """
-    text, offsets = _text(path, "offsets file"), Offsets()
+    text, file = _text(path, "offsets file"), str(path)
     lines = [(number, line.partition("#")[0].split()) for number, line in enumerate(text.splitlines(), 1)]
     if any(words and PARAMETER.fullmatch(words[0]) for _, words in lines):
-        for number, words in lines:
-            place = Place(str(path), number)
-            if words and (len(words) != 2 or not PARAMETER.fullmatch(words[0])):
-                raise place.fail(f"{' '.join(words)[:40]!r} is not a parameter", "LinuxCNC's `5221 12.5`")
-            if words:
-                _set_parameter(offsets, int(words[0]), _number(words[1], words[0], place))
-        return offsets
-    toml = TomlReader(OFFSET_KEY.sub(r'"\1" =', text), str(path), "the offsets file", ProgramError)
+        return _offsets_of_parameters([(number, words) for number, words in lines if words], file)
+    toml = TomlReader(OFFSET_KEY.sub(r'"\1" =', text), file, "the offsets file", ProgramError)
     return _offsets_in(toml, toml.data, "")
 
 
@@ -282,53 +251,46 @@ def _offsets_in(toml: TomlReader, table: Mapping[str, object], before: str) -> O
     offsets = Offsets()
     for key, values in table.items():
         name, where = key.upper(), f"{before}{key}"
-        if additional_offset(name) in offsets.additional:
+        number = additional_offset(name)
+        if number in offsets.additional:
             raise toml.error(f"{where!r} is there twice: G54.1 and G154 name the same offsets", where=where)
-        if name not in (*WORK_OFFSETS, *HOMES) and additional_offset(name) is None:
+        if name not in (*WORK_OFFSETS, *HOMES) and number is None:
             expected = f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)'
             raise toml.error(f"{where} is not an offset", expected, where=where)
         most = 6 if name in HOMES else 7
         if not isinstance(values, list) or not 1 <= len(values) <= most:
             raise toml.error(f"{where} = {values!r}", f"1 to {most} numbers: x, y, z, a, b, c, r", where=where)
-        set_offset(offsets, name, [toml.number(where, value, LARGEST_MM) for value in values])
+        numbers = [toml.number(where, value, LARGEST_MM) for value in values]
+        axes = [*numbers[:6], *[0.0] * (6 - len(numbers))]
+        offset = WorkOffset(axes, numbers[6] if len(numbers) > 6 else 0.0, given=True)
+        if name in HOMES:
+            (offsets.home_g28 if name == "G28" else offsets.home_g30)[:] = axes
+        elif number is None:
+            offsets.table[WORK_OFFSETS.index(name)] = offset
+        else:
+            offsets.additional[number] = offset
     return offsets
 
 
-def set_offset(offsets: Offsets, name: str, values: list[float]) -> None:
-    """Set an offset (x, y, z, a, b, c, r) or a reference point, G28 or G30; missing numbers are 0.
-
-    Examples
-    --------
-    >>> offsets = Offsets()
-    >>> set_offset(offsets, "G55", [100.0, 50.0])
-    >>> offsets.at(1)
-    WorkOffset(axes=[100.0, 50.0, 0.0, 0.0, 0.0, 0.0], rotation=0.0, given=True)
-    """
-    axes = [*values[:6], *[0.0] * (6 - len(values[:6]))]
-    if name == "G28":
-        offsets.home_g28 = axes
-    elif name == "G30":
-        offsets.home_g30 = axes
-    else:
-        offset = WorkOffset(axes, values[6] if len(values) > 6 else 0.0, given=True)
-        if name in WORK_OFFSETS:
-            offsets.table[WORK_OFFSETS.index(name)] = offset
-        else:
-            number = additional_offset(name)
-            assert number is not None
-            offsets.additional[number] = offset
-
-
-def _set_parameter(offsets: Offsets, number: int, value: float) -> None:
-    """One line of a LinuxCNC parameter file; other parameters are ignored."""
-    for home, first in ((offsets.home_g28, HOME_G28), (offsets.home_g30, HOME_G30)):
-        if 0 <= number - first < 6:
-            home[number - first] = value
-    index, place = divmod(number - FIRST_OFFSET, OFFSET_STRIDE)
-    if 0 <= index < len(offsets.table) and 0 <= place <= ROTATION and not 6 <= place < ROTATION:
-        offset = offsets.table[index]
-        if place == ROTATION:
-            offset.rotation = value
-        else:
-            offset.axes[place] = value
-        offset.given = offset.given or value != 0.0
+def _offsets_of_parameters(lines: list[tuple[int, list[str]]], file: str) -> Offsets:
+    """Offsets of the lines of a LinuxCNC parameter file; other parameters are ignored."""
+    offsets = Offsets()
+    for line, words in lines:
+        if len(words) != 2 or not PARAMETER.fullmatch(words[0]):
+            raise Place(file, line).fail(f"{' '.join(words)[:40]!r} is not a parameter", "LinuxCNC's `5221 12.5`")
+        try:
+            number, value = int(words[0]), _number(words[1], words[0])
+        except ProgramError as error:
+            raise error.in_line(file, line) from None
+        for home, first in ((offsets.home_g28, HOME_G28), (offsets.home_g30, HOME_G30)):
+            if 0 <= number - first < 6:
+                home[number - first] = value
+        index, place = divmod(number - FIRST_OFFSET, OFFSET_STRIDE)
+        if 0 <= index < len(offsets.table) and (0 <= place < 6 or place == ROTATION):
+            offset = offsets.table[index]
+            offset.given = offset.given or value != 0.0
+            if place == ROTATION:
+                offset.rotation = value
+            else:
+                offset.axes[place] = value
+    return offsets

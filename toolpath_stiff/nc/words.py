@@ -1,21 +1,10 @@
-"""Lines to blocks, blocks to words. The only module that knows pygcode.
-
-pygcode 0.2.1 (unmaintained since 2017) fails on comments of both styles in one line, on `X+1` and on spaces inside
-words, drops the E of `1.5E2`, and ignores what it does not know. So comments, spaces, signs, exponents and N words are
-handled before it is called, each word keeps its true column, and every word that pygcode does not return is an error.
-"""
-
-from __future__ import annotations
+"""Lines to blocks, blocks to words, each with its true column."""
 
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from decimal import Decimal
+from dataclasses import dataclass
 from typing import NamedTuple
-
-from pygcode.exceptions import GCodeWordStrError
-from pygcode.words import text2words
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.place import Place
@@ -24,17 +13,16 @@ NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
 WORD = re.compile(rf"([A-Z@^]|,[CR])({NUMBER})(E[+-]?\d++)?", re.ASCII)
 AXES = "XYZABC"
-POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
+POLAR = "@^"  # LinuxCNC's polar words
 CORNERS = (",C", ",R")  # chamfer and rounding of the corner to the next block (Fanuc, Haas)
-NOT_PYGCODES = (*POLAR, *CORNERS)
 LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *POLAR, *CORNERS))
 COMMENT = re.compile("[();]")
 EXPRESSION = re.compile(r"[#\[]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
-# Caps: longer is no block.
+# Longer is no block.
 LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
-LONGEST_NUMBER = 100  # characters
 MOST_DIGITS = 9  # of a program number, its O included
+NUMBERED = {"G": 1, "M": 1, "L": 0, "T": 0}  # decimals of words that number something
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
 
 
@@ -62,12 +50,6 @@ class Block:
     percent: bool = False
     switch: int = 1
     rest: int | None = None
-
-    def executed(self, switches: frozenset[int]) -> Block:
-        """The block without what the block-delete switches leave out behind a slash in its middle."""
-        if self.rest is None or self.switch not in switches:
-            return self
-        return replace(self, words=self.words[: self.rest])
 
 
 def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block:
@@ -100,7 +82,8 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     if slash > 0:
         rest = len(words)
         words += _tokens(compact, columns, behind, text, place)
-    return Block(line, through_pygcode(words, place), optional=slash == 0, switch=switch, rest=rest)
+    check_numbers(words, place)
+    return Block(line, tuple(words), optional=slash == 0, switch=switch, rest=rest)
 
 
 def block_delete(compact: str, slash: int, columns: Sequence[int], place: Place) -> tuple[int, int]:
@@ -118,8 +101,9 @@ def block_delete(compact: str, slash: int, columns: Sequence[int], place: Place)
 def check_length(compact: str, place: Place) -> None:
     """Refuse a block that no control reads."""
     if len(compact) > LONGEST_BLOCK:
-        problem = f"a block of {len(compact)} characters without comments and blanks"
-        raise place.fail(problem, f"at most {LONGEST_BLOCK}")
+        raise place.fail(
+            f"a block of {len(compact)} characters without comments and blanks", f"at most {LONGEST_BLOCK}"
+        )
 
 
 def program_number(compact: str, column: int, place: Place) -> Block:
@@ -188,27 +172,21 @@ def _tokens(
         if exponent:
             # An exponent stands without blanks; `X1 E5` is two words, not a hundred metres.
             begin = match.start(3)
-            apart = columns[begin] - columns[begin - 1] > 1
-            if letter in NO_EXPONENT or apart or HAS_E_WORD.search(compact):
+            if letter in NO_EXPONENT or (columns[begin] - columns[begin - 1] > 1) or HAS_E_WORD.search(compact):
                 end = begin
             else:
                 number += exponent
         original = text[column - 1 : columns[end - 1]]
-        if end - position > 1 + LONGEST_NUMBER:
-            problem = f"a number of {end - position - 1} characters after {letter}"
-            raise place.fail(problem, f"at most {LONGEST_NUMBER}", column=column)
-        if letter == "N":
-            if words:
-                problem = f"line number {original!r} after another word"
-                raise place.fail(problem, "N at the beginning of the line", column=column)
-        elif letter not in LETTERS:
+        position, value = end, float(number)
+        if letter not in LETTERS:
             raise place.fail(f"word {original!r} is not known", column=column)
-        else:
-            value = float(number)
-            if not math.isfinite(value):
-                raise place.fail(f"{original!r} is not a finite number", column=column)
+        if not math.isfinite(value):
+            raise place.fail(f"{original!r} is not a finite number", column=column)
+        if letter != "N":
             words.append(Word(letter, value, column, original))
-        position = end
+        elif words:
+            problem = f"line number {original!r} after another word"
+            raise place.fail(problem, "N at the beginning of the line", column=column)
     return words
 
 
@@ -216,41 +194,18 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
     """The error for text that is not a word."""
     character, follower = compact[position], compact[position + 1 : position + 3].lstrip("+-")[:1]
     if character == "%":
-        hint = "take the name behind it away; a Fanuc's number is read past with --dialect fanuc"
-        return place.fail("`%` among other words", "`%` alone on its line", hint, column)
+        return place.fail("`%` among other words", "`%` alone on its line", "take the name behind it away", column)
     if character in LETTERS and (not follower or follower in LETTERS or follower == "/"):
         return place.fail(f"the word {character!r} has no number", f"a number after {character}", column=column)
     return place.fail(f"{compact[position : position + 12]!r} is not a word", "a letter and a number", column=column)
 
 
-def through_pygcode(words: Sequence[Word], place: Place) -> tuple[Word, ...]:
-    """Let pygcode read the normalised words; what it does not return exactly is an error."""
-    known = [word for word in words if word.letter not in NOT_PYGCODES]
-    returned: list[tuple[str, float]] = []
-    try:
-        for word in text2words(" ".join([_plain(word) for word in known])):
-            returned.append((word.letter, float(word.value)))
-    except (GCodeWordStrError, ValueError):
-        returned.append(("", math.nan))
-    for word, read in zip(known, [*returned, ("", math.nan)], strict=False):
-        if read != (word.letter, word.value):
-            raise place.fail(f"word {word.text!r} cannot be read", _expected(word.letter), column=word.column)
-    return tuple(words)
-
-
-def _plain(word: Word) -> str:
-    """The word as pygcode can read it: no plus, no exponent, whole numbers where it wants them."""
-    number = repr(word.value)
-    if "e" in number:
-        number = format(Decimal(number), "f")
-    if number.endswith(".0"):
-        number = number[:-2]
-    return word.letter + number
-
-
-def _expected(letter: str) -> str:
-    if letter in "GM":
-        return f"a code such as {letter}1 or {letter}59.3"
-    if letter in "LTN":
-        return "a whole number that is not negative"
-    return "a decimal number"
+def check_numbers(words: Sequence[Word], place: Place) -> None:
+    """Refuse numbers that no code, tool or count has."""
+    for letter, value, column, text in words:
+        decimals = NUMBERED.get(letter)
+        if decimals is not None and (value < 0.0 or value != round(value, decimals)):
+            expected = (
+                f"a code such as {letter}1 or {letter}59.3" if decimals else "a whole number that is not negative"
+            )
+            raise place.fail(f"word {text!r} cannot be read", expected, column=column)

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, json_number
 from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.portrait.portrait import Portrait, Sized
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.stiffness.terms import PINS, SWINGS, Term
-from toolpath_stiff.units import RAD_PER_DEG, json_number
+from toolpath_stiff.units import RAD_PER_DEG
 
 # Variable -> how it is said, SI value of the unit shown, that unit.
 SAID: dict[str, tuple[str, float, str]] = {

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, number
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report import analysis_tables as words
 from toolpath_stiff.report.colours import page_colours
@@ -24,7 +24,7 @@ from toolpath_stiff.report.curves import beyond_scale, cutting_box, extremes_by_
 from toolpath_stiff.report.pages import Part, markup, part, render
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, number
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 SCRIPTS = ("stage.js", "viewer.js", "profile.js", "analysis.js")
 

@@ -1,11 +1,10 @@
 """The results of a case study, the paper's or one's own: text and table."""
 
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, number
 from toolpath_stiff.placement.case_study import FIGURES, HIGH_MM, LOW_MM, REGION_COLUMNS, CaseStudy
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.stiffness.model import machine_words
-from toolpath_stiff.units import number
 
 HOLDS = {True: "yes", False: "NO", None: "not tested"}
 # As in the paper's Figure 10, mean and range first.
@@ -32,9 +31,8 @@ def text(study: CaseStudy) -> str:
         "| --- | --- | --- | --- |",
     ]
     for row in summary["regions"]:
-        place = f"{row['x_mm']:g}, {row['y_mm']:g}, {row['z_mm']:g}"
         lines.append(
-            f"| {row['region']} | {place} | {row['rotation_deg']:g} deg | "
+            f"| {row['region']} | {row['x_mm']:g}, {row['y_mm']:g}, {row['z_mm']:g} | {row['rotation_deg']:g} deg | "
             f"{number(row['mean_N_per_mm'])} ({number(row['range_N_per_mm'])}) |"
         )
     lines += ["", "## The paper's conclusions", ""]

@@ -94,7 +94,7 @@ def _load_path(comparison: Comparison) -> ShownTable:
     nm_per_N = 1e9 * np.array([*comparison.shares.values()])  # a row a link, a column an axis
     sums = nm_per_N.sum(axis=0)
     links = (zip(parts, sums, strict=True) for parts in nm_per_N)
-    rows = [[f"{part:.1f} nm/N, {part / whole:.0%}" for part, whole in parts] for parts in links]
+    rows = [[f"{part:.1f} nm/N, {100.0 * part / whole:.0f} %" for part, whole in parts] for parts in links]
     rows.append([f"{whole:.1f} nm/N" for whole in sums])
     rows.append([_measured(comparison, axis, whole) for axis, whole in zip("XYZ", sums, strict=True)])
     names = (*comparison.shares, "the model in all", "measured")

@@ -9,6 +9,7 @@ from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.rows import percent_of
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why
+from toolpath_stiff.documents import json_number, number
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.portrait.portrait import Portrait, Sized
 from toolpath_stiff.portrait.words import portrait_text, term_words
@@ -17,7 +18,7 @@ from toolpath_stiff.report.loops import loops_section
 from toolpath_stiff.report.pages import Head, Hints, Part, Section, markup, page_of
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, significant
-from toolpath_stiff.units import deg_from_rad, json_number, mm_from_m, n_per_mm_from_n_per_m, number
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 text = words.text  # what a terminal shows
 PAGE = "report.html"

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.rows import SHOWN, FittedSize, HypothesisRow, percent_of
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, next_steps, verdict_text, why
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, json_number, number
 from toolpath_stiff.hints import parted
 from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.errors import scatter_text
@@ -13,7 +13,6 @@ from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.portrait.words import portrait_text
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import WIDTH, counted, labelled, machine_text, percent, plain, shortened, significant
-from toolpath_stiff.units import json_number, number
 
 HEADLINES = {
     "adequate": "Nothing is missing that these data could show",
@@ -224,5 +223,5 @@ def _next_readings(diagnosis: Diagnosis) -> list[str]:
         return []
     reasons = list(dict.fromkeys(reading["why"] for reading in diagnosis.next_measurements))
     more = [f"{len(reasons) - FEW_REASONS} more in the file"] if len(reasons) > FEW_REASONS else []
-    proposed = counted(len(diagnosis.next_measurements), "reading")
-    return [f"{proposed} proposed in diagnose.json: {'; '.join([*reasons[:FEW_REASONS], *more])}"]
+    listed = "; ".join([*reasons[:FEW_REASONS], *more])
+    return [f"{counted(len(diagnosis.next_measurements), 'reading')} proposed in diagnose.json: {listed}"]

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 from toolpath_stiff.machine.limits import Reach
 from toolpath_stiff.machine.model import Hexapod, StrutLaw
-from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m, pose_in_mm
+from toolpath_stiff.poses import pose_in_mm
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m
 
 
 class MachineFigure(NamedTuple):

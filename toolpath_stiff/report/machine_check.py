@@ -4,10 +4,10 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.machine_check import BEYOND, MACHINING_CENTRE, ROBOT, MachineCheck
 from toolpath_stiff.analysis.poses import PoseStiffness
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.machine.symmetry import Symmetry
+from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.stiffness.model import acting_names, condition_warnings
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m, pose_in_mm, um_from_m
+from toolpath_stiff.units import n_per_mm_from_n_per_m, n_per_um_from_n_per_m, um_from_m
 
 
 def text(check: MachineCheck) -> str:
@@ -20,7 +20,7 @@ def text(check: MachineCheck) -> str:
     for word, texts in (("WRONG", check.wrong), ("doubtful", check.doubtful), ("warning", condition_warnings(model))):
         lines += [f"  {word}: {text}" for text in texts]
     effects = ", ".join([*acting_names(model), *(active.effect.name for active in model.instruments)]) or "none"
-    lines += [f"  effects: {effects}", f"  {symmetry_words(check.symmetry)}"]
+    lines.append(f"  effects: {effects}")
     if check.neutral.reach.reachable[0]:
         lines.append(f"  {neutral_words(machine, check.neutral)}")
     if check.origin.reach.reachable[0]:
@@ -54,11 +54,3 @@ def neutral_words(machine: Hexapod, report: PoseStiffness) -> str:
         f"at the neutral pose {' '.join(pose)}: {kx:.0f}, {ky:.0f}, {kz:.0f} N/mm along X, Y, Z; "
         f"{defaults.FORCE:g} N move the tool by {moved}; softest direction {softest:.3g} N/um, {words}"
     )
-
-
-def symmetry_words(symmetry: Symmetry) -> str:
-    """What holds for the joints that follow."""
-    if not symmetry.kind:
-        return "the joints follow neither a three-fold symmetry nor a mirror plane: nothing to hold one against"
-    count = 12 - len(symmetry.strays)
-    return f"{count} of 12 joints follow a {symmetry.kind} symmetry within {mm_from_m(symmetry.residual):.2g} mm"

@@ -11,10 +11,10 @@ from toolpath_stiff.correction.result import Update
 from toolpath_stiff.correction.steps import LadderStep
 from toolpath_stiff.correction.strut_law import bar_curve_csv
 from toolpath_stiff.diagnosis.rows import FittedSize, percent_of
+from toolpath_stiff.documents import number
 from toolpath_stiff.report.pages import Hints, Section, page_of, readings_head
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, WIDTH, counted, machine_text, percent, plain
-from toolpath_stiff.units import number
 
 VERDICTS = {
     UPDATED: "The machine is updated",

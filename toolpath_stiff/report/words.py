@@ -5,8 +5,8 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
+from toolpath_stiff.documents import number
 from toolpath_stiff.stiffness.model import machine_words
-from toolpath_stiff.units import number
 
 WIDTH = 100  # columns of the terminal
 # The sign of every residual that is shown, for axes and legends.

@@ -5,12 +5,12 @@ import re
 from collections.abc import Sequence
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.arc import ARCS
 from toolpath_stiff.nc.codes.drilling import CYCLES
+from toolpath_stiff.nc.codes.motion import ARCS
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
-from toolpath_stiff.nc.moves import RAPID, Arc
-from toolpath_stiff.nc.state import Flow, Segment
+from toolpath_stiff.nc.moves import RAPID, Arc, Move
+from toolpath_stiff.nc.state import Flow
 from toolpath_stiff.nc.words import AXES, CORNERS, POLAR, Block
 from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
 from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, point_at
@@ -32,8 +32,6 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     letters = {word.letter for word in block.words}
     refused = {
         "a subprogram (M98, M99), which may run at several places,": current.flow is not Flow.NEXT,
-        "saved modes (M70 to M73)": "M modal state" in current.groups,
-        "spindle-synchronised motion (G33)": bool({source.motion, current.groups.get("motion")} & {"G33", "G33.1"}),
         "cutter compensation (G41, G42)": source.cutter is not None,
         "polar words (G16, @, ^)": source.polar is not None or bool(letters & set(POLAR)),
         "a corner with the next block (,R ,C)": bool(letters & set(CORNERS)),
@@ -93,7 +91,7 @@ def _home(controls: Controls) -> None:
     controls.go(controls.target(controls.trace[0].end), axes, only=named)
 
 
-def _arc(controls: Controls, plane: str, move: Segment, arc: Arc) -> None:
+def _arc(controls: Controls, plane: str, move: Move, arc: Arc) -> None:
     source, out, edit, axes = controls.source, controls.out, controls.edit, controls.axes
     name, sign = controls.image(source.plane) or (source.plane, 1.0)
     if name != plane:
@@ -139,9 +137,9 @@ def _cycle(controls: Controls, plane: str) -> None:
             edit.write(letter, height / controls.scale(normal), controls.digits)
 
 
-def _piece_count(controls: Controls, move: Segment) -> int:
+def _piece_count(controls: Controls, move: Move) -> int:
     """Number of pieces into which a move must be cut; those that must be are refused, unless it was asked for."""
-    motion, start, end, arc = move
+    motion, start, end, arc = move.motion, move.start, move.end, move.arc
     plane, leaning = controls.source.plane, 0.0
     off_plane = arc is not None and controls.image(plane) is None
     if motion != RAPID and controls.turn.turns and start[3:] != end[3:]:
@@ -155,12 +153,11 @@ def _piece_count(controls: Controls, move: Segment) -> int:
     if controls.linearise is None or (not off_plane and leaning == 0.0):
         return 1
     tolerance = controls.linearise - controls.unit
-    option = f"--linearise {controls.linearise:g}"
-    rounding = f"{option} is no more than the rounding to {controls.digits} decimals"
+    rounding = f"--linearise {controls.linearise:g} is no more than the rounding to {controls.digits} decimals"
     controls.refuse_if(tolerance < controls.unit, rounding, "give more of it, or more --decimals")
     count = math.ceil(math.sqrt(leaning / math.degrees(tolerance / LEVER)))
     if arc is not None and (off_plane or count > 1):
-        controls.note(
+        controls.notes.add(
             f"arcs that the turn takes out of the planes are written as chords within {controls.linearise:g} mm"
         )
         frames = controls.source.frames
@@ -171,8 +168,7 @@ def _piece_count(controls: Controls, move: Segment) -> int:
 def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
     """Straight moves, the first in the block's own line."""
     stop, edit = controls.current and controls.current.code("M stop"), controls.edit
-    what = stop[0] if stop else "inverse-time feed (G93)"
-    several = f"{what} in a block that is written as several"
+    several = f"{stop[0] if stop else 'inverse-time feed (G93)'} in a block that is written as several"
     controls.refuse_if(stop or controls.out.feed_mode == "G93", several, "give it a block of its own, or G94")
     edit.remove("IJKRPLQ")
     lead = "".join(SLASH.findall(edit.render())) if edit.block.optional else ""
@@ -182,7 +178,7 @@ def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
             controls.edit, controls.current = edit.next_line(lead), None
         controls.motion_word(code)
         controls.go(controls.of_setup(point), [] if number else controls.axes)
-        if number == 0 or controls.edit.moves:
+        if number == 0 or any(map(controls.edit.word, AXES)):
             lines.append(controls.emit())
         if dwell:
             controls.edit = edit.next_line(lead)

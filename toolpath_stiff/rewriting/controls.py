@@ -16,8 +16,8 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.interpreter import execute
-from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.nc.state import CurrentBlock, Segment, State
+from toolpath_stiff.nc.moves import RAPID, Move
+from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
 from toolpath_stiff.rewriting.turn import Turn, differences
 from toolpath_stiff.units import MM_PER_INCH
@@ -43,13 +43,13 @@ class LineEdit:
     def __init__(self, text: str, block: Block) -> None:
         self.block = block
         self._words = list(block.words)
-        self._parts, end = list[str](), 0  # what stands before the first word, that, what stands before the next...
-        for word in block.words:
-            start = word.column - 1
-            self._parts += [text[end:start], word.text]
-            end = start + len(word.text)
-        self._parts.append(text[end:])
-        self._between = "" if "" in self._parts[2:-1:2] else " "
+        starts = [word.column - 1 for word in block.words]
+        ends = [start + len(word.text) for start, word in zip(starts, block.words, strict=True)]
+        self._texts = [word.text for word in block.words]
+        self._gaps = [
+            text[a:b] for a, b in zip([0, *ends], [*starts, len(text)], strict=True)
+        ]  # before, after, between
+        self._between = "" if "" in self._gaps[1:-1] else " "
         self._points = any("." in word.text for word in block.words if word.letter in NUMBERS)
         self._lower = bool(block.words) and block.words[0].text[0].islower()
 
@@ -79,7 +79,7 @@ class LineEdit:
 
     def _put(self, word: Word, text: str) -> None:
         """Another number in a word."""
-        self._parts[2 * self._words.index(word) + 1] = word.text[0] + text
+        self._texts[self._words.index(word)] = word.text[0] + text
 
     def remove(self, letters: Iterable[str]) -> None:
         """Take out the words of these letters, and the blanks beside them that are then one too many."""
@@ -87,13 +87,12 @@ class LineEdit:
             word = self.word(letter)
             if word is not None:
                 index = self._words.index(word)
-                before, _, after = self._parts[2 * index : 2 * index + 3]
-                self._parts[2 * index : 2 * index + 3] = [before.rstrip() + after]
-                del self._words[index]
+                self._gaps[index : index + 2] = [self._gaps[index].rstrip() + self._gaps[index + 1]]
+                del self._words[index], self._texts[index]
 
     def render(self) -> str:
         """The line as edited."""
-        return "".join(self._parts)
+        return self._gaps[0] + "".join(map("".join, zip(self._texts, self._gaps[1:], strict=True)))
 
     def next_line(self, lead: str) -> LineEdit:
         """A further line in this one's style, with no words yet; `lead` stands before them."""
@@ -101,19 +100,12 @@ class LineEdit:
         line._between, line._points, line._lower = self._between, self._points, self._lower
         return line
 
-    @property
-    def moves(self) -> bool:
-        """True where the line holds an axis word."""
-        return any(word.letter in AXES for word in self._words)
-
     def _add(self, letter: str, text: str) -> None:
         rank = ORDER.index(letter)
         ranks = [ORDER.index(word.letter) if word.letter in ORDER else rank for word in self._words]
         index = 1 + max((i for i, other in enumerate(ranks) if other < rank), default=-1)
-        if index:
-            self._parts[2 * index : 2 * index] = [self._between, text]
-        else:  # what stands before the first word stays there
-            self._parts[1:1] = [text, self._between if self._words else ""]
+        self._gaps.insert(max(index, 1), self._between if self._words else "")  # what begins the line stays there
+        self._texts.insert(index, text)
         self._words.insert(index, Word(letter, 0.0, 0, text))
 
 
@@ -128,7 +120,7 @@ class Controls:
     Attributes
     ----------
     known
-        Axes that the program has put somewhere; of the others only the control knows where they stand.
+        Letters of axes that the program has put somewhere; of the others only the control knows where they stand.
     edit, axes
         The line of the current block as it will be, the letters of the axes that it names.
     current
@@ -136,25 +128,19 @@ class Controls:
     trace
         The moves of that block as the untouched program makes them.
     notes
-        What the user should know, each once.
+        What the user should know.
     """
 
     def __init__(self, source: State, out: State, turn: Turn, decimals: int | None, linearise: float | None) -> None:
         self.source, self.out, self.turn = source, out, turn
         self.decimals, self.linearise = decimals, linearise
-        self.known = [False, False, False, True, True, True]
-        self.notes: list[str] = []
+        self.known = set("ABC")
+        self.notes: set[str] = set()
         self.edit = LineEdit("", Block(0, ()))
         self.current: CurrentBlock | None = None
         self.axes: list[str] = []
-        self.trace: list[Segment] = []
+        self.trace: list[Move] = []
         source.trace = self.trace
-        self._coarsest = 0.0  # mm, the last decimal of any block so far: inches round coarser than mm
-
-    def note(self, sentence: str) -> None:
-        """Say a sentence, once."""
-        if sentence not in self.notes:
-            self.notes.append(sentence)
 
     def refusal(self, problem: str, hint: str = "") -> InputError:
         """The error for the current block, which cannot be rewritten."""
@@ -187,10 +173,8 @@ class Controls:
     def image(self, plane: str) -> tuple[str, float] | None:
         """The plane that a plane is turned into, and the sign of its normal; None if it is none of the three."""
         column = self.matrix[:, geometry.PLANES[plane][2]]
-        for name, (_, _, normal) in geometry.PLANES.items():
-            if abs(column[normal]) == 1.0:
-                return name, float(column[normal])
-        return None
+        images = [(name, float(column[axes[2]])) for name, axes in geometry.PLANES.items()]
+        return next(((name, sign) for name, sign in images if abs(sign) == 1.0), None)
 
     def plane_word(self, before: str) -> str:
         """Turn the plane word of the block, if it has one; the plane that will be in force."""
@@ -226,13 +210,13 @@ class Controls:
         out = self.out
         there, here = out.frames.to_program(target), out.frames.to_program(out.frames.position)
         named = [AXES.index(letter) for letter in axes if letter in "XYZ"]
-        matrix = self.matrix if named and not all(self.known) else None
+        matrix = self.matrix if named and not self.known.issuperset("XYZ") else None
         for axis in only:
             letter, scale = AXES[axis], self.scale(axis)
             if letter not in axes:
                 coupled = axis < 3 and matrix is not None and matrix[axis, named].any()
                 off = abs(there[axis] - here[axis]) > OFF * 10.0**-self.digits * scale
-                if not off or not (self.known[axis] or coupled):
+                if not off or not (letter in self.known or coupled):
                     continue
             goal = there[axis] if out.absolute else (there[axis] - here[axis]) / parts
             self.edit.write(letter, goal / scale, self.digits)
@@ -247,14 +231,12 @@ class Controls:
             raise self.refusal(
                 f"the block, rewritten as {text.strip()!r}, would be refused: {error.found}", "give more --decimals"
             ) from None
-        for word in block.words:
-            if self.trace and word.letter in AXES:
-                self.known[AXES.index(word.letter)] = True
+        if self.trace:
+            self.known.update(word.letter for word in block.words)
         return text
 
     def check(self, first: int, first_out: int, pieces: bool) -> None:
         """Every cutting move of the block must be the placed one within the rounding; of one in `pieces` the ends."""
-        self._coarsest = max(self._coarsest, self.unit)
         source, out = self.source.recorder.recent[first:], self.out.recorder.recent[first_out:]
         wanted, written = ([move for move in moves if move.motion != RAPID] for moves in (source, out))
         if pieces and len(wanted) == 1 and written:
@@ -262,8 +244,8 @@ class Controls:
             written = [replace(written[0], end=written[-1].end)]
         # The steps of a cycle with L in G91 repeat one rounding.
         repeats = next((word.value for word in self.edit.block.words if word.letter == "L"), 1.0)
-        difference = differences(self.turn, wanted, written, self._coarsest * max(repeats, 1.0))
-        unknown = ", ".join(AXES[axis] for axis in range(3) if not self.known[axis])
-        hint = "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
-        hint = f"position {unknown} in rapid before the first cutting move" if unknown else hint
+        difference = differences(self.turn, wanted, written, self.unit * max(repeats, 1.0))
+        unknown = ", ".join(letter for letter in "XYZ" if letter not in self.known)
+        place = f"position {unknown} in rapid before the first cutting move"
+        hint = place if unknown else "give more --decimals, or position X, Y, Z and the rotary axes in rapid before it"
         self.refuse_if(difference, f"the block cannot be rewritten: its cutting move {difference}", hint)

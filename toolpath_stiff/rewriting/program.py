@@ -11,24 +11,24 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Unpack
+from typing import Any, ClassVar
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, switches_on
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.lines import read_text, split_lines
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.nc.place import Place
-from toolpath_stiff.nc.reader import Options
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import read_block
+from toolpath_stiff.poses import Pose, pose_in_mm
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
 from toolpath_stiff.rewriting.turn import Turn
-from toolpath_stiff.units import Pose, mm_from_m, pose_in_mm
+from toolpath_stiff.units import mm_from_m
 
 LINE_END = re.compile("\r\n|\n|\r")
 PLAIN_DIALECTS = ("generic", "linuxcnc")
@@ -93,7 +93,7 @@ def rewrite_program(
     *,
     decimals: int | None = None,
     linearise: float | None = None,
-    **read_as: Unpack[Options],
+    control: Controller = UNKNOWN_CONTROL,
 ) -> RewrittenProgram:
     r"""Write a program so that at the original origin it does what it does, untouched, at a placement.
 
@@ -108,8 +108,8 @@ def rewrite_program(
     linearise
         m: arcs that lie in no plane any more, cycles that the set-up tilts and large turns of the tool are written as
         straight moves that stay within this of them. Unless given they are refused.
-    read_as
-        Offsets, tools and block-delete switches that the program was read with, as in `parse_program`.
+    control
+        Offsets, tools and block-delete switches that the program was read with.
 
     Raises
     ------
@@ -130,20 +130,21 @@ def rewrite_program(
     M30
     """
     check_rewritable(program)
-    offsets, tools = read_as.get("offsets") or Offsets(), read_as.get("tools")
-    switches = switches_on(read_as.get("block_delete", False), UNKNOWN_CONTROL)
     placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
     source, out = (
-        State(program.name, Frames(copy.deepcopy(offsets), origin, origin), copy.deepcopy(tools))
+        State(
+            program.name,
+            Frames(copy.deepcopy(control.offsets or Offsets()), origin, origin),
+            copy.deepcopy(control.tools),
+        )
         for origin in (placement, original)
     )
-    tolerance = None if linearise is None else mm_from_m(linearise)
-    controls = Controls(source, out, Turn(placement, original), decimals, tolerance)
+    controls = Controls(source, out, Turn(placement, original), decimals, linearise and mm_from_m(linearise))
     text, encoding = read_text(program.path) if program.path else ("\n".join([*program.source, ""]), "utf-8")
     if placement == original:
         return RewrittenProgram(program.name, text, encoding, [])
-    lines = list(_rewritten_lines(controls, text, program.name, switches))
-    return RewrittenProgram(program.name, "".join(lines), encoding, controls.notes)
+    lines = list(_rewritten_lines(controls, text, program.name, control.switches))
+    return RewrittenProgram(program.name, "".join(lines), encoding, sorted(controls.notes))
 
 
 def check_rewritable(program: ReadProgram) -> None:
@@ -171,8 +172,7 @@ def check_rewritable(program: ReadProgram) -> None:
 
 def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
     """Lines with their ends; what follows the program's end stays as it is."""
-    lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), LINE_END.findall(text)
-    ends += [""] * (len(lines) - len(ends))
+    lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), [*LINE_END.findall(text), ""]
     running, started = True, False
     for number, (line, raw, end) in enumerate(zip(lines, raw_lines, ends, strict=False), 1):
         written = [line]
@@ -188,5 +188,5 @@ def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozens
                 problem = "a block that --block-delete leaves out cannot be rewritten"
                 raise Place(name, number).fail(problem, hint="take it out of the program, or do without --block-delete")
             if block.optional and written != [line]:
-                controls.note(SLASHED)
+                controls.notes.add(SLASHED)
         yield raw + end if written == [line] else (end or ends[0] or "\n").join(written) + end

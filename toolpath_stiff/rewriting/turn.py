@@ -17,8 +17,8 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.courses import frame_of, point_on_arc
 from toolpath_stiff.nc.moves import Arc, Move
+from toolpath_stiff.poses import ShopPose
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
-from toolpath_stiff.units import ShopPose
 
 NOISE = 1e-12  # of a direction cosine: what is left of 0 or 1 after cosines and products
 UPRIGHT = 1e-9  # degrees; smaller tilts are rounding
@@ -117,6 +117,11 @@ def angle_between(first: FloatArray, second: FloatArray) -> float:
 # centre and a sweep add what their own words are rounded by.
 END_UNITS, MIDDLE_UNITS = 2.0, 24.0
 SHORTEST_UNITS = 4.0
+# Where moves are compared: its name, share of the move, units by which they may be apart there.
+PLACES = (
+    ("at its start", 0.0, END_UNITS), ("at its end", 1.0, END_UNITS),
+    *(("on its way", share, MIDDLE_UNITS) for share in BETWEEN.tolist()),
+)  # fmt: skip
 
 
 def differences(turn: Turn, wanted: list[Move], written: list[Move], unit: float) -> str:
@@ -140,17 +145,13 @@ def _short(move: Move, unit: float) -> bool:
 
 def _difference(turn: Turn, wanted: Move, written: Move, unit: float) -> str:
     """For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them."""
-    for what, placed, point in (("starts", wanted.start, written.start), ("ends", wanted.end, written.end)):
+    for where, share, units in PLACES if wanted.arc or written.arc else PLACES[:2]:
+        placed, point = (point_at(move.start, move.end, move.arc, share) for move in (wanted, written))
         apart = math.dist(turn.point(placed[:3]), point[:3])
-        if apart > END_UNITS * unit:
-            return f"{what} {apart:.4g} mm off"
-        if placed[3:] != point[3:] or not turn.keeps(placed[3:]):
+        if apart > units * unit:
+            return f"is {apart:.4g} mm off {where}"
+        if units == END_UNITS and (placed[3:] != point[3:] or not turn.keeps(placed[3:])):
             angle = angle_between(turn.rotations(np.array([placed[3:]]))[0], rotation_matrices(np.radians(point[3:])))
             if angle > END_UNITS * unit:
-                return f"has its tool axis {angle:.4g} degrees off"
-    for share in BETWEEN.tolist() if wanted.arc or written.arc else ():
-        placed, point = (point_at(move.start, move.end, move.arc, share)[:3] for move in (wanted, written))
-        apart = math.dist(turn.point(placed), point)
-        if apart > MIDDLE_UNITS * unit:
-            return f"is {apart:.4g} mm off on its way"
+                return f"has its tool axis {angle:.4g} degrees off {where}"
     return ""

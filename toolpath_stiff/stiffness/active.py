@@ -1,4 +1,4 @@
-"""An effect with its parameters, at work: one from outside the package is held against the contract as it returns.
+"""An effect with its parameters, as files give them, at work: a user's own is held against the contract as it returns.
 
 Each fault is one `EffectFault` with file and line of the effect's code. The packaged effects are held against the
 contract by the tests and go through unchecked.
@@ -11,8 +11,8 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import EffectFault
-from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness.contract import SETUP, Effect, LoadPath, Values, at_pose
+from toolpath_stiff.machine.model import EffectEntry, Hexapod
+from toolpath_stiff.stiffness.contract import SETUP, Effect, LoadPath, Parameter, Values, at_pose
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign, line_in, line_of
 
 # What each hook that adds to the compliance returns for n poses: shape beyond n.
@@ -67,8 +67,7 @@ class ActiveEffect:
             if not isinstance(changed, Hexapod):
                 raise self._fault("geometry", f"returns {_kind(changed)}", "a Machine (machine.with_changes(...))")
             for joints in (changed.frame_joints, changed.platform_joints):
-                self._check_shape("geometry", joints, (6, 3))
-                if not np.isfinite(joints).all():
+                if np.shape(joints) != (6, 3) or not np.isfinite(joints).all():
                     raise self._fault("geometry", "gives joints that are not finite", "(6, 3) m")
         return changed
 
@@ -117,3 +116,36 @@ def _kind(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"an array of {value.shape} {value.dtype}"
     return f"{type(value).__name__} ({value!r:.40})"
+
+
+def read_parameters(effect: Effect, entry: EffectEntry, where: str) -> Values:
+    """SI values of an effect's parameters from a machine file's keys; choices as they are.
+
+    Raises
+    ------
+    InputError
+        A key is unknown or missing, a value is not a number or out of bounds; at its line of the machine file, or with
+        `where` for an entry that stands in none.
+    """
+    by_key = {parameter.key: parameter for parameter in effect.parameters}
+    for key in (*entry.parameters, *by_key):
+        mistake = expected = ""
+        if key not in by_key:
+            mistake = f"unknown key {key}"
+            expected = f"one of {', '.join(by_key)}" if by_key else "no keys besides name and provenance"
+        elif key not in entry.parameters:
+            mistake, expected = f"{key} is missing", by_key[key].expected
+        elif not _is_valid(by_key[key], entry.parameters[key]):
+            mistake, expected = f"{key} = {entry.parameters[key]!r}", by_key[key].expected
+        if mistake:
+            raise entry.error(f"effect {effect.name}: {mistake}", key, expected=expected, where=where)
+    given = {p: entry.parameters[p.key] for p in effect.parameters}
+    return {p.name: float(value) * p.si if p.kind == "real" else value for p, value in given.items()}
+
+
+def _is_valid(parameter: Parameter, value: object) -> bool:
+    if parameter.kind == "text":
+        return isinstance(value, str)
+    numbers = int if parameter.kind == "integer" else int | float
+    low, high = parameter.bounds
+    return isinstance(value, numbers) and not isinstance(value, bool) and low <= value <= high

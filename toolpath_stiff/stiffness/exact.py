@@ -19,6 +19,8 @@ the stretch of strut i, s_i the secant compliance that the effects state, the fo
 
 It is convex, because a strut gives more under more force, and its gradient has kinks (a strut at the edge of its gap).
 Whole steps of Newton's method settle most poses; where they cycle between the kinks, parts of them settle the others.
+
+Every result is held to what a compliance can be: finite, symmetric, positive definite.
 """
 
 from contextlib import suppress
@@ -26,13 +28,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import EffectError, InputError
+from toolpath_stiff.hints import command_line
 from toolpath_stiff.stiffness.contract import LoadPath, at_pose
+from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.stiffness.possible import possible, refuse_struts_without_stiffness
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
+APART = 1e-6  # of the tip's compliance: how far a result may be from symmetric
+# Condition of the struts' screws, arms in units of their size, beyond which a pose with an impossible compliance counts
+# as singular: rounding may have left nothing right but its largest eigenvalue.
+NEARLY_SINGULAR = 1e7
 LEAST_STIFFNESS = 1e-6  # N/m; what a strut law gives below is no stiffness, and its inverse may be no number
 SHARES = (1.0, 0.5, 0.25, 0.1, 1.0)  # of a step: where whole ones cycle between the kinks, parts of them do not
 WHOLE_STEPS, PART_STEPS = 25, 200
@@ -69,7 +76,9 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> tuple[FloatArray, F
         strut = strut if series is None else strut + series
         form = form if loads is None else form + loads
         parallel = beside if parallel is None else parallel if beside is None else parallel + beside
-    refuse_struts_without_stiffness(model, path, strut)
+    if ((strut <= 0.0) | (strut == np.inf)).any():
+        row, i = np.argwhere((strut <= 0.0) | (strut == np.inf))[0]
+        raise _impossible(model, path, int(row), f"strut {i + 1}")
     form[:, np.arange(6), np.arange(6)] += strut
     return form, parallel
 
@@ -248,3 +257,59 @@ def _newton_steps(
 
 def _times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("nij,nj->ni", matrix, vector))
+
+
+def possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> FloatArray:
+    """The symmetric part of the tip's compliance (n, k, k) m/N, if there can be such a one; nan at a singular pose.
+
+    Raises
+    ------
+    InputError
+        It is not finite, not symmetric or not positive definite at a pose that is not singular; with effects and pose.
+        A fit walks away from there.
+    """
+    rows = np.flatnonzero(~is_compliance(compliance))
+    with np.errstate(over="ignore", invalid="ignore"):
+        symmetric = np.asarray(0.5 * (compliance + np.swapaxes(compliance, 1, 2)))
+    if len(rows):
+        regular = rows[~_is_singular(path.take(rows))]
+        if len(regular):
+            raise _impossible(model, path, int(regular[0]), "the tip")
+        symmetric[rows] = np.nan
+    return symmetric
+
+
+def _is_singular(path: LoadPath) -> BoolArray:
+    screws = path.struts.jacobian.copy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        screws[:, :, 3:] /= np.linalg.norm(path.struts.arms, axis=-1).mean(axis=-1)[:, None, None]
+    regular = np.flatnonzero(np.isfinite(screws).all(axis=(1, 2)))
+    singular = np.ones(len(path), dtype=bool)
+    singular[regular] = ~(np.linalg.cond(screws[regular]) < NEARLY_SINGULAR)
+    return singular
+
+
+def is_compliance(tensor: FloatArray) -> BoolArray:
+    """(n,) whether tensors (n, k, k) are finite, symmetric and positive definite."""
+    scale = np.abs(tensor).max(axis=(1, 2))
+    good = (scale > 0.0) & (scale < np.inf)
+    unit = tensor[good] / scale[good, None, None]  # sums of the largest numbers overflow
+    turned = np.swapaxes(unit, 1, 2)
+    even = np.abs(unit - turned).max(axis=(1, 2)) <= APART
+    good[good] = even & (np.linalg.eigvalsh(0.5 * (unit + turned))[:, 0] > 0.0)
+    return np.asarray(good)
+
+
+def _impossible(model: StiffnessModel, path: LoadPath, row: int, part: str) -> EffectError:
+    """An error that names the effects from outside the package, else all effects, else the machine."""
+    effects = [active.effect for active in model.effects]
+    foreign = [effect for effect in effects if is_foreign(effect)]
+    names = ", ".join(effect.name for effect in foreign or effects)
+    cause, hint = f"machine {path.machine.name}", "check the parameters of the effects, strut law and joints"
+    if foreign:
+        hint = f"`{command_line('effects', 'check', file_of(foreign[0]))}` tries an effect by itself"
+    return EffectError(
+        f"with {f'effect {names}' if names else cause} {part} has no positive stiffness{at_pose(path, row)}",
+        expected="a compliance that is finite, symmetric and positive definite",
+        hint=hint,
+    )

@@ -6,7 +6,7 @@ import multiprocessing
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
@@ -138,13 +138,12 @@ def answer(
         "set_up": (Path(case.state.program).name, "not_written.txt"),
     }
     written = [f"{result}/{name}" for name in files.get(kind, ()) if (case.folder / result / name).is_file()]
-    path: Document = {}
+    reply = Reply(repr(kept).strip("<>"), command, kept.to_dict(), result, file="".join(written[:1]))
     if kind == "analyze":
-        origin = case.state.origin or None
-        before = tps.analyze(case.program, case.machine_of(first), origin_mm_deg=origin, partial=True, progress=tell)
-        path = _columns(kept, before)
-    accepted = kind == "update" and kept.accepted
-    return Reply(repr(kept).strip("<>"), command, kept.to_dict(), result, accepted, "".join(written[:1]), path)
+        given_machine, origin = case.machine_of(first), case.state.origin or None
+        before = tps.analyze(case.program, given_machine, origin_mm_deg=origin, partial=True, progress=tell)
+        return replace(reply, path=_columns(kept, before))
+    return replace(reply, accepted=kind == "update" and kept.accepted)
 
 
 def _columns(analysis: tps.Analysis, before: tps.Analysis) -> Document:

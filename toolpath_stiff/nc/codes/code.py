@@ -1,4 +1,4 @@
-"""A code: its name, its modal group (`groups`), what it does, and the manual that it follows.
+"""A code: its name, its modal group (`state`), what it does, and the manual that it follows.
 
 Each module here has a group of codes, each a function and a row; `registry` joins the rows to one table.
 """
@@ -6,8 +6,7 @@ Each module here has a group of codes, each a function and a row; `registry` joi
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from toolpath_stiff.nc.groups import STEPS, Group
-from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.state import STEPS, CurrentBlock, Group, State
 
 EVERYWHERE = ("generic", "linuxcnc", "fanuc", "haas")
 FANUC, HAAS = "Fanuc, operator's manuals", "Haas, mill operator's manual"
@@ -73,17 +72,6 @@ class Refused:
     what: str
     hint: str
     source: str
-
-
-@dataclass(frozen=True)
-class Alias:
-    """Another name that some dialects have for a code."""
-
-    name: str
-    code: str
-    meaning: str
-    source: str
-    controls: tuple[str, ...]
 
 
 def family(

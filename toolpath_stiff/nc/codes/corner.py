@@ -9,45 +9,45 @@ from dataclasses import replace
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.code import FANUC, HAAS, family
 from toolpath_stiff.nc.moves import ARC, FEED, Arc
-from toolpath_stiff.nc.state import Corner, CurrentBlock, State
+from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import CORNERS
 
 
 def corner(state: State, block: CurrentBlock, code: str) -> None:
     """`,C` and `,R`: the corner to the next block is cut off or rounded."""
     word, size, recent = block.values[code], block.take(code) or 0.0, state.recorder.recent
-    if state.dialect.name == "linuxcnc":
-        raise block.fail(word, "is not a word of the dialect linuxcnc", "generic, fanuc or haas")
-    if size <= 0.0:
-        raise block.fail(word, "is the size of a corner", "more than 0")
+    block.refuse_if(
+        state.dialect.name == "linuxcnc", word, "is not a word of the dialect linuxcnc", "generic, fanuc or haas"
+    )
+    block.refuse_if(size <= 0.0, word, "is the size of a corner", "more than 0")
     after_feed = recent and recent[-1].line == block.line and recent[-1].motion == FEED
-    if not after_feed or len(block.values.keys() & {*CORNERS}) > 1 or state.feed_mode == "G93":
-        raise block.fail(word, "beside another corner, under G93, or without a feed move", "one corner beside a G1")
-    state.corner = Corner(code, size * state.length_scale, block.line)
+    alone = after_feed and len(block.values.keys() & {*CORNERS}) == 1 and state.feed_mode != "G93"
+    block.refuse_if(not alone, word, "beside another corner, under G93, or without a feed move", "one beside a G1")
+    state.corner = block
 
 
 def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     """Shorten the move before this one, and add the corner between them; the tool then stands at its end."""
     pending, frames, before = state.corner, state.frames, state.recorder.recent[-1]
     assert pending is not None
-    harmless = {"motion", "distance", *(group for group in block.groups if group.startswith("M "))}
-    if block.groups.keys() - harmless or before.dwell:
-        problem = f"the second move of a corner ({pending.letter}, line {pending.line}) beside other codes"
-        raise block.fail(None, problem, "G1")
+    others = [group for group in block.groups if group not in ("motion", "distance") and not group.startswith("M ")]
+    block.refuse_if(
+        others or before.dwell, None, f"the second move of the corner of line {pending.line} beside other codes", "G1"
+    )
     state.corner = None
     begin, vertex, end = before.start, frames.to_setup(frames.position), frames.to_setup(target)
     normal = frames.turn_direction(geometry.normal_of(state.plane))
-    try:
-        if begin[3:] != vertex[3:] or vertex[3:] != end[3:]:
-            raise geometry.ArcError("a corner while the rotary axes turn", "X, Y and Z alone")
-        ends = geometry.corner(begin[:3], vertex[:3], end[:3], normal, pending.size, pending.letter == ",R")
-    except geometry.ArcError as error:
-        raise block.fail(None, f"{error.found} ({pending.letter} of line {pending.line})", error.expected) from None
+    geometry.refuse_arc_if(
+        begin[3:] != vertex[3:] or vertex[3:] != end[3:], "a corner while the rotary axes turn", "X, Y and Z alone"
+    )
+    rounded = ",R" in pending.values
+    size = pending.values[",R" if rounded else ",C"].value * state.length_scale
+    ends = geometry.corner(begin[:3], vertex[:3], end[:3], normal, size, rounded)
     if ends is None:  # the path goes straight on
         return
     first, last, center, sweep = ends
     before.end = [*first, *vertex[3:]]
-    arc = Arc(center, normal, sweep) if pending.letter == ",R" else None
+    arc = Arc(center, normal, sweep) if rounded else None
     bound, motion, beyond = before.from_machine[1], ARC if arc else FEED, [*last, *vertex[3:]]
     state.recorder.add(
         replace(before, motion=motion, start=before.end, end=beyond, from_machine=(bound, bound), arc=arc)

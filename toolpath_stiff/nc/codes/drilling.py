@@ -6,11 +6,10 @@ cycle") where a dialect follows them.
 
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes
-from toolpath_stiff.nc.codes.dwell import time_word
+from toolpath_stiff.nc.codes.feeds import time_word
 from toolpath_stiff.nc.codes.motion import record
-from toolpath_stiff.nc.codes.points import destination, point_words
-from toolpath_stiff.nc.codes.polar import xy_of_polar_words
-from toolpath_stiff.nc.moves import CYCLE, RAPID
+from toolpath_stiff.nc.codes.points import destination, point_words, xy_of_polar_words
+from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM, Drilling, strokes
 from toolpath_stiff.nc.words import AXES
@@ -43,9 +42,8 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     if code == "G76" and not state.dialect.increments:
         problem = "is a lathe's threading cycle on LinuxCNC, fine boring on Fanuc's and Haas' controls"
         raise block.fail(code, problem, hint="name the control with --dialect, or leave threading out")
-    if code in TAPS and state.plane != "G17" and not state.dialect.increments:
-        problem = f"{code} in {state.plane}: LinuxCNC's rs274 taps along another axis"
-        raise block.fail(None, problem, "G17", "name the control with --dialect")
+    elsewhere = code in TAPS and state.plane != "G17" and not state.dialect.increments
+    block.refuse_if(elsewhere, None, f"{code} in {state.plane}: LinuxCNC's rs274 taps along another axis", "G17")
     normal = geometry.PLANES[state.plane][2]
     repeats = _repeats(state, block)
     _keep_heights(state, block, code, normal)
@@ -76,10 +74,10 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
         record(state, block, RAPID, frames.to_control(place), words)
         level = clear
         _along_normal(state, block, normal, hole.retract, RAPID)
-        for stroke in strokes(hole):
-            _along_normal(state, block, normal, stroke.height, CYCLE if stroke.feed else RAPID)
-            if stroke.dwell:
-                state.recorder.add_dwell(stroke.dwell)
+        for height, motion, wait in strokes(hole):
+            _along_normal(state, block, normal, height, motion)
+            if wait:
+                state.recorder.add_dwell(wait)
 
 
 def _along_normal(state: State, block: CurrentBlock, normal: int, height: float, motion: int) -> None:
@@ -96,8 +94,8 @@ def _repeats(state: State, block: CurrentBlock) -> int:
         return 1
     block.take(letter)
     word = block.as_written(letter)  # a count, whatever a bare K length is
-    if word.value != int(word.value) or not 0 <= word.value <= MOST_REPEATS:
-        raise block.fail(word, "is not a number of repeats", "a whole number from 0")
+    wrong = word.value != int(word.value) or not 0 <= word.value <= MOST_REPEATS
+    block.refuse_if(wrong, word, "is not a number of repeats", "a whole number from 0")
     return int(word.value)
 
 
@@ -128,8 +126,8 @@ def _cycle_words(state: State, block: CurrentBlock, code: str, normal: int, give
         state.sticky["P"] = time_word(state, block, "P") or 0.0
     _words_of_one_control(state, block, code)
     words = point_words(state, block)
-    if (not words and given) or any(axis > 2 for axis in words):
-        raise block.fail(None, f"{code} without axis words, or with rotary axes", "X, Y, Z; A, B, C before it")
+    wrong = (not words and given) or any(axis > 2 for axis in words)
+    block.refuse_if(wrong, None, f"{code} without axis words, or with rotary axes", "X, Y, Z; A, B, C before it")
     if normal in words:
         state.sticky["Z"] = words.pop(normal)
     if state.dialect.name == "haas" and "R" not in state.sticky:  # Haas, mill operator's manual, G81: R is optional
@@ -147,8 +145,9 @@ def _words_of_one_control(state: State, block: CurrentBlock, code: str) -> None:
         _shallower_pecks(state, block)
     if code in TAPS and haas and block.take("J") is not None:
         state.note(block.line, block.values["J"], "how much faster the tap comes out")
-    if code in TAPS and state.sticky.get("Q"):
-        raise block.fail("Q", "is a tap in pecks, which depends on the control's parameters", "no Q")
+    block.refuse_if(
+        code in TAPS and state.sticky.get("Q"), "Q", "is a tap in pecks, which depends on the control", "no Q"
+    )
     for letter in "QIJ" if code == "G76" else "":
         block.take(letter)
         if letter in block.values:
@@ -170,19 +169,17 @@ def _shallower_pecks(state: State, block: CurrentBlock) -> None:
 
 
 def _check_cycle(state: State, block: CurrentBlock, code: str, normal: int) -> None:
-    axis = AXES[normal]
-    for letter, what in (("Z", axis), ("R", "R")):
-        if letter not in state.sticky:
-            raise block.fail(None, f"{code} without {what}", f"{what} in the cycle's first block")
-    if code in PECKS and not state.sticky.get("Q", 0.0) > 0.0:
-        raise block.fail(None, f"{code} without a peck", "Q above 0")
+    for letter, what in (("Z", AXES[normal]), ("R", "R")):
+        block.refuse_if(
+            letter not in state.sticky, None, f"{code} without {what}", f"{what} in the cycle's first block"
+        )
+    block.refuse_if(code in PECKS and not state.sticky.get("Q", 0.0) > 0.0, None, f"{code} without a peck", "Q above 0")
     if code in DWELLS:
         dwell = state.sticky.get("P")
-        if dwell is None or not 0.0 <= dwell <= SECONDS_PER_DAY:
-            raise block.fail(None, f"{code} without its dwell", "P with the seconds, 0 or more")
-    if state.sticky.setdefault("unit", state.length_scale) != state.length_scale:
-        problem = f"{code} after a change between G20 and G21: controls differ in whether the run keeps its heights"
-        raise block.fail(None, problem, "G80 before it, and R and Z again")
+        wrong = dwell is None or not 0.0 <= dwell <= SECONDS_PER_DAY
+        block.refuse_if(wrong, None, f"{code} without its dwell", "P with the seconds, 0 or more")
+    other = state.sticky.setdefault("unit", state.length_scale) != state.length_scale
+    block.refuse_if(other, None, f"{code} after a change between G20 and G21", "G80 before it, and R and Z again")
 
 
 def _heights(state: State, block: CurrentBlock, code: str, initial: float) -> tuple[float, float]:
@@ -198,14 +195,12 @@ def _heights(state: State, block: CurrentBlock, code: str, initial: float) -> tu
 
 
 def _check_pecks(state: State, block: CurrentBlock, code: str, depth: float, repeats: int) -> None:
-    pecks = depth / state.sticky["Q"] if code in PECKS else 1.0
-    if pecks * repeats > MOST_STROKES:
-        raise block.fail(None, f"{code} with more than {MOST_STROKES} strokes", "a larger Q, or fewer repeats")
+    many = (depth / state.sticky["Q"] if code in PECKS else 1.0) * repeats > MOST_STROKES
+    block.refuse_if(many, None, f"{code} with more than {MOST_STROKES} strokes", "a larger Q, or fewer repeats")
 
 
 _MANUAL = f"{FANUC}, Canned cycle for drilling"
 _RETURNS = {"G98": "cycles return to their level", "G99": "cycles return to R"}
-_FINE = f"{_MANUAL}, Fine boring cycle (G76)"
 DRILLING_CODES = (
     Code("G73", "motion", cycle, "chip-breaking drilling", g_codes("G73")),
     Code("G81", "motion", cycle, "drilling", g_codes("G81")),
@@ -213,7 +208,7 @@ DRILLING_CODES = (
     Code("G83", "motion", cycle, "peck drilling", g_codes("G83")),
     Code("G74", "motion", cycle, "left-hand tapping", f"{g_codes('G74')}; {_MANUAL}, G74"),
     Code("G84", "motion", cycle, "right-hand tapping", f"{g_codes('G84')}; {_MANUAL}, G84"),
-    Code("G76", "motion", cycle, "fine boring, rapid out", _FINE, ("fanuc", "haas")),
+    Code("G76", "motion", cycle, "fine boring, rapid out", f"{_MANUAL}, Fine boring cycle (G76)", ("fanuc", "haas")),
     Code("G86", "motion", cycle, "boring, spindle stop, rapid out", g_codes("G86")),
     Code("G85", "motion", cycle, "boring, feed out", g_codes("G85")),
     Code("G89", "motion", cycle, "boring with dwell, feed out", g_codes("G89")),

@@ -1,13 +1,13 @@
-"""F and S, feed and spindle modes (G93 G94 G95, G96 G97), and the feed of a move. mm/min inside."""
+"""Feed, speed and time: F and S, G93 G94 G95, G96 G97, the feed of a move; G4 and words of time. mm/min, s inside."""
 
 import math
 
-from toolpath_stiff.nc.codes.code import Code, family, g_codes, holds_anyway
-from toolpath_stiff.nc.codes.dwell import dwells_by
+from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes, holds_anyway
+from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
 from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc
-from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.units import MM_PER_INCH
+from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
 SLOWEST = 1e-6  # mm/min, or 1/min: slower is a slip, and its time beyond all numbers
 
@@ -24,15 +24,11 @@ def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
 def feed_word(state: State, block: CurrentBlock, code: str) -> None:
     """F: the feed from here on; F0 takes it away."""
     feed, word = block.take("F") or 0.0, block.values["F"]
-    if feed < 0.0 or 0.0 < feed * state.feed_scale < SLOWEST:
-        raise block.fail(word, "is no feed that moves", "F above 0, a nanometre a minute or more")
-    if "." not in word.text and feed and bare_feed_is_open(state):
-        units = "inch" if state.inch else "mm"
-        raise block.fail(
-            word,
-            f"without a decimal point is a feed that depends on the control's parameters ({state.dialect.name})",
-            f"{word.text}. if it is that many {units} per {'revolution' if state.feed_mode == 'G95' else 'minute'}",
-        )
+    slow = feed < 0.0 or 0.0 < feed * state.feed_scale < SLOWEST
+    block.refuse_if(slow, word, "is no feed that moves", "F above 0, a nanometre a minute or more")
+    bare = "." not in word.text and feed and bare_feed_is_open(state)
+    problem = f"without a decimal point depends on the control's parameters ({state.dialect.name})"
+    block.refuse_if(bare, word, problem, f"{word.text}. if it is that many units")
     state.feed = feed * state.feed_scale or None
 
 
@@ -49,8 +45,7 @@ def speed_word(state: State, block: CurrentBlock, code: str) -> None:
     if dwells_by(state, block) == "S":
         return
     state.speed = block.take("S") or 0.0
-    if state.speed < 0.0:
-        raise block.fail("S", "is a negative speed", "S of 0 or more")
+    block.refuse_if(state.speed < 0.0, "S", "is a negative speed", "S of 0 or more")
 
 
 def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
@@ -63,8 +58,7 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
     """Feed of a move in mm/min, or deg/min for one of the rotary axes alone."""
     if state.feed is None:
         word = next((word for word in block.block.words if word.letter == "G"), block.block.words[0])
-        if state.feed_mode == "G93":
-            raise block.fail(word, "is a feed move without F under G93", "F above 0")
+        block.refuse_if(state.feed_mode == "G93", word, "is a feed move without F under G93", "F above 0")
         hint = ", or --feed MM_PER_MIN for such moves" if state.feed_mode == "G94" else ""
         raise block.fail(word, "is a feed move before any feed", f"F above 0{hint}")
     if state.feed_mode == "G93":
@@ -97,6 +91,45 @@ def _length(start: list[float], end: list[float], arc: Arc | None) -> float:
     return math.hypot(arc.sweep * (first + last) / 2.0, climb, last - first)
 
 
+def dwells_by(state: State, block: CurrentBlock) -> str:
+    """The word that holds the time of a block's G4: P; X on Fanuc's controls, S in Marlin; "" for no such word."""
+    if "G4" not in block.codes:
+        return ""
+    letters = {"linuxcnc": "P", "generic": "PXS"}.get(state.dialect.name, "XP")
+    return next((letter for letter in letters if letter in block.values), "")
+
+
+def dwell(state: State, block: CurrentBlock, code: str) -> None:
+    """G4: a pause, before the block's own moves."""
+    letter = dwells_by(state, block)
+    seconds = time_word(state, block, letter) if letter else None
+    if not letter and state.dialect.name in ("generic", "fanuc") and "F" not in block.values:  # F: Siemens' seconds
+        state.assume("G4 without a time is no pause: an exact stop (Fanuc), the end of the moves before it (Marlin)")
+        seconds = 0.0
+    if state.dialect.name == GENERIC.name and letter in ("X", "S"):
+        word = block.values[letter]
+        doubtful = letter == "X" and ("." not in word.text or any(block.has(axis) for axis in POINT_WORDS))
+        expected = f"{word.text.rstrip('.')}. alone, for seconds"
+        block.refuse_if(doubtful, word, "beside G4 may count milliseconds", expected, "name the control with --dialect")
+        state.assume(f"the {letter} of G4 is a time in seconds, as {'Fanuc' if letter == 'X' else 'Marlin'} means it")
+    if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
+        raise block.fail(code, "needs its time", "P with the seconds, 0 or more")
+    state.recorder.add_dwell(seconds)
+
+
+def time_word(state: State, block: CurrentBlock, letter: str) -> float | None:
+    """A time word in s; what its number counts is the dialect's."""
+    value = block.take(letter)
+    if value is None or state.dialect.dwell == SECONDS:
+        return value
+    written = block.as_written(letter)
+    if "." not in written.text:
+        return written.value / 1e3
+    whole = letter == "P" and state.dialect.dwell == MILLISECONDS
+    block.refuse_if(whole, written, f"has a decimal point, which {state.dialect.name} does not allow", "milliseconds")
+    return value
+
+
 _FEEDS = {"G93": "inverse-time feed", "G94": "feed per minute", "G95": "feed per revolution"}
 _SPINDLE, _UNUSED = g_codes("G96 G97"), "constant surface speed: the spindle speed does not enter"
 FEED_CODES = (
@@ -104,5 +137,6 @@ FEED_CODES = (
     Code("S", "S", speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
     *family(_FEEDS, "feed mode", feed_mode, g_codes("G93 G94 G95")),
     Code("G96", "spindle mode", surface_speed, "constant surface speed", _SPINDLE, listed=_UNUSED),
+    Code("G4", "non-modal", dwell, "dwell", f"{g_codes('G4')}; {FANUC}, Dwell (G04); Marlin, G004", step="dwell"),
     Code("G97", "spindle mode", holds_anyway, "spindle speed in revolutions", _SPINDLE),
 )

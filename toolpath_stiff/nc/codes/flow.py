@@ -5,30 +5,22 @@ from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, State
 
 
 def call(state: State, block: CurrentBlock, code: str) -> None:
-    """M98 P L: run a subprogram; M97 P L (Haas), M98 Q L (Fanuc): from that N number. The block's moves first."""
-    word, by_q = block.codes[code], code == "M98" and block.has("Q")
+    """M98 P L: run a subprogram; M97 P L (Haas): from that N number. The block's moves first."""
+    word = block.codes[code]
     if code == "M97" and not state.dialect.local_calls:
         hint = "give --dialect haas if it is that, or make it a subprogram (O number, M98, M99)"
         raise block.fail(word, "is Haas' call of a block by its N number", hint=hint)
-    if block.groups.get("non-modal") in ("G4", "G10"):
-        raise block.fail(word, "beside a code that uses the P word too", "two blocks")
-    if by_q:
-        if state.dialect.name != "fanuc" or block.has("P"):
-            raise block.fail(
-                "Q",
-                "beside M98 names the block at which the call begins, as on Fanuc's controls with parameter 6005",
-                "Q alone, with --dialect fanuc",
-                "or make what it calls a subprogram of its own (O, M99)",
-            )
-        state.assume("M98 Q calls the block of that N number, as Fanuc's controls do with parameter 6005 #0")
-    number = block.whole("Q" if by_q else "P", word)
+    block.refuse_if(
+        block.groups.get("non-modal") in ("G4", "G10"), word, "beside a code that uses the P word too", "two blocks"
+    )
+    block.refuse_if(block.has("Q"), "Q", f"beside {word.text} names a block", "a subprogram of its own (O, M99)")
+    number = block.whole("P", word)
     if number is None:
         raise block.fail(word, "without P", "P with the number of what it calls")
     if state.dialect.name == "linuxcnc" and "L" in block.values and block.values["L"].value == 0:
         block.take("L")  # LinuxCNC's tests/interp/m98m99: L0 calls nothing
-        return
-    repeats = block.whole("L", word)
-    block.flow = Call(number, repeats, word.column, by_q or code == "M97")
+    else:
+        block.flow = Call(number, block.whole("L", word), word.column, code == "M97")
 
 
 def macro_call(state: State, block: CurrentBlock, code: str) -> None:

@@ -3,13 +3,15 @@
 Sources: Fanuc's operator's manuals, "Decimal point programming"; Haas' "Help with the decimal points".
 """
 
-from collections.abc import Iterable
+import re
+from collections.abc import Sequence
 
 from toolpath_stiff.nc.controller import GENERIC, INCREMENT_DEGREE, INCREMENT_INCH, INCREMENT_MM
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.moves import Remark
+from toolpath_stiff.nc.operations import split_comments
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.words import AXES, CORNERS, Word
+from toolpath_stiff.nc.words import AXES, CORNERS
 
 ANGLES = frozenset("ABC")
 LENGTHS = frozenset((*"XYZIJKRQ", *CORNERS))
@@ -25,12 +27,11 @@ MIXED = (
 
 def read_numbers(state: State, block: CurrentBlock) -> None:
     """Give the block's words their values in program units, by the dialect's decimal-point rule."""
-    # Q may be a number of something else: G5.1 Q1, M61 Q5, M98 Q5.
-    counts = "Q" if "look-ahead" in block.groups or not {"M61", "M98"}.isdisjoint(block.codes) else ""
-    words = [word for letter, word in block.values.items() if letter not in counts]
     if not state.dialect.increments:
-        notice_lengths(state, block.line, words)
         return
+    # Q may be a number of something else: G5.1 Q1, M61 Q5.
+    counts = "Q" if "look-ahead" in block.groups or "M61" in block.codes else ""
+    words = [word for letter, word in block.values.items() if letter not in counts]
     inch = block.groups.get("units", "G20" if state.inch else "G21") == "G20"
     angles = set(ANGLES)
     if block.groups.get("rotation") == "G68":
@@ -40,8 +41,7 @@ def read_numbers(state: State, block: CurrentBlock) -> None:
         angles.add(AXES[PLANES[block.groups.get("plane", state.plane)][1]])
     for word in words:
         if "." not in word.text and word.value and word.letter in LENGTHS | angles:
-            unit = increment(word.letter in angles, inch)
-            block.values[word.letter] = word._replace(value=word.value * unit)
+            block.values[word.letter] = word._replace(value=word.value * increment(word.letter in angles, inch))
             assume_increments(state)
 
 
@@ -64,16 +64,23 @@ def increments_hint(state: State) -> str:
     return f"numbers without a point are read in {step} {unit} (--dialect {name}); without it X10 is 10 {unit}"
 
 
-def notice_lengths(state: State, line: int, words: Iterable[Word]) -> None:
-    """Warn, once, of what looks like a program for a control that counts increments, where no dialect is named."""
-    if state.dialect.name != GENERIC.name or (state.bare is not None and state.pointed):
-        return
-    for word in words:
-        if word.letter not in LENGTHS or not word.value:
-            continue
-        if word.text.endswith("."):
-            state.pointed = True
-        elif state.bare is None and "." not in word.text and "E" not in word.text.upper():
-            state.bare = (line, word)
-    if state.pointed and state.bare is not None:
-        state.warnings.append(Remark(MIXED.format(state.bare[1].text), state.bare[0]))
+_LENGTH_WORDS = re.compile(r"[XYZIJR]\s*[-+]?(?:\d+\.?\d*|\.\d+)(?![\d.]|\s*E)", re.IGNORECASE)
+_LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beginning
+
+
+def point_warning(state: State, lines: Sequence[str]) -> list[Remark]:
+    """That lengths without a decimal point may be meant otherwise than they were read, by how others are written.
+
+    Where whole numbers are increments, posts end those in mm with their point. So X10 beside X5. is one, whatever it
+    was read as; X10 beside X5.5, and nothing like X5., is none.
+    """
+    texts = ((line, split_comments(text)[0]) for line, text in enumerate(lines[:_LOOKED_AT], 1))
+    words = [(line, word) for line, text in texts for word in _LENGTH_WORDS.findall(text)]
+    pointed = any(word.endswith(".") for _, word in words)
+    line, whole = next((word for word in words if "." not in word[1] and set(word[1]) & {*"123456789"}), (0, ""))
+    if whole and pointed and state.dialect == GENERIC:
+        return [Remark(MIXED.format(whole), line)]
+    hint = increments_hint(state)
+    if whole and hint and not pointed and any("." in word for _, word in words):
+        return [Remark(f"{whole} stands beside numbers with decimals, and none ends with its point: {hint}")]
+    return []

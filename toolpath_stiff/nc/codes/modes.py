@@ -1,18 +1,23 @@
-"""Units, plane, distance modes: G20 G21, G17 G18 G19, G90 G91, G90.1 G91.1."""
+"""Units, plane, distance modes, polar words: G20 G21 (G70 G71), G17 to G19, G90 G91, G90.1 G91.1, G15 G16."""
 
-from toolpath_stiff.nc.codes.code import FANUC, Alias, family, g_codes
-from toolpath_stiff.nc.codes.polar import forget_polar
-from toolpath_stiff.nc.codes.unsettled import refuse_while_rotated
+import math
+
+from toolpath_stiff.nc.codes.code import FANUC, family, g_codes
+from toolpath_stiff.nc.codes.points import forget_polar, refuse_while_rotated
 from toolpath_stiff.nc.state import CurrentBlock, State
 
 
 def units(state: State, block: CurrentBlock, code: str) -> None:
     """G20: lengths and feeds in inches; G21: in millimetres."""
     inch = code == "G20"
-    if inch != state.inch and state.frames.tool:
-        problem = "while a tool length is in force: LinuxCNC would read its number in the new unit"
-        raise block.fail(code, problem, "G49 before it")
+    block.refuse_if(inch != state.inch and state.frames.tool, code, "while a tool length is in force", "G49 before it")
     state.inch = inch
+
+
+def no_units(state: State, block: CurrentBlock, code: str) -> None:
+    """G70, G71: G20 and G21 where the dialect or the controller file says so; what comes here is something else."""
+    what, hint = state.dialect.g70
+    raise block.fail(code, f"is {what}, which is not supported", hint=hint)
 
 
 def plane(state: State, block: CurrentBlock, code: str) -> None:
@@ -33,12 +38,19 @@ def arc_distance(state: State, block: CurrentBlock, code: str) -> None:
     state.arc_absolute = code == "G90.1"
 
 
+def polar_mode(state: State, block: CurrentBlock, code: str) -> None:
+    """G16: the plane's first axis word is a radius, the second an angle. G15: they are Cartesian."""
+    state.polar = [math.nan, math.nan] if code == "G16" else None
+
+
 _INCH = f"{FANUC}, Inch/metric conversion (G20 G21, in G-code system C G70 G71)"
 _CENTERS = {"G90.1": "absolute arc centres", "G91.1": "incremental arc centres"}
+_POLAR = f"{FANUC} of the series 16 and 15i, Polar coordinate command (G15, G16)"
 MODE_CODES = (
     *family({"G17": "plane XY", "G18": "plane ZX", "G19": "plane YZ"}, "plane", plane, g_codes("G17 - G19.1")),
     *family({"G20": "inch", "G21": "mm"}, "units", units, g_codes("G20 G21")),
+    *family({"G70": "inch, as G20", "G71": "mm, as G21"}, "units", no_units, _INCH, ("fanuc",)),
     *family({"G90": "absolute", "G91": "incremental"}, "distance", distance, g_codes("G90 G91")),
     *family(_CENTERS, "arc distance", arc_distance, g_codes("G90.1 G91.1")),
+    *family({"G15": "Cartesian words", "G16": "polar words"}, "polar", polar_mode, _POLAR),
 )
-MODE_ALIASES = (Alias("G70", "G20", "inch", _INCH, ("fanuc",)), Alias("G71", "G21", "mm", _INCH, ("fanuc",)))

@@ -1,4 +1,4 @@
-"""G0, G1, G53, G28, G30, G80: straight moves, from the words of a block. mm, degrees.
+"""G0 to G3, G53, G28, G30, G80: moves along lines and arcs, from the words of a block. mm, degrees.
 
 A move is recorded with its ends in the set-up frame, its feed and its tool; beside it stands whether the present height
 is known.
@@ -6,19 +6,33 @@ is known.
 
 import math
 from collections.abc import Collection
+from dataclasses import replace
 
-from toolpath_stiff.nc.codes.center_path import offset_move
+from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.code import FANUC, Code, g_codes
 from toolpath_stiff.nc.codes.corner import cut_corner
+from toolpath_stiff.nc.codes.cutter import offset_move
 from toolpath_stiff.nc.codes.feeds import feed_of_move
-from toolpath_stiff.nc.codes.points import axis_words, cartesian, control_point, point_words
-from toolpath_stiff.nc.codes.polar import forget_polar
-from toolpath_stiff.nc.codes.unsettled import XY, know_place, refuse_while_rotated
+from toolpath_stiff.nc.codes.points import (
+    XY,
+    axis_words,
+    cartesian,
+    control_point,
+    destination,
+    forget_polar,
+    know_place,
+    point_words,
+    refuse_while_rotated,
+)
 from toolpath_stiff.nc.frames import standing
-from toolpath_stiff.nc.moves import FEED, RAPID, Arc, Move
-from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, Segment, State
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Move
+from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
 from toolpath_stiff.nc.tables import tool_of
 from toolpath_stiff.nc.words import Word
+
+ARCS = ("G2", "G3")
+MOST_TURNS = 10_000
+INCREMENTAL_AXES = "UVW"  # X, Y, Z in steps, on lathes and as G28 U0 W0 on mills
 
 
 def record(
@@ -47,11 +61,11 @@ def record(
         start, state.beside = [s + b for s, b in zip(start, state.beside, strict=True)], None
     move = Move(block.line, motion, start, end, feed, state.tool, state.tool_length, (was, frames.bound), arc)
     if state.cutter is not None and state.cutter.radius:
-        added = offset_move(state, block, move, control)
+        added = offset_move(state, state.cutter, move, control)
     else:
         added = state.recorder.add(move)
     if state.trace is not None:
-        state.trace.append(Segment(motion, list(frames.position), list(control), arc))
+        state.trace.append(replace(move, start=list(frames.position), end=list(control), arc=arc))
     frames.position = control
     if added:
         note_tool(state)
@@ -60,7 +74,7 @@ def record(
 def note_tool(state: State) -> None:
     """Keep the tool in the spindle among those that moved."""
     if state.tool not in state.used_tools:
-        state.used_tools[state.tool] = tool_of(state.tools, state.tool).in_use()
+        state.used_tools[state.tool] = replace(tool_of(state.tools, state.tool))
 
 
 def find_height(state: State, block: CurrentBlock, motion: int, named: bool) -> None:
@@ -101,6 +115,60 @@ def straight(state: State, block: CurrentBlock, code: str) -> None:
         find_height(state, block, FEED, named=False)
 
 
+def arc(state: State, block: CurrentBlock, code: str) -> None:
+    """G2, G3: clockwise and counter-clockwise in the plane in force, to the point that the axis words name."""
+    if not (any(block.has(letter) for letter in (*POINT_WORDS, *geometry.CENTER_LETTERS)) or "motion" in block.groups):
+        return
+    if state.beside is not None:
+        raise block.fail(block.block.words[0], "is an arc as the first move after cutter compensation", "G0 or G1")
+    first, second, _ = geometry.PLANES[state.plane]
+    frames, clockwise = state.frames, code == "G2"
+    here = frames.to_program(frames.position)
+    words = point_words(state, block)
+    target = destination(state, block, here, words)
+    start, end = (here[first], here[second]), (target[first], target[second])
+    turns = block.whole("P", block.block.words[0]) or 1
+    block.refuse_if(turns > MOST_TURNS, "P", "is not a number of turns", f"a whole number from 1 to {MOST_TURNS}")
+    center = _center(state, block, start, end, clockwise, words)
+    sweep = geometry.sweep_about(center, start, end, clockwise, state.inch, turns)
+    middle = list(here)
+    middle[first], middle[second] = center
+    x, y, z = frames.to_setup(frames.to_control(middle))[:3]
+    turned = frames.turn_direction(geometry.normal_of(state.plane))
+    record(state, block, ARC, control_point(state, block, here, words), words, arc=Arc((x, y, z), turned, sweep))
+
+
+def _center(
+    state: State,
+    block: CurrentBlock,
+    start: geometry.Point2,
+    end: geometry.Point2,
+    clockwise: bool,
+    words: dict[int, float],
+) -> geometry.Point2:
+    """Centre by R, or by the two of I, J, K that belong to the plane. Raises `InputError`, `geometry.ArcError`."""
+    first, second, normal = geometry.PLANES[state.plane]
+    radius = block.take("R")
+    off_plane = geometry.CENTER_WORDS[normal]
+    in_plane = (geometry.CENTER_WORDS[first], geometry.CENTER_WORDS[second])
+    if block.has(off_plane) and block.values[off_plane].value == 0.0:
+        block.take(off_plane)  # posts write all three
+    block.refuse_if(block.has(off_plane), off_plane, f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
+    offsets = [block.take(letter) for letter in in_plane]
+    if state.polar is not None and offsets != [None, None]:
+        raise geometry.ArcError("an arc with I, J or K in polar mode (G16)", "R")
+    if radius is not None:
+        block.refuse_if(offsets != [None, None], "R", "and a centre (I, J, K) are both given", "one of them")
+        if not {first, second} & words.keys():
+            raise geometry.ArcError("an arc with R and without an end point", "an axis word of the plane")
+        return geometry.center_from_radius(start, end, radius * state.length_scale, clockwise)
+    if offsets == [None, None] or (state.arc_absolute and None in offsets):
+        expected = f"{in_plane[0]} and {in_plane[1]}, or R"
+        raise geometry.ArcError("an arc without a centre, or with one word of an absolute one (G90.1)", expected)
+    a, b = ((offset or 0.0) * state.length_scale for offset in offsets)
+    return (a, b) if state.arc_absolute else (start[0] + a, start[1] + b)
+
+
 def motion_off(state: State, block: CurrentBlock, code: str) -> None:
     """G80: no motion mode; axis words have none to move in. On Fanuc's and Haas' controls G0 or G1 hold on."""
     state.motion = state.group_01 if state.group_01 in ("G0", "G1") else None
@@ -109,21 +177,17 @@ def motion_off(state: State, block: CurrentBlock, code: str) -> None:
 def machine_move(state: State, block: CurrentBlock, code: str) -> None:
     """G53: the axis words are machine coordinates, for this block only."""
     word, frames = block.codes[code], state.frames
-    if state.motion not in ("G0", "G1") or not state.absolute:
-        raise block.fail(word, f"with {state.motion}, or in incremental mode (G91)", "G0 or G1, in G90")
+    straight = state.motion in ("G0", "G1") and state.absolute
+    block.refuse_if(not straight, word, f"with {state.motion}, or in incremental mode (G91)", "G0 or G1, in G90")
     words = axis_words(state, block)
-    if any(axis > 2 for axis in words) and any(frames.origin[3:]):
-        raise block.fail(word, "with rotary axes, while the work is turned", "X, Y, Z alone")
+    turned = any(axis > 2 for axis in words) and any(frames.origin[3:])
+    block.refuse_if(turned, word, "with rotary axes, while the work is turned", "X, Y, Z alone")
     if words:
         _leave_program_coordinates(state, block, word, words)
     point = frames.machine_position()
     for axis, value in words.items():
         point[axis] = value
-    motion = RAPID if state.motion == "G0" else FEED
-    record(state, block, motion, frames.control_of_machine(point), machine=words)
-
-
-INCREMENTAL_AXES = "UVW"  # X, Y, Z in steps, on lathes and as G28 U0 W0 on mills
+    record(state, block, RAPID if state.motion == "G0" else FEED, frames.control_of_machine(point), machine=words)
 
 
 def homes_standing(block: CurrentBlock, letter: str) -> bool:
@@ -157,14 +221,12 @@ def set_home(state: State, block: CurrentBlock, code: str) -> None:
     """G28.1, G30.1: the present point is the reference point from here on."""
     know_position(state, block, block.codes[code], range(6))
     offsets = state.frames.offsets
-    home = offsets.home_g28 if code == "G28.1" else offsets.home_g30
-    home[:] = state.frames.machine_position()
+    (offsets.home_g28 if code == "G28.1" else offsets.home_g30)[:] = state.frames.machine_position()
 
 
 def _leave_program_coordinates(state: State, block: CurrentBlock, word: Word, axes: Collection[int]) -> None:
     """A move of `axes` (none: all) by machine coordinates: harmless under G68 only off the rotated plane."""
-    if state.frames.tip_held:
-        raise block.fail(word, "while tool centre point control is on (G43.4)", "G49 before it")
+    block.refuse_if(state.frames.tip_held, word, "while tool centre point control is on (G43.4)", "G49 before it")
     both = not axes or set(axes) >= XY
     if not both:
         know_place(state, block, word)
@@ -177,9 +239,11 @@ def _leave_program_coordinates(state: State, block: CurrentBlock, word: Word, ax
 
 _G28, _G30 = g_codes("G28 - G28.1"), g_codes("G30 - G30.1")
 _OFF = "motion mode off; on Fanuc's and Haas' controls the cycle alone"
-STRAIGHT_CODES = (
+MOTION_CODES = (
     Code("G0", "motion", straight, "rapid", g_codes("G0"), many=True),
     Code("G1", "motion", straight, "feed", g_codes("G1"), many=True),
+    Code("G2", "motion", arc, "clockwise arc", g_codes("G2 G3"), many=True),
+    Code("G3", "motion", arc, "counter-clockwise arc", g_codes("G2 G3"), many=True),
     Code("G80", "motion", motion_off, _OFF, f"{g_codes('G80')}; {FANUC}, Canned cycle cancel (G80)"),
     Code("G53", "non-modal", machine_move, "machine coordinates", g_codes("G53"), step="motion"),
     Code("G28", "non-modal", go_home, "to the first reference point", _G28, takes_axes=True),

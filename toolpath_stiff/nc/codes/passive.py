@@ -29,8 +29,8 @@ def take_words(state: State, block: CurrentBlock, code: str) -> None:
     """G61, G64 P Q: tolerances; G5 P, G5.1 Q, G8 P, G103 P, G187 P E: look-ahead; G22, G25, G26: zones, the spindle."""
     taken = TAKEN[code]
     letters = {word.letter for word in block.block.words} - {*"GMFST"}
-    if code in SPLINES and (letters - {*taken} or not letters):
-        raise block.fail(code, "is a spline, which is not supported", hint="post the program with arcs and lines")
+    spline = code in SPLINES and (letters - {*taken} or not letters)
+    block.refuse_if(spline, code, "is a spline, which is not supported", hint="post the program with arcs and lines")
     for letter in taken:
         if block.take(letter) is not None and code == "G8":  # alone it is a mode of lathes that holds anyway
             state.note(block.line, block.codes[code], _PLANNING)
@@ -39,9 +39,7 @@ def take_words(state: State, block: CurrentBlock, code: str) -> None:
 def scaling_off(state: State, block: CurrentBlock, code: str) -> None:
     """G50 alone; with S or axis words it is a lathe's."""
     letter = next((letter for letter in "SXYZUVW" if letter in block.values), None)
-    if letter is not None:
-        problem = f"with {letter} is a lathe's code (the limit of its speed, or a shift), and a lathe's X is a diameter"
-        raise block.fail(code, problem, hint=LATHE_HINT)
+    block.refuse_if(letter, code, f"with {letter} is a lathe's code, and a lathe's X is a diameter", hint=LATHE_HINT)
 
 
 def dynamic_offset(state: State, block: CurrentBlock, code: str) -> None:
@@ -56,13 +54,6 @@ _BLENDED = "path blending: the path is taken as programmed, corners included"
 _FOLLOWS = "the work offset follows the part where a rotary axis is turned"
 _OFF = "none is on, since switching it on is refused"
 _ZONE, _SPEED = "the zone that the tool must not enter", "the spindle's speed"
-_STROKE = f"{FANUC}, Stored stroke check (G22, G23)"
-_WATCH = f"{FANUC}, Spindle speed fluctuation detection (G25, G26)"
-_RADIUS = "LinuxCNC, G-Codes, G8; Fanuc, operator's manuals, Advanced preview control (G08)"
-_AI, _HRV = f"{FANUC}, AI contour control (G05.1)", f"{FANUC}, HRV3 (G05.4)"
-_POLAR = f"{FANUC}, Polar coordinate interpolation (G12.1, G13.1)"
-_CORNER = f"{FANUC}, Automatic corner override (G62)"
-_FAST, _MIRROR = f"{FANUC}, High speed cycle machining (G05)", f"{FANUC}, Programmable mirror image (G50.1, G51.1)"
 FANUC_ONLY, HAAS_ONLY = ("generic", "fanuc"), ("generic", "haas")
 _SPINDLE = {"M3": "spindle on", "M4": "spindle on, reversed", "M5": "spindle off"}
 _COOLANT = {"M7": "mist coolant on", "M8": "flood coolant on", "M9": "coolant off"}
@@ -71,22 +62,14 @@ _WATCHED = {"G25": "spindle speed not watched", "G26": "spindle speed watched"}
 _DYNAMIC = {"G254": "dynamic work offset", "G255": "no dynamic work offset"}
 _AHEAD = {"G103": "limit of the look-ahead", "G187": "smoothness"}
 PASSIVE_CODES = (
-    Code("G8", "lathe diameter", take_words, "lathe radius mode; with P: look-ahead", _RADIUS),
-    Code("G5", "look-ahead", take_words, "high-speed machining, with P alone", _FAST, listed=_PLANNING),
-    Code("G5.1", "look-ahead", take_words, "contour control, with Q alone", _AI, listed=_PLANNING),
-    Code("G5.4", "look-ahead", take_words, "high-speed control", _HRV, FANUC_ONLY, listed=_PLANNING),
+    Code("G8", "lathe diameter", take_words, "lathe radius mode; with P: look-ahead", f"{g_codes('G8')}; {FANUC}, G08"),
+    Code("G5", "look-ahead", take_words, "high-speed machining, with P alone", f"{FANUC}, G05", listed=_PLANNING),
+    Code("G5.1", "look-ahead", take_words, "contour control, with Q alone", f"{FANUC}, G05.1", listed=_PLANNING),
+    Code("G5.4", "look-ahead", take_words, "high-speed control", f"{FANUC}, G05.4", FANUC_ONLY, listed=_PLANNING),
     *family(_AHEAD, "look-ahead", take_words, f"{HAAS}, G103, G187", HAAS_ONLY, _PLANNING),
     Code("G9", "exact stop", holds_anyway, "exact stop", f"{FANUC}, Exact stop (G09)", listed=_EXACT),
     *family(_DYNAMIC, "dynamic offset", dynamic_offset, f"{HAAS}, G254, G255", HAAS_ONLY, _FOLLOWS),
-    Code(
-        "M29",
-        "M rigid tapping",
-        holds_anyway,
-        "rigid tapping",
-        f"{FANUC}, Rigid tapping (M29)",
-        FANUC_ONLY,
-        listed="rigid tapping",
-    ),
+    *family({"M29": "rigid tapping"}, "M rigid tapping", holds_anyway, f"{FANUC}, M29", FANUC_ONLY, "rigid tapping"),
     Code("G50", "scaling", scaling_off, "scaling off", f"{FANUC}, Scaling (G50, G51)"),
     Code("G61", "path control", take_words, "exact path", g_codes("G61"), listed=_EXACT),
     Code("G61.1", "path control", take_words, "exact stop", g_codes("G61.1"), listed=_EXACT),
@@ -95,22 +78,20 @@ PASSIVE_CODES = (
     Code("M19", "M spindle", holds_anyway, "spindle orientation", m_codes("M19"), listed="spindle orientation"),
     *family(_COOLANT, "M coolant", holds_anyway, m_codes("M7 M8 M9"), listed="coolant"),
     *family(_OVERRIDES, "M overrides", holds_anyway, m_codes("M48 - M53"), listed="overrides"),
-    Code("G13.1", "polar interpolation", holds_anyway, "polar interpolation off", _POLAR, FANUC_ONLY, listed=_OFF),
-    Code("G50.1", "mirror image", holds_anyway, "mirror image off", _MIRROR, FANUC_ONLY, listed=_OFF),
-    Code("G100", "mirror image", holds_anyway, "mirror image off", f"{HAAS}, G100", HAAS_ONLY, listed=_OFF),
     Code(
-        "G22", "stroke check", take_words, "stored stroke check on", _STROKE, FANUC_ONLY, takes_axes=True, listed=_ZONE
-    ),
-    Code("G23", "stroke check", holds_anyway, "stored stroke check off", _STROKE, FANUC_ONLY, listed=_ZONE),
-    *family(_WATCHED, "speed watch", take_words, _WATCH, FANUC_ONLY, _SPEED),
-    Code("G62", "path control", holds_anyway, "automatic corner override", _CORNER, FANUC_ONLY, listed="slower feed"),
-    Code(
-        "G63",
-        "path control",
+        "G13.1",
+        "polar interpolation",
         holds_anyway,
-        "tapping mode",
-        f"{FANUC}, Tapping mode (G63)",
+        "polar interpolation off",
+        f"{FANUC}, G13.1",
         FANUC_ONLY,
-        listed="no override",
+        listed=_OFF,
     ),
+    Code("G50.1", "mirror image", holds_anyway, "mirror image off", f"{FANUC}, G50.1", FANUC_ONLY, listed=_OFF),
+    Code("G100", "mirror image", holds_anyway, "mirror image off", f"{HAAS}, G100", HAAS_ONLY, listed=_OFF),
+    Code("G22", "stroke check", take_words, "stored stroke check on", f"{FANUC}, G22", FANUC_ONLY, None, True, _ZONE),
+    Code("G23", "stroke check", holds_anyway, "stored stroke check off", f"{FANUC}, G23", FANUC_ONLY, listed=_ZONE),
+    *family(_WATCHED, "speed watch", take_words, f"{FANUC}, G25, G26", FANUC_ONLY, _SPEED),
+    *family({"G62": "corner override"}, "path control", holds_anyway, f"{FANUC}, G62", FANUC_ONLY, "slower feed"),
+    *family({"G63": "tapping mode"}, "path control", holds_anyway, f"{FANUC}, G63", FANUC_ONLY, "no override"),
 )

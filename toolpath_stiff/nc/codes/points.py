@@ -1,21 +1,27 @@
-"""What the axis words of a block mean: points and steps. mm and degrees."""
+"""Points: what the axis words and polar words of a block mean, and what a turned program makes uncertain. mm, degrees.
 
-from toolpath_stiff.nc.codes.polar import at_radius_and_angle, polar_point
-from toolpath_stiff.nc.codes.unsettled import settle
+Polar words: LinuxCNC, "G-Code Overview", "Polar Coordinates"; Fanuc's operator's manuals of the series 16 and 15i,
+"Polar coordinate command" (G16).
+"""
+
+import math
+
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.words import AXES
+from toolpath_stiff.nc.words import AXES, Word
 
 LINEAR = frozenset("XYZ")
+XY = frozenset((0, 1))
+SAME_PLACE_MM = 1e-9
+TURNED = "G10, or another work offset and M6, turned the coordinates: LinuxCNC's interpreter may have other ones"
 
 
 def axis_words(state: State, block: CurrentBlock) -> dict[int, float]:
     """Axis index -> value of the block's axis words in mm and degrees; they then count as used."""
-    values = {axis: block.take(letter) for axis, letter in enumerate(AXES)}
     return {
-        axis: value * (state.length_scale if axis < len(LINEAR) else 1.0)
-        for axis, value in values.items()
-        if value is not None
+        axis: value * (state.length_scale if letter in LINEAR else 1.0)
+        for axis, letter in enumerate(AXES)
+        if (value := block.take(letter)) is not None
     }
 
 
@@ -23,36 +29,31 @@ def point_words(state: State, block: CurrentBlock) -> dict[int, float]:
     """As `axis_words`, of a block that moves in program coordinates: under G16 the second one is an angle."""
     block.polar_words = None
     if block.has("@") or block.has("^"):
-        xy = at_radius_and_angle(state, block)
+        xy = _at_radius_and_angle(state, block)
         return {**axis_words(state, block), **xy}
     if state.polar is None:
         words = axis_words(state, block)
         if state.unsettled:
-            settle(state, block, words)
+            _settle(state, block, words)
         return words
     second = PLANES[state.plane][1]
     angle = block.take(AXES[second])
-    words = axis_words(state, block)
-    if angle is not None:
-        words[second] = angle
-    return words
+    return axis_words(state, block) | ({} if angle is None else {second: angle})
 
 
 def cartesian(state: State, here: list[float], words: dict[int, float]) -> list[float]:
     """The point that words name in the distance mode in force, coming from `here`."""
-    point = list(here)
-    for axis, value in words.items():
-        point[axis] = value if state.absolute else here[axis] + value
-    return point
+    if state.absolute:
+        return [words.get(axis, coordinate) for axis, coordinate in enumerate(here)]
+    return [coordinate + words.get(axis, 0.0) for axis, coordinate in enumerate(here)]
 
 
 def destination(state: State, block: CurrentBlock, here: list[float], words: dict[int, float]) -> list[float]:
     """Program coordinates of the point that words from `point_words` name, coming from `here`."""
     point = cartesian(state, here, words)
-    if state.polar is not None:
-        first, second, _ = PLANES[state.plane]
-        if first in words or second in words:
-            point[first], point[second] = polar_point(state, block, words.get(first), words.get(second))
+    first, second, _ = PLANES[state.plane]
+    if state.polar is not None and (first in words or second in words):
+        point[first], point[second] = _polar_point(state, block, words.get(first), words.get(second))
     return point
 
 
@@ -65,9 +66,88 @@ def control_point(state: State, block: CurrentBlock, here: list[float], words: d
     frames = state.frames
     point = frames.to_control(destination(state, block, here, words))
     if state.polar is None and not frames.rotated:
-        for axis, present in enumerate(frames.position):
-            if axis not in words:
-                point[axis] = present
-            elif not state.absolute:
-                point[axis] = present + words[axis]
+        return [
+            point[axis] if state.absolute and axis in words else present + words.get(axis, 0.0)
+            for axis, present in enumerate(frames.position)
+        ]
     return point
+
+
+def _at_radius_and_angle(state: State, block: CurrentBlock) -> dict[int, float]:
+    """LinuxCNC's polar words: @ the radius, ^ the angle about the program zero, of the XY plane."""
+    word = block.values["@" if block.has("@") else "^"]
+    turned = state.polar is not None or state.unsettled or state.frames.rotation is not None
+    elsewhere = state.dialect.increments or state.plane != "G17" or turned or block.has("X") or block.has("Y")
+    problem = "is a polar word of LinuxCNC's, beside X or Y, outside of G17, or under G16 or a rotation"
+    block.refuse_if(elsewhere, word, problem, "X and Y, or G16")
+    block.polar_words = (word, block.take("@"), block.take("^"))
+    return xy_of_polar_words(state, block)
+
+
+def xy_of_polar_words(state: State, block: CurrentBlock) -> dict[int, float]:
+    """X and Y, as words in the distance mode in force, of the block's polar words at the present point.
+
+    As measured on `rs274` 2.9: the one that is absent is that of the present point; in G91 both add to it.
+    """
+    assert block.polar_words is not None
+    word, radius, angle = block.polar_words
+    here = state.frames.to_program(state.frames.position)
+    present, turn = math.hypot(here[0], here[1]), math.atan2(here[1], here[0])
+    at_zero = present < SAME_PLACE_MM and (radius is None or angle is None or not state.absolute)
+    block.refuse_if(at_zero, word, "counts from the present point, which is the program zero", "both @ and ^, in G90")
+    if radius is not None:
+        present = radius * state.length_scale + (0.0 if state.absolute else present)
+    if angle is not None:
+        turn = math.radians(angle) + (0.0 if state.absolute else turn)
+    point = (present * math.cos(turn), present * math.sin(turn))
+    return {axis: value if state.absolute else value - here[axis] for axis, value in enumerate(point)}
+
+
+def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle: float | None) -> tuple[float, float]:
+    """The point of G16's words, of which the last ones hold on."""
+    polar, letter = state.polar, AXES[PLANES[state.plane][0 if radius is not None else 1]]
+    assert polar is not None
+    if radius is not None:
+        block.refuse_if(not state.absolute, letter, "is a polar radius in incremental mode (G91)", "G90 before it")
+        polar[0] = radius
+    if angle is not None:
+        polar[1] = angle if state.absolute else polar[1] + angle
+    half = math.isnan(polar[0]) or math.isnan(polar[1])
+    block.refuse_if(
+        half, letter, "is half of a polar point, and nothing before it gives the other half", "both, in G90"
+    )
+    state.unsettled = None
+    turn = math.radians(polar[1])
+    return (polar[0] * math.cos(turn), polar[0] * math.sin(turn))
+
+
+def forget_polar(state: State) -> None:
+    """The tool or the zero moved by other than polar words: the next ones must name both."""
+    if state.polar is not None:
+        state.polar = [math.nan, math.nan]
+
+
+def refuse_while_rotated(state: State, block: CurrentBlock, word: Word | str, what: str) -> None:
+    """Refuse what Fanuc's controls forbid between G68 and G69."""
+    block.refuse_if(
+        state.frames.rotation is not None, word, f"{what} while the coordinate system is rotated (G68)", "G69 before it"
+    )
+
+
+def know_place(state: State, block: CurrentBlock, word: Word) -> None:
+    """Refuse what depends on the present X and Y, after a G10 that turned the offset in force."""
+    block.refuse_if(
+        state.unsettled == "G10", word, f"depends on the present X and Y. {TURNED}", "a move with both before it"
+    )
+
+
+def _settle(state: State, block: CurrentBlock, words: dict[int, float]) -> None:
+    """Refuse what a control may read as another point: X and Y had other numbers before the rotation changed."""
+    named = XY & words.keys()
+    if state.absolute and named == XY:
+        state.unsettled = None
+    elif state.unsettled == "G10":
+        raise block.fail(None, f"{TURNED}, and the next move does not name both X and Y", "both, in G90")
+    elif named and (state.absolute or state.unsettled == "G69"):
+        word = block.values[AXES[min(named)]]
+        raise block.fail(word, f"alone, or incremental, in the first move after {state.unsettled}", "X and Y, in G90")

@@ -6,8 +6,7 @@ from toolpath_stiff.nc.cutter_location.circles import VERTICAL
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number
 from toolpath_stiff.nc.cutter_location.tool_axes import unit_axis
-from toolpath_stiff.nc.moves import ToolUse
-from toolpath_stiff.nc.tables import tool_of
+from toolpath_stiff.nc.tables import ToolEntry, tool_of
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY, SECONDS_PER_MINUTE
 
 MM_PER_FOOT = 12.0 * MM_PER_INCH
@@ -24,7 +23,7 @@ FEED_UNITS: dict[str, tuple[float | None, bool]] = {
 }
 INCH_FEEDS = {"IPM", "IPR", "FPM", "FPR"}
 LENGTH_UNITS = {"MM": 1.0, "INCH": MM_PER_INCH, "INCHES": MM_PER_INCH, "IN": MM_PER_INCH}
-SEVERAL_TOOLS = ToolUse(0, math.nan, math.nan, "several tools without numbers")
+SEVERAL_TOOLS = ToolEntry(0, remark="several tools without numbers")
 TURNING = "turning: the points are read as those of a mill, X as a position"
 HEADING = "a heading or a remark"
 TOOL = "about the tool; LOADTL, LOAD/TOOL and CUTTER are what counts"
@@ -125,8 +124,8 @@ def tlaxis(state: CutterLocationState, statement: MajorStatement) -> None:
 
 def frame_word(state: CutterLocationState, statement: MajorStatement) -> None:
     """A second, different one is refused."""
-    numbers = tuple(state.number(argument) for argument in statement.arguments if is_number(argument))
-    one_frame(state, statement.word, numbers, statement.shown)
+    numbers = (state.number(argument) for argument in statement.arguments if is_number(argument))
+    one_frame(state, statement.word, tuple(numbers), statement.shown)
     state.note(FRAMES[statement.word])
 
 

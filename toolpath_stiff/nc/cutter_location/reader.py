@@ -34,7 +34,7 @@ def not_for(request: Request) -> list[Remark]:
         "a dialect": controller.dialect.name != "generic",
         "work offsets": any(offset.given for offset in request.work_offsets.table),
         "posted kinematics": controller.kinematics is not None,
-        "block-delete switches": bool(request.switches),
+        "block-delete switches": bool(request.controller.switches),
     }
     return [Remark(f"{what} mean nothing to a cutter-location file") for what in given if given[what]]
 
@@ -102,10 +102,9 @@ def run(state: CutterLocationState, lines: tuple[str, ...], most_errors: int = 1
         return errors
     if state.ended and any(line.strip() and not line.lstrip().startswith("$$") for line in lines[index:]):
         state.warnings.append(Remark("FINI ends the file; what follows is not read", index))
-    try:
-        state.no_circle("the end of the file")
-    except InputError as error:
-        errors.append(error)
+    if state.circle is not None:
+        problem = f"the end of the file while the circle of line {state.circle.line} waits for its GOTO"
+        errors.append(state.fail(problem, "GOTO/"))
     if not errors and not state.recorder.cuts:
         errors = [ProgramError("no cutting move", expected="GOTO/ after FEDRAT/, not after RAPID", file=state.name)]
     _conclude(state)

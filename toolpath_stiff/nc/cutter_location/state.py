@@ -14,7 +14,7 @@ from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, d
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle
 from toolpath_stiff.nc.geometry import Vector
-from toolpath_stiff.nc.moves import CYCLE, RAPID, Arc, Move, Recorder, Remark, ToolUse, Unsupported
+from toolpath_stiff.nc.moves import RAPID, Arc, Move, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.strokes import Drilling, strokes
 from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry, tool_of
@@ -72,7 +72,7 @@ class CutterLocationState:
 
     # What the file holds.
     recorder: Recorder = field(default_factory=Recorder)
-    used_tools: dict[int, ToolUse] = field(default_factory=dict)
+    used_tools: dict[int, ToolEntry] = field(default_factory=dict)
     used_words: dict[str, list[int]] = field(default_factory=dict)  # line of the first, count
     marks: list[tuple[int, str]] = field(default_factory=list)  # line and name of each operation
     assumptions: list[str] = field(default_factory=list)
@@ -113,9 +113,8 @@ class CutterLocationState:
     def numbers(self, statement: MajorStatement, *counts: int) -> list[float]:
         """All arguments as numbers; there must be one of `counts` of them."""
         numbers = [self.number(argument) for argument in statement.arguments]
-        if len(numbers) not in counts:
-            expected = " or ".join(map(str, counts))
-            raise self.fail(f"{statement.word}/ with {len(numbers)} numbers", f"{expected} numbers")
+        expected = f"{' or '.join(map(str, counts))} numbers"
+        self.refuse_if(len(numbers) not in counts, f"{statement.word}/ with {len(numbers)} numbers", expected)
         return numbers
 
     def scaled(self, numbers: list[float]) -> Vector:
@@ -135,8 +134,8 @@ class CutterLocationState:
         """mm/min of a feed that may be per revolution."""
         if not per_revolution:
             return feed
-        if not self.speed > 0.0:
-            raise self.fail("a feed per revolution without a spindle speed", "SPINDL/ with RPM before it")
+        no_speed = not self.speed > 0.0
+        self.refuse_if(no_speed, "a feed per revolution without a spindle speed", "SPINDL/ with RPM before it")
         return feed * self.speed
 
 
@@ -195,10 +194,11 @@ def move(state: CutterLocationState, motion: int, target: Vector, axis: Vector, 
 
 def drill(state: CutterLocationState, target: Vector, axis: Vector, hole: Drilling) -> None:
     """The hole of the cycle in force at a point, along the tool axis."""
-    if state.point is not None and axis != state.axis:
-        raise state.fail(
-            "a hole with another tool axis than the move before", "a GOTO/ before the cycle that turns the tool"
-        )
+    state.refuse_if(
+        state.point is not None and axis != state.axis,
+        "a hole with another tool axis than the move before",
+        "a GOTO/ before the cycle that turns the tool",
+    )
     feed = state.feed_per_minute(state.hole_feed, state.hole_per_revolution)
     if state.point is None:
         stand(state, along(target, axis, hole.clear), axis)
@@ -211,7 +211,7 @@ def drill(state: CutterLocationState, target: Vector, axis: Vector, hole: Drilli
         (along(state.point, axis, -height), level, RAPID, 0.0),
         (target, level, RAPID, 0.0),
         (target, hole.retract, RAPID, 0.0),
-        *((target, stroke.height, CYCLE if stroke.feed else RAPID, stroke.dwell) for stroke in strokes(hole)),
+        *((target, *stroke) for stroke in strokes(hole)),
     ]
     for foot, above, motion, dwell in stops:
         point = along(foot, axis, above)
@@ -242,4 +242,4 @@ def _add(
         entry = tool_of(state.tools, tool)
         diameter = state.diameter if math.isnan(entry.diameter) else entry.diameter
         remark = entry.remark or state.tool_name
-        state.used_tools[tool] = replace(entry, length=state.tool_length, diameter=diameter, remark=remark).in_use()
+        state.used_tools[tool] = replace(entry, length=state.tool_length, diameter=diameter, remark=remark)

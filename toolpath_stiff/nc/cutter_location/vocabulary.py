@@ -24,7 +24,6 @@ DASSAULT, POSTS = "Dassault, CATIA's help on APT import", "Autodesk's APT posts"
 VERICUT, MANUALS = 'Vericut, "Supported APT-CLS NC Program Records"', "manuals of post processors"
 # An unknown word that begins like one of a motion or a feed, or that carries a point, is not passed over.
 LIKE_MOTION = ("GO", "RAP", "FED", "CIR", "ARC", "MOV", "HEL", "CYC", "TLA", "TLO", "TLL", "TLR", "UNI", "MUL", "FRO")
-NUMBERS_OF_A_POINT = 3
 LIKE_G_CODE = re.compile(r"[A-Z]-?[\d.]+")
 GEOMETRY = "points, tool axes and feeds alone"
 UNKNOWN, NO_CHANGE = "is not known", "changes nothing"
@@ -91,11 +90,9 @@ def changes_nothing(statement: MajorStatement) -> bool:
 _POINT, _PAUSE = "/x,y,z[,i,j,k]", "/seconds or revolutions,REV"
 _CIRCLE, _SHIFTS = "the next motion follows a circle", "shifts all that follows"
 _TOLERANCE = "a tolerance of the CAM system: the points are taken as they stand"
-_SCREEN, _STOP = "for the CAM system's screen", "a stop: the path goes on"
+_SCREEN = "for the CAM system's screen"
 _OUTPUT = "about the output of the post processor"
-_RETRACT = "a plane to retract to, of which nothing is made without RETRCT"
 _BLOCK = "a block for the control as it stands: what it does is not known"
-_M_CODE, _G_CODE = (f"{kind} of one control: what it does is not known" for kind in ("an M code", "a G code"))
 _TURNS, _COMPENSATES = "turns the work or the head of one machine", "is cutter compensation"
 _REPEATS, _DRIVE = "repeats or calls a part of the file", "is driven along surfaces: APT's processor writes the points"
 
@@ -143,7 +140,7 @@ TABLE = (
     *listed(HEADING, NX, SIEMENS, "END-OF-PATH"),
     *listed(_TOLERANCE, ALL, VERICUT, "INTOL OUTTOL TOLER LINTOL THICK MCHTOL"),
     *listed(_TOLERANCE, "", APT, "OUTOL MAXDP NUMPTS"),
-    *listed(_STOP, ALL, ISO, "STOP OPSTOP END BREAK"),
+    *listed("a stop: the path goes on", ALL, ISO, "STOP OPSTOP END BREAK"),
     *listed(_SCREEN, NX, SIEMENS, "PAINT"),
     *listed(_SCREEN, "", VERICUT, "DISPLY PLOT VERIFY CLPRNT"),
     *listed(TOOL, NX, SIEMENS, "SELECT"),
@@ -154,11 +151,11 @@ TABLE = (
     *listed("for CAMplete", CAMPLETE, POSTS, "CSI_PROGRAM_COMMENT CSI_SET_PATH_PARAM CSI_PATH_TOLERANCE"),
     *listed(TOOL, CAMPLETE, POSTS, "CSI_SET_FLUTE_LENGTH"),
     *listed("coolant", ALL, ISO, "COOLNT FLUSH"),
-    *listed(_RETRACT, "", ISO, "CLEARP CLRSRF"),
+    *listed("a plane to retract to, of which nothing is made without RETRCT", "", ISO, "CLEARP CLRSRF"),
     *listed("the part surface; the points have its height already", CATIA, DASSAULT, "AUTOPS PSIS"),
     *listed("clamps of machine axes", "", ISO, "CLAMP UNCLMP"),
-    *listed(_M_CODE, "", ISO, "AUXFUN", DOUBTFUL),
-    *listed(_G_CODE, "", ISO, "PREFUN", DOUBTFUL),
+    *listed("an M code of one control: what it does is not known", "", ISO, "AUXFUN", DOUBTFUL),
+    *listed("a G code of one control: what it does is not known", "", ISO, "PREFUN", DOUBTFUL),
     *listed(_BLOCK, "", ISO, "INSERT", DOUBTFUL),
     *listed(_BLOCK, CAMPLETE, POSTS, "CSI_INSERT_CUSTOM_GCODE", DOUBTFUL),
     *listed("statements that the operator may leave out: they are read", "", ISO, "OPSKIP", DOUBTFUL),
@@ -189,9 +186,8 @@ def look_up(name: str) -> MajorWord | None:
 def meaning_of(name: str) -> str:
     """The meaning of a word, for a list of the words used."""
     word = look_up(name)
-    if word is None:
-        return UNKNOWN
-    return f"{word.meaning}, not supported" if word.kind == REFUSED else word.meaning
+    meaning = word.meaning if word is not None else UNKNOWN
+    return f"{meaning}, not supported" if word is not None and word.kind == REFUSED else meaning
 
 
 def execute(state: CutterLocationState, statement: MajorStatement) -> None:
@@ -207,7 +203,7 @@ def execute(state: CutterLocationState, statement: MajorStatement) -> None:
         return
     other = LIKE_G_CODE.match(name) or (not count and " " in name)
     state.refuse_if(other, f"{statement.shown!r} is not a statement of a cutter-location file", "a word of APT's")
-    carries_point = count >= NUMBERS_OF_A_POINT and all(map(is_number, statement.words))
+    carries_point = count >= 3 and all(map(is_number, statement.words))
     moves = f"{statement.shown}: {name} {UNKNOWN}, and may move the tool"
     state.refuse_if(name.startswith(LIKE_MOTION) or carries_point, moves, GEOMETRY, "take the line out if it does not")
     state.note(f"{name} {UNKNOWN}, and not acted upon", doubtful=True)

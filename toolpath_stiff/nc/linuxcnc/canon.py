@@ -109,8 +109,8 @@ class Follower:
 
     def fail(self, problem: str, expected: str = "", hint: str = "", line: int | None = None) -> InputError:
         """An error of a line of the program, unless one is given of that being read."""
-        number = (self.reading if line is None else line) or None
-        return ProgramError(problem, expected=expected, hint=hint, file=self.name, line=number)
+        line = self.reading if line is None else line
+        return ProgramError(problem, expected=expected, hint=hint, file=self.name, line=line or None)
 
     def _words(self, line: int) -> str:
         return self.lines[line - 1].plain if line else ""

@@ -23,7 +23,7 @@ from toolpath_stiff.nc.moves import ReadProgram, Remark, Unsupported
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START
 from toolpath_stiff.nc.tables import tool_of
-from toolpath_stiff.units import ShopPose, pose_in_si
+from toolpath_stiff.poses import ShopPose, pose_in_si
 
 MACHINE_CODES = re.compile(r"G0*(?:53|28|30)(?!\d)")
 OFFSET_CODES = re.compile(r"G0*10(?!\d)")
@@ -92,7 +92,7 @@ class _Session:
                 *(Remark(WAITING, line.number) for line in self.lines if WAITS.search(line.plain)),
             ),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program"),
-            tools=tuple(tool_of(request.controller.tools, number).in_use() for number in follower.used_tools),
+            tools=tuple(tool_of(request.controller.tools, number) for number in follower.used_tools),
             interpreter="linuxcnc",
             dialect="linuxcnc",
             jumps=tuple(follower.jumps),
@@ -140,7 +140,7 @@ class _Session:
             prefix += [f"N0G21G90G53G0X{x:.6f}Y{y:.6f}Z{z:.6f}", "N0G80"]
         lines = [Line(line.number, "", "M2") if line.number == until else line for line in self.lines]
         return run_rs274(
-            numbered(lines, name, block_delete=bool(self.request.switches), prefix=prefix),
+            numbered(lines, name, block_delete=bool(self.request.controller.switches), prefix=prefix),
             parameter_file(self.offsets, shift, active),
             tool_file(self.tool_numbers, self.request.controller.tools),
             rs274=self.rs274,

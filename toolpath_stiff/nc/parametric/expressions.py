@@ -121,9 +121,12 @@ class Scanner:
 
         def value(variables: Variables) -> float:
             try:
-                return finite(work(variables))
+                result = work(variables)
+                if not math.isfinite(result):
+                    raise ValueError("the result is no finite number")
             except (ArithmeticError, ValueError) as error:
                 raise self.fail(f"{name} cannot be worked out: {error}", column=column) from None
+            return result
 
         return value
 
@@ -257,13 +260,6 @@ def number(value: float | None) -> float:
     return 0.0 if value is None else value
 
 
-def finite(value: float) -> float:
-    """The value. Raises `ValueError` unless it is a finite real number."""
-    if isinstance(value, complex) or not math.isfinite(value):
-        raise ValueError("the result is no finite number")
-    return float(value)
-
-
 def operate(operator: str, left: float | None, right: float | None, family: str) -> float:
     """The value of an operator.
 
@@ -280,8 +276,6 @@ def operate(operator: str, left: float | None, right: float | None, family: str)
         if any(value != round(value) or not 0 <= value < LARGEST_BITS for value in (a, b)):
             raise ValueError("its values are not whole numbers from 0")
         return float(LOGIC[operator](round(a), round(b)))
-    if operator in ("/", "MOD") and b == 0.0:
-        raise ValueError("the divisor is 0")
     if operator != "MOD":
         return float(ARITHMETIC[operator](a, b))
     if family != NGC and (a < 0.0 or b < 0.0):

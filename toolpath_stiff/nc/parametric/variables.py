@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from toolpath_stiff.nc.codes.motion import know_height
-from toolpath_stiff.nc.codes.unsettled import know_place
+from toolpath_stiff.nc.codes.points import know_place
 from toolpath_stiff.nc.parametric.families import EITHER, MACRO_B, NGC
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -28,6 +28,7 @@ MACRO_POSITIONS = (5001, 5041)  # block end; present position, with the tool len
 TOOL_LENGTHS = range(2001, 2201)  # Fanuc's memory A and Haas: geometry of the length of H1 to H200
 LAST_WORK_OFFSET = 6  # G54 to G59 in Macro B's numbers, which are those of LinuxCNC's parameters
 MODAL = range(4001, 4121)
+ALARM, WITHOUT_PATH = 3000, (3003, 3004, 3006)
 
 Which = str | int  # a variable: its name or its number
 Values = dict[Which, float | None]
@@ -118,9 +119,16 @@ class Variables:
         scope = self._scope(which)
         if scope is not None:
             scope[which] = value
-        elif self.family != MACRO_B or value is None or not self._set_macro_system(int(which), value, place):
+        elif self.family == MACRO_B and which in WITHOUT_PATH:
+            word = Word("#", 0.0, place.column or 1, f"#{which}")
+            self.state.note(place.line, word, "single block, feed hold or a message: the path does not depend on it")
+        elif self.family == MACRO_B and which == ALARM:
+            raise place.fail(
+                f"the program stops with its alarm {value or 0.0:g} (#3000)", "a program that runs through"
+            )
+        else:
             known = f"#31 to #{NGC_LAST}" if self.family == NGC else "#1 to #33, #100 to #199, #500 to #999"
-            raise place.fail(f"#{which} cannot be set here", known)
+            raise place.fail(f"#{which} cannot be set here", f"{known}; G10 for work offsets and tool lengths")
 
     def angle(self, y: float, x: float) -> float:
         """ATAN[y]/[x], degrees: -180 to 180 on LinuxCNC, 0 to 360 on Fanuc's (parameter 6004, NAT = 0)."""
@@ -163,17 +171,12 @@ class Variables:
         if number in TOOL_LENGTHS:
             length = tool_of(state.tools, number - TOOL_LENGTHS.start + 1).length
             return None if math.isnan(length) else length / state.length_scale
-        offset = self._offset_place(number)
-        if offset is not None:
-            index, axis = offset
-            value = state.frames.offsets.table[index].axes[axis] / (state.length_scale if axis < 3 else 1.0)
-            return value if state.frames.offsets.table[index].given else None
+        offset, axis = divmod(number - FIRST_OFFSET, OFFSET_STRIDE)  # #5221 to #5326
+        if 0 <= offset < LAST_WORK_OFFSET and axis < len(AXES):
+            work_offset = state.frames.offsets.table[offset]
+            value = work_offset.axes[axis] / (state.length_scale if axis < 3 else 1.0)
+            return value if work_offset.given else None
         return self._modal(number) if number in MODAL else None
-
-    def _offset_place(self, number: int) -> tuple[int, int] | None:
-        """The work offset (from 0) and axis of #5221 to #5326."""
-        index, axis = divmod(number - FIRST_OFFSET, OFFSET_STRIDE)
-        return (index, axis) if 0 <= index < LAST_WORK_OFFSET and axis < len(AXES) else None
 
     def _modal(self, number: int) -> float | None:
         """#4001 to #4120: what was in force before this block, by Fanuc's groups of G codes; then by letters."""
@@ -195,37 +198,10 @@ class Variables:
         }
         return group_values.get(number - 4000)
 
-    def _set_macro_system(self, number: int, value: float, place: Place) -> bool:
-        """Set a system variable of Macro B; whether it is one."""
-        state = self.state
-        if number == 3000:
-            raise place.fail(f"the program stops with its alarm {value:g} (#3000)", "a program that runs through")
-        if number in (3003, 3004, 3006):
-            word = Word("#", float(number), place.column or 1, f"#{number}")
-            state.note(place.line, word, "single block, feed hold or a message: the path does not depend on it")
-            return True
-        offset_place = self._offset_place(number)
-        if offset_place is None:
-            return False
-        index, axis = offset_place
-        if index == state.frames.active:
-            expected = f"G10 L2 P{index + 1}, whose effect is defined"
-            raise place.fail(f"#{number} changes the work offset in force", expected)
-        offset = state.frames.offsets.table[index]
-        offset.axes[axis] = value * (state.length_scale if axis < 3 else 1.0)
-        offset.given = True
-        return True
-
 
 def _axis(axis: int) -> Callable[[Variables], float]:
     shown = f"#<_{AXES[axis].lower()}>"
     return lambda variables: variables.position(axis, shown, Place(variables.state.name, variables.line, 1))
-
-
-def _motion_mode(variables: Variables) -> float:
-    """LinuxCNC's G codes times ten; -10 without a motion mode."""
-    motion = variables.state.motion
-    return -10.0 if motion is None else round(10.0 * float(motion[1:]))
 
 
 def _plain(read: Callable[[State], float]) -> Callable[[Variables], float]:
@@ -239,7 +215,7 @@ PREDEFINED: dict[str, Callable[[Variables], float]] = {
     "_LINE": lambda variables: float(variables.line),
     "_CALL_LEVEL": lambda variables: float(len(variables.levels) - 1),
     "_REMAP_LEVEL": lambda variables: 0.0,
-    "_MOTION_MODE": _motion_mode,
+    "_MOTION_MODE": _plain(lambda state: round(10.0 * float((state.motion or "G-1")[1:]))),  # -10: none
     "_PLANE": _plain(lambda state: 10.0 * float(state.plane[1:])),
     "_METRIC": _plain(lambda state: not state.inch),
     "_IMPERIAL": _plain(lambda state: state.inch),

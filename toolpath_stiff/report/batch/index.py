@@ -13,14 +13,13 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, number
 from toolpath_stiff.files import Content
 from toolpath_stiff.report.analysis_tables import ONLY_PLUNGES
 from toolpath_stiff.report.batch.outcomes import ProgramOutcome, good_and_failed, summary_csv
 from toolpath_stiff.report.batch.programs import RESERVED
 from toolpath_stiff.report.pages import markup, render
 from toolpath_stiff.report.words import counted, duration, plain, shortened
-from toolpath_stiff.units import number
 
 INDEX, SUMMARY = RESERVED
 TEXT = 40  # characters of a program's line that are shown
@@ -123,9 +122,8 @@ def _scale(good: Sequence[ProgramOutcome]) -> StiffnessScale | None:
     known = [outcome for outcome in good if outcome.figure("min_N_per_mm") is not None]
     if not known:
         return None
-    across = [outcome for outcome in known if not outcome.plunges_only]
-    ends = [outcome.figure(name) for outcome in across or known for name in DRAWN]
-    values = [float(end) for end in ends if end is not None]
+    across = [outcome for outcome in known if not outcome.plunges_only] or known
+    values = [float(end) for outcome in across for name in DRAWN if (end := outcome.figure(name)) is not None]
     low, high = min(values), max(values)
     if high - low < 1e-6 * high:
         low, high = 0.9 * low, 1.1 * high
@@ -218,8 +216,13 @@ def _table(good: Sequence[ProgramOutcome]) -> Document | None:
         *([("other", f"mean on the other machine, {other}")] if other is not None else []),
         *([("required", "required"), ("span below", "below it somewhere")] if scale.required is not None else []),
     ]
-    rows = [[column.cell(outcome) for column in columns] for outcome in good]
-    return {"how": HOW_TO_READ, "key": key, "columns": columns, "axis": _axis(scale), "rows": rows}
+    return {
+        "how": HOW_TO_READ,
+        "key": key,
+        "columns": columns,
+        "axis": _axis(scale),
+        "rows": [[column.cell(outcome) for column in columns] for outcome in good],
+    }
 
 
 def _link(outcome: ProgramOutcome) -> Cell:

@@ -7,11 +7,10 @@ from typing import Any
 
 from toolpath_stiff.analysis.statistics import FIGURES
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, number
 from toolpath_stiff.report.analysis_tables import only_plunges
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import WIDTH, counted, duration, plain, shortened
-from toolpath_stiff.units import number
 
 MOST_NAME = 36  # columns of the terminal for the name
 # First columns of summary.csv -> what of the outcome they show.

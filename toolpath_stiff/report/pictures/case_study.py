@@ -5,12 +5,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, number
 from toolpath_stiff.placement.case_study import CaseStudy
 from toolpath_stiff.report.colours import BLUE, INK, MUTED, ORANGE, STIFFNESS
 from toolpath_stiff.report.pictures.style import Look, colour_scale, in_thousands, new_figure, panel
 from toolpath_stiff.report.words import counted
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 MOST_PANELS = 3
 ABOVE, LEAST_ASPECT = 0.2, 0.6  # of a path of one's own: room for words above it; a panel's height over its width

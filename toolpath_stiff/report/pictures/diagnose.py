@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from toolpath_stiff.comparison.residuals import directions
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.rows import HypothesisRow
+from toolpath_stiff.documents import json_number
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, deviation_percent
 from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.portrait.portrait import Portrait
@@ -20,7 +21,6 @@ from toolpath_stiff.report.explanations import floor_text, probability_text, rem
 from toolpath_stiff.report.pictures.before_after import before_after
 from toolpath_stiff.report.pictures.style import Look, new_figure, open_frame, panel
 from toolpath_stiff.report.words import RESIDUAL_AXIS, counted, percent, plain, shortened
-from toolpath_stiff.units import json_number
 
 MOST_BARS = 8
 ROW = 0.47  # inch a candidate

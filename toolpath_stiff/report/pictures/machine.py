@@ -1,7 +1,5 @@
 """The pictures of a machine: at a pose, and of one that was checked with its doubtful joints."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -10,10 +8,10 @@ from toolpath_stiff.analysis.machine_check import MachineCheck
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.machine.symmetry import Stray
+from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.report.colours import BLUE
 from toolpath_stiff.report.pictures.style import Look, new_figure, panel
-from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m, pose_in_mm
+from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"
 LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
@@ -25,27 +23,23 @@ def machine_at(_: object, *, machine: Hexapod, pose: FloatArray) -> Figure:
 
 
 def machine_checked(check: MachineCheck) -> Figure:
-    """The machine at its neutral pose; joints that stray have a ring."""
+    """The machine at its neutral pose."""
     machine = check.model.machine
-    return _views(machine, np.array(machine.limits.neutral_pose), check.symmetry.strays)
+    return _views(machine, np.array(machine.limits.neutral_pose))
 
 
-def _views(machine: Hexapod, pose: FloatArray, strays: Sequence[Stray] = ()) -> Figure:
+def _views(machine: Hexapod, pose: FloatArray) -> Figure:
     """From above, from the front and from the right, at a pose (6,) in m and rad; struts with length and stiffness."""
     struts = solve_struts_at(machine, pose)
     joints, frame, tip = mm_from_m(pose[:3] + struts.arms[0]), mm_from_m(machine.frame_joints), mm_from_m(pose[:3])
     where = "tool tip at X{:g} Y{:g} Z{:g} mm, roll {:g}, pitch {:g}, yaw {:g} degrees".format(
         *pose_in_mm(pose.tolist())
     )
-    ring = "   ·   ring: does not follow the symmetry of the other joints" if strays else ""
     stiffness = n_per_um_from_n_per_m(machine.strut_law.stiffness(struts.lengths[0]))
-    figure = new_figure(14.0, 7.4, machine.title, where.format(*pose_in_mm(pose.tolist())) + ring)
+    figure = new_figure(14.0, 7.4, machine.title, where.format(*pose_in_mm(pose.tolist())))
     for k, (first, second, title) in enumerate(((0, 1, "from above"), (0, 2, "from the front"))):
         axes = panel(figure, 0.84 + 6.86 * k, 0.67, 5.88, 5.2)
         _draw_view(axes, frame, joints, tip, [first, second])
-        for stray in strays:
-            place = (frame if stray.body == "frame" else joints)[stray.joint]
-            axes.plot(place[first], place[second], "o", ms=18, mfc="none", mec=TOOL, mew=2.0)
         axes.set(title=title, xlabel=f"{'XYZ'[first]} mm", ylabel=f"{'XYZ'[second]} mm")
     figures = zip(mm_from_m(struts.lengths[0]), stiffness, strict=True)
     words = [f"{i}: {mm:.0f} mm, {k:.1f} N/um" for i, (mm, k) in enumerate(figures, 1)]

@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 
 from toolpath_stiff.analysis.grid import StiffnessMap
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import number
 from toolpath_stiff.report.colours import INK, NOWHERE, RED, STIFFNESS
 from toolpath_stiff.report.map import heading
 from toolpath_stiff.report.pictures.style import colour_scale, new_figure, panel
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 CONTOURS = 9
 ACROSS = 3  # panels in a row

@@ -16,11 +16,12 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.documents import number
 from toolpath_stiff.report.colours import CLASSES, GREY, INK, MUTED, RED, SLATE, STIFFNESS
 from toolpath_stiff.report.curves import beyond_scale, cutting_box, scale_limits
 from toolpath_stiff.report.pictures.labels import add_heading, add_legend, label_places
 from toolpath_stiff.report.pictures.style import POINTS, Look, new_figure, panel
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
 LEFT, RIGHT, TOP, BOTTOM, BETWEEN = 0.95, 0.45, 1.35, 0.75, 1.05  # inches around and between the views

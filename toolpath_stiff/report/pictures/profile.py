@@ -9,12 +9,13 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.documents import number
 from toolpath_stiff.report.colours import INK, MUTED, ORANGE, RED, SLATE
 from toolpath_stiff.report.curves import extremes_by_column, profile_band, profile_curve
 from toolpath_stiff.report.pictures.labels import CHARACTER, add_heading, add_legend, label_places
 from toolpath_stiff.report.pictures.style import DPI, POINTS, Look, new_figure, panel
 from toolpath_stiff.report.words import plain, shortened
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, number
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 WIDTH, HEIGHT = 14.0, 6.2  # inches
 LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75

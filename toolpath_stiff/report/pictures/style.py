@@ -9,8 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
+from toolpath_stiff.documents import number
 from toolpath_stiff.report import colours
-from toolpath_stiff.units import number
 
 DPI, POINTS = 100, 72.0  # per inch
 Look = dict[str, Any]  # arguments of matplotlib by name
