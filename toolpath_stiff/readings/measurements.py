@@ -21,18 +21,7 @@ from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, offsets
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measured_poses import pose_warnings
-from toolpath_stiff.readings.rows import (
-    ANGLES,
-    AXES,
-    COLUMNS,
-    LABELS,
-    OPTIONAL,
-    POSITION,
-    VECTOR,
-    Row,
-    duplicates,
-    read_rows,
-)
+from toolpath_stiff.readings.rows import ANGLES, COLUMNS, LABELS, OPTIONAL, POSITION, VECTOR, Row, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -194,9 +183,6 @@ def read_measurements(
     names = list(map(str, [paths] if isinstance(paths, str | Path) else paths))
     if not names:
         raise MeasurementError("no measurements", expected="a CSV file, or nist-table1")
-    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
-    if twice is not None:
-        raise MeasurementError(f"{twice!r} is given twice", hint="name it once")
     rows: list[Row] = []
     notes: list[str] = []
     errors: list[InputError] = []
@@ -224,7 +210,7 @@ def _table_1() -> Table:
     rows = tuple(
         (line, (*cells[:3], axis, measured, "riser" if float(cells[2]) > RISER_ABOVE_MM else "no riser"))
         for line, cells in printed.rows
-        for axis, measured in zip(AXES, cells[3:6], strict=True)
+        for axis, measured in zip("XYZ", cells[3:6], strict=True)
     )
     note = "two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
     return replace(

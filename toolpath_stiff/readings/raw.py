@@ -6,28 +6,34 @@ of 100 um), restrained by a force gauge; indicators read how far it really moved
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.documents import to_dict
-from toolpath_stiff.errors import InputError, InputErrors
+from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.loop_figures import LoopFigures, in_tension, reduce_loop
-from toolpath_stiff.readings.mapping import mapped_table
-from toolpath_stiff.readings.raw_records import COLUMNS, STIFFNESS, read_raw
+from toolpath_stiff.readings.mapping import DATE, check_needed, mapped_table
+from toolpath_stiff.readings.raw_records import COLUMNS, PLACE, STIFFNESS, Loop, read_raw, strut_or_loop, unused
 from toolpath_stiff.readings.raw_rows import loop_entry, measurement_csv, remarks, struts_over_dates
-from toolpath_stiff.readings.strut_tables import read_strut_table
+from toolpath_stiff.readings.rows import LABELS, SOFTEST, STIFFEST, number, optional_number, parsed_rows
 from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.tables import Table
+from toolpath_stiff.units import n_per_m_from_n_per_mm
 
 if TYPE_CHECKING:
     import pandas as pd
 
 READ = (".csv", ".txt", ".dat", ".asc", ".tsv", ".xlsx", ".xlsm")  # of a folder
 OWN_OUTPUT = "_measurements.csv"
+FAILED = 0.05  # of the rows of such a table: tests that may have failed, near zero; of more the unit is wrong; assumed
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -181,3 +187,41 @@ def _files(name: str) -> list[str]:
     if not files:
         raise InputError("a folder without records", expected=f"files {', '.join(READ)}", file=name)
     return files
+
+
+def read_strut_table(table: Table) -> tuple[list[LoopFigures], list[str]]:
+    """Struts alone without records; and remarks.
+
+    A few rows with a stiffness near zero are failed tests: they are left out, with a note.
+
+    Raises
+    ------
+    InputError, InputErrors
+        Rows that are not of a strut alone, have no stiffness or none that could be; all of them.
+    """
+    needed = STIFFNESS[:1] if "loop" in table.heading else ("strut", STIFFNESS[0])
+    check_needed(table, needed, "strut,date,stiffness_N_per_mm of struts alone")
+
+    def strut(line: int, record: dict[str, str]) -> LoopFigures:
+        if strut_or_loop(record).kind != "alone":
+            raise MeasurementError("a row of no strut", expected="strut 1 to 6")
+        failed = abs(number(record, STIFFNESS[0], (-STIFFEST, STIFFEST))) < SOFTEST
+        stiffness = math.nan if failed else n_per_m_from_n_per_mm(number(record, STIFFNESS[0]))
+        place = {name: record[name] for name in PLACE if record.get(name)}
+        loop = Loop(place, None, np.empty(0), np.empty(0), line, table.file)
+        return LoopFigures(loop, stiffness, optional_number(record, STIFFNESS[1]))
+
+    struts, errors = parsed_rows(table, strut)
+    failed = [row.loop.line for row in struts if math.isnan(row.stiffness)]
+    fault = f"{len(failed)} of {len(table.rows)} rows with a stiffness within {SOFTEST:g} N/mm of zero"
+    if len(failed) > FAILED * len(table.rows):
+        hint = f"is the unit right? At most {100 * FAILED:g} % are left out as failed tests"
+        errors.append(MeasurementError(fault, hint=hint, file=table.file, line=failed[0]))
+    if errors:
+        raise InputErrors(errors)
+    if not struts:
+        raise MeasurementError("no rows below the heading", file=table.file, line=table.heading_line)
+    notes = unused(table, ("strut", *LABELS, DATE, "length_mm", *STIFFNESS))
+    if failed:
+        notes.append(f"{table.file}: {fault} are left out as failed tests, from line {failed[0]}")
+    return [row for row in struts if not math.isnan(row.stiffness)], notes

@@ -29,12 +29,11 @@ from toolpath_stiff.units import m_from_um
 
 READINGS = ("jog_um", "force_N", "displacement_um")
 LARGEST = (-1e7, 1e7)  # of each of them, either sign
-CONDITIONS = ("time_min", "temperature_C")
 STIFFNESS = ("stiffness_N_per_mm", "strut_force_N")  # of a table of struts that were reduced elsewhere
 # What one loop has in common.
 PLACE = (*POSITION, *ANGLES, "direction", *VECTOR, *LABELS, "tool_extension_mm", "length_mm", DATE)
 COLUMNS = Columns(
-    numbers=(*POSITION, *ANGLES, *VECTOR, "tool_extension_mm", "length_mm", *READINGS, *CONDITIONS, *STIFFNESS),
+    numbers=(*POSITION, *ANGLES, *VECTOR, "tool_extension_mm", "length_mm", *READINGS, *STIFFNESS),
     texts=("direction", *LABELS, DATE, "strut"),
 )
 LOST = ("", "-", "nan", "n/a")  # what is written for a lost reading
@@ -44,11 +43,10 @@ LAYOUTS = (
 )
 ONE_SIDE = 0.05  # of the range: a force set on a bench that goes less far to the other side is of one side
 NEAR_END = 0.02  # of the range of a force set on a bench: records this close are at its extreme, and averaged
-SHARED = 3  # records that a date-time needs to stand for a loop of its own
 SAME_JOG = 1e-9  # m: jogs this close are the same step
 DAY = len("2024-03-31")
 
-Record = tuple[int, dict[str, str], list[float]]  # line, cells, `READINGS` and `CONDITIONS`
+Record = tuple[int, dict[str, str], list[float]]  # line, cells, `READINGS`
 
 
 @dataclass(frozen=True)
@@ -59,8 +57,6 @@ class Loop:
     ----------
     place
         Column -> text of what the records have in common: pose, direction, labels.
-    conditions
-        Column -> mean of time and temperature, in the file's unit.
     jog, force, displacement
         (m,) m, N, m, along the direction. `jog` is None of a strut on a bench.
     line, file
@@ -68,7 +64,6 @@ class Loop:
     """
 
     place: Mapping[str, str]
-    conditions: Mapping[str, float]
     jog: FloatArray | None
     force: FloatArray
     displacement: FloatArray
@@ -149,11 +144,11 @@ def read_raw(table: Table) -> tuple[list[Loop], list[str]]:
     if not groups:
         fault = "no records below the heading with a force and a displacement"
         raise MeasurementError(fault, file=table.file, line=table.heading_line)
-    notes = unused(table, (*PLACE, *READINGS, *CONDITIONS, "strut"))
+    notes = unused(table, (*PLACE, *READINGS, "strut"))
     if lost:
         fault = f"{len(lost)} records without force or displacement are passed over, from line {lost[0]}"
         notes.append(f"{table.file}: {fault}")
-    loops = [_loop(part, table.file) for group in groups.values() for part in _by_time(group)]
+    loops = [_loop(group, table.file) for group in groups.values()]
     return sorted(loops, key=lambda loop: loop.line), notes
 
 
@@ -174,30 +169,28 @@ def _needed(heading: Sequence[str]) -> tuple[str, ...]:
 
 
 def _record(line: int, record: dict[str, str]) -> Record:
-    """A record with jog (nan on a bench), force, displacement and conditions; without values if it has lost them."""
+    """A record with jog (nan on a bench), force and displacement; without values if it has lost them."""
     if not record.get("jog_um") and any(record.get(name, "").lower() in LOST for name in READINGS[1:]):
         return line, record, []
     on_bench = strut_or_loop(record).kind == "alone" and not record.get("jog_um")
-    check_place(record)
     if not on_bench:
         for name in (*POSITION, *(angle for angle in ANGLES if angle in record)):
             number(record, name)
         direction_of(record)
     values = [math.nan if on_bench and name == "jog_um" else number(record, name, LARGEST) for name in READINGS]
-    return line, record, values + [optional_number(record, name) for name in CONDITIONS]
+    return line, record, values
 
 
-def check_place(record: Mapping[str, str]) -> None:
-    """Raise `InputError` for a date or a length that is none."""
+def strut_or_loop(record: dict[str, str]) -> MeasuringLoop:
+    """The loop of a record; `strut` 3 is the loop "strut 3 alone", and the record says so afterwards.
+
+    Raises `InputError` for no such strut, and for a date or a length that is none.
+    """
     day_of(record.get(DATE, ""))
     if record.get(DATE) == "":
         raise MeasurementError("no date", expected="one in every row")
     for name in ("tool_extension_mm", "length_mm"):
         optional_number(record, name)
-
-
-def strut_or_loop(record: dict[str, str]) -> MeasuringLoop:
-    """The loop of a record; `strut` 3 is the loop "strut 3 alone", and the record says so afterwards."""
     loop = loop_of(record.get("loop", ""))
     if record.get("strut"):
         strut = measuring_loop(f"strut {record['strut'].lower().removeprefix('strut')} alone")
@@ -209,20 +202,11 @@ def strut_or_loop(record: dict[str, str]) -> MeasuringLoop:
     return loop
 
 
-def _by_time(records: list[Record]) -> list[list[Record]]:
-    """Records of one day by their date-times, if these are of whole loops; a logger's clock that runs on is not."""
-    times: dict[str, list[Record]] = {}
-    for line, cells, values in records:
-        times.setdefault(cells.get(DATE, ""), []).append((line, cells, values))
-    return list(times.values()) if min(map(len, times.values())) >= SHARED else [records]
-
-
 def _loop(records: list[Record], file: str) -> Loop:
     line, cells, _ = records[0]
-    jog, force, displacement, *conditions = np.array([values for _, _, values in records]).T
+    jog, force, displacement = np.array([values for _, _, values in records]).T
     return Loop(
         place={name: cells[name] for name in PLACE if name in cells},
-        conditions={n: float(v.mean()) for n, v in zip(CONDITIONS, conditions, strict=True) if not np.isnan(v).any()},
         jog=None if np.isnan(jog).any() else m_from_um(jog),
         force=force,
         displacement=m_from_um(displacement),

@@ -8,10 +8,9 @@ import numpy as np
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.readings.dates import day_of
-from toolpath_stiff.readings.history import StrutHistory, history
+from toolpath_stiff.readings.history import SURE, StrutHistory, StrutReadings, history
 from toolpath_stiff.readings.loop_figures import LoopFigures
-from toolpath_stiff.readings.raw_records import CONDITIONS, PLACE
-from toolpath_stiff.readings.strut_series import SURE, StrutReadings
+from toolpath_stiff.readings.raw_records import PLACE
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
 
@@ -103,19 +102,17 @@ def measurement_csv(reduced: Sequence[LoopFigures], over_time: StrutHistory) -> 
     loops = [record.loop for record in figures]
     place = [name for name in PLACE if any(loop.place.get(name) for loop in loops)]
     forces = sorted({_force_column(record) for record in figures})
-    conditions = [name for name in CONDITIONS if all(name in loop.conditions for loop in loops)]
     further = [name for name in _further(figures[0]) if all(math.isfinite(_further(r)[name]) for r in figures)]
     rows = [
         [
             *(record.loop.place.get(name, "") for name in place),
             f"{n_per_mm_from_n_per_m(record.stiffness):.1f}",
             *(f"{record.force:.2f}".replace("nan", "") if name == _force_column(record) else "" for name in forces),
-            *(f"{record.loop.conditions[name]:.6g}" for name in conditions),
             *(f"{_further(record)[name] + 0.0:.3f}" for name in further),
         ]
         for record in figures
     ]
-    return csv_text([*place, "stiffness_N_per_mm", *forces, *conditions, *further], rows)
+    return csv_text([*place, "stiffness_N_per_mm", *forces, *further], rows)
 
 
 def _force_column(figures: LoopFigures) -> str:
