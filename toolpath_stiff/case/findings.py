@@ -32,8 +32,8 @@ def find(case: Contents, kind: str, result: str, progress: Progress | None = Non
 def _analyze(case: Contents, result: str, progress: Progress | None, machine: str = "") -> tuple[tps.Analysis, str]:
     state = case.state
     on = case.machine_of(machine) if machine else case.machine_with(state.on)
-    asked: Document = {"origin_mm_deg": state.origin or None, "require_N_per_mm": state.require or None}
-    analysis = tps.analyze(case.program, on, partial=True, progress=progress, **asked)
+    stated: Document = {"origin_mm_deg": state.origin or None, "require_N_per_mm": state.require or None}
+    analysis = tps.analyze(case.program, on, partial=True, progress=progress, **stated)
     analysis.save(case.folder / result, plots=case.plots)
     if not machine and state.on:
         machine = f"{result}/machine.toml"

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
+from toolpath_stiff.documents import Document
 from toolpath_stiff.hints import parted
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import counted, machine_text, plain
@@ -86,7 +87,7 @@ def page_of(
 
 
 def readings_head(
-    command: str, document: Mapping[str, Any], verdict: str, headline: str, figures: Sequence[tuple[str, str]]
+    command: str, document: Document, verdict: str, headline: str, figures: Sequence[tuple[str, str]]
 ) -> Head:
     """The head of a page on readings: text, data, machine, warnings and seed are those of its document."""
     files = ", ".join(document["data"])

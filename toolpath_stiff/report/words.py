@@ -2,10 +2,8 @@
 
 import math
 import textwrap
-from collections.abc import Mapping
-from typing import Any
 
-from toolpath_stiff.documents import number
+from toolpath_stiff.documents import Document, number
 from toolpath_stiff.stiffness.model import machine_words
 
 WIDTH = 100  # columns of the terminal
@@ -56,7 +54,7 @@ def shortened(text: str, width: int) -> str:
     return text if len(text) <= width else text[: max(width - 3, 0)] + "..."
 
 
-def machine_text(document: Mapping[str, Any]) -> str:
+def machine_text(document: Document) -> str:
     """The machine of a result for headings, with the effects that act on it and the set-up."""
     return plain(machine_words(document))
 
