@@ -50,7 +50,7 @@ def write_atomically(path: str | Path, content: Content, keep: bool = False) -> 
         try:
             write_new(part, content)
             if keep and target.is_file() and not filecmp.cmp(part, target, shallow=False):
-                write_atomically(old_name(place), target.read_bytes())
+                write_atomically(old_name(place), read_bytes(target, "the old file"))
             part.replace(target)
         except BaseException:
             part.unlink(missing_ok=True)

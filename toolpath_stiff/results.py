@@ -234,7 +234,7 @@ class TextFile(Result):
     def _short(self) -> str:
         return f"{self.name}, {len(self.text.splitlines())} lines"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Name, text and notes."""
         return {"name": self.name, "text": self.text, "notes": self.notes}
 

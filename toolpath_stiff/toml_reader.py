@@ -9,10 +9,11 @@ from __future__ import annotations
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeGuard
 
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_bytes
 
@@ -74,7 +75,7 @@ class TomlReader:
         """An error at the line of the dotted name `where`."""
         return self.kind(mistake, expected=expected, hint=hint, file=self.file, line=self.line_at(where))
 
-    def only(self, where: str, table: Mapping[str, Any], known: Iterable[str], of: str = "") -> None:
+    def only(self, where: str, table: Document, known: Iterable[str], of: str = "") -> None:
         """Refuse a key of a table that is not known; `of` ends the sentence."""
         known = list(known)
         for key in table:
@@ -82,7 +83,7 @@ class TomlReader:
                 name = f"{where}.{key}" if where else repr(key)
                 raise self.error(f"{name} is not known{of}", ", ".join(known), where=f"{where}.{key}".lstrip("."))
 
-    def needed(self, where: str, table: Mapping[str, Any], key: str, expected: str) -> Any:
+    def needed(self, where: str, table: Document, key: str, expected: str) -> Any:
         """The value of a key that must be there."""
         if key not in table:
             raise self.error(f"{where}.{key} is missing", expected, where=where)
@@ -106,14 +107,14 @@ class TomlReader:
             raise self.error(f"{where} = {value!r}", expected, where=where)
         return value
 
-    def table(self, where: str, value: object, expected: str) -> dict[str, Any]:
+    def table(self, where: str, value: object, expected: str) -> Document:
         """A table."""
         if not isinstance(value, dict):
             raise self.error(f"{where} = {value!r}", expected, where=where)
         return value
 
 
-def _places(lines: Sequence[str], data: Mapping[str, Any]) -> dict[str, int]:
+def _places(lines: Sequence[str], data: Document) -> dict[str, int]:
     """Line of each dotted name, first of its name: keys, tables, what holds them; `tools[2]` is of a list of tables."""
     places: dict[str, int] = {}
     above: dict[str, int] = {}

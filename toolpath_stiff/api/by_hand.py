@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -53,7 +52,7 @@ class Preview:
         *,
         strut_law: bool = True,
         near: Mapping[str, Document] | None = None,
-    ) -> dict[str, Any]:
+    ) -> Document:
         """Errors in per cent with these effects beside those of the machine file.
 
         Parameters

@@ -354,7 +354,7 @@ class Machine(Result):
         """
         return str(self.view.text(self.model.machine, self.standing(pose_mm_deg)[2]))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Name, title, source, effects, and its figures as `to_frame` has them, each with its unit and origin.
 
         Examples

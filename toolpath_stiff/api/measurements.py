@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.defaults import MACHINE
-from toolpath_stiff.documents import without_nan
+from toolpath_stiff.documents import Document, without_nan
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings, read_measurements, reading_columns
 
@@ -100,7 +100,7 @@ class Measurements:
 
         return pd.DataFrame(reading_columns(self.on(machine_from(machine))))
 
-    def to_dict(self, machine: Machine | str | Path = MACHINE) -> dict[str, Any]:
+    def to_dict(self, machine: Machine | str | Path = MACHINE) -> Document:
         """The files, and the readings as `to_frame` has them: the unit in each key, None where one does not say.
 
         Examples

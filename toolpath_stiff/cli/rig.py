@@ -11,10 +11,11 @@ The rig shares no stiffness code with the model that it tests. The seal is a bli
 
 from argparse import Namespace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import JSON, REPLACE, command
+from toolpath_stiff.documents import Document
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.options import Option
 from toolpath_stiff.rig.exercise import FILES, blind_case, measured_again, new_exercise, reveal
@@ -104,7 +105,7 @@ def _diagnose(folder: str, *more: str) -> str:
     return hint("next", Asked(tuple(files), str(Path(folder, "machine.toml"))).command("diagnose"))
 
 
-def _wording(truth: dict[str, Any]) -> str:
+def _wording(truth: Document) -> str:
     """What was hidden, in lines."""
     lines = [f"claim {', '.join(truth['claim'])}: {truth['verdict']}"]
     for effect in truth["effects"]:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.comparison.loop_readings import BesideTip
+from toolpath_stiff.comparison.loop_readings import LoopMean
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.documents import DIGITS, Document, json_number
 from toolpath_stiff.hints import Asked
@@ -172,7 +172,7 @@ class Examination:
     alike: Alike | None = None
     unexcluded: tuple[Unexcluded, ...] = ()
     suspects: tuple[SuspectEntry, ...] = ()
-    loops: BesideTip = field(default_factory=BesideTip)
+    loops: tuple[LoopMean, ...] = ()
     inputs: tuple[str, ...] = ()
 
     @property
