@@ -5,7 +5,6 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
@@ -124,6 +123,8 @@ def recover_geometry(starts: int = 20, seed: int = 1) -> Document:
 
 
 def _fit(residuals: Any, start: FloatArray, bounds: tuple[float, float] = (-np.inf, np.inf)) -> Any:
+    from scipy.optimize import least_squares
+
     return least_squares(
         residuals, start, bounds=bounds, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=500
     )
