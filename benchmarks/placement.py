@@ -24,12 +24,10 @@ from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program, read_program
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator
-from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules
+from toolpath_stiff.placement.goals import Bounds, Goal, SearchRules
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.placing import place_program
-from toolpath_stiff.placement.result import Placement
-from toolpath_stiff.placement.rows import FIGURES
-from toolpath_stiff.placement.task import PlacementTask
+from toolpath_stiff.placement.result import FIGURES, Placement, PlacementTask
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
@@ -133,11 +131,11 @@ def against_grid(name: str) -> tuple[Row, bool]:
     start = time.process_time()
     found = placed(program, 1e-3)
     cpu = time.process_time() - start
-    path = work_path(program, 1e-3, LOAD, program.origin)
+    path = work_path(program, 1e-3, LOAD)
     whole, few = (Evaluator(MODEL, part, LOAD, 1000.0) for part in (path, representative_path(path, GRID_SAMPLES)))
     best = np.array(found.best.origin)
     now = whole.figures(np.array([program.origin]))
-    rules = PlacementRules(0.01, float(now.extrapolated[0]))
+    rules = SearchRules(margin=0.01, extrapolated=float(now.extrapolated[0]))
     ours, ours_few = (evaluator.figures(best[None]).objectives[0] for evaluator in (whole, few))
     grid = grid_placements()
     figures = few.figures(grid)
@@ -160,7 +158,7 @@ def against_grid(name: str) -> tuple[Row, bool]:
     final = whole.figures(np.vstack([grid[nearest], BOUNDS.placements(np.array(polished))]))
     allowed = rules.violation(final) == 0.0
     by = float(np.where(allowed, dominance(final.objectives, ours), 0.0).max())
-    poses = found.search.pose_evaluations
+    poses = found.pose_evaluations
     passed = by <= DOMINATED
     if name == "pocket.nc":
         passed &= cpu <= CPU_SECONDS
@@ -173,10 +171,10 @@ def ends(program: ReadProgram) -> tuple[Row, bool]:
     from scipy.stats import qmc
 
     front = np.array([[getattr(row, key) for key in FIGURES.values()] for row in placed(program, ENDS_STEP).front])
-    path = work_path(program, ENDS_STEP, LOAD, program.origin)
+    path = work_path(program, ENDS_STEP, LOAD)
     whole = Evaluator(MODEL, path, LOAD, 1000.0)
     now = whole.figures(np.array([program.origin]))
-    rules = PlacementRules(0.01, float(now.extrapolated[0]) if now.margin[0] >= 0.0 else np.inf)
+    rules = SearchRules(margin=0.01, extrapolated=float(now.extrapolated[0]) if now.margin[0] >= 0.0 else np.inf)
     points = BOUNDS.placements(qmc.Sobol(len(BOUNDS.free), seed=7).random(SOBOL))
     figures = whole.figures(points)
     short = []

@@ -11,7 +11,7 @@ from tests.stiffness import opensees, reference
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
-from toolpath_stiff.stiffness import closed_form, compiled, core
+from toolpath_stiff.stiffness import closed_form, core
 from toolpath_stiff.stiffness.model import build_model
 
 BAR_STIFFNESS = 1e12  # N/m: rigid to 5e-5, the stiffest bars that direct stiffness solves well
@@ -61,7 +61,7 @@ def methods(tilted: bool) -> list[Method]:
         "exact route (batched LAPACK)": lambda: core.tip_compliance(model, position, rotation),
         "evaluate(): stiffness, margins, limits (numpy)": lambda: evaluate(model, position, abc, direction),
         "closed form (numpy), one direction and lengths": lambda: closed_form.compliance_along_columns(*one_way),
-        "compiled (numba), the same, poses last": lambda: compiled.compliance_along_columns(*one_way),
+        "compiled (numba), the same, poses last": lambda: core.compiled_columns(*one_way),
     }
     slow = (plain, rebuilt)
     return [(name, PLAIN_POSES if call in slow else FAST_POSES, call) for name, call in calls.items()]

@@ -39,7 +39,6 @@ PAIRS = {
             partial=True,
         )
     ),
-    "check slot.nc --strut-speed 5000": lambda: tps.check("slot.nc", strut_speed_mm_per_min=5000),
     "check slot.nc --machine none --dialect fanuc": lambda: tps.check(
         tps.Program.read("slot.nc", dialect="fanuc"), None
     ),

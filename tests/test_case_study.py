@@ -119,14 +119,10 @@ def test_conclusions_on_own_regions_compare_what_can_be_compared(slot):
     assert "not tested. no two regions" in str(one) and "0 of 0" in repr(one)
 
 
-def test_regions_by_option_by_file_and_from_python_are_the_same(slot, capsys):
+def test_regions_by_option_and_from_python_are_the_same(slot, capsys):
     options = [f"--region={name}:{','.join(map(str, at))}" for name, at in REGIONS.items()]
     assert main(["case-study", "slot.nc", *options, "--step", "10", "--out", "one", "--json"]) == 0
-    shown = capsys.readouterr().out
-    assert json.loads(shown) == slot.to_dict()
-    command = ["case-study", "slot.nc", "--regions", "one/case_study.csv", "--step", "10", "--json", "--no-plots"]
-    assert main(command) == 0
-    assert capsys.readouterr().out == shown
+    assert json.loads(capsys.readouterr().out) == slot.to_dict()
     assert {file.name for file in Path("one").iterdir()} >= {"regions.png", "heights.png", "case_study.md"}
 
 
@@ -137,20 +133,9 @@ def test_regions_by_option_by_file_and_from_python_are_the_same(slot, capsys):
         (["--region", "a:0,0,800", "--region", "a:0,0,700"], "a name is given twice"),
         (["--region", "a:0,0"], "expected NAME:X,Y,Z"),
         (["--region", "a:0,0,1e9"], "region a"),
-        (["--regions", "none.csv"], "none.csv"),
-        (["--regions", "two.csv"], "two.csv:3: region a: a, 0, 0, 900"),
-        (["--regions", "short.csv"], "short.csv:2: region a: a, 0, 0"),
-        (["--regions", "word.csv"], "word.csv:2: "),
-        (["--regions", "turn.csv"], "turn.csv:2: region a: a, 0, 0, 800, nan"),
-        (["--regions", "empty.csv"], "empty.csv"),
     ],
 )
 def test_regions_that_are_refused(slot, capsys, arguments, told):
-    Path("two.csv").write_text("region,x_mm,y_mm,z_mm\na,0,0,800\na,0,0,900\n")
-    Path("short.csv").write_text("region,x_mm,y_mm\na,0,0\n")
-    Path("word.csv").write_text("region,x_mm,y_mm,z_mm\na,0,zero,800\n")
-    Path("turn.csv").write_text("region,x_mm,y_mm,z_mm,rotation_deg\na,0,0,800,nan\n")
-    Path("empty.csv").write_text("region,x_mm,y_mm,z_mm\n")
     try:
         code = main(["case-study", "slot.nc", *arguments, "--step", "10", "--no-plots", "--out", "o"])
     except SystemExit as stopped:

@@ -104,7 +104,7 @@ def test_the_header_names_effect_and_set_up(here, capsys):
 def test_a_set_up_that_nobody_knows_is_refused_with_the_known_ones(here, capsys):
     assert main(["analyze", "part.nc", "--machine", "riser.toml", "--setup", "riserr"]) == 2
     error = capsys.readouterr().err
-    assert "'riserr'" in error and "one of riser, or none" in error and "did you mean riser?" in error.lower()
+    assert "'riserr'" in error and "one of riser, or none" in error
     assert not (here / "reports").exists()
     for command in (["map"], ["pose", "0", "0", "800"], ["place", "part.nc"], ["case-study"]):
         assert main([*command, "--machine", "riser.toml", "--setup", "riserr"]) == 2, command

@@ -7,11 +7,10 @@ from operator import attrgetter
 import numpy as np
 import pytest
 
-from toolpath_stiff.analysis.document import required_stiffness_missed
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import load_directions, parse_load, principal_directions
 from toolpath_stiff.analysis.poses import evaluate_poses
-from toolpath_stiff.analysis.results import analyze
+from toolpath_stiff.analysis.results import analyze, required_stiffness_missed
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program

@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.report.factory import make_analysis, spiral
-from toolpath_stiff.analysis.loads import PLUNGES_ONLY
 from toolpath_stiff.analysis.results import Analysis, analyze
-from toolpath_stiff.analysis.statistics import FIGURES, weighted_figures
+from toolpath_stiff.analysis.statistics import FIGURES, PLUNGES_ONLY, stiffness_figures
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.reader import parse_program
@@ -143,15 +142,16 @@ def test_an_operation_out_of_reach_has_no_figures() -> None:
     check_parts(analysis, "per_operation")
 
 
-def test_a_tool_of_two_lengths_has_two_rows() -> None:
+def test_a_tool_of_two_lengths_is_one_row() -> None:
     moves = [
         {"end": (0.1, 0.0, 0.0), "tool": 1},
         {"end": (0.1, 0.05, 0.0), "tool": 1, "tool_length": 0.08},
         {"end": (0.0, 0.05, 0.0), "tool": 1},
     ]
     rows = make_analysis(moves).to_dict()["per_tool"]
-    assert [(row["tool"], row["length_mm"]) for row in rows] == [(1, None), (1, pytest.approx(80.0))]
-    assert [row["cutting_length_mm"] for row in rows] == pytest.approx([200.0, 50.0])
+    (row,) = rows
+    assert (row["tool"], row["length_mm"]) == (1, None)  # that of its first cut
+    assert row["cutting_length_mm"] == pytest.approx(250.0)
 
 
 def test_the_approach_before_a_tools_length_is_in_force_is_the_tools_time() -> None:
@@ -170,4 +170,4 @@ def test_the_samples_tell_their_operation() -> None:
 
 
 def test_figures_of_nothing() -> None:
-    assert weighted_figures(np.empty(0), np.empty(0), 1000.0) == dict.fromkeys(FIGURES)
+    assert stiffness_figures(spiral(), np.empty(0, dtype=int)) == dict.fromkeys(FIGURES)

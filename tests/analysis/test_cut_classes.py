@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.report.factory import make_analysis
-from toolpath_stiff.analysis.document import required_stiffness_missed
 from toolpath_stiff.analysis.loads import LOADS, along_tool_axis, headline_rows, parse_load, plunging_rows
-from toolpath_stiff.analysis.results import analyze
+from toolpath_stiff.analysis.results import analyze, required_stiffness_missed
 from toolpath_stiff.analysis.statistics import FIGURES, stiffness_figures
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program, read_program
@@ -58,16 +57,17 @@ def test_blocks_change_nothing():
 @pytest.mark.parametrize("load", [load for load in LOADS if load != "tangential"] + ["1,0,2"])
 def test_other_loads_have_one_class(load):
     tangent, counted = np.array([leaning(0), leaning(90), leaning(180)]), np.array([True, True, False])
-    options = (parse_load(load), tangent, np.zeros((3, 3)), counted)
-    assert not plunging_rows(*options).any()
-    assert headline_rows(*options).tolist() == counted.tolist()
+    plunging = plunging_rows(parse_load(load), tangent, np.zeros((3, 3)), counted)
+    assert not plunging.any()
+    assert headline_rows(counted, plunging).tolist() == counted.tolist()
 
 
 def test_plunges_alone_are_the_headline():
     tangent, counted = np.array([leaning(1), leaning(90), leaning(180)]), np.array([True, False, True])
-    assert headline_rows(TANGENTIAL, tangent, np.zeros((3, 3)), counted).tolist() == counted.tolist()
     everything = np.ones(3, dtype=bool)
-    assert headline_rows(TANGENTIAL, tangent, np.zeros((3, 3)), everything).tolist() == [False, True, False]
+    for rows, headline in ((counted, [True, False, True]), (everything, [False, True, False])):
+        plunging = plunging_rows(TANGENTIAL, tangent, np.zeros((3, 3)), rows)
+        assert headline_rows(rows, plunging).tolist() == headline
 
 
 ANGLE = st.floats(-np.pi, np.pi)
@@ -78,7 +78,8 @@ def test_classes_are_disjoint_and_cover_what_counts(rows, load):
     values = np.array(rows, dtype=float).reshape(-1, 6)
     polar, azimuth, abc, counted = values[:, 0], values[:, 1], values[:, 2:5], values[:, 5] > 0.0
     tangent = np.column_stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
-    headline, plunging = (rows(parse_load(load), tangent, abc, counted) for rows in (headline_rows, plunging_rows))
+    plunging = plunging_rows(parse_load(load), tangent, abc, counted)
+    headline = headline_rows(counted, plunging)
     np.testing.assert_array_equal(headline | plunging, counted)
     assert not (headline & plunging).any() or np.array_equal(headline, plunging)
     assert headline.any() == counted.any()

@@ -12,10 +12,9 @@ import pytest
 import toolpath_stiff as tps
 from tests.effects.test_own_effects import BODY, FORM, own, use, with_machine
 from tests.stiffness.cases import nist
-from toolpath_stiff.analysis.document import required_stiffness_missed
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.poses import evaluate_poses
-from toolpath_stiff.analysis.results import analyze
+from toolpath_stiff.analysis.results import analyze, required_stiffness_missed
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.nc.reader import parse_program

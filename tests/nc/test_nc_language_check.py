@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.nc.test_nc_against_rs274 import TOOLS, Writer, cycle_program
-from toolpath_stiff.analysis.program_check import extents, figures, machine_findings, radii_findings
+from toolpath_stiff.analysis.program_check import extents, figures, machine_findings
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
@@ -48,11 +48,10 @@ def test_figures_of_a_program_by_hand():
     ).moves
     found = figures(moves, rapid_feed=0.1)
     half = math.pi * 10
-    assert found.lengths_mm == pytest.approx({"cutting": half + 40 + 10 + 30, "rapid": 40, "total": half + 120})
+    assert found["lengths_mm"] == pytest.approx({"cutting": half + 40 + 10 + 30, "rapid": 40, "total": half + 120})
     cutting = half / 10 + 4 + 120 + 30 / (200 / 60)
-    assert found.times_s == pytest.approx({"cutting": cutting, "rapid": 0.4, "dwell": 2, "total": cutting + 2.4})
-    assert found.extents_mm["y"] == pytest.approx([-40, 10])
-    assert found.extents_with_rapids_mm["z"] == [0, 30]
+    assert found["times_s"] == pytest.approx({"cutting": cutting, "rapid": 0.4, "dwell": 2, "total": cutting + 2.4})
+    assert found["extents_mm"]["y"] == pytest.approx([-40, 10])
 
 
 def test_findings_go_on_after_an_error():
@@ -76,17 +75,11 @@ def test_what_cannot_be_a_program_is_one_error(text):
     assert [f.severity for f in found.findings if f.severity == "error"] == ["error"]
 
 
-def test_arcs_whose_radii_disagree_within_tolerance():
-    moves = parse_program("F100 G0 X50\nG3 X0 Y50.02 I-50\nG0 X50 Y0\nG3 X0 Y50.001 I-50\n").moves
-    (finding,) = radii_findings(moves)
-    assert finding.line == 2 and "50.0200" in finding.text and finding.severity == "warning"
-
-
 def test_reach_and_strut_speeds():
     """A strut's speed is the part of the tip's velocity along it: u . v, at constant orientation."""
     machine = load_machine("nist")
     found = checked("G0 X0 Y0 Z0\nG1 X30 F6000\nG0 X2000\nG1 X2001", default_origin=machine.default_origin)
-    findings, speed = machine_findings(found.program, machine, 1e-4, 0.05)
+    findings, speed = machine_findings(found.program, machine, 1e-4)
     assert [(f.line, f.severity) for f in findings if f.code == "reach"] == [(3, "warning"), (4, "error")]
     from toolpath_stiff.machine.kinematics import solve_struts
 
@@ -95,7 +88,6 @@ def test_reach_and_strut_speeds():
     beyond = np.array(machine.default_origin[:3]) + np.array([[2.0, 0, 0], [2.001, 0, 0]])
     along = max(along, float(np.abs(solve_struts(machine, beyond).directions[:, :, 0]).max() * 6000))
     assert speed["mm_per_min"] == pytest.approx(along, rel=1e-3)
-    assert any(f.code == "strut speed" for f in findings)
 
 
 def test_the_command(tmp_path, capsys):
@@ -115,7 +107,6 @@ def test_the_command(tmp_path, capsys):
     program.write_text("")
     assert main(["check", str(program)]) == 2
     assert main(["check", str(program), "--interpreter", "auto"]) == 2
-    assert main(["check", str(program), "--machine", "none", "--strut-speed", "5"]) == 2
     capsys.readouterr()
 
 

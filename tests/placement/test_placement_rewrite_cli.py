@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -71,8 +72,10 @@ def test_a_turn_that_cannot_be_written_keeps_the_search(in_empty_folder, capsys)
     summary = json.loads(Path("out/placement.json").read_text())
     assert "an arc of G18" in summary["written"]["refused"]
     assert not Path("placed.nc").exists()
-    pick = str(summary["chosen"]["number"])
-    assert place("arcs_in_planes.nc", "--write", "placed.nc", "--pick", pick, "--linearise", "0.01") == 0
+    fixed = re.search(r"without a search by (--x=.*)", error)[1].split()
+    assert place("arcs_in_planes.nc", "--write", "placed.nc", *fixed, "--linearise", "0.01") == 0
+    again = json.loads(Path("out/placement.json").read_text())
+    assert again["chosen"]["mean_N_per_mm"] == pytest.approx(summary["chosen"]["mean_N_per_mm"], rel=1e-5)
 
 
 def test_nothing_asked_nothing_written():

@@ -1,9 +1,7 @@
-"""What a recommended placement keeps: never worse than now, rapids, margins, strut law, bounds; and `--pick`."""
+"""What a recommended placement keeps: never worse than now, rapids, margins, strut law, bounds."""
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import shutil
 import subprocess
@@ -21,11 +19,9 @@ from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program
-from toolpath_stiff.path.placing import place
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator
-from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules
-from toolpath_stiff.placement.keep_out import KeepOut
+from toolpath_stiff.placement.goals import Bounds, Goal, SearchRules
 from toolpath_stiff.placement.linear_programmes import least_costs
 from toolpath_stiff.placement.paths import representative_path, work_path
 from toolpath_stiff.placement.search import search_placements
@@ -41,8 +37,8 @@ NIST = load_machine("nist")
 STEP = 8e-3  # m
 
 
-def searched(program, bounds=README_BOUNDS, present=PRESENT, step=STEP, read=None, **asked):
-    path = work_path(program, step, TANGENTIAL, present, read)
+def searched(program, bounds=README_BOUNDS, present=PRESENT, step=STEP, **asked):
+    path = work_path(program, step, TANGENTIAL)
     return search_placements(Search(MODEL, path, TANGENTIAL, bounds, SearchRules(**asked), present=np.array(present)))
 
 
@@ -131,91 +127,26 @@ def test_a_rapid_is_a_constraint_like_a_cut():
     assert searched(low, UPRIGHT_BOUNDS, objective="mean").front[:, 2].max() > found.front[:, 2].max() + 0.05
 
 
-def test_the_first_rapid_starts_where_the_control_stands_now():
-    program = program_of("pocket")
-    path = work_path(program, STEP, TANGENTIAL, PRESENT)
-    anchored = path.anchored
-    turn = np.eye(3)[None]
-    here = anchored.placed(turn, np.array([PRESENT[:3]]))[0]
-    there = anchored.placed(turn, np.array([[0.2, 0.1, 1.0]]))[0]
-    at_start = np.flatnonzero((anchored.u == 0.0) & ~anchored.follows[:, 0].any(axis=1))
-    assert len(at_start)
-    np.testing.assert_allclose(there[at_start], here[at_start])
-    np.testing.assert_allclose(here[at_start], np.tile(PRESENT[:3], (len(at_start), 1)))
-    # X and Y before Z: a point over the new place at the old height.
-    assert (np.linalg.norm(there - [0.2, 0.1, 0.8], axis=1) < 1e-12).any()
-
-
-def homing(reference: str):
-    text = f"{reference}G21 G90 F500\nG0 X0 Y0 Z50\nG0 Z5\nG1 Z0\nG1 X40\nG1 Y30\nG1 X0 Y0\nG0 Z50\n"
-
-    def read(origin):
-        return parse_program(text + "G53 G0 Z1300\nG53 G0 X0 Y0\nM2\n", "home.nc", origin=origin)
-
-    return read
-
-
-def test_axes_in_machine_coordinates_stay_where_they_are():
-    """Held against the program read anew for the placement: every anchored sample lies on the control's own line."""
-    read = homing("")
-    program = read(PRESENT)
-    anchored = work_path(program, STEP, TANGENTIAL, PRESENT, read).anchored
-    there = (0.1, -0.05, 0.9, 0.0, 0.0, 0.5)
-    c, s = np.cos(0.5), np.sin(0.5)
-    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])[None]
-    position = anchored.placed(turn, np.array([there[:3]]))[0]
-    moves = place(read(there).moves, there)
-    for line in (9, 10):
-        row = int(np.flatnonzero(moves.line == line)[0])
-        start, end = moves.start[row, :3], moves.end[row, :3]
-        some = anchored.line == line
-        assert some.any()
-        expected = start + anchored.u[some, None] * (end - start)
-        np.testing.assert_allclose(position[some], expected, atol=1e-9)
-    assert moves.end[-1, 2] == pytest.approx(1.3)
-
-
-def test_a_homing_rapid_that_no_placement_mends_is_named_and_no_constraint(tmp_path, monkeypatch, capsys):
+def test_a_homing_rapid_out_of_reach_is_named_and_no_constraint(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = "G21 G90 F500\nG0 X0 Y0 Z50\nG0 Z5\nG1 Z0\nG1 X40\nG1 Y30\nG1 X0 Y0\nG0 Z50\nG53 G0 Z2500\nM2\n"
     Path("home.nc").write_text(text)
     command = ["place", "home.nc", "--x=-100:100", "--y=-100:100", "--z", "700:1000", "--step", "5", "--out", "out"]
     assert main([*command, "--no-plots"]) == 0
     summary = json.loads(Path("out/placement.json").read_text())
-    assert summary["search"]["rapids_left_out"] == [9]
-    assert any(
-        text.startswith("line 9: no placement within the bounds keeps this rapid") for text in summary["warnings"]
-    )
-    assert "line 9: no placement" in capsys.readouterr().out
+    assert any(text.startswith("line 9:") and "rapid moves are out of reach" in text for text in summary["warnings"])
+    assert any("placement has a margin of -" in text and "in line 9" in text for text in summary["warnings"])
+    assert "line 9:" in capsys.readouterr().out
 
 
-def test_a_reference_point_below_reach_is_named_and_left_out(tmp_path):
-    """An ordinary post's program, from a user: G28 to 0, 0, 0 of the machine, whose end alone a tool cannot reach."""
-    tools = tmp_path / "bracket.tbl"
-    tools.write_text("T1 P1 D12 Z120\nT2 P2 D8.5 Z150\n")
-    command = ["place", str(Path(__file__).with_name("bracket.nc")), "--tools", str(tools), "--out", str(tmp_path)]
-    assert main([*command, "--x=-50:50", "--y=-50:50", "--z", "700:900", "--no-plots"]) == 0
-    summary = json.loads((tmp_path / "placement.json").read_text())
-    assert summary["search"]["rapids_left_out"] == [14, 149, 150]
-
-
-def test_where_two_rapids_exclude_each_other_the_error_names_what_failed():
-    """One passes a slab where X is above 0, the other where it is below; each can be kept alone."""
-    text = "G21 G90 F500\nG0 X0 Y0 Z50\nG1 Z0\nG1 X20\nG0 X0 Z50\nG53 G0 Z1150\nG53 G0 Z1300\nM2\n"
-
-    def read(origin):
-        return parse_program(text, "slabs.nc", origin=origin)
-
-    slabs = (
-        KeepOut("left", (-2000, -2000, 1100), (10, 2000, 1120)),
-        KeepOut("right", (-10, -2000, 1200), (2000, 2000, 1220)),
-    )
-    path = work_path(read(PRESENT), STEP, TANGENTIAL, PRESENT, read)
-    bounds = Bounds(np.array([-0.2, 0, 0.8, 0, 0, 0]), np.array([0.2, 0, 0.8, 0, 0, 0]))
-    with pytest.raises(UnreachableError, match=r"the rapid of line [67] runs [1-9][\d.]* mm deep into the keep-out"):
-        search_placements(
-            Search(MODEL, path, TANGENTIAL, bounds, SearchRules(keepouts=slabs), present=np.array(PRESENT))
-        )
+def test_a_homing_rapid_through_a_keep_out_is_named(tmp_path):
+    part = tmp_path / "slab.nc"
+    part.write_text("G21 G90 F500\nG0 X0 Y0 Z50\nG1 Z0\nG1 X20\nG0 X0 Z50\nG53 G0 Z1150\nM2\n")
+    command = ["place", str(part), "--x", "0", "--y", "0", "--z", "800", "--rotate", "0", "--no-plots"]
+    assert main([*command, "--keep-out", "slab:-99,-99,1000,99,99,1100", "--out", str(tmp_path / "out")]) == 0
+    summary = json.loads((tmp_path / "out/placement.json").read_text())
+    words = "the recommended placement runs 50.0 mm deep into the keep-out slab in line 6"
+    assert any(text.startswith(words) for text in summary["warnings"])
 
 
 @pytest.mark.parametrize("margin", [0.01, 0.2])
@@ -295,12 +226,12 @@ def test_within_two_thousandths_of_brute_force_with_polish(name, objective, tilt
     """6,000 placements at random, of which the best in several places are polished by scipy's simplex search."""
     from scipy.optimize import minimize
 
-    path = representative_path(work_path(program_of(name), 5e-3, TANGENTIAL, PRESENT), 60)
+    path = representative_path(work_path(program_of(name), 5e-3, TANGENTIAL), 60)
     lean = np.radians(tilt)
     bounds = Bounds(np.array([-0.3, -0.3, 0.4, -lean, -lean, 0]), np.array([0.3, 0.3, 1.25, lean, lean, 2 * np.pi]))
     evaluator, rules, goal = (
         Evaluator(MODEL, path, TANGENTIAL, 1000.0),
-        PlacementRules(0.01),
+        SearchRules(margin=0.01),
         Goal(OBJECTIVES[objective], NO_FLOORS),
     )
 
@@ -328,12 +259,12 @@ def test_within_two_thousandths_of_brute_force_with_polish(name, objective, tilt
 
 def test_a_long_path_is_climbed_on_what_decides(monkeypatch):
     """With every path long, the recommendation is that of the climb on all samples, within two thousandths."""
-    from toolpath_stiff.placement import ascents, search
+    from toolpath_stiff.placement import search
 
     program, goal = program_of("pocket"), Goal(OBJECTIVES["balanced"], NO_FLOORS)
     bounds = Bounds(np.array([-0.1, -0.1, 0.9, 0, 0, 0.3]), np.array([0.1, 0.1, 1.2, 0, 0, 0.3]))
     whole = searched(program, bounds)
-    monkeypatch.setattr(ascents, "SHORT", 0)
+    monkeypatch.setattr(search, "SHORT", 0)
     monkeypatch.setattr(search, "WHOLE_POSES", 0)
     long = searched(program, bounds)
     value, wanted = (float(goal.value(found.best_figures)[0]) for found in (long, whole))
@@ -343,12 +274,12 @@ def test_a_long_path_is_climbed_on_what_decides(monkeypatch):
 
 def test_a_search_asks_no_compiled_kernel(monkeypatch):
     """It amplifies the last digit: with and without numba it has to be the same kernel."""
-    from toolpath_stiff.stiffness import compiled
+    from toolpath_stiff.stiffness import core
 
     def never(*_, **__):
         raise AssertionError("compiled")
 
-    monkeypatch.setattr(compiled, "compliance_along_columns", never)
+    monkeypatch.setattr(core, "compiled_columns", never)
     monkeypatch.setattr("toolpath_stiff.stiffness.core.COMPILED_FROM", 200)
     here = np.array(PRESENT)
     searched(program_of("inch_bracket"), Bounds(here, here + 0.1 * np.eye(6)[2]))
@@ -358,9 +289,9 @@ def test_a_climb_ends_no_lower_than_nelder_mead():
     """An independent way up, scipy's simplex search from the same place: each may end on another kink, within 1 %."""
     from scipy.optimize import minimize
 
-    path = representative_path(work_path(program_of("pocket"), 5e-3, TANGENTIAL, PRESENT), 150)
+    path = representative_path(work_path(program_of("pocket"), 5e-3, TANGENTIAL), 150)
     evaluator = Evaluator(MODEL, path, TANGENTIAL, 1000.0)
-    climber = Climber(evaluator, README_BOUNDS, PlacementRules(0.01))
+    climber = Climber(evaluator, README_BOUNDS, SearchRules(margin=0.01))
     goal = Goal(OBJECTIVES["balanced"], NO_FLOORS)
     for first in ([0.1, 0.05, 0.9, 0, 0, 1.0], [-0.05, 0.1, 1.0, 0, 0, 4.0]):
         ours = climber.climb(np.array([first], dtype=float), goal, 40)[0]
@@ -371,80 +302,6 @@ def test_a_climb_ends_no_lower_than_nelder_mead():
         start = README_BOUNDS.unit(np.array([first], dtype=float))[0]
         theirs = minimize(loss, start, method="Nelder-Mead", options={"maxfev": 500})
         assert goal.value(evaluator.figures(ours[None]))[0] / 1e6 >= -0.99 * theirs.fun
-
-
-SEARCH = ["--x=-100:100", "--y=-100:100", "--z", "700:1100", "--step", "5", "--points", "12", "--no-plots"]
-
-
-@pytest.fixture(scope="module")
-def searched_folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("earlier")
-    shutil.copy(ROOT / "programs/pocket.nc", folder / "part.nc")
-    with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()):
-        assert main(["place", "part.nc", *SEARCH, "--out", "out"]) == 0
-    return folder
-
-
-@pytest.fixture
-def earlier(searched_folder, tmp_path, monkeypatch):
-    """A folder of one's own with the search in it; the search is made once."""
-    shutil.copytree(searched_folder, tmp_path / "copy")
-    monkeypatch.chdir(tmp_path / "copy")
-    return json.loads(Path("out/placement.json").read_text())
-
-
-def test_pick_takes_a_point_of_the_front_without_a_search(earlier, monkeypatch, capsys):
-    from toolpath_stiff.placement import search as placement
-
-    def never(*_, **__):
-        raise AssertionError("searched again")
-
-    monkeypatch.setattr(placement, "search_placements", never)
-    number = 1 if earlier["recommended"]["number"] != 1 else 2
-    command = ["place", "part.nc", *SEARCH, "--out", "out", "--pick", str(number), "--write", "placed.nc"]
-    assert main([*command, "--decimals", "7"]) == 0
-    summary = json.loads(Path("out/placement.json").read_text())
-    row = earlier["front"][number - 1]
-    assert summary["picked"] and summary["chosen"]["number"] == number
-    assert summary["front"] == earlier["front"] and summary["recommended"] == earlier["recommended"]
-    assert f"Z{row['z_mm']:.4f}".rstrip("0").rstrip(".") in summary["offset_blocks"]["linuxcnc"]
-    again = analyze(NIST, parse_program(Path("placed.nc").read_text(), "placed.nc"), origin=PRESENT, step=5e-3)
-    assert headline_figures(again)["mean_N_per_mm"] == pytest.approx(row["mean_N_per_mm"], rel=1e-6)
-    printed = capsys.readouterr().out
-    assert f"placement {number} of {len(earlier['front'])}, picked" in printed
-    # From the picked one's own folder another may be picked.
-    assert main(["place", "part.nc", *SEARCH, "--out", "out", "--pick", str(earlier["recommended"]["number"])]) == 0
-    back = json.loads(Path("out/placement.json").read_text())
-    assert back == earlier
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (["--pick", "99"], "--pick 99"),
-        (["--pick", "0"], "--pick 0"),
-        (["--pick", "2", "--margin", "2"], "differs in --margin"),
-        (["--pick", "2", "--objective", "mean"], "differs in --objective"),
-        (["--pick", "2", "--x=-50:50"], "differs in --x"),
-        (["--pick", "2", "--origin", "0,0,850"], "differs in --origin"),
-        (["--pick", "2", "--machine", "softer.toml"], "differs in machine"),
-    ],
-)
-def test_pick_refuses_another_search(earlier, capsys, change, words):
-    toml = (ROOT / "toolpath_stiff/data/machines/nist.toml").read_text()
-    Path("softer.toml").write_text(toml.replace("[46.5, 32.5]", "[46.0, 32.0]"))
-    before = Path("out/placement.json").read_bytes()
-    assert main(["place", "part.nc", *SEARCH, "--out", "out", *change]) == 2
-    assert words in capsys.readouterr().err
-    assert Path("out/placement.json").read_bytes() == before
-
-
-def test_pick_refuses_a_changed_program(earlier, capsys):
-    text = Path("part.nc").read_text()
-    Path("part.nc").write_text(text.replace("X60. Y30.", "X60. Y30. (CHANGED)"))
-    assert Path("part.nc").read_text() != text
-    assert main(["place", "part.nc", *SEARCH, "--out", "out", "--pick", "1"]) == 2
-    assert "differs in program" in capsys.readouterr().err
 
 
 def test_a_program_that_only_plunges_says_so(tmp_path, capsys):

@@ -165,7 +165,9 @@ def test_a_machine_with_effects_shows_them_in_the_load_path():
         EffectEntry("spindle_compliance", {"radial_nm_per_N": 8.0, "axial_nm_per_N": 2.0}),
     )
     found = compare(load_machine("nist").with_changes(effects=entries), table_1(), draws=100)
-    assert found.shares.links[:6] == tuple(f"strut {i}" for i in range(1, 7))
-    assert len(found.shares.links) == 8
+    assert tuple(found.shares)[:6] == tuple(f"strut {i}" for i in range(1, 7))
+    assert len(found.shares) == 8
     # The table is 5, 4, 3 nm/N soft along X, Y, Z whatever the pose, the upright spindle 8, 8, 2.
-    assert found.shares.compliance[:, 6:] * 1e9 == pytest.approx(np.array([[5.0, 8.0], [4.0, 8.0], [3.0, 2.0]]))
+    assert np.array([*found.shares.values()]).T[:, 6:] * 1e9 == pytest.approx(
+        np.array([[5.0, 8.0], [4.0, 8.0], [3.0, 2.0]])
+    )

@@ -5,7 +5,7 @@ import copy
 import pytest
 
 from tests.report.factory import make_analysis, short, spiral
-from toolpath_stiff.analysis.document import compare_summaries
+from toolpath_stiff.analysis.results import compare_summaries
 from toolpath_stiff.documents import number
 from toolpath_stiff.report.analysis import MOST_OPERATIONS, terminal_text
 from toolpath_stiff.report.analysis_tables import comparison

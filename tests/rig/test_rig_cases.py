@@ -15,7 +15,7 @@ from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import Nuisances, disturb_readings
 from toolpath_stiff.rig.nominal import load_nominal, reachable
 from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
-from toolpath_stiff.rig.sizes import NuisanceCovariance
+from toolpath_stiff.rig.sizes import whitened_length
 
 NIST = load_nominal("nist")
 
@@ -128,7 +128,7 @@ def test_whitened_length_against_the_dense_covariance():
     dense = 0.02**2 * np.eye(100) + 0.01**2 * (clamps[:, None] == clamps) + spread @ spread.T
     expected = np.sqrt(x @ np.linalg.solve(dense, x))
     # The dense matrix has a condition number of 1e6.
-    assert NuisanceCovariance(clamps, spread, Nuisances()).length(x) == pytest.approx(expected, rel=1e-8)
+    assert whitened_length(clamps, spread, Nuisances())(x) == pytest.approx(expected, rel=1e-8)
 
 
 def test_strut_spread_and_joint_errors_over_many_machines():

@@ -613,7 +613,8 @@ def test_the_journey_by_keyboard(running, browser, tmp_path, monkeypatch, capsys
         keys.press("Enter")
     plan.value.save_as(tmp_path / "plan.csv")
     exercise = tps.Case.open(running.folder).state.exercise
-    rig.measure_again(running.folder / exercise, str(tmp_path / "plan.csv"), str(tmp_path / "measured.csv"), 1)
+    text, _ = rig.measured_again(running.folder / exercise, str(tmp_path / "plan.csv"), 1)
+    (tmp_path / "measured.csv").write_text(text)
     keys.add(tmp_path / "measured.csv")
     tab.until("!document.querySelector('#machine-name').textContent.includes('42 readings')")
     keys.stop()  # nothing here hangs on the new diagnosis

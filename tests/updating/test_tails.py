@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from toolpath_stiff.inference.tails import surprise
+from toolpath_stiff.inference.gates import surprise
 
 
 def test_surprise_is_the_tail_of_chi_square_even_where_it_underflows():

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -23,6 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_POINTS = 5_000_000
+COLUMNS = ("x_mm", "y_mm", "z_mm", "stiffness_N_per_mm", "reachable")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -50,8 +49,8 @@ class StiffnessMap(FolderResult):
     [800.0, 1200.0]
     >>> found.to_frame().columns.tolist(), len(found.to_frame())
     (['x_mm', 'y_mm', 'z_mm', 'stiffness_N_per_mm', 'reachable'], 50)
-    >>> [plane["x_mm"].size for plane in found.columns()]
-    [25, 25]
+    >>> found.columns()["x_mm"].size
+    50
     >>> type(found.plot()).__name__
     'Figure'
     """
@@ -70,51 +69,36 @@ class StiffnessMap(FolderResult):
     inputs: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Extremes of each plane, and of a circle about the machine axis where the planes hold one: `map.json`."""
+        """Extremes of each plane: `map.json`."""
         return {
             "machine": self.model.machine.name,
             "load": str(self.load),
             "abc_deg": [deg_from_rad(v) for v in self.abc],
             "points": int(self.stiffness.size),
-            "slices": self._slices,
+            "slices": [self._slice(i) for i in range(len(self.z))],
             **effects_stated(self.model),
             "warnings": condition_warnings(self.model),
         }
 
-    @cached_property
-    def _slices(self) -> list[Document]:
-        return [self._slice(i) for i in range(len(self.z))]
-
     def _slice(self, i: int) -> Document:
-        height, layer = float(self.z[i]), n_per_mm_from_n_per_m(self.stiffness[i])
-        row: dict[str, object] = {"z_mm": mm_from_m(height), "reachable_share": float(self.reachable[i].mean())}
-        for name, extreme in (("softest", np.nanargmin), ("stiffest", np.nanargmax)) if self.reachable[i].any() else ():
+        layer, reachable = n_per_mm_from_n_per_m(self.stiffness[i]), self.reachable[i]
+        row: dict[str, object] = {"z_mm": mm_from_m(float(self.z[i])), "reachable_share": float(reachable.mean())}
+        for name, extreme in (("softest", np.nanargmin), ("stiffest", np.nanargmax)) if reachable.any() else ():
             j, k = divmod(int(extreme(layer)), len(self.x))
             place = {"x_mm": mm_from_m(float(self.x[k])), "y_mm": mm_from_m(float(self.y[j]))}
             row[name] = {**place, "stiffness_N_per_mm": float(layer[j, k])}
-        radius = float(min(-self.x[0], self.x[-1], -self.y[0], self.y[-1]))
-        if self.reachable[i].any() and radius > 0.0 and not any(self.abc):
-            turns = turning_points(self.model, radius, height, self.load)
-            angles = {f"{k}_deg": [round(deg_from_rad(v), 2) for v in angles] for k, angles in turns.items()}
-            row["circle"] = {"radius_mm": mm_from_m(radius), **angles}
         return row
 
-    def columns(self) -> Iterator[dict[str, AnyArray]]:
+    def columns(self) -> dict[str, AnyArray]:
         """Column of `map.csv` -> values, plane by plane."""
-        ys, xs = np.meshgrid(mm_from_m(self.y), mm_from_m(self.x), indexing="ij")
-        for i, height in enumerate(self.z):
-            yield {
-                "x_mm": xs.ravel(),
-                "y_mm": ys.ravel(),
-                "z_mm": np.full(xs.size, mm_from_m(float(height))),
-                "stiffness_N_per_mm": n_per_mm_from_n_per_m(self.stiffness[i].ravel()),
-                "reachable": self.reachable[i].ravel(),
-            }
+        zs, ys, xs = np.meshgrid(mm_from_m(self.z), mm_from_m(self.y), mm_from_m(self.x), indexing="ij")
+        stiffness = n_per_mm_from_n_per_m(self.stiffness)
+        values = (xs, ys, zs, stiffness, self.reachable)
+        return {name: column.ravel() for name, column in zip(COLUMNS, values, strict=True)}
 
     def to_frame(self) -> pd.DataFrame:
         """One row a point of the grid: x_mm, y_mm, z_mm, stiffness_N_per_mm (nan out of reach), reachable."""
-        planes = list(self.columns())
-        return frame_of({name: np.concatenate([plane[name] for plane in planes]) for name in planes[0]})
+        return frame_of(self.columns())
 
     def _short(self) -> str:
         return f"{self.model.machine.name}, load {self.load}, {self.stiffness.size} points"
@@ -185,26 +169,3 @@ def map_stiffness(
     return StiffnessMap(
         model, xs, ys, zs, evaluation.stiffness.reshape(shape), evaluation.reachable.reshape(shape), load, abc
     )
-
-
-def around_axis(model: StiffnessModel, radius: float, height: float, load: Load, angles: FloatArray) -> FloatArray:
-    """Stiffness N/m on a circle about the machine axis at angles (n,) rad; nan where out of reach."""
-    position = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(len(angles), height)])
-    zeros = np.zeros_like(position)
-    return evaluate(model, position, zeros, zeros, load=load).stiffness
-
-
-def turning_points(model: StiffnessModel, radius: float, height: float, load: Load) -> dict[str, list[float]]:
-    """Angles in rad of the maxima and minima on a circle about the machine axis, to a hundredth of a degree.
-
-    Where the whole circle varies by less than a millionth there are none.
-    """
-    angles = np.linspace(0.0, 2.0 * np.pi, 36000, endpoint=False)
-    values = around_axis(model, radius, height, load, angles)
-    if np.isnan(values).any() or np.ptp(values) < 1e-6 * values.mean():
-        return {"maxima": [], "minima": []}
-    before, after = np.roll(values, 1), np.roll(values, -1)
-    return {
-        "maxima": [float(a) for a in angles[(values > before) & (values >= after)]],
-        "minima": [float(a) for a in angles[(values < before) & (values <= after)]],
-    }

@@ -22,7 +22,6 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # Below this sine of the angle between motion and tool axis (0.06 degrees) "sideways" has no meaning.
 ALONG_AXIS = 1e-3
 
-ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"
 BLOCK = 16_384  # samples at a time: nine numbers for each
 
 
@@ -49,11 +48,9 @@ def parse_load(text: str) -> Load:
         vector = np.array([])
     if vector.shape != (3,) or not np.isfinite(vector).all() or not np.abs(vector).max() > 0.0:
         raise InputError(
-            f"load {text!r} is not a direction",
-            expected=f"one of {', '.join(LOADS)}, or DX,DY,DZ such as 1,0,-0.5",
+            f"load {text!r} is not a direction", expected=f"one of {', '.join(LOADS)}, or DX,DY,DZ such as 1,0,-0.5"
         )
-    vector = vector / np.abs(vector).max()
-    x, y, z = (float(v) for v in vector / np.linalg.norm(vector))
+    x, y, z = (vector / np.linalg.norm(vector)).tolist()
     return Load("fixed", (x, y, z))
 
 
@@ -107,7 +104,9 @@ def geometric_directions(
     if load.kind == "softest":
         return np.full((n, 3), np.nan), ~everywhere
     if load.kind == "radial":
-        return _radial(position), everywhere
+        across = -position * np.array([1.0, 1.0, 0.0])
+        radius = np.linalg.norm(across, axis=1, keepdims=True)
+        return np.where(radius < 1e-9, AXES["x"], across / np.maximum(radius, 1e-9)), everywhere
     axis = np.broadcast_to(np.array(AXES["z"]), (n, 3)) if rotation is None else rotation[:, :, 2]
     if load.kind == "axial":
         return axis, everywhere
@@ -116,14 +115,6 @@ def geometric_directions(
         sine = np.linalg.norm(sideways, axis=1)
         return sideways / np.where(sine > 0.0, sine, 1.0)[:, None], sine >= ALONG_AXIS
     return tangent, np.any(tangent != 0.0, axis=1)
-
-
-def _radial(position: FloatArray) -> FloatArray:
-    radius = np.hypot(position[:, 0], position[:, 1])
-    directions = -position / np.maximum(radius, 1e-9)[:, None]
-    directions[:, 2] = 0.0
-    directions[radius < 1e-9] = AXES["x"]
-    return directions
 
 
 def principal_directions(compliance: FloatArray, softest: bool = True) -> FloatArray:
@@ -158,38 +149,16 @@ def along_tool_axis(tangent: FloatArray, abc: FloatArray) -> BoolArray:
 
 
 def plunging_rows(load: Load, tangent: FloatArray, abc: FloatArray, counted: BoolArray) -> BoolArray:
-    """(n,) the counted samples of plunges; none where the load does not follow the motion. As `headline_rows`."""
+    """(n,) the counted samples of plunges; none where the load does not follow the motion."""
     if load.kind != "tangential":
         return np.zeros(len(counted), dtype=bool)
     return np.asarray(counted & along_tool_axis(tangent, abc))
 
 
-def headline_rows(load: Load, tangent: FloatArray, abc: FloatArray, counted: BoolArray) -> BoolArray:
-    """(n,) the counted samples that mean, range and weakest place of a path are about.
+def headline_rows(counted: BoolArray, plunging: BoolArray) -> BoolArray:
+    """(n,) the counted samples that mean, range and weakest place are about: of a path, or of a part of it.
 
-    Those across the tool axis under a load that follows the motion; all of them under another load, and of a program
-    that only plunges.
-
-    Parameters
-    ----------
-    load
-        Direction of the load.
-    tangent, abc
-        (n, 3) and (n, 3) as in `along_tool_axis`.
-    counted
-        (n,) the samples of the statistics.
+    Those that do not plunge; all of them where every one does.
     """
-    return headline_of(counted, plunging_rows(load, tangent, abc, counted))
-
-
-def headline_of(counted: BoolArray, plunging: BoolArray) -> BoolArray:
-    """(n,) the counted samples that do not plunge; all of them where every one does. Also of a part of a path."""
     across = counted & ~plunging
     return np.asarray(across if across.any() else counted)
-
-
-def headline_words(load: Load, counted: BoolArray, plunging: BoolArray) -> str:
-    """What the headline figures of these samples (n,) are about: `ACROSS`, `PLUNGES_ONLY` or `ALL_CUTS`."""
-    if load.kind != "tangential" or not counted.any():
-        return ALL_CUTS
-    return PLUNGES_ONLY if plunging[counted].all() else ACROSS

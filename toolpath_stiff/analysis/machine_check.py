@@ -11,7 +11,6 @@ from toolpath_stiff.analysis.poses import PoseStiffness, evaluate_poses
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
-from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
@@ -109,14 +108,20 @@ def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
         Its effects give no stiffness at the neutral pose or the default origin.
     """
     machine = model.given or model.machine
-    neutral, origin = (_at(model, pose) for pose in (machine.limits.neutral_pose, machine.default_origin))
+    neutral, origin = (
+        evaluate_poses(model, np.array([pose[:3]]), np.array([pose[3:]]))
+        for pose in (machine.limits.neutral_pose, machine.default_origin)
+    )
     wrong = _struts(machine)
     for name, report in (("neutral pose", neutral), ("default origin", origin)):
         if not report.reach.reachable[0]:
             wrong.append(f"the {name} is out of reach: {report.reach.describe(0)}")
     doubtful = _odd_struts(neutral.strut_lengths[0])
     if neutral.reach.reachable[0]:
-        doubtful += _stiffness(neutral)
+        softest = n_per_um_from_n_per_m(float(neutral.softest_stiffness[0]))
+        if not ROBOT <= softest <= BEYOND:
+            beside = "less than a robot arm has" if softest < ROBOT else "more than any machine tool has"
+            doubtful.append(f"at the neutral pose the softest direction has {softest:.3g} N/um at the tool, {beside}")
     if neutral.extrapolated[0]:
         lengths = ", ".join(f"{mm_from_m(float(v)):.0f}" for v in neutral.strut_lengths[0])
         doubtful.append(f"at the neutral pose the struts ({lengths} mm) lie outside the lengths of [strut_law]")
@@ -127,16 +132,15 @@ def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
     return MachineCheck(file, model, wrong, doubtful, neutral, origin)
 
 
-def _at(model: StiffnessModel, pose: Pose) -> PoseStiffness:
-    values = np.array([pose])
-    return evaluate_poses(model, values[:, :3], values[:, 3:])
-
-
 def _struts(machine: Hexapod) -> list[str]:
-    """Stiffnesses of a strut that no strut has, at the lengths that the file gives, else at the ends of the travel."""
-    law = machine.strut_law
-    ends = [(x, float(law.stiffness(np.array(x)))) for x in machine.limits.strut_length if np.isfinite(x)]
-    return _implausible("[strut_law]", law.points) or _implausible("the strut law at an end of the travel", ends)
+    """Stiffnesses of a strut that no strut has, at the lengths that the file gives."""
+    struts = [(mm_from_m(length), n_per_um_from_n_per_m(stiffness)) for length, stiffness in machine.strut_law.points]
+    return [
+        f"[strut_law]: a strut of {length:g} mm with {value:g} N/um; expected {STRUT_SOFTEST:g} to "
+        f"{STRUT_STIFFEST:g} N/um; is it in {'N/mm' if value > STRUT_STIFFEST else 'kN/um'}?"
+        for length, value in struts
+        if not STRUT_SOFTEST <= value <= STRUT_STIFFEST
+    ]
 
 
 def _odd_struts(lengths: FloatArray) -> list[str]:
@@ -149,21 +153,3 @@ def _odd_struts(lengths: FloatArray) -> list[str]:
         f"{mm_from_m(usual):.0f} mm: is a sign of one of its joints flipped, or are two numbers exchanged?"
         for i in (odd if len(odd) <= MOST_ODD else [])
     ]
-
-
-def _implausible(where: str, struts: list[tuple[float, float]]) -> list[str]:
-    values = [(mm_from_m(length), n_per_um_from_n_per_m(stiffness)) for length, stiffness in struts]
-    return [
-        f"{where}: a strut of {length:g} mm with {value:g} N/um; expected {STRUT_SOFTEST:g} to {STRUT_STIFFEST:g} N/um"
-        + ("; is it in N/mm?" if value > STRUT_STIFFEST else "; is it in kN/um?")
-        for length, value in values
-        if not STRUT_SOFTEST <= value <= STRUT_STIFFEST
-    ]
-
-
-def _stiffness(report: PoseStiffness) -> list[str]:
-    softest = n_per_um_from_n_per_m(float(report.softest_stiffness[0]))
-    if ROBOT <= softest <= BEYOND:
-        return []
-    beside = "less than a robot arm has" if softest < ROBOT else "more than any machine tool has"
-    return [f"at the neutral pose the softest direction has {softest:.3g} N/um at the tool, {beside}"]

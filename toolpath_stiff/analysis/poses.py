@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.evaluation import refuse_no_number
+from toolpath_stiff.analysis.evaluation import compliance_along, tip_compliances
 from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
@@ -19,14 +19,13 @@ from toolpath_stiff.machine.limits import Reach, reach
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
 
-DECIMALS: dict[str, int | None] = {"extrapolated": None, "margin_limit": None}  # a whole number, a word
+AS_IT_IS = ("extrapolated", "margin_limit")  # a whole number, a word
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
 
@@ -137,7 +136,8 @@ class PoseStiffness(Result):
 
     def csv(self) -> str:
         """The table as the command writes it."""
-        decimals = {name: DECIMALS.get(name, 4 if name.endswith("N_per_mm") else 6) for name in self.columns}
+        places = ((name, 4 if name.endswith("N_per_mm") else 6) for name in self.columns)
+        decimals = {name: None if name in AS_IT_IS else digits for name, digits in places}
         return ",".join(decimals) + "\n" + csv_rows(self.columns, decimals)
 
     def __str__(self) -> str:
@@ -152,48 +152,30 @@ class PoseStiffness(Result):
 
 
 def evaluate_poses(
-    model: StiffnessModel,
-    position: FloatArray,
-    abc: FloatArray,
-    tool_length: float = np.nan,
-    force: float = defaults.FORCE,
+    model: StiffnessModel, position: FloatArray, abc: FloatArray, force: float = defaults.FORCE
 ) -> PoseStiffness:
-    """Evaluate n poses: position (n, 3) m, abc (n, 3) rad; `tool_length` in m (nan: the reference tool)."""
-    rotation = rotation_matrices(abc)
-    struts = solve_struts(model.machine, position, rotation, tool_length)
-    stand = reach(model.machine, position, struts, rotation)
-    n, within = len(position), stand.reachable
-    tip, turn = position[within], rotation[within]
-    compliance = core.tip_compliance(model, tip, turn, tool_length, force)
-    refuse_no_number(model.machine, tip, np.isnan(compliance[:, 0, 0]))
+    """Evaluate n poses: position (n, 3) m, abc (n, 3) rad."""
+    poses = (position, rotation_matrices(abc), np.nan)
+    lengths, extrapolated, stand, compliance = tip_compliances(model, poses, force)
+    soft, stiff = (principal_directions(compliance, softest) for softest in (True, False))
 
     def along(direction: FloatArray) -> FloatArray:
-        if model.load_dependent:
-            return core.compliance_along(model, direction, tip, turn, tool_length, force)
-        return np.asarray(np.einsum("ni,nij,nj->n", direction, compliance, direction))
-
-    soft, stiff = (principal_directions(compliance, which) for which in (True, False))
-    axes = [along(np.broadcast_to(axis, (len(tip), 3))) for axis in np.eye(3)]
-
-    def spread(values: FloatArray) -> FloatArray:
-        full = np.full((n, *values.shape[1:]), np.nan)
-        full[within] = values
-        return full
+        return np.asarray(1.0 / compliance_along(model, direction, compliance, poses, force))
 
     return PoseStiffness(
         model=model,
-        along_axes=spread(1.0 / np.stack(axes, axis=1)),
-        softest=spread(soft),
-        softest_stiffness=spread(1.0 / along(soft)),
-        stiffest=spread(stiff),
-        stiffest_stiffness=spread(1.0 / along(stiff)),
-        strut_lengths=struts.lengths,
-        extrapolated=np.asarray(model.machine.strut_law.extrapolates(struts.lengths).any(axis=1)),
+        along_axes=np.stack([along(np.broadcast_to(axis, position.shape)) for axis in np.eye(3)], axis=1),
+        softest=soft,
+        softest_stiffness=along(soft),
+        stiffest=stiff,
+        stiffest_stiffness=along(stiff),
+        strut_lengths=lengths,
+        extrapolated=extrapolated,
         reach=stand,
     )
 
 
-RAY_STEP, RAY_END, RAY_EXACT = 0.05, 5.0, 1e-4  # m: marching out, at most so far, and how exact the end is
+RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and how many: each goes on where the one before found a limit
 
 
 def reach_along(machine: Hexapod, start: FloatArray, directions: FloatArray, turn: FloatArray) -> FloatArray:
@@ -201,18 +183,11 @@ def reach_along(machine: Hexapod, start: FloatArray, directions: FloatArray, tur
 
     `turn` (3, 3) is the orientation, which is kept. 0 where the place itself is out of reach.
     """
-
-    def inside(lengths: FloatArray) -> BoolArray:
-        tips = start + lengths[:, None] * directions
+    length = np.zeros(len(directions))
+    for step, count in RAY_STEPS:
+        tried = length[:, None] + step * np.arange(count + 1)
+        tips = (start + tried[:, :, None] * directions[:, None]).reshape(-1, 3)
         turns = np.broadcast_to(turn, (len(tips), 3, 3))
-        return np.asarray(reach(machine, tips, solve_struts(machine, tips, turns), turns).reachable)
-
-    steps = np.arange(0.0, RAY_END, RAY_STEP)
-    good = np.stack([inside(np.full(len(directions), step)) for step in steps], axis=1)
-    first = np.where(good.all(axis=1), len(steps), np.argmin(good, axis=1))
-    low, high = np.maximum(first - 1, 0) * RAY_STEP, first * RAY_STEP
-    for _ in range(int(np.ceil(np.log2(RAY_STEP / RAY_EXACT)))):
-        middle = 0.5 * (low + high)
-        within = inside(middle)
-        low, high = np.where(within, middle, low), np.where(within, high, middle)
-    return np.where(first > 0, low, 0.0)
+        good = reach(machine, tips, solve_struts(machine, tips, turns), turns).reachable.reshape(tried.shape)
+        length += step * np.where(good.all(axis=1), count, np.maximum(good.argmin(axis=1) - 1, 0))
+    return length

@@ -1,4 +1,4 @@
-"""Checks of a program before any stiffness: extents, lengths, times, arcs, reach and strut speeds."""
+"""Checks of a program before any stiffness: extents, lengths, times, reach and strut speeds."""
 
 from __future__ import annotations
 
@@ -9,59 +9,42 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.evaluation import other_poses
-from toolpath_stiff.analysis.statistics import operation_heading, rows_of_parts
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.analysis.evaluation import evaluate
+from toolpath_stiff.analysis.loads import Load
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.checking import ERROR, WARNING, Finding, UsedCode, check, in_order
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
-from toolpath_stiff.nc.operations import operations
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.path.placing import place
-from toolpath_stiff.path.sampling import BLOCK, Samples, move_durations, sample_moves
+from toolpath_stiff.path.sampling import move_durations, sample_moves
 from toolpath_stiff.results import Result, frame_of
-from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, mm_per_min_from_m_per_s
+from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RADII_APART = m_from_mm(2e-3)  # what rounding I, J, K, X, Y to 0.001 mm explains, and a little more
 MOST_NAMED = 20  # lines named for one kind of finding
 Extents = dict[str, list[float]]
 
 
-@dataclass(frozen=True)
-class Figures:
-    """Extents of the tip in program coordinates of G54, lengths and times of some moves."""
-
-    extents_mm: Extents
-    extents_deg: Extents
-    extents_with_rapids_mm: Extents
-    lengths_mm: dict[str, float]
-    times_s: dict[str, float]
-
-
-def figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> Figures:
-    """Extents, lengths and times of moves; rapids at `rapid_feed`, m/s."""
+def figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> dict[str, dict[str, Any]]:
+    """Extents of the cuts in program coordinates of G54, lengths and times of moves; rapids at `rapid_feed`, m/s."""
     cutting = moves.motion != RAPID
-    length, duration = move_lengths(moves), move_durations(moves, rapid_feed)
+    length, duration, ends = move_lengths(moves), move_durations(moves, rapid_feed), extents(moves.take(cutting))
     parts = (("cutting", cutting), ("rapid", ~cutting))
     lengths = {name: mm_from_m(float(length[rows].sum())) for name, rows in parts}
     times = {name: float(duration[rows].sum()) for name, rows in parts} | {"dwell": float(moves.dwell.sum())}
-    cuts, everything = extents(moves.take(cutting)), extents(moves)
-    return Figures(
-        {axis: cuts[axis] for axis in "xyz" if cuts},
-        {axis: cuts[axis] for axis in "abc" if cuts},
-        {axis: everything[axis] for axis in "xyz" if everything},
-        {**lengths, "total": sum(lengths.values())},
-        {**times, "total": sum(times.values())},
-    )
+    return {
+        "extents_mm": {axis: ends[axis] for axis in "xyz" if ends},
+        "extents_deg": {axis: ends[axis] for axis in "abc" if ends},
+        "lengths_mm": {**lengths, "total": sum(lengths.values())},
+        "times_s": {**times, "total": sum(times.values())},
+    }
 
 
 def extents(moves: Moves) -> Extents:
@@ -93,109 +76,31 @@ def _arc_extremes(arcs: Moves) -> FloatArray:
     return np.concatenate(points)
 
 
-def radii_findings(moves: Moves) -> list[Finding]:
-    """Arcs whose end lies off the circle of their start by more than rounding."""
-    arcs = moves.take(moves.arc_sweep != 0.0)
-    frame = arc_frame(arcs, np.arange(len(arcs)))
-    bad = np.flatnonzero(np.abs(frame.radius_end - frame.radius_start) > RADII_APART)
-    findings = []
-    for i in bad[:MOST_NAMED]:
-        first, last = mm_from_m(float(frame.radius_start[i])), mm_from_m(float(frame.radius_end[i]))
-        text = f"the arc's radius is {first:.4f} mm at its start and {last:.4f} mm at its end"
-        findings.append(Finding(int(arcs.line[i]), 0, "arc radii", text, WARNING))
-    return findings + _rest("arc radii", len(bad))
+def machine_findings(program: ReadProgram, machine: Hexapod, step: float) -> tuple[list[Finding], dict[str, float]]:
+    """Moves beyond reach; the largest speed of a strut in a cut at the programmed feeds, with its line.
 
-
-def machine_findings(
-    program: ReadProgram, machine: Hexapod, step: float, speed_limit: float | None
-) -> tuple[list[Finding], dict[str, float]]:
-    """Moves beyond reach, and the struts' speeds (m/s) at the programmed feeds.
-
-    Parameters
-    ----------
-    program, machine
-        The program, where it sits on the machine, and that.
-    step
-        Distance of the samples, m.
-    speed_limit
-        m/s that no strut may exceed in a cut; None: none is known.
-
-    Returns
-    -------
-    findings, and the largest speed of a strut in a cut with its line.
+    The program sits where it was read for; `step` is the distance of the samples, m.
     """
     moves, origin = place(program.moves, program.origin), program.origin
     samples = sample_moves(moves, step=step, rapid_feed=machine.rapid_feed, origin=origin)
-    strut_lengths, within = _struts_and_reach(machine, samples)
-    cutting = samples.motion != RAPID
-    findings = []
-    for line in np.unique(samples.line[~within.reachable])[:MOST_NAMED]:
-        there = np.flatnonzero((samples.line == line) & ~within.reachable)
-        worst = int(there[np.argmin(within.margin[there])])
-        cuts = bool(cutting[there].any())
-        text = f"{'a cutting move' if cuts else 'a rapid'} leaves the machine's reach: {within.describe(worst)}"
-        findings.append(Finding(int(line), 0, "reach", text, ERROR if cuts else WARNING))
-    findings += _rest("reach", len(np.unique(samples.line[~within.reachable])))
-    same = (samples.move[1:] == samples.move[:-1]) & cutting[1:] & (np.diff(samples.t) > 0.0)
-    speed = np.abs(np.diff(strut_lengths, axis=0)[same]) / np.diff(samples.t)[same, None]
-    if not len(speed):
+    poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+    there = evaluate(StiffnessModel(machine), *poses, Load("z"))
+    lines, findings = np.unique(samples.line[~there.reachable]).tolist(), []
+    for line in lines[:MOST_NAMED]:
+        rows = np.flatnonzero((samples.line == line) & ~there.reachable)
+        limit = there.reach.describe(int(rows[np.argmin(there.reach.margin[rows])]))
+        cuts = samples.cutting[rows].any()
+        text = f"{'a cutting move' if cuts else 'a rapid'} leaves the machine's reach: {limit}"
+        findings.append(Finding(line, 0, "reach", text, ERROR if cuts else WARNING))
+    if more := len(lines) - len(findings):
+        findings.append(Finding(0, 0, "reach", f"and {more} more lines leave the machine's reach", WARNING))
+    time = np.diff(samples.t)
+    same = (samples.move[1:] == samples.move[:-1]) & samples.cutting[1:] & (time > 0.0)
+    if not same.any():
         return findings, {}
-    fastest, lines = speed.max(axis=1), samples.line[1:][same]
-    top = int(np.argmax(fastest))
-    if speed_limit is not None:
-        over = np.unique(lines[fastest > speed_limit])
-        for line in over[:MOST_NAMED]:
-            most = mm_per_min_from_m_per_s(float(fastest[lines == line].max()))
-            text = (
-                f"a strut moves at {most:.0f} mm/min at the programmed feed, beyond "
-                f"{mm_per_min_from_m_per_s(speed_limit):.0f} mm/min"
-            )
-            findings.append(Finding(int(line), 0, "strut speed", text, WARNING))
-        findings += _rest("strut speed", len(over))
-    return findings, {"mm_per_min": mm_per_min_from_m_per_s(float(fastest[top])), "line": int(lines[top])}
-
-
-def _struts_and_reach(machine: Hexapod, samples: Samples) -> tuple[FloatArray, Reach]:
-    """(n, 6) m strut lengths of n samples, and their reach; block by block, as work arrays of a long path are large."""
-    other = other_poses(samples.position, samples.abc, samples.tool_length)
-    poses, of_sample = np.flatnonzero(other), np.cumsum(other) - 1
-    n = len(poses)
-    lengths = np.empty((n, 6))
-    margin, limit, value = np.empty(n), np.empty(n, dtype=np.int64), np.empty(n)
-    for start in range(0, n, BLOCK):
-        rows = poses[start : start + BLOCK]
-        here = slice(start, start + BLOCK)
-        position, rotation = samples.position[rows], rotation_matrices(samples.abc[rows])
-        struts = solve_struts(machine, position, rotation, samples.tool_length[rows])
-        within = reach(machine, position, struts, rotation)
-        lengths[here] = struts.lengths
-        margin[here], limit[here], value[here] = within.margin, within.limit, within.value
-    return lengths[of_sample], Reach(margin[of_sample], limit[of_sample], value[of_sample], machine_limits(machine))
-
-
-def _rest(code: str, count: int) -> list[Finding]:
-    if count <= MOST_NAMED:
-        return []
-    return [Finding(0, 0, code, f"and {count - MOST_NAMED} more of the kind {code!r}", WARNING)]
-
-
-@dataclass(frozen=True)
-class ToolRow(Figures):
-    """What a tool does; `remark` is the tool table's."""
-
-    tool: int
-    remark: str
-
-
-@dataclass(frozen=True)
-class OperationRow(Figures):
-    """What an operation does; from its heading to the last line of its moves."""
-
-    operation: int
-    name: str
-    tool: int
-    first_line: int
-    last_line: int
+    speed = (np.abs(np.diff(there.strut_lengths, axis=0)[same]) / time[same, None]).max(axis=1)
+    fastest, top = mm_per_min_from_m_per_s(float(speed.max())), int(np.argmax(speed))
+    return findings, {"mm_per_min": fastest, "line": int(samples.line[1:][same][top])}
 
 
 @dataclass(frozen=True, repr=False)
@@ -210,8 +115,10 @@ class ProgramCheck(Result):
         Whether it was read to its end.
     used, unsupported, findings
         Codes; words not acted upon; errors, warnings and notes, in the order of lines.
-    whole, tools, operations
-        Figures of all moves, of each tool in order of use, of each operation in the order of the run.
+    extents_mm, extents_deg
+        Smallest and largest X, Y, Z and A, B, C of the cuts in program coordinates of G54.
+    lengths_mm, times_s
+        Of cuts, of rapids, together; dwells among the times.
     fastest_strut
         Largest speed of a strut in a cut with its line; empty without a machine.
     modal_start, modal_end
@@ -240,18 +147,17 @@ class ProgramCheck(Result):
     used: tuple[UsedCode, ...]
     unsupported: tuple[Finding, ...]
     findings: tuple[Finding, ...]
-    whole: Figures
-    tools: tuple[ToolRow, ...]
-    operations: tuple[OperationRow, ...]
+    extents_mm: Extents
+    extents_deg: Extents
+    lengths_mm: dict[str, float]
+    times_s: dict[str, float]
     fastest_strut: dict[str, float]
     modal_start: dict[str, str]
     modal_end: dict[str, str]
 
     def to_dict(self) -> dict[str, Any]:
-        """The JSON document of the command; the figures of all moves stand among its own keys."""
-        document: dict[str, Any] = {}
-        for key, value in to_dict(self).items():
-            document |= value if key == "whole" else {key: value}
+        """The JSON document of the command."""
+        document: dict[str, Any] = to_dict(self)
         return document
 
     @property
@@ -282,9 +188,7 @@ class ProgramCheck(Result):
         return f"{self.program}, {errors}"
 
 
-def check_program(
-    request: Request, machine: Hexapod | None, step: float = defaults.STEP, strut_speed: float | None = None
-) -> ProgramCheck:
+def check_program(request: Request, machine: Hexapod | None, step: float = defaults.STEP) -> ProgramCheck:
     """Everything that is to be said of a program, in the shop's units.
 
     Parameters
@@ -293,18 +197,15 @@ def check_program(
         The program, and how it is read; its default origin is the machine's.
     machine
         Whose reach and strut speeds are checked; None: the program alone.
-    step, strut_speed
-        Distance of the samples, m; largest speed of a strut, m/s.
+    step
+        Distance of the samples, m.
     """
     checked = check(request)
     program, findings = checked.program, list(checked.findings)
     speed: dict[str, float] = {}
-    rapid_feed = machine.rapid_feed if machine else defaults.RAPID_FEED
-    if len(program.moves):
-        findings += radii_findings(program.moves)
-        if machine is not None:
-            more, speed = machine_findings(program, machine, step, strut_speed)
-            findings += more
+    if machine is not None and len(program.moves):
+        more, speed = machine_findings(program, machine, step)
+        findings += more
     return ProgramCheck(
         program=program.name,
         interpreter=program.interpreter,
@@ -314,35 +215,8 @@ def check_program(
         used=checked.used,
         unsupported=checked.unsupported,
         findings=in_order(findings),
-        whole=figures(program.moves, rapid_feed),
-        tools=tool_rows(program, rapid_feed),
-        operations=operation_rows(program, rapid_feed),
+        **figures(program.moves, machine.rapid_feed if machine else defaults.RAPID_FEED),
         fastest_strut=speed,
         modal_start=checked.start,
         modal_end=checked.end,
     )
-
-
-def tool_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[ToolRow, ...]:
-    """Figures of each tool in order of use; rapids at `rapid_feed`, m/s."""
-    numbers, first, of_move = np.unique(program.moves.tool, return_index=True, return_inverse=True)
-    remarks = {tool.number: tool.remark for tool in program.tools}
-    parts = _parts(program.moves, of_move, len(numbers), rapid_feed)
-    return tuple(
-        ToolRow(**vars(parts[i]), tool=int(numbers[i]), remark=remarks.get(int(numbers[i]), ""))
-        for i in np.argsort(first).tolist()
-    )
-
-
-def operation_rows(program: ReadProgram, rapid_feed: float = defaults.RAPID_FEED) -> tuple[OperationRow, ...]:
-    """Figures of each operation in the order of the run; rapids at `rapid_feed`, m/s."""
-    stretches = operations(program)
-    parts = _parts(program.moves, stretches.of_move, len(stretches.rows), rapid_feed)
-    return tuple(
-        OperationRow(**vars(part), **operation_heading(row)) for row, part in zip(stretches.rows, parts, strict=True)
-    )
-
-
-def _parts(moves: Moves, of_move: IntArray, count: int, rapid_feed: float) -> list[Figures]:
-    """The figures of moves in `count` parts, each in the part that `of_move` (n,) says."""
-    return [figures(moves.take(part), rapid_feed) for part in rows_of_parts(of_move, count)] if count else []

@@ -1,8 +1,8 @@
-"""A program on a machine: sample its path, evaluate every sample, say what was assumed and what is out of reach."""
+"""A program on a machine: sample its path, evaluate every sample; its figures and what was assumed, `summary.json`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -10,27 +10,38 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.document import (
-    compare_summaries,
-    required_stiffness_missed,
-    summarise,
-    words_turn_the_platform,
-)
-from toolpath_stiff.analysis.evaluation import Evaluation, Progress, evaluate
+from toolpath_stiff.analysis.evaluation import Progress, evaluate
 from toolpath_stiff.analysis.loads import Load, parse_load
-from toolpath_stiff.analysis.statistics import EvaluatedPath, sample_columns
+from toolpath_stiff.analysis.statistics import (
+    FIGURES,
+    EvaluatedPath,
+    describe_sample,
+    per_operation,
+    per_tool,
+    sample_columns,
+    share,
+)
+from toolpath_stiff.analysis.uncertainty import band_figures
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import number, without_nan
+from toolpath_stiff.documents import Document, number, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.nc.moves import Moves, ReadProgram
+from toolpath_stiff.nc.courses import move_lengths
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
 from toolpath_stiff.path.placing import place
-from toolpath_stiff.path.sampling import Samples, sample_moves
-from toolpath_stiff.poses import Pose
+from toolpath_stiff.path.sampling import sample_moves
+from toolpath_stiff.poses import Pose, pose_in_mm
 from toolpath_stiff.results import FolderResult, frame_of
-from toolpath_stiff.stiffness.model import StiffnessModel, build_model, condition_warnings
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.stiffness.model import (
+    StiffnessModel,
+    acting_effects,
+    build_model,
+    condition_warnings,
+    conditions_stated,
+    effects_stated,
+)
+from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,26 +90,34 @@ class Analysis(EvaluatedPath, FolderResult):
     on_other: Analysis | None = None
     inputs: tuple[str, ...] = ()
 
+    @cached_property
+    def warnings(self) -> list[str]:
+        """What deserves a look, the program's own warnings included."""
+        return [*map(str, self.program.warnings), *condition_warnings(self.model), *_warnings(self)]
+
     @property
     def moves(self) -> Moves:
         """The moves in machine coordinates; made anew each time, for a long program is a fifth of all memory."""
         return place(self.program.moves, self.origin)
 
+    def _value(self, name: str) -> float:
+        value = self.figures[name]
+        return np.nan if value is None else float(value)
+
     @property
     def mean_N_per_mm(self) -> float:  # noqa: N802  (newton)
         """Mean stiffness over the length of the cuts, plunges along the tool axis left out; nan without any."""
-        return float(self.figures["mean_N_per_mm"] or np.nan)
+        return self._value("mean_N_per_mm")
 
     @property
     def min_N_per_mm(self) -> float:  # noqa: N802
         """The smallest stiffness of these cuts."""
-        return float(self.figures["min_N_per_mm"] or np.nan)
+        return self._value("min_N_per_mm")
 
     @property
     def range_N_per_mm(self) -> float:  # noqa: N802
         """The largest less the smallest."""
-        span = self.figures["range_N_per_mm"]
-        return np.nan if span is None else float(span)
+        return self._value("range_N_per_mm")
 
     @property
     def complete(self) -> bool:
@@ -125,23 +144,22 @@ class Analysis(EvaluatedPath, FolderResult):
 
     @cached_property
     def _document(self) -> dict[str, Any]:
-        summary: dict[str, Any] = {**summarise(self)}
+        document: dict[str, Any] = without_nan(_summary(self))
         if self.required is not None:
-            summary["required"] = {
+            document["required"] = {
                 "required_N_per_mm": n_per_mm_from_n_per_m(self.required),
-                "below": [{"line": line, "min_N_per_mm": lowest} for line, lowest in self.below_required],
+                "below": without_nan([{"line": line, "min_N_per_mm": low} for line, low in self.below_required]),
             }
         if self.on_other is not None:
             other = self.on_other.to_dict()
-            summary["compare"] = compare_summaries(summary, other)
+            document["compare"] = compare_summaries(document, other)
             option = f"--compare {other['machine']}"  # without these the two machines may look the same
             idle = [f"{option}: {row['effect']} does not act: {row['reason']}" for row in other["effects_idle"]]
-            summary["warnings"] = [*self.warnings, *idle]
-        finite: dict[str, Any] = without_nan(summary)
-        return finite
+            document["warnings"] = [*self.warnings, *idle]
+        return document
 
     def _short(self) -> str:
-        mean, low = (number(self.to_dict()[name]) for name in ("mean_N_per_mm", "min_N_per_mm"))
+        mean, low = number(self.mean_N_per_mm), number(self.min_N_per_mm)
         return f"{self.program.name} on {self.machine.name}, mean {mean} N/mm, min {low} N/mm"
 
     def plot(self, *, show_plunges: bool = False) -> Figure:
@@ -210,14 +228,18 @@ def analyze(
     direction = parse_load(load) if isinstance(load, str) else load
     place_at, source = _effective_origin(model.machine, program, origin)
     samples = sample_moves(place(program.moves, place_at), step, model.machine.rapid_feed, place_at)
-    evaluation = evaluate(
-        model, samples.position, samples.abc, samples.tangent, samples.tool_length, direction, force, progress
-    )
-    warnings = [*map(str, program.warnings), *condition_warnings(model), *_warnings(samples, evaluation)]
+    poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
     analysis = Analysis(
-        program=program, model=model, origin=place_at, origin_source=source, load=direction, force=force, step=step,
-        samples=samples, at=evaluation, warnings=warnings,
-    )  # fmt: skip
+        program=program,
+        model=model,
+        origin=place_at,
+        origin_source=source,
+        load=direction,
+        force=force,
+        step=step,
+        samples=samples,
+        at=evaluate(model, *poses, direction, force, progress),
+    )
     _check_reach(analysis, partial)
     return analysis
 
@@ -238,15 +260,15 @@ def _effective_origin(machine: Hexapod, program: ReadProgram, origin: Pose | Non
     return chosen, source
 
 
-def _warnings(samples: Samples, evaluation: Evaluation) -> list[str]:
+def _warnings(analysis: Analysis) -> list[str]:
     """What the evaluation itself has to say."""
-    warnings = []
-    rapids, swapped = ~samples.cutting & ~evaluation.reachable, samples.cutting & evaluation.substituted
+    warnings, samples, there = [], analysis.samples, analysis.at
+    rapids, swapped = ~samples.cutting & ~there.reachable, samples.cutting & there.substituted
     if rapids.any():
         first = int(np.argmax(rapids))
         warnings.append(
             f"line {samples.line[first]}: {int(rapids.sum())} samples of rapid moves are out of reach, first "
-            f"{describe_pose(samples, first)}: {evaluation.reach.describe(first)}"
+            f"{_sample_words(analysis, first)}"
         )
     if swapped.any():
         lines = np.unique(samples.line[swapped])
@@ -258,32 +280,156 @@ def _warnings(samples: Samples, evaluation: Evaluation) -> list[str]:
     return warnings
 
 
-def describe_pose(samples: Samples, i: int) -> str:
-    """The pose of sample i as a control would show it, machine coordinates."""
-    values = [*mm_from_m(samples.position[i]), *deg_from_rad(samples.abc[i])]
-    words = [f"{axis}{value:.3f}" for axis, value in zip("XYZABC", values, strict=True)]
-    return f"at {' '.join(words if samples.abc[i].any() else words[:3])} (machine coordinates, mm)"
+def _sample_words(analysis: Analysis, i: int) -> str:
+    """Where sample i is, as a control would show it, and which limit it breaks."""
+    pose = [*analysis.samples.position[i], *analysis.samples.abc[i]]
+    return f"at {_pose_words(pose, '.3f')} (machine coordinates, mm): {analysis.at.reach.describe(i)}"
+
+
+def _pose_words(pose: Sequence[float], digits: str) -> str:
+    words = [f"{axis}{value:{digits}}" for axis, value in zip("XYZABC", pose_in_mm(pose), strict=True)]
+    return " ".join(words if any(pose[3:]) else words[:3])
 
 
 def _check_reach(analysis: Analysis, partial: bool) -> None:
     """Refuse a program that cuts nothing, or, unless `partial`, whose cuts leave the machine's reach."""
-    samples, evaluation = analysis.samples, analysis.at
-    if not samples.cutting.any():
+    cutting, bad = analysis.samples.cutting, analysis.out_of_reach
+    if not cutting.any():
         raise ProgramError(
             "no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=analysis.program.name
         )
-    bad = analysis.out_of_reach
-    if not bad.any() or (partial and not bad[samples.cutting].all()):
+    if not bad.any() or (partial and not bad[cutting].all()):
         return
     first = int(np.argmax(bad))
     hint = "place the work elsewhere with --origin"
     hint += "" if partial else ", or keep the reachable part with --partial"
-    if words_turn_the_platform(analysis.program):
+    if _words_turn_the_platform(analysis.program):
         hint += "; if the program was posted for another machine, name it with [kinematics] in a controller file"
     raise UnreachableError(
-        f"{int(bad.sum())} of {int(samples.cutting.sum())} cutting samples are out of reach, first "
-        f"{describe_pose(samples, first)}: {evaluation.reach.describe(first)}",
+        f"{int(bad.sum())} of {int(cutting.sum())} cutting samples are out of reach, first "
+        f"{_sample_words(analysis, first)}",
         hint=hint,
         file=analysis.program.name,
-        line=int(samples.line[first]),
+        line=int(analysis.samples.line[first]),
     )
+
+
+def _assumptions(analysis: Analysis) -> list[str]:
+    """Everything that was assumed or recovered rather than published or given."""
+    machine, model, law = analysis.machine, analysis.model, analysis.machine.strut_law
+    sentences = list(analysis.program.assumptions)
+    if _words_turn_the_platform(analysis.program):
+        sentences.append(
+            "A, B, C of the program are roll, pitch, yaw of the platform (see [kinematics] of controller files)"
+        )
+    if analysis.origin_source == "default":
+        sentences.append(
+            f"program zero (G54) sits at {_pose_words(analysis.origin, 'g')} in machine coordinates, the machine's "
+            f"default; --origin puts it elsewhere"
+        )
+    for quantity, origin in machine.origins.items():
+        if origin != "published":
+            remark = machine.remarks.get(quantity)
+            sentences.append(f"machine {machine.name}: {quantity} {origin}" + (f": {remark}" if remark else ""))
+    secant = "; the stiffness is the secant one at this load" if model.load_dependent else ""
+    sentences += [
+        f"rapid moves take {mm_per_min_from_m_per_s(machine.rapid_feed):g} mm/min (time only)",
+        *conditions_stated(model),
+        f"a force of {analysis.force:g} N for deflections{secant}",
+    ]
+    low, high = sorted((mm_from_m(law.length_1), mm_from_m(law.length_2)))
+    range_of_law = f"the strut law is extrapolated outside {low:.1f} to {high:.1f} mm of strut length"
+    sentences.append("the stiffness of a strut is the same at every length" if law.constant else range_of_law)
+    if analysis.parameter_band is not None:
+        sentences.append(
+            "the band of the stiffness holds the uncertainty of the fitted parameters alone, propagated linearly: "
+            f"{', '.join(analysis.parameter_band.names)}"
+        )
+    if not acting_effects(model):
+        sentences.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
+    return sentences
+
+
+def _summary(analysis: Analysis) -> dict[str, Any]:
+    """The figures of `summary.json`, in the shop's units."""
+    samples, program, there, band = analysis.samples, analysis.program, analysis.at, analysis.parameter_band
+    cutting, length = samples.cutting & there.reachable, mm_from_m(move_lengths(program.moves))
+    rapid, weight = program.moves.motion == RAPID, np.where(analysis.headline, samples.weight, 0.0)
+    nearest = int(np.argmin(np.where(cutting, there.reach.margin, np.inf)))
+    return {
+        "program": program.name,
+        "interpreter": program.interpreter,
+        "kinematics": program.kinematics,
+        "machine": analysis.machine.name,
+        "load": str(analysis.load),
+        "force_N": analysis.force,
+        "step_mm": mm_from_m(analysis.step),
+        "origin_mm_deg": list(pose_in_mm(analysis.origin)),
+        "origin_source": analysis.origin_source,
+        "samples": len(samples),
+        "cutting_length_mm": float(length[~rapid].sum()),
+        "rapid_length_mm": float(length[rapid].sum()),
+        "time_s": float(samples.t[-1]),
+        **analysis.figures,
+        **({} if band is None else {"parameter_uncertainty": band_figures(band, there.stiffness, weight)}),
+        "weakest_places": [describe_sample(analysis, row) for row in analysis.weakest_rows],
+        "per_tool": per_tool(analysis),
+        "per_operation": per_operation(analysis),
+        "min_margin": float(there.reach.margin[nearest]),
+        "min_margin_limit": there.reach.describe(nearest),
+        "min_margin_line": int(samples.line[nearest]),
+        "out_of_reach_samples": int(analysis.out_of_reach.sum()),
+        "extrapolated_share": share(there.extrapolated, cutting),
+        **effects_stated(analysis.model),
+        "unsupported": to_dict(program.unsupported),
+        "assumptions": _assumptions(analysis),
+        "warnings": analysis.warnings,
+        "version": defaults.VERSION,
+    }
+
+
+def compare_summaries(summary: Document, other: Document) -> Document:
+    """The entry `compare` of `summary.json`.
+
+    The other machine's figures, and `difference_percent`: how much higher each is than the first machine's
+    (None where a figure is missing, or the first machine's is zero); the same for the mean of the plunges.
+    """
+    names = {name: name.partition("_N_per")[0].removesuffix("_um") for name in FIGURES}
+    plunges = [(figures["plunges"] or {}).get("mean_N_per_mm") for figures in (summary, other)]
+    return {
+        "machine": other["machine"],
+        "effects": list(other["effects"]),
+        **{name: other[name] for name in (*FIGURES, "weakest", "out_of_reach_samples", "extrapolated_share")},
+        "difference_percent": {short: _higher(summary[name], other[name]) for name, short in names.items()},
+        "headline": other["headline"],
+        "plunges": other["plunges"],
+        "plunges_difference_percent": _higher(*plunges),
+    }
+
+
+def _higher(first: float | None, second: float | None) -> float | None:
+    """By how much the second is higher, in percent of the first; None where that cannot be said."""
+    return None if first is None or second is None or not first else (second - first) / first * 100.0
+
+
+def _words_turn_the_platform(program: ReadProgram) -> bool:
+    """Whether rotary words were taken for the platform's own angles."""
+    native = not program.kinematics and program.dialect != CUTTER_LOCATION
+    return native and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())
+
+
+def required_stiffness_missed(analysis: EvaluatedPath, required: float) -> list[tuple[int, float]]:
+    """(line, smallest stiffness in N/mm) of cutting moves that are not known to have `required` N/m, weakest first.
+
+    What has no stiffness does not have the required one: nan, before all others, for lines that are out of reach in
+    part (`partial`), and for all cutting lines where no sample counts at all.
+    """
+    samples, counted = analysis.samples, analysis.counted
+    cuts = samples.cutting & ((samples.weight > 0.0) | (not counted.any()))
+    lines, index = np.unique(samples.line[cuts], return_inverse=True)
+    lowest = np.full(len(lines), np.inf)
+    np.minimum.at(lowest, index, np.where(counted, analysis.at.stiffness, -np.inf)[cuts])
+    missed = np.flatnonzero(lowest < required)
+    missed = missed[np.argsort(lowest[missed], kind="stable")]
+    shown = n_per_mm_from_n_per_m(np.where(np.isfinite(lowest), lowest, np.nan))[missed]
+    return list(zip(lines[missed].tolist(), shown.tolist(), strict=True))

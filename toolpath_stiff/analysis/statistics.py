@@ -1,22 +1,22 @@
 """Figures and tables of a path: length-weighted mean, extremes, the weakest places, tool by tool; sample by sample."""
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
 
 from toolpath_stiff.analysis.evaluation import Evaluation
-from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_of, headline_words
+from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_rows
 from toolpath_stiff.analysis.uncertainty import ParameterBand, parameter_band
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.column_files import csv_pieces, parquet_pieces
 from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
-from toolpath_stiff.nc.operations import Operation, Operations, operations
-from toolpath_stiff.path.sampling import Samples
+from toolpath_stiff.nc.operations import Operations, operations
+from toolpath_stiff.path.sampling import Samples, move_durations
 from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
 from toolpath_stiff.poses import Pose
 from toolpath_stiff.stiffness.model import StiffnessModel
@@ -30,11 +30,10 @@ COLUMNS: dict[str, int | None] = {
     "deflection_um": 6,
     **{f"strut{i}_mm": 6 for i in range(1, 7)},
     "margin": 6,
-    "margin_limit": None,
-    "operation": None,
-    "cut": None,
+    **dict.fromkeys(("margin_limit", "operation", "cut")),
 }
 
+ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"  # what headline figures are about
 WEAKEST_PLACES = 3
 FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
 
@@ -59,8 +58,6 @@ class EvaluatedPath:
         Where program zero sits (m, rad) and who said so: "option", "program" or "default".
     step
         Largest distance of two samples in m.
-    warnings
-        What deserves a look, plain sentences, the program's own included.
     """
 
     program: ReadProgram
@@ -72,7 +69,6 @@ class EvaluatedPath:
     origin: Pose
     origin_source: str
     step: float
-    warnings: list[str]
 
     @property
     def machine(self) -> Hexapod:
@@ -102,7 +98,7 @@ class EvaluatedPath:
     @property
     def headline(self) -> BoolArray:
         """(n,) counted samples that mean, range and weakest place are about: those of `headline_rows`."""
-        return headline_of(self.counted, self.plunging)
+        return headline_rows(self.counted, self.plunging)
 
     @property
     def set_aside(self) -> BoolArray:
@@ -127,28 +123,20 @@ class EvaluatedPath:
             rows = rows[(np.abs(s[rows] - s[weakest]) >= apart) & (line[rows] != line[weakest])]
         return chosen
 
+    @property
+    def charted(self) -> FloatArray:
+        """Stiffness in N/m of the headline samples; of a program that only turns rotary axes of every one in reach."""
+        rows = self.headline if self.headline.any() else self.samples.cutting & self.at.reachable
+        return self.at.stiffness[rows]
+
     @cached_property
     def central_range(self) -> tuple[float, float]:
         """Lowest and highest of `charted` in N/m, those far out (`FENCE`) set aside."""
-        stiffness, weight = self.charted
-        order = np.argsort(stiffness, kind="stable")
-        length = np.cumsum(weight[order])
-        lower, upper = stiffness[order[np.searchsorted(length, [0.25 * length[-1], 0.75 * length[-1]])]]
+        lower, upper = np.quantile(self.charted, (0.25, 0.75))
         reach = FENCE * (upper - lower)
-        inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
-        values = inside if np.ptp(inside) > 0.0 else stiffness
+        inside = self.charted[(self.charted >= lower - reach) & (self.charted <= upper + reach)]
+        values = inside if np.ptp(inside) > 0.0 else self.charted
         return float(values.min()), float(values.max())
-
-    @property
-    def charted(self) -> tuple[FloatArray, FloatArray]:
-        """Stiffness in N/m and length in m of the headline samples.
-
-        A program that only turns rotary axes has none: then every reachable cutting sample counts alike.
-        """
-        about, weight = self.headline, self.samples.weight
-        if not about.any():
-            about, weight = self.samples.cutting & self.at.reachable, np.ones(len(weight))
-        return self.at.stiffness[about], weight[about]
 
     @property
     def out_of_reach(self) -> BoolArray:
@@ -161,42 +149,24 @@ class EvaluatedPath:
         return operations(self.program)
 
 
-def stiffness_figures(path: EvaluatedPath, rows: BoolArray) -> Document:
+def stiffness_figures(path: EvaluatedPath, rows: BoolArray | IntArray) -> Document:
     """Mean (by length), min, max, range in N/mm and mean deflection in um of some counted samples.
 
     None for each where there are no such samples.
     """
-    return weighted_figures(path.at.stiffness[rows], path.samples.weight[rows], path.force)
-
-
-def path_length(samples: Samples, rapid: bool) -> float:
-    """Length in m of the rapid, or of the cutting moves."""
-    step = np.diff(samples.s, prepend=samples.s[0])
-    step[np.diff(samples.move, prepend=samples.move[0]) != 0] = 0.0  # a move's first sample repeats the last end
-    return float(step[(samples.motion == RAPID) == rapid].sum())
+    stiffness, weight = path.at.stiffness[rows], path.samples.weight[rows]
+    if not len(stiffness):
+        return dict.fromkeys(FIGURES)
+    low, high = float(stiffness.min()), float(stiffness.max())
+    mean = float(np.average(stiffness, weights=weight))
+    values = [float(n_per_mm_from_n_per_m(value)) for value in (mean, low, high, high - low)]
+    deflection = um_from_m(float(np.average(path.force / stiffness, weights=weight)))
+    return dict(zip(FIGURES, [*values, deflection], strict=True))
 
 
 def share(condition: BoolArray, among: BoolArray) -> float:
     """Share of the rows of `among` for which `condition` holds; 0 of none."""
-    total = int(among.sum())
-    return float((condition & among).sum()) / total if total else 0.0
-
-
-def weighted_figures(stiffness: FloatArray, weight: FloatArray, force: float) -> dict[str, float | None]:
-    """Mean by weight, min, max, range in N/mm and mean deflection in um; None for each where there is nothing.
-
-    stiffness (n,) N/m; weight (n,); force N.
-    """
-    if not len(stiffness):
-        return dict.fromkeys(FIGURES)
-    low, high = float(stiffness.min()), float(stiffness.max())
-    return {
-        "mean_N_per_mm": n_per_mm_from_n_per_m(float(np.average(stiffness, weights=weight))),
-        "min_N_per_mm": n_per_mm_from_n_per_m(low),
-        "max_N_per_mm": n_per_mm_from_n_per_m(high),
-        "range_N_per_mm": n_per_mm_from_n_per_m(high - low),
-        "mean_deflection_um": um_from_m(float(np.average(force / stiffness, weights=weight))),
-    }
+    return float(condition[among].mean()) if among.any() else 0.0
 
 
 def class_figures(path: EvaluatedPath, rows: IntArray) -> Document:
@@ -204,85 +174,66 @@ def class_figures(path: EvaluatedPath, rows: IntArray) -> Document:
 
     `rows` (m,) are rows of samples, in order; only those in the statistics count. `plunges` is None without any.
     """
-    counted, plunging = path.counted[rows], path.plunging[rows]
-    plunges, samples = rows[plunging], path.samples
+    counted, plunging, samples = path.counted[rows], path.plunging[rows], path.samples
+    plunges = rows[plunging]
+    headline = ALL_CUTS
+    if path.load.kind == "tangential" and counted.any():
+        headline = PLUNGES_ONLY if plunging[counted].all() else ACROSS
 
     def about(some: IntArray) -> Document:
-        stiffness = path.at.stiffness[some]
-        weakest = describe_sample(path, int(some[np.argmin(stiffness)])) if len(some) else None
-        return {**weighted_figures(stiffness, samples.weight[some], path.force), "weakest": weakest}
+        weakest = describe_sample(path, int(some[np.argmin(path.at.stiffness[some])])) if len(some) else None
+        return {**stiffness_figures(path, some), "weakest": weakest}
 
     beside = {
         "samples": len(plunges),
-        "moves": 1 + int(np.count_nonzero(np.diff(samples.move[plunges]))),  # they rise along the path
+        "moves": len(np.unique(samples.move[plunges])),
         "length_mm": mm_from_m(float(samples.weight[plunges].sum())),
         **about(plunges),
     }
     return {
-        "headline": headline_words(path.load, counted, plunging),
-        **about(rows[headline_of(counted, plunging)]),
+        "headline": headline,
+        **about(rows[headline_rows(counted, plunging)]),
         "plunges": beside if len(plunges) else None,
     }
 
 
-def operation_heading(operation: Operation) -> Document:
-    """Number, name, tool and lines of an operation, as its row begins."""
-    names = ("name", "tool", "first_line", "last_line")
-    return {"operation": operation.number, **{name: getattr(operation, name) for name in names}}
-
-
 def per_operation(path: EvaluatedPath) -> list[Document]:
     """The figures of each operation, in the order of the run; their lengths, times and samples add up to the whole."""
-    operations = path.operations
-    parts = _parts(path, operations.of_move, range(len(operations.rows)))
-    return [{**operation_heading(row), **part} for row, part in zip(operations.rows, parts, strict=True)]
+    rows, names = path.operations.rows, ("name", "tool", "first_line", "last_line")
+    headings = [{"operation": row.number, **{name: getattr(row, name) for name in names}} for row in rows]
+    parts = _parts(path, path.operations.of_move, len(rows))
+    return [{**heading, **part} for heading, part in zip(headings, parts, strict=True)]
 
 
 def per_tool(path: EvaluatedPath) -> list[Document]:
-    """The figures of each tool that cuts, in order of use; a tool that cuts with two lengths has two rows.
-
-    Rapids with a length that the tool never cuts with (before G43) count with the first that it does.
-    """
+    """The figures of each tool that cuts, in order of use; its length is that of its first cut."""
     moves, remarks = path.program.moves, {tool.number: tool.remark for tool in path.program.tools}
-    tools, tool = np.unique(moves.tool, return_inverse=True)
-    lengths, length = np.unique(moves.tool_length, return_inverse=True)  # nan, the reference tool's, is one of them
-    of_move, cuts = tool * len(lengths) + length, np.flatnonzero(moves.motion != RAPID)
+    numbers, of_move = np.unique(moves.tool, return_inverse=True)
+    parts, cuts = _parts(path, of_move, len(numbers)), np.flatnonzero(moves.motion != RAPID)
     used, first = np.unique(of_move[cuts], return_index=True)
-    order = np.argsort(first)
-    parts, cuts = used[order], cuts[first[order]]
-    first_of_tool = np.full(len(tools), len(tools) * len(lengths))  # a part of its own where a tool never cuts
-    first_of_tool[tool[cuts][::-1]] = parts[::-1]
-    counts_with = np.where(np.isin(of_move, used), of_move, first_of_tool[tool])
     rows: list[Document] = []
-    for cut, part in zip(cuts, _parts(path, counts_with, parts.tolist()), strict=True):
-        number, in_use = int(moves.tool[cut]), float(moves.tool_length[cut])
-        mm = None if math.isnan(in_use) else mm_from_m(in_use)
-        rows.append({"tool": number, "remark": remarks.get(number, ""), "length_mm": mm, **part})
+    for i, cut in sorted(zip(used.tolist(), cuts[first].tolist(), strict=True), key=lambda pair: pair[1]):
+        tool, length = int(numbers[i]), mm_from_m(float(moves.tool_length[cut]))
+        heading = {"tool": tool, "remark": remarks.get(tool, ""), "length_mm": None if np.isnan(length) else length}
+        rows.append({**heading, **parts[i]})
     return rows
 
 
-def _parts(path: EvaluatedPath, of_move: IntArray, wanted: Sequence[int]) -> list[Document]:
-    """Length, time, figures, weakest place and nearest limit of parts of a path; (n_moves,) says which each move is."""
+def _parts(path: EvaluatedPath, of_move: IntArray, count: int) -> list[Document]:
+    """The figures of `count` parts of a program; `of_move` (n,) says to which each move belongs."""
     samples, moves = path.samples, path.program.moves
-    count = int(of_move.max(initial=0)) + 1
-    first = np.searchsorted(samples.move, np.arange(len(moves)))
-    last = np.append(first[1:], len(samples)) - 1
-    length, rapid = samples.s[last] - samples.s[first], moves.motion == RAPID
-    duration = np.diff(np.append(samples.t[first], samples.t[-1]))  # with the dwell after each move but the last
-    each = (np.where(rapid, 0.0, length), np.where(rapid, length, 0.0), duration)
-    cutting_length, rapid_length, time = (np.bincount(of_move, values, count) for values in each)
+    length, rapid = move_lengths(moves), moves.motion == RAPID
+    duration = move_durations(moves, path.machine.rapid_feed) + moves.dwell
     margin = np.where(samples.cutting & path.at.reachable, path.at.reach.margin, np.inf)
-    rows_of = rows_of_parts(of_move[samples.move], count)
     parts: list[Document] = []
-    for part in wanted:
-        rows = rows_of[part]
+    for made, rows in zip(_rows_of(of_move, count), _rows_of(of_move[samples.move], count), strict=True):
         nearest = int(rows[np.argmin(margin[rows])])
         known = bool(np.isfinite(margin[nearest]))
         parts.append(
             {
-                "cutting_length_mm": mm_from_m(float(cutting_length[part])),
-                "rapid_length_mm": mm_from_m(float(rapid_length[part])),
-                "time_s": float(time[part]),
+                "cutting_length_mm": mm_from_m(float(length[made][~rapid[made]].sum())),
+                "rapid_length_mm": mm_from_m(float(length[made][rapid[made]].sum())),
+                "time_s": float(duration[made].sum()),
                 **(path.figures if len(rows) == len(samples) else class_figures(path, rows)),
                 "min_margin": float(margin[nearest]) if known else None,
                 "min_margin_limit": path.at.reach.describe(nearest) if known else None,
@@ -293,7 +244,7 @@ def _parts(path: EvaluatedPath, of_move: IntArray, wanted: Sequence[int]) -> lis
     return parts
 
 
-def rows_of_parts(part: IntArray, count: int) -> list[IntArray]:
+def _rows_of(part: IntArray, count: int) -> list[IntArray]:
     """The rows of each of `count` parts, in order; `part` (n,) says in which each row is."""
     order = np.argsort(part, kind="stable")
     return np.split(order, np.searchsorted(part[order], np.arange(1, count)))[:count]

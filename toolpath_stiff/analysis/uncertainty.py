@@ -4,6 +4,7 @@ A linear propagation (JCGM 100:2008, Guide to the expression of uncertainty in m
 of the parameters between two slopes of the stiffness, which are differences of whole evaluations.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.path.sampling import Samples
@@ -56,49 +57,40 @@ def parameter_band(
 ) -> ParameterBand | None:
     """The band of a path, given its stiffness (n,); None where the machine file states no uncertainty of what acts."""
     uncertainty = model.given.uncertainty if model.given is not None else None
-    if uncertainty is None:
-        return None
     idle = {active.effect.name for active in model.instruments} | idle_effects(model).keys()
-    kept = [
-        i
-        for i, (name, sd) in enumerate(zip(uncertainty.names, uncertainty.sd, strict=True))
-        if sd > 0.0 and name.partition(".")[0] not in idle
-    ]
-    if not kept:
+    sd = {} if uncertainty is None else dict(zip(uncertainty.names, uncertainty.sd.tolist(), strict=True))
+    kept = [i for i, (name, size) in enumerate(sd.items()) if size > 0.0 and name.partition(".")[0] not in idle]
+    if uncertainty is None or not kept:
         return None
 
-    def slope(name: str, sd: float) -> FloatArray:
+    def slope(name: str) -> FloatArray:
         """(n,) N/m per standard deviation of one parameter, away from a bound that is near."""
         for step in (STEP, -STEP):
-            try:
-                moved = with_parameter_moved(model, name, step * sd)
-            except InputError:
-                continue
-            path = (samples.position, samples.abc, samples.tangent, samples.tool_length)
-            return np.asarray((evaluate(moved, *path, load, force).stiffness - stiffness) / step)
-        raise InputError(f"[uncertainty]: {name} has no room between its bounds for a standard deviation of {sd:g}")
+            with suppress(InputError):
+                moved = with_parameter_moved(model, name, step * sd[name])
+                path = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+                return np.asarray((evaluate(moved, *path, load, force).stiffness - stiffness) / step)
+        raise InputError(
+            f"[uncertainty]: {name} has no room between its bounds for a standard deviation of {sd[name]:g}"
+        )
 
-    return ParameterBand(
-        tuple(uncertainty.names[i] for i in kept),
-        np.stack([slope(uncertainty.names[i], float(uncertainty.sd[i])) for i in kept], axis=1),
-        np.asarray(uncertainty.correlation[np.ix_(kept, kept)]),
-    )
+    names = tuple(uncertainty.names[i] for i in kept)
+    correlation = np.asarray(uncertainty.correlation[np.ix_(kept, kept)])
+    return ParameterBand(names, np.stack([slope(name) for name in names], axis=1), correlation)
 
 
-def band_figures(band: ParameterBand, samples: Samples, stiffness: FloatArray, rows: BoolArray) -> Document | None:
-    """Standard deviations and 95 % intervals of mean and smallest stiffness of some samples (n,), the widest place."""
-    if not rows.any():
+def band_figures(band: ParameterBand, stiffness: FloatArray, weight: FloatArray) -> Document | None:
+    """Standard deviations and 95 % intervals of mean and smallest stiffness of samples (n,) that have a weight."""
+    if not weight.any():
         return None
-    weight = np.where(rows, samples.weight, 0.0)
-    relative = np.where(rows, band.deviation / stiffness, 0.0)
-    low, widest = int(np.argmin(np.where(rows, stiffness, np.inf))), int(np.argmax(relative))
+    low = int(np.argmin(np.where(weight > 0.0, stiffness, np.inf)))
+    mean = float(np.average(stiffness[weight > 0.0], weights=weight[weight > 0.0]))
     figures: dict[str, object] = {"parameters": list(band.names)}
     for name, value, sd in (
-        ("mean", float(np.average(stiffness[rows], weights=weight[rows])), band.deviation_of_mean(weight)),
+        ("mean", mean, band.deviation_of_mean(weight)),
         ("min", float(stiffness[low]), float(band.deviation[low])),
     ):
-        figures[f"{name}_sd_N_per_mm"] = n_per_mm_from_n_per_m(sd)
         ends = (value - defaults.NORMAL_95 * sd, value + defaults.NORMAL_95 * sd)
+        figures[f"{name}_sd_N_per_mm"] = n_per_mm_from_n_per_m(sd)
         figures[f"{name}_95_N_per_mm"] = [n_per_mm_from_n_per_m(end) for end in ends]
-    widest_place = {"largest_sd_percent": 100.0 * float(relative[widest]), "largest_sd_line": int(samples.line[widest])}
-    return {**figures, **widest_place}
+    return figures

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -23,7 +23,6 @@ from toolpath_stiff.api.inputs import (
 )
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
-from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import ReadProgram
@@ -33,13 +32,10 @@ from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import work_path
-from toolpath_stiff.placement.placing import place_again, place_program
-from toolpath_stiff.placement.result import Placement
-from toolpath_stiff.placement.task import PlacementTask, Rewriting
-from toolpath_stiff.poses import Pose
+from toolpath_stiff.placement.placing import place_program
+from toolpath_stiff.placement.result import Placement, PlacementTask
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
-from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
 FARTHEST_TURN_DEG = 720.0
@@ -67,8 +63,6 @@ def place(
     objective: Annotated[str, Option("--objective", choices=tuple(OBJECTIVES))] = "balanced",
     points: Annotated[int, Option("--points", at_least=2, at_most=MOST_FRONT_POINTS)] = 60,
     seed: Annotated[int, Option("--seed", at_least=0)] = 1,
-    pick: Annotated[int | None, Option("--pick")] = None,
-    earlier: Placement | str | Path | Document | None = None,
     origin_mm_deg: Origin = None,
     load: LoadDirection = LOAD,
     step_mm: Step = 1.0,
@@ -78,7 +72,7 @@ def place(
     linearise_mm: Linearised = None,
     progress: Progress | None = None,
 ) -> Placement:
-    r"""Search where the work should sit, or take another point of an earlier search.
+    r"""Search where the work should sit.
 
     Parameters
     ----------
@@ -102,11 +96,6 @@ def place(
         Most points of the front.
     seed
         Of the search.
-    pick
-        Take this point (its number in placements.csv) of the front of an earlier search, without searching again.
-        Everything else has to be as it was.
-    earlier
-        That search as its result, its document or the file `placement.json`.
     origin_mm_deg
         The present placement, X, Y, Z or X, Y, Z, A, B, C of program zero; unless given, where the program's G10 says,
         else the machine's default.
@@ -140,47 +129,29 @@ def place(
     >>> found.worse
     []
     """
+    if write is None and not (decimals is None and linearise_mm is None):
+        raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     on, part = machine_from(machine), program_from(program)
     model, origin = on.running(part), origin_si(origin_mm_deg)
-    read, present, again = _read(part, model, origin)
+    default = model.machine.default_origin
+    read = part.moves(origin, default)
     task = PlacementTask(
         model=model,
         program=read,
-        present=present,
-        read=again,
+        present=origin or (read.origin if read.origin_source == "program" else default),
+        read=lambda other: part.moves(other, default),
         bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
         rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
         load=parse_load(load),
         step=m_from_mm(step_mm),
         force=force_N,
-        rewriting=_rewriting(part, write, decimals, linearise_mm),
+        write="" if write is None else str(write),
+        decimals=decimals,
+        linearise=None if linearise_mm is None else m_from_mm(linearise_mm),
+        control=part.request.controller,
     )
-    if pick is None:
-        placed = place_program(task, counter(progress, f"{part.name}: search"))
-    else:
-        placed = place_again(task, earlier, pick)
+    placed = place_program(task, counter(progress, f"{part.name}: search"))
     return replace(placed, inputs=(*part.inputs, *on.inputs))
-
-
-def _read(
-    part: Program, model: StiffnessModel, origin: Pose | None
-) -> tuple[ReadProgram, Pose, Callable[[Pose], ReadProgram]]:
-    """A program where it is now, where that is, and what reads it for another placement."""
-    default = model.machine.default_origin
-    read = part.moves(origin, default)
-    present = origin or (read.origin if read.origin_source == "program" else default)
-    return read, present, lambda other: part.moves(other, default)
-
-
-def _rewriting(
-    part: Program, write: str | Path | None, decimals: int | None, linearise_mm: float | None
-) -> Rewriting | None:
-    chord = None if linearise_mm is None else m_from_mm(linearise_mm)
-    if write is not None:
-        return Rewriting(str(write), decimals, chord, part.request.controller)
-    if decimals is not None or chord is not None:
-        raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
-    return None
 
 
 def _keep_out(text: str) -> KeepOut:
@@ -266,9 +237,8 @@ def try_placement(
     """
     on, part = machine_from(machine), program_from(program)
     model, direction = on.running(part), parse_load(load)
-    read, present, again = _read(part, model, None)
-    path = work_path(read, m_from_mm(step_mm), direction, present, again)
-    return PlacementTrial(read, Evaluator(model, path, direction, force_N))
+    read = part.moves(None, model.machine.default_origin)
+    return PlacementTrial(read, Evaluator(model, work_path(read, m_from_mm(step_mm), direction), direction, force_N))
 
 
 @checked

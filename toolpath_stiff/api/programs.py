@@ -18,9 +18,9 @@ from toolpath_stiff.options import Option, checked
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.path.table import SampledPath
-from toolpath_stiff.placement.case_study import MOST_REGIONS, CaseStudy, Region, read_regions, run_case_study
+from toolpath_stiff.placement.case_study import MOST_REGIONS, CaseStudy, Region, run_case_study
 from toolpath_stiff.results import Progress, counter
-from toolpath_stiff.units import m_from_mm, m_per_s_from_mm_per_min, n_per_m_from_n_per_mm
+from toolpath_stiff.units import m_from_mm, n_per_m_from_n_per_mm
 
 Jobs = Annotated[int | None, Option("--jobs", at_least=1)]
 Table = Annotated[str, Option("--format", choices=("csv", "parquet"))]
@@ -141,9 +141,8 @@ def check(
     *,
     origin_mm_deg: Origin = None,
     step_mm: Step = 1.0,
-    strut_speed_mm_per_min: Annotated[float | None, Option("--strut-speed", "mm/min", above=0, at_most=1e6)] = None,
 ) -> ProgramCheck:
-    r"""What a program uses, what is not understood, extents and times; with a machine its reach and strut speeds.
+    r"""What a program uses, what is not understood, extents and times; with a machine its reach and fastest strut.
 
     Where the reader would refuse the program the check says so and goes on with the next block.
 
@@ -155,13 +154,11 @@ def check(
         Where program zero sits.
     step_mm
         Largest distance of the samples at which the machine is asked.
-    strut_speed_mm_per_min
-        Speed of a strut above which a cut is a finding.
 
     Raises
     ------
     InputError
-        The file cannot be read at all, or a speed is given without a machine.
+        The file cannot be read at all.
 
     Examples
     --------
@@ -172,21 +169,16 @@ def check(
     """
     part = program_from(program)
     on = None if machine is None else machine_from(machine)
-    if on is None and strut_speed_mm_per_min is not None:
-        raise InputError("--strut-speed without a machine", hint="name one with --machine")
-    speed = None
-    if strut_speed_mm_per_min is not None:
-        speed = m_per_s_from_mm_per_min(strut_speed_mm_per_min)
     hexapod = None if on is None else on.model.machine
     request = part.placed(origin_si(origin_mm_deg), ZERO if hexapod is None else hexapod.default_origin)
-    return check_program(request, hexapod, m_from_mm(step_mm), speed)
+    return check_program(request, hexapod, m_from_mm(step_mm))
 
 
 @checked
 def case_study(
     program: Program | str | Path | None = None,
     machine: Machine | str | Path = "nist",
-    regions: Mapping[str, Sequence[float]] | str | Path | None = None,
+    regions: Mapping[str, Sequence[float]] | None = None,
     *,
     step_mm: Step = 1.0,
 ) -> CaseStudy:
@@ -199,15 +191,15 @@ def case_study(
     machine
         A machine, its name or its file.
     regions
-        Name -> x, y, z of program zero in mm and, if turned, the angle in degrees; or a table with the columns region,
-        x_mm, y_mm, z_mm, rotation_deg. Unless given, four of the reference machine.
+        Name -> x, y, z of program zero in mm and, if turned, the angle in degrees. Unless given, four of the reference
+        machine.
     step_mm
         Distance of the samples.
 
     Raises
     ------
     InputError
-        Regions or program cannot be read.
+        A region or the program cannot be read.
     UnreachableError
         The machine cannot reach a region.
 
@@ -224,17 +216,14 @@ def case_study(
     part = None if program is None else program_from(program)
     model = on.running(part)
     read = None if part is None else lambda origin: part.moves(origin, model.machine.default_origin)
-    file = (str(regions),) if isinstance(regions, str | Path) else ()
-    inputs = (*(part.inputs if part else ()), *file, *on.inputs)
+    inputs = (*(part.inputs if part else ()), *on.inputs)
     return run_case_study(model, m_from_mm(step_mm), read, None if regions is None else _regions(regions), inputs)
 
 
-def _regions(given: Mapping[str, Sequence[float]] | str | Path) -> dict[str, Region]:
+def _regions(named: Mapping[str, Sequence[float]]) -> dict[str, Region]:
     """Regions by name in mm and degrees, checked."""
-    file = "" if isinstance(given, Mapping) else str(given)
-    named: Mapping[str, Sequence[float]] = given if isinstance(given, Mapping) else read_regions(file)
     if not 0 < len(named) <= MOST_REGIONS:
-        raise InputError(f"{len(named)} regions", expected=f"1 to {MOST_REGIONS}", file=file)
+        raise InputError(f"{len(named)} regions", expected=f"1 to {MOST_REGIONS}")
     regions = {}
     for name, numbers in named.items():
         if len(numbers) not in (3, 4):

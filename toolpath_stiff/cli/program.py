@@ -159,7 +159,6 @@ def check(
     for example:
       tps check part.nc
       tps check part.nc --dialect fanuc --json
-      tps check part.nc --strut-speed 5000         warn of cuts in which a strut is faster, mm/min
       tps check part.nc --machine none             the program alone, no reach and no strut speeds
       tps check part.ngc --interpreter auto        by LinuxCNC's interpreter where ours does not read it to its end
 
@@ -181,7 +180,7 @@ def place(args: Namespace) -> int:
       tps place programs/pocket.nc --z-values 400,600,800 --rotate 0 --objective mean
       tps place programs/pocket.nc --keep-out vice:100,100,0,300,300,900
       tps place programs/pocket.nc --rotate 0 --write placed.nc
-      tps place programs/pocket.nc --rotate 0 --pick 7 --write placed.nc
+      tps place programs/pocket.nc --x 40 --y 25.5 --z 900 --rotate 0 --write placed.nc
 
     The recommended placement is never worse than the present one in mean, range or weakest place, if one such can be
     found.
@@ -192,14 +191,15 @@ def place(args: Namespace) -> int:
     """
     run.check_single(args, args.write)
     folder, rules = run.destination(args, tps.Placement, [args.program])
-    placement = run.call(args, tps.place, earlier=folder / "placement.json")
+    placement = run.call(args, tps.place)
     written = placement.save(folder, plots=not args.no_plots, rules=rules)
     if args.write and not placement.refusal:
         written += run.write_single(args, {Path(args.write): placement.program_bytes})
     run.show(args, placement, run.written_text(written))
     if placement.refusal:
         raise InputError(
-            f"{args.write} was not written; the search is kept in {folder} (--pick takes it up): {placement.refusal}"
+            f"{args.write} was not written; the search is kept in {folder}: {placement.refusal}",
+            hint=f"place it there without a search by {placement.fixed}",
         )
     return 0
 
@@ -220,7 +220,6 @@ def case_study(
     args: Namespace,
     program: Annotated[str | None, Option("PROGRAM")] = None,
     region: Annotated[Sequence[Region], Option("--region", "NAME:X,Y,Z[,TURN]", read=_region, count="append")] = (),
-    regions: Annotated[str | None, Option("--regions", "FILE", instead_of="region")] = None,
 ) -> int:
     """The paper's four regions: one path at two heights, displaced and turned.
 
@@ -228,11 +227,9 @@ def case_study(
       tps case-study
       tps case-study programs/pocket.nc
       tps case-study programs/pocket.nc --region left:-200,0,800 --region right:200,0,800,90
-      tps case-study programs/pocket.nc --regions reports/case_study/case_study.csv
 
     Writes case_study.csv, case_study.json, case_study.md, regions.png and heights.png: one tool path at two heights,
     displaced and turned, as the paper's Figure 10; its three conclusions checked one by one; where they stop holding.
-    A file of regions has the columns region, x_mm, y_mm, z_mm, rotation_deg (CSV or FILE.xlsx[#SHEET]).
 
     Parameters
     ----------
@@ -241,10 +238,8 @@ def case_study(
     region
         Where program zero sits, mm, and how far the path is turned about it, degrees; once for each region (default:
         four of the reference machine).
-    regions
-        The same as a table.
     """
     named = dict(region)
     if len(named) < len(region):
         raise InputError("--region: a name is given twice", expected="a name of its own for each region")
-    return run.to_folder(args, tps.case_study, tps.CaseStudy, [program or args.machine], regions=named or regions)
+    return run.to_folder(args, tps.case_study, tps.CaseStudy, [program or args.machine], regions=named or None)

@@ -7,7 +7,7 @@ counted and which sign they have: `baseline`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from io import StringIO
 from pathlib import Path
@@ -16,23 +16,19 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.comparison.load_path import LinkShares, load_path_shares
-from toolpath_stiff.comparison.loop_readings import BesideTip, beside_tip, strut_history
-from toolpath_stiff.comparison.principles import Check, assess, model_free_checks
-from toolpath_stiff.comparison.residuals import ReadingNames, Residuals, Variable
-from toolpath_stiff.comparison.structure import Scattering, find_structure
-from toolpath_stiff.comparison.summary import Answer, ComparisonSummary, summary_of
+from toolpath_stiff.comparison.load_path import load_path_shares
+from toolpath_stiff.comparison.loop_readings import beside_tip
+from toolpath_stiff.comparison.principles import assess, model_free_checks
+from toolpath_stiff.comparison.residuals import ReadingNames, Variable, labels, modelled, patterns, variables
+from toolpath_stiff.comparison.structure import FoundPattern, Scattering, find_structure, shared_tests
+from toolpath_stiff.comparison.summary import ComparisonSummary, summary_of
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.documents import certain, to_dict
+from toolpath_stiff.documents import Document, certain, to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.covariances import Covariance, Groups
-from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.fits import base_fit
-from toolpath_stiff.inference.noise import Noise, Scatter, covariance, noise_models
+from toolpath_stiff.inference.noise import Noise, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
 
@@ -40,9 +36,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
-
-
-FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,13 +56,12 @@ class Comparison(FolderResult):
         (n,) ln(measured / modelled).
     scatter
         (n,) standard deviation of `residual` from scatter alone, under the last noise.
-    covariance, places, excess
-        Of the residuals under the last noise; readings that are mechanically the same, and the relative sd by which
-        these scatter more than noise.
     numbers, names
         What the residuals were held against.
+    tests
+        Every pattern that was looked for, on its own.
     shares
-        Compliance by link.
+        Compliance by link: (3,) m/N along X, Y, Z.
     summary
         What it says, in shop units: compare.json.
     inputs
@@ -96,20 +88,17 @@ class Comparison(FolderResult):
     log_model: FloatArray
     residual: FloatArray
     scatter: FloatArray
-    covariance: Covariance
-    places: Groups
-    excess: float
     numbers: tuple[Variable, ...]
     names: tuple[ReadingNames, ...]
-    shares: LinkShares
+    tests: tuple[FoundPattern, ...]
+    shares: dict[str, FloatArray]
     summary: ComparisonSummary
     inputs: tuple[str, ...] = ()
 
     @cached_property
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Document:
         """The content of compare.json."""
-        document: dict[str, Any] = to_dict(self.summary)
-        return document
+        return dict(to_dict(self.summary))
 
     def to_dict(self) -> dict[str, Any]:
         """The content of compare.json."""
@@ -123,11 +112,6 @@ class Comparison(FolderResult):
 
     def _short(self) -> str:
         return f"{self.summary.machine}, mean error {self.summary.baseline.mean_abs_error_percent:.2f} %"
-
-    def variance(self, weights: FloatArray) -> float:
-        """Of a combination of residuals with weights (n,), by noise and by what it leaves unexplained."""
-        of_places = float((self.places.sums(weights) ** 2).sum())
-        return float(self.covariance.squares(weights)) + self.excess**2 * of_places
 
 
 def compare(
@@ -173,56 +157,40 @@ def compare(
     >>> round(found.summary.baseline.mean_abs_error_percent, 2)
     9.62
     """
-    every, data = data, data.of_tip
-    if not len(data):
+    tip = data.of_tip
+    if not len(tip):
         raise InputError(
             "no reading of the tip",
             expected="readings of tool against work beside those of other loops",
             hint="`tps reduce` shows struts measured alone over their dates, raw records or stiffnesses",
         )
-    residuals = Residuals.of(Predictor(machine, data, effect_files))
-    noises = noise_models(data, noise, strut_spread)
-    checks, cannot = model_free_checks(machine, data)
-    answers = [_answer(residuals, checks, noise_model, draws, seed) for noise_model in noises]
-    beside = _beside_tip(machine, every, effect_files, noise_models(every, noise, strut_spread)[-1], seed)
-    scattering = answers[-1].scattering
-    summary = certain(summary_of(residuals, answers, cannot, beside, seed))
+    predictor = Predictor(machine, tip, effect_files)
+    log_model, noises = modelled(predictor), noise_models(tip, noise, strut_spread)
+    values = np.log(tip.stiffness) - log_model
+    numbers, (names, notes) = variables(predictor, log_model), labels(tip)
+    looked_for = patterns(tip, numbers, names)
+    places = repeat_groups(tip, apart=("force", "loop"))
+    checks, not_checked = model_free_checks(machine, tip)
+    structures, outcomes = [], []
+    for model in noises:
+        scattering = Scattering(model, covariance(model, predictor), tip.clamp, places, draws, seed)
+        structures.append(find_structure(values, looked_for, scattering))
+        outcomes.append(assess(checks, tip, scattering.covariance, scattering.draws(0.0)))
+    summary = summary_of(predictor, values, structures, outcomes, not_checked, notes, seed)
+    if data.beside is not None:  # other loops against the machine as its file has it
+        every = Predictor(machine, data, effect_files)
+        spread = covariance(noise_models(data, noise, strut_spread)[-1], every)
+        summary = replace(summary, loops=beside_tip(data, every.log_stiffness(), spread))
     return Comparison(
-        residuals.predictor,
-        data,
+        predictor,
+        predictor.data,
         noises,
-        residuals.log_model,
-        residuals.values,
+        log_model,
+        values,
         np.sqrt(scattering.square),
-        scattering.covariance,
-        scattering.places,
-        answers[-1].structure.excess,
-        tuple(residuals.numbers),
-        tuple(residuals.names),
-        load_path_shares(residuals.predictor.base, data),
-        summary,
+        tuple(numbers),
+        tuple(names),
+        shared_tests(structures),
+        load_path_shares(predictor.base, tip),
+        certain(summary),
     )
-
-
-def _answer(residuals: Residuals, checks: list[Check], noise: Noise, draws: int, seed: int) -> Answer:
-    """Everything under one noise model."""
-    predictor, values = residuals.predictor, residuals.values
-    spread = covariance(noise, predictor)
-    places = repeat_groups(predictor.data, apart=("force", "loop"))
-    scattering = Scattering(noise, spread, predictor.data.clamp, places, draws, seed)
-    structure = find_structure(values, residuals.patterns, scattering)
-    problem = Problem(predictor, Scatter.of(noise, spread))
-    law = base_fit(problem, law_free=True) if len(values) >= FEWEST_TO_REFIT else None
-    model_free = assess(checks, predictor.data, spread, scattering.draws(0.0))
-    return Answer(noise, scattering, structure, law, model_free, problem)
-
-
-def _beside_tip(
-    machine: Hexapod, data: Readings, effect_files: Sequence[str | Path], noise: Noise, seed: int
-) -> tuple[BesideTip, StrutHistory]:
-    """Readings of loops beside the tip against the machine as its file has it; struts alone over their dates."""
-    if data.beside is None:
-        return BesideTip(), StrutHistory()
-    predictor = Predictor(machine, data, effect_files)
-    log_model = predictor.log_stiffness()
-    return beside_tip(data, log_model, covariance(noise, predictor)), strut_history(data, log_model, seed)

@@ -1,6 +1,6 @@
 """Compliance at the measured poses, link by link of the load path."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,35 +11,14 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 
-@dataclass(frozen=True)
-class LinkShares:
-    """Compliance by link.
-
-    Attributes
-    ----------
-    links
-        "strut 1" to "strut 6", then names of effects.
-    compliance
-        (3, links) m/N along X, Y, Z, mean over the measured poses.
-    poses
-        How many poses.
-    """
-
-    links: tuple[str, ...]
-    compliance: FloatArray
-    poses: int
-
-
-def load_path_shares(model: StiffnessModel, data: Readings) -> LinkShares:
-    """Shares at the measured poses, each counted once."""
+def load_path_shares(model: StiffnessModel, data: Readings) -> dict[str, FloatArray]:
+    """Link, "strut 1" to "strut 6" and effects -> (3,) m/N along X, Y, Z, mean over the measured poses."""
     poses = repeat_groups(data, apart=("direction", "force", "loop"))
     distinct = data.select(np.unique(poses, return_index=True)[1])
-    by_axis = []
-    for axis in np.eye(3):
-        rows = replace(distinct, direction=np.broadcast_to(axis, (len(distinct), 3)).copy())
-        by_axis.append(_by_link(model, rows).mean(axis=0))
-    names = tuple(f"strut {i + 1}" for i in range(6)) + tuple(active.effect.name for active in model.effects)
-    return LinkShares(names, np.array(by_axis), len(distinct))
+    axes = (np.broadcast_to(axis, (len(distinct), 3)).copy() for axis in np.eye(3))
+    by_axis = [_by_link(model, replace(distinct, direction=axis)).mean(axis=0) for axis in axes]
+    names = [*(f"strut {i + 1}" for i in range(6)), *(active.effect.name for active in model.effects)]
+    return dict(zip(names, np.array(by_axis).T, strict=True))
 
 
 def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:

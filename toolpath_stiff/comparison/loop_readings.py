@@ -5,36 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.comparison.residuals import directions
 from toolpath_stiff.inference.covariances import Covariance
-from toolpath_stiff.readings.dates import day_of, short_dates
-from toolpath_stiff.readings.history import StrutHistory, history
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.readings.strut_series import StrutReadings
 
 STANDS_OUT = 3.0  # standard deviations from which a loop is said to read something else than the model has
 
 
 @dataclass(frozen=True)
-class LoopReadingFigures:
-    """One reading; nm per N of load at the tip (of a strut alone: of force in it)."""
-
-    file: str
-    line: int
-    point: str
-    loop: str
-    direction: str
-    force_N: float
-    read_nm_per_N: float
-    model_nm_per_N: float
-    off_nm_per_N: float
-    sd_nm_per_N: float
-    standard_deviations: float
-
-
-@dataclass(frozen=True)
 class LoopMean:
-    """All readings of one loop; counted in the direction in which the machine file's struts would move it."""
+    """All readings of one loop, nm per N of load at the tip (of a strut alone: of force in it).
+
+    Counted in the direction in which the machine file's struts would move it.
+    """
 
     loop: str
     readings: int
@@ -46,16 +28,8 @@ class LoopMean:
     text: str
 
 
-@dataclass(frozen=True)
-class BesideTip:
-    """Loops beside the tip: by loop, and reading by reading."""
-
-    by_loop: tuple[LoopMean, ...] = ()
-    readings: tuple[LoopReadingFigures, ...] = ()
-
-
-def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> BesideTip:
-    """Readings of loops beside the tip.
+def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> tuple[LoopMean, ...]:
+    """Readings of loops beside the tip, by loop.
 
     Parameters
     ----------
@@ -68,42 +42,19 @@ def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> Bes
     """
     beside = data.beside
     if beside is None:
-        return BesideTip()
+        return ()
     joined = np.exp(-log_model)
     read, model, sd = 1e9 * data.compliance, 1e9 * beside.alone(joined), 1e9 * np.sqrt(spread.diagonal) * joined
-    rows = np.flatnonzero(beside.beside)
-    along, off = directions(data), read - model
-    texts = (data.file, data.line, data.point, data.loop, along)
-    figures = (data.force, read, model, off, sd, off / sd)
-    columns = (column[rows].tolist() for column in (*texts, *figures))
-    readings = [LoopReadingFigures(*row) for row in zip(*columns, strict=True)]
     means = []
-    for name in dict.fromkeys(data.loop[rows].tolist()):
+    for name in dict.fromkeys(data.loop[beside.beside].tolist()):
         of_loop = data.loop == name
         weights = np.where(of_loop, 1.0 / sd**2, 0.0)
         toward = beside.toward * weights / weights.sum()
         error = 1e9 * float(np.sqrt(spread.squares(toward * joined)))
-        count, mean, modelled, apart = int(of_loop.sum()), *(float(toward @ part) for part in (read, model, off))
+        count, mean, modelled = int(of_loop.sum()), float(toward @ read), float(toward @ model)
+        ratio = float(toward @ (read - model)) / error
         text = f"{name}: {mean:.2f} nm/N read in the mean of {count}, {modelled:.2f} nm/N modelled"
-        side = "more" if apart > 0.0 else "less"
-        ratio = apart / error
-        text += f": {abs(ratio):.1f} standard deviations {side}" if abs(ratio) >= STANDS_OUT else ", which agrees"
-        means.append(LoopMean(name, count, mean, modelled, apart, error, ratio, text))
-    return BesideTip(tuple(means), tuple(readings))
-
-
-def strut_history(data: Readings, log_model: FloatArray, seed: int) -> StrutHistory:
-    """Struts measured alone, over their dates and by the sign of their force.
-
-    Readings at several lengths are reduced to the mean of these by the model's own stiffness, `log_model` (n,).
-    """
-    if data.beside is None:
-        return StrutHistory()
-    alone = np.array([loop.kind == "alone" for loop in data.beside.loops])[data.beside.which]
-    names, log_read, modelled = data.loop[alone], np.log(data.stiffness[alone]), log_model[alone]
-    for name in np.unique(names):
-        of_strut = names == name
-        log_read[of_strut] -= modelled[of_strut] - modelled[of_strut].mean()
-    dates = [""] * len(names) if data.date is None else data.date[alone].tolist()
-    day = np.array([day_of(text) for text in dates], dtype=float)
-    return history(StrutReadings(names, day, log_read, data.beside.side[alone], short_dates(dates)), seed=seed)
+        off = f": {abs(ratio):.1f} standard deviations {'more' if ratio > 0.0 else 'less'}"
+        text += off if abs(ratio) >= STANDS_OUT else ", which agrees"
+        means.append(LoopMean(name, count, mean, modelled, ratio * error, error, ratio, text))
+    return tuple(means)

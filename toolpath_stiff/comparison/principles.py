@@ -29,6 +29,9 @@ SAME = 1e-3  # m, poses and joints closer than this are one
 UPRIGHT = 1e-3  # rad
 
 
+SURE = 0.05  # probability, all checks counted, below which a principle does not hold
+
+
 ON_AXIS, IMAGES = "threefold symmetry on the axis", "symmetric images"
 
 
@@ -67,42 +70,36 @@ class CheckOutcome:
     text: str
 
 
-@dataclass(frozen=True)
-class NotChecked:
-    """A check that these data do not allow."""
-
-    check: str
-    reason: str
-
-
 def symmetries(machine: Hexapod) -> list[FloatArray]:
     """(3, 3) turns by 120 and 240 degrees about Z and mirrors that leave the machine's joints as they are."""
-    candidates = []
+    turns = []
     for degrees, sign in [(120.0, 1.0), (240.0, 1.0), *((2.0 * half, -1.0) for half in range(0, 180, 30))]:
         c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-        candidates.append(np.array([[c, -sign * s, 0.0], [s, sign * c, 0.0], [0.0, 0.0, 1.0]]))
+        q = np.array([[c, -sign * s, 0.0], [s, sign * c, 0.0], [0.0, 0.0, 1.0]])
+        distances = [
+            np.linalg.norm((joints @ q.T)[:, None] - joints[None], axis=-1)
+            for joints in (machine.frame_joints, machine.platform_joints)
+        ]
+        if all((distance.min(axis=1) < SAME).all() for distance in distances):
+            turns.append(q)
+    return turns
 
-    def maps(q: FloatArray, joints: FloatArray) -> bool:
-        distance = np.linalg.norm((joints @ q.T)[:, None] - joints[None], axis=-1)
-        return bool((distance.min(axis=1) < SAME).all())
 
-    return [q for q in candidates if maps(q, machine.frame_joints) and maps(q, machine.platform_joints)]
-
-
-def model_free_checks(machine: Hexapod, data: Readings) -> tuple[list[Check], list[NotChecked]]:
+def model_free_checks(machine: Hexapod, data: Readings) -> tuple[list[Check], dict[str, str]]:
     """The checks that n readings allow; for the others, why not."""
     cells, turns = Groups.by(repeat_groups(data)).members(), symmetries(machine)
     threefold = sum(np.linalg.det(q) > 0 for q in turns) == 2
-    across = "no pose on the axis was measured along X and Y with the spindle vertical"
     turned = "a turn by 120 degrees does not leave this machine's joints as they are"
-    kinds: list[tuple[str, list[Check], str]] = [
-        (ON_AXIS, list(_on_axis(data, cells)) if threefold else [], across if threefold else turned),
-        (IMAGES, list(_images(data, cells, turns)), "no two readings are images of each other under its symmetry"),
-        ("proportionality", list(_proportionality(data)), "no pose was measured at two loads"),
-        ("set-ups", list(_setups(data)), "no pose was measured in two set-ups"),
-    ]
-    cannot = [NotChecked(name, reason) for name, checks, reason in kinds if not checks]
-    return [check for _, checks, _ in kinds for check in checks], cannot
+    across = "no pose on the axis was measured along X and Y with the spindle vertical"
+    kinds = {
+        ON_AXIS: (_on_axis(data, cells), across) if threefold else ((), turned),
+        IMAGES: (_images(data, cells, turns), "no two readings are images of each other under its symmetry"),
+        "proportionality": (_proportionality(data), "no pose was measured at two loads"),
+        "set-ups": (_setups(data), "no pose was measured in two set-ups"),
+    }
+    checks = {name: list(kind) for name, (kind, _) in kinds.items()}
+    cannot = {name: reason for name, (_, reason) in kinds.items() if not checks[name]}
+    return [check for kind in checks.values() for check in kind], cannot
 
 
 def assess(checks: list[Check], data: Readings, covariance: Covariance, draws: FloatArray) -> list[CheckOutcome]:
@@ -114,22 +111,20 @@ def assess(checks: list[Check], data: Readings, covariance: Covariance, draws: F
         return []
     weights = np.array([check.weights for check in checks])
     sd = np.sqrt(covariance.squares(weights))
-    value = weights @ np.log(data.stiffness)
     largest = np.abs(draws @ (weights / sd[:, None]).T).max(axis=1)
     outcomes = []
-    for check, size, spread in zip(checks, value.tolist(), sd.tolist(), strict=True):
+    for check, size, spread in zip(checks, (weights @ np.log(data.stiffness)).tolist(), sd.tolist(), strict=True):
         p = (1.0 + float((largest >= abs(size) / spread).sum())) / (1.0 + len(largest))
-        holds = p >= 0.05
         percent, error = 100.0 * np.expm1(size), 100.0 * spread
         text = check.text.format(percent=f"{percent:+.2g} % (scatter alone: +-{2 * error:.2g} %)")
-        text = f"{text}: {'no more than scatter' if holds else check.broken}"
-        outcomes.append(CheckOutcome(check.check, holds, percent, error, size / spread, p, text))
+        text = f"{text}: {'no more than scatter' if p >= SURE else check.broken}"
+        outcomes.append(CheckOutcome(check.check, p >= SURE, percent, error, size / spread, p, text))
     return outcomes
 
 
-def _mean(n: int, rows: Rows, weight: float = 1.0) -> FloatArray:
+def _mean(n: int, rows: Rows) -> FloatArray:
     weights = np.zeros(n)
-    weights[rows] = weight / len(rows)
+    weights[rows] = 1.0 / len(rows)
     return weights
 
 
@@ -138,14 +133,14 @@ def _on_axis(data: Readings, cells: list[Rows]) -> Iterator[Check]:
     central = (radius(data) <= SAME) & (np.abs(data.angles[:, :2]).max(axis=1) <= UPRIGHT)
     along, poses = directions(data), repeat_groups(data, apart=("direction",))
     on_axis = [rows for rows in cells if central[rows[0]]]
-    for rows in (rows for rows in on_axis if along[rows[0]] == "X"):
+    across = {int(poses[rows[0]]): rows for rows in reversed(on_axis) if along[rows[0]] == "Y"}
+    for rows in on_axis:
         i = rows[0]
-        across = next((other for other in on_axis if poses[other[0]] == poses[i] and along[other[0]] == "Y"), None)
-        if across is not None:
+        if along[i] == "X" and int(poses[i]) in across:
             setup = f", set-up {data.setup[i]}" if data.setup[i] else ""
             yield Check(
                 ON_AXIS,
-                _mean(len(data), rows) - _mean(len(data), across),
+                _mean(len(data), rows) - _mean(len(data), across[int(poses[i])]),
                 f"On the axis at z = {mm_from_m(float(data.position[i, 2])):.0f} mm{setup}, X against Y: {{percent}}",
                 "the three legs, table or instruments are not alike (table, set-up, gauge, one strut or vertex)",
             )
@@ -165,12 +160,13 @@ def _images(data: Readings, cells: list[Rows], turns: list[FloatArray]) -> Itera
         same = np.abs(q @ turn[a] @ q.T - turn[b]).max(axis=(1, 2)) < UPRIGHT
         same &= np.abs(((along[a] @ q.T) * along[b]).sum(axis=1)) > 1.0 - 1e-6
         images |= set(zip(a[same].tolist(), b[same].tolist(), strict=True))
-    points, names = data.point[firsts], directions(data)[firsts]
+    names = directions(data)
     for first, second in sorted(images):
+        rows, others = cells[first], cells[second]
         yield Check(
             IMAGES,
-            _mean(len(data), cells[first]) - _mean(len(data), cells[second]),
-            f"Point {points[first]} and its image {points[second]}, along {names[first]}: {{percent}}",
+            _mean(len(data), rows) - _mean(len(data), others),
+            f"Point {data.point[rows[0]]} and its image {data.point[others[0]]}, along {names[rows[0]]}: {{percent}}",
             "the legs are not alike, or something about the machine is not symmetric",
         )
 
@@ -180,9 +176,8 @@ def _proportionality(data: Readings) -> Iterator[Check]:
     if "force_N" in data.missing:
         return
     groups = repeat_groups(data, apart=("force",))
-    log_force = np.log(data.force)
+    log_force, along = np.log(data.force), directions(data)
     centred = log_force - (np.bincount(groups, log_force) / np.bincount(groups))[groups]
-    along = directions(data)
     for name in ["every direction", *np.unique(along)]:
         x = np.where((along == name) | (name == "every direction"), centred, 0.0)
         if float((x**2).sum()) > 1e-6:
@@ -198,19 +193,15 @@ def _proportionality(data: Readings) -> Iterator[Check]:
 def _setups(data: Readings) -> Iterator[Check]:
     """Means of the differences between two set-ups at poses and directions measured in both."""
     groups = repeat_groups(data, apart=("setup", "loop"))
-    n, along = len(data), directions(data)
+    n, along, cells = len(data), directions(data), Groups.by(groups).members()
     for a, b in combinations(np.unique(data.setup).tolist(), 2):
         for name in np.unique(along):
-            both = [
-                (rows[data.setup[rows] == a], rows[data.setup[rows] == b])
-                for rows in (np.flatnonzero((groups == g) & (along == name)) for g in np.unique(groups))
-            ]
-            both = [(rows_a, rows_b) for rows_a, rows_b in both if len(rows_a) and len(rows_b)]
-            if both:
-                weights = sum(_mean(n, rows_a) - _mean(n, rows_b) for rows_a, rows_b in both) / len(both)
+            both = [[rows[(along[rows] == name) & (data.setup[rows] == s)] for s in (a, b)] for rows in cells]
+            apart = [_mean(n, rows_a) - _mean(n, rows_b) for rows_a, rows_b in both if len(rows_a) and len(rows_b)]
+            if apart:
                 yield Check(
                     "set-ups",
-                    np.asarray(weights),
+                    np.asarray(sum(apart) / len(apart)),
                     f"{name} in set-up {a or '(unnamed)'} against {b or '(unnamed)'}, same pose: {{percent}}",
                     "the set-ups themselves differ in stiffness",
                 )

@@ -4,8 +4,6 @@ A `Variable` is numbers (height, time, force), `ReadingNames` are names (set-up,
 heights, zones are distances from the machine's axis.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -27,7 +25,24 @@ SAME_PLANE = 0.005  # m, heights closer than this are one plane
 MOST_PLANES = 5  # beyond, heights are put into three bands of equally many readings
 
 
+# Number of planes -> their names, the lowest first; of more by their heights.
+PLANES = {
+    1: ("only plane",),
+    2: ("lower plane", "upper plane"),
+    3: ("lower plane", "middle plane", "upper plane"),
+}
+
+
 ON_AXIS, NEAR_AXIS = 0.1, 0.6  # of the largest distance from the axis: limits of the zones
+
+
+FEWEST = 2  # readings in a level; a single one is a reading, not a pattern
+
+
+CURVED = ("order", "time_min", "height", "mean_strut_length")  # variables whose curvature is looked for too
+
+
+ALL = "all"
 
 
 MOST_LEVELS = 100  # of a label: beyond, its levels are not tested one by one
@@ -65,48 +80,19 @@ class ReadingNames:
     by_direction: bool
 
 
-@dataclass(frozen=True)
-class Residuals:
-    """ln(measured / modelled) of n readings of the tip, and what they are held against.
-
-    Attributes
-    ----------
-    predictor
-        Model and readings.
-    log_model, values
-        (n,) ln(N/m) that the readings should show; the residuals.
-    numbers, names
-        What they are held against.
-    notes
-        What was left out of that.
-    patterns
-        Everything that is looked for in them.
-    """
-
-    predictor: Predictor
-    log_model: FloatArray
-    values: FloatArray
-    numbers: list[Variable]
-    names: list[ReadingNames]
-    notes: list[str]
-    patterns: list[Pattern]
-
-    @classmethod
-    def of(cls, predictor: Predictor) -> Residuals:
-        """Residuals of the predictor's readings. Raises `InputError` where the model has no stiffness for one."""
-        data, log_model = predictor.data, predictor.log_stiffness()
-        bad = np.flatnonzero(~np.isfinite(log_model))
-        if len(bad):
-            model_stiffness(predictor.base, data)  # which effect leaves none, at which pose, if it is one
-            raise InputError(
-                "the model has no stiffness for this reading",
-                hint="check the pose and the machine file's effects",
-                file=str(data.file[bad[0]]),
-                line=int(data.line[bad[0]]),
-            )
-        numbers, (names, notes) = variables(predictor, log_model), labels(data)
-        values = np.log(data.stiffness) - log_model
-        return cls(predictor, log_model, values, numbers, names, notes, patterns(data, numbers, names))
+def modelled(predictor: Predictor) -> FloatArray:
+    """(n,) ln(N/m) that the predictor's readings should show. Raises `InputError` where there is no stiffness."""
+    data, log_model = predictor.data, predictor.log_stiffness()
+    bad = np.flatnonzero(~np.isfinite(log_model))
+    if len(bad):
+        model_stiffness(predictor.base, data)  # which effect leaves none, at which pose, if it is one
+        raise InputError(
+            "the model has no stiffness for this reading",
+            hint="check the pose and the machine file's effects",
+            file=str(data.file[bad[0]]),
+            line=int(data.line[bad[0]]),
+        )
+    return log_model
 
 
 def directions(data: Readings) -> TextArray:
@@ -126,18 +112,14 @@ def planes(data: Readings) -> TextArray:
     if count > MOST_PLANES:
         edges = np.quantile(z, [1.0 / 3.0, 2.0 / 3.0])
         return np.array(["lower third", "middle third", "upper third"])[np.searchsorted(edges, z, side="left")]
-    if count == 1:
-        return np.full(len(z), "only plane")
-    named = {2: ("lower plane", "upper plane"), 3: ("lower plane", "middle plane", "upper plane")}
     heights = [f"plane at z = {mm_from_m(float(z[group == g].mean())):.0f} mm" for g in range(count)]
-    return np.array(named.get(count, heights))[group]
+    return np.array(PLANES.get(count, heights))[group]
 
 
 def plane_heights_mm(data: Readings) -> dict[str, float]:
     """Mean height of each plane's readings, mm; the lowest first."""
-    names = planes(data)
-    heights = {str(name): float(mm_from_m(data.position[names == name, 2]).mean()) for name in np.unique(names)}
-    return dict(sorted(heights.items(), key=lambda plane: plane[1]))
+    where, z = planes(data), mm_from_m(data.position[:, 2])
+    return dict(sorted(((str(p), float(z[where == p].mean())) for p in np.unique(where)), key=lambda plane: plane[1]))
 
 
 def radius(data: Readings) -> FloatArray:
@@ -148,10 +130,9 @@ def radius(data: Readings) -> FloatArray:
 def zones(data: Readings) -> TextArray:
     """(n,) "on the axis", "near the axis" or "far from the axis"; "" where all are on it."""
     r = radius(data)
-    largest = float(r.max())
-    if largest < SAME_PLANE:
+    if float(r.max()) < SAME_PLANE:
         return np.full(len(r), "", dtype="<U18")
-    share = r / largest
+    share = r / r.max()
     names = np.where(share > NEAR_AXIS, "far from the axis", "near the axis")
     return np.where(share <= ON_AXIS, "on the axis", names)
 
@@ -162,27 +143,28 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
     `log_model` (n,): ln(N/m) that the model says.
     """
     data = predictor.data
-    turn = data.rotation
-    tilt = np.arccos(np.clip(turn[:, 2, 2], -1.0, 1.0))
-    azimuth = np.arctan2(data.position[:, 1], data.position[:, 0])
-    lengths = mm_from_m(predictor.strut_lengths())
-    share = 100.0 * predictor.strut_columns()
-    along_tool = np.einsum("ni,ni->n", data.direction, turn[:, :, 2]) ** 2
-    off_axis = radius(data) > SAME_PLANE
+    turn, position = data.rotation, mm_from_m(data.position)
+    azimuth = np.where(radius(data) > SAME_PLANE, 3.0 * np.arctan2(position[:, 1], position[:, 0]), np.nan)
+    lengths, share = mm_from_m(predictor.strut_lengths()), 100.0 * predictor.strut_columns()
     known = [
         Variable("order", "the reading's place in the measuring order", "", np.arange(1.0, len(data) + 1.0)),
-        Variable("height", "the height", "mm", mm_from_m(data.position[:, 2])),
-        Variable("x", "X", "mm", mm_from_m(data.position[:, 0])),
-        Variable("y", "Y", "mm", mm_from_m(data.position[:, 1])),
+        Variable("height", "the height", "mm", position[:, 2]),
+        Variable("x", "X", "mm", position[:, 0]),
+        Variable("y", "Y", "mm", position[:, 1]),
         Variable("radius", "the distance from the axis", "mm", mm_from_m(radius(data))),
-        Variable("cos_3_azimuth", "the cosine of 3 x azimuth", "", np.where(off_axis, np.cos(3 * azimuth), np.nan)),
-        Variable("sin_3_azimuth", "the sine of 3 x azimuth", "", np.where(off_axis, np.sin(3 * azimuth), np.nan)),
-        Variable("tilt", "the tilt", "deg", deg_from_rad(tilt)),
+        Variable("cos_3_azimuth", "the cosine of 3 x azimuth", "", np.cos(azimuth)),
+        Variable("sin_3_azimuth", "the sine of 3 x azimuth", "", np.sin(azimuth)),
+        Variable("tilt", "the tilt", "deg", deg_from_rad(np.arccos(np.clip(turn[:, 2, 2], -1.0, 1.0)))),
         *(
             Variable(f"{name}_angle", f"the {name} angle", "deg", deg_from_rad(data.angles[:, i]))
             for i, name in enumerate(("roll", "pitch", "yaw"))
         ),
-        Variable("along_tool", "the load's alignment with the tool axis", "", along_tool),
+        Variable(
+            "along_tool",
+            "the load's alignment with the tool axis",
+            "",
+            np.einsum("ni,ni->n", data.direction, turn[:, :, 2]) ** 2,
+        ),
         Variable("vertical_share", "the load's vertical share", "", data.direction[:, 2] ** 2),
         Variable("mean_strut_length", "the mean strut length", "mm", lengths.mean(axis=1)),
         Variable("max_strut_length", "the longest strut's length", "mm", lengths.max(axis=1)),
@@ -200,8 +182,8 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
         Variable("temperature_C", "the temperature", "C", data.temperature),
         Variable("tool_extension_mm", "the tool's extra length", "mm", mm_from_m(data.tool_extension)),
     ]
-    known += [variable for variable in columns if variable.name not in data.missing]
-    known += [variable for variable in (columns[2], columns[1]) if variable.name in data.missing]  # given in some rows
+    in_some_rows = ("time_min", "temperature_C")
+    known += [column for column in columns if column.name not in data.missing or column.name in in_some_rows]
     known += [Variable(name, f"column {name}", "", values) for name, values in data.extra.items()]
     return [variable for variable in known if varies(variable.values)]
 
@@ -214,37 +196,21 @@ def varies(values: FloatArray) -> bool:
 
 def labels(data: Readings) -> tuple[list[ReadingNames], list[str]]:
     """Names to hold residuals against, only those with two levels or more; notes about those with too many."""
-    clamp, file = data.clamp, data.file
-    if len(set(file.tolist())) == 1:
-        prefix = f"{file[0]}: "
-        clamp = np.array([name.removeprefix(prefix) for name in clamp.tolist()])
-    every = [
+    prefix = f"{data.file[0]}: " if len(set(data.file.tolist())) == 1 else ""
+    clamps = np.array([clamp.removeprefix(prefix) for clamp in data.clamp.tolist()])
+    known = [
         ReadingNames("plane", "at the {}", planes(data), True),
         ReadingNames("zone", "{}", zones(data), True),
         ReadingNames("setup", "with set-up {}", data.setup, True),
         ReadingNames("loop", "read {}", data.loop, True),
-        ReadingNames("file", "in {}", file, True),
+        ReadingNames("file", "in {}", data.file, True),
         ReadingNames("repeat", "in repeat {}", data.repeat, True),
-        ReadingNames("clamp", "in clamping ({})", clamp, False),
+        ReadingNames("clamp", "in clamping ({})", clamps, False),
         ReadingNames("point", "at point {}", data.point, False),
     ]
-    kept, notes = [], []
-    for label in every:
-        count = len(set(label.values.tolist()))
-        if count > MOST_LEVELS:
-            notes.append(f"{label.name} has {count} levels: not tested one by one")
-        elif count > 1:
-            kept.append(label)
-    return kept, notes
-
-
-FEWEST = 2  # readings in a level; a single one is a reading, not a pattern
-
-
-CURVED = ("order", "time_min", "height", "mean_strut_length")  # variables whose curvature is looked for too
-
-
-ALL = "all"
+    levels = {label.name: len(set(label.values.tolist())) for label in known}
+    notes = [f"{name} has {n} levels: not tested one by one" for name, n in levels.items() if n > MOST_LEVELS]
+    return [label for label in known if 1 < levels[label.name] <= MOST_LEVELS], notes
 
 
 def patterns(data: Readings, numbers: list[Variable], names: list[ReadingNames]) -> list[Pattern]:
@@ -271,9 +237,8 @@ def _candidates(data: Readings, numbers: list[Variable], names: list[ReadingName
             for group, rows in (groups if label.by_direction else {ALL: whole}).items()
             for level in np.unique(label.values)
         ]
-    by_name = {label.name: label for label in names}
-    if "plane" in by_name and "zone" in by_name:
-        plane, zone = by_name["plane"], by_name["zone"]
+    plane, zone = (next((label for label in names if label.name == name), None) for name in ("plane", "zone"))
+    if plane and zone:
         levels += [
             (f"zone {here}, plane {level}", group, rows & (plane.values == level) & (zone.values == here),
              f"{here} {plane.text.format(level)}")

@@ -15,13 +15,14 @@ strongest pattern is then taken out and the rest is asked again, until nothing s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.noise import Noise
 
@@ -87,7 +88,7 @@ class Pattern:
     direction: str
     kind: str
     values: FloatArray
-    rows: NDArray[np.bool_]
+    rows: BoolArray
     place: str
     given: FloatArray | None = None
     unit: str = ""
@@ -119,29 +120,6 @@ class FoundPattern:
     alike: tuple[Pattern, ...]
 
 
-@dataclass(frozen=True)
-class FoundPatterns:
-    """All answers.
-
-    Attributes
-    ----------
-    patterns
-        Patterns that stand out, one after the other.
-    tests
-        Every pattern on its own.
-    excess, excess_left
-        Relative sd from place to place beyond the noise, before and after taking the patterns out.
-    probability
-        Of residuals this large in scatter alone.
-    """
-
-    patterns: tuple[FoundPattern, ...]
-    tests: tuple[FoundPattern, ...]
-    excess: float
-    excess_left: float
-    probability: float
-
-
 class Scattering:
     """The scatter of n readings, ready to be whitened and drawn.
 
@@ -163,12 +141,12 @@ class Scattering:
         self,
         noise: Noise,
         covariance: Covariance,
-        clamp: NDArray[np.str_],
-        place: NDArray[np.int64],
+        clamp: TextArray,
+        place: IntArray,
         draws: int,
         seed: int,
     ) -> None:
-        self.covariance = covariance
+        self.noise, self.covariance = noise, covariance
         self.places = Groups.by(place)
         clamps, wide_clamps = _narrow(covariance.groups)
         narrow, wide_places = _narrow(self.places)
@@ -176,11 +154,10 @@ class Scattering:
         self.weights = 1.0 / np.sqrt(1.0 + EXCESSES[:, None] ** 2 * np.maximum(spread, 0.0))  # (g, n)
         self._shared = self.turned(np.concatenate([covariance.shared, np.sqrt(covariance.common) * wide_clamps]))
         self._wide_places = self.turned(wide_places)
-        self._axes: dict[int, tuple[FloatArray, FloatArray]] = {}
+        self.axes = cache(self._axes)
         self.sd = np.sqrt(covariance.diagonal)
         # Wild readings included; how well the noise itself is known is not.
         self.square = covariance.diagonal + noise.repeat**2 * noise.outliers * (noise.outlier_width**2 - 1.0)
-        self.repeated = len(place) - self.places.count
         rng = np.random.default_rng(seed)
         self._normal, self._of_place = self._draw(noise, Groups.by(clamp), draws, rng)
 
@@ -211,13 +188,11 @@ class Scattering:
         """Rows (m, n) in the basis in which the noise is white, but for what all share, and the excess diagonal."""
         return np.asarray((self.turn @ rows.T).T)
 
-    def axes(self, grid: int) -> tuple[FloatArray, FloatArray]:
+    def _axes(self, grid: int) -> tuple[FloatArray, FloatArray]:
         """Principal axes (n, q) of what all share at an excess of the grid, and how much of each is to be taken off."""
-        if grid not in self._axes:
-            shared = np.concatenate([self._shared, EXCESSES[grid] * self._wide_places]) * self.weights[grid]
-            axes, size, _ = np.linalg.svd(shared.T, full_matrices=False)
-            self._axes[grid] = axes, 1.0 - 1.0 / np.sqrt(1.0 + size**2)
-        return self._axes[grid]
+        shared = np.concatenate([self._shared, EXCESSES[grid] * self._wide_places]) * self.weights[grid]
+        axes, size, _ = np.linalg.svd(shared.T, full_matrices=False)
+        return axes, 1.0 - 1.0 / np.sqrt(1.0 + size**2)
 
     def shrunk(self, columns: FloatArray, grid: int) -> FloatArray:
         """Columns (n, m), turned and weighted, white also in what all readings share."""
@@ -225,15 +200,13 @@ class Scattering:
         return np.asarray(columns - axes @ (share[:, None] * (axes.T @ columns)))
 
 
-def _narrow(groups: Groups) -> tuple[NDArray[np.int64], FloatArray]:
+def _narrow(groups: Groups) -> tuple[IntArray, FloatArray]:
     """(n,) each reading's group, -1 in one of more than `WIDE` readings; (w, n) ones and noughts of those."""
     wide = np.flatnonzero(np.bincount(groups.of) > WIDE)
     return np.where(np.isin(groups.of, wide), -1, groups.of), (groups.of == wide[:, None]).astype(float)
 
 
-def _turn_blocks(
-    covariance: Covariance, clamp: NDArray[np.int64], place: NDArray[np.int64]
-) -> tuple[csr_array, FloatArray]:
+def _turn_blocks(covariance: Covariance, clamp: IntArray, place: IntArray) -> tuple[csr_array, FloatArray]:
     """Turn (n, n) in which each reading's own scatter and its clamping's are white, and the variance of its place.
 
     The readings of a block have a clamping or a place in common with each other; -1 is none.
@@ -251,7 +224,7 @@ def _turn_blocks(
     return csr_array((data, (row, column)), shape=(len(clamp),) * 2), spread
 
 
-def _connected(clamp: NDArray[np.int64], place: NDArray[np.int64]) -> Groups:
+def _connected(clamp: IntArray, place: IntArray) -> Groups:
     """Readings (n,) that hang together by their clampings and places; -1 is none."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -273,8 +246,7 @@ class _Fit:
     def __init__(self, scattering: Scattering, columns: FloatArray, base: FloatArray) -> None:
         self.scattering, self.base = scattering, base
         self._turned, self._fixed = scattering.turned(columns).T, scattering.turned(base).T
-        self._bases: dict[int, tuple[FloatArray, FloatArray]] = {}
-        self._columns: dict[int, tuple[FloatArray, FloatArray, FloatArray]] = {}
+        self.of_base, self.columns = cache(self._of_base), cache(self._columns)
         white = scattering.shrunk(self._fixed * scattering.weights[0][:, None], 0)
         # (n, b) from turned residuals to their share in each row of the base.
         self._taken = scattering.shrunk(np.asarray(np.linalg.pinv(white).T), 0) * scattering.weights[0][:, None]
@@ -284,57 +256,52 @@ class _Fit:
 
     def _of_base(self, grid: int) -> tuple[FloatArray, FloatArray]:
         """Orthonormal basis (n, b) of the white base; (n, q) what removes it and what all share from a square."""
-        if grid not in self._bases:
-            axes, share = self.scattering.axes(grid)
-            weight = self.scattering.weights[grid][:, None]
-            basis = _orthonormal(self.scattering.shrunk(self._fixed * weight, grid))
-            both = [axes * np.sqrt(1.0 - (1.0 - share) ** 2), self.scattering.shrunk(basis, grid)]
-            self._bases[grid] = basis, np.concatenate(both, axis=1) * weight
-        return self._bases[grid]
+        axes, share = self.scattering.axes(grid)
+        weight = self.scattering.weights[grid][:, None]
+        left, singular, _ = np.linalg.svd(self.scattering.shrunk(self._fixed * weight, grid), full_matrices=False)
+        basis = left[:, singular > 1e-9 * max(float(singular.max(initial=0.0)), 1e-300)]
+        both = [axes * np.sqrt(1.0 - (1.0 - share) ** 2), self.scattering.shrunk(basis, grid)]
+        return basis, np.concatenate(both, axis=1) * weight
 
-    def columns(self, grid: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _columns(self, grid: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Patterns (n, patterns) white and of length 1; their lengths before; what gives turned residuals' share."""
-        if grid not in self._columns:
-            weight = self.scattering.weights[grid][:, None]
-            basis, _ = self._of_base(grid)
-            x = self.scattering.shrunk(self._turned * weight, grid)
-            whole = np.einsum("ij,ij->j", x, x)
-            x = x - basis @ (basis.T @ x)
-            left = np.einsum("ij,ij->j", x, x)
-            size = np.sqrt(np.where(left > DEPENDENT * whole, left, np.inf))
-            x = x / size
-            self._columns[grid] = x, size, self.scattering.shrunk(x, grid) * weight
-        return self._columns[grid]
+        weight, (basis, _) = self.scattering.weights[grid][:, None], self.of_base(grid)
+        x = self.scattering.shrunk(self._turned * weight, grid)
+        whole = np.einsum("ij,ij->j", x, x)
+        x = x - basis @ (basis.T @ x)
+        left = np.einsum("ij,ij->j", x, x)
+        size = np.sqrt(np.where(left > DEPENDENT * whole, left, np.inf))
+        x = x / size
+        return x, size, self.scattering.shrunk(x, grid) * weight
 
     def tamed(self, residuals: FloatArray) -> FloatArray:
         """Rows (m, n) of residuals beside the base, wild ones drawn in (Huber 1981, Robust Statistics, psi)."""
         rest = residuals - (self.scattering.turned(residuals) @ self._taken) @ self.base
-        scaled = np.abs(rest) / self.scattering.sd
+        typical = np.median(np.abs(rest) / self.scattering.sd, axis=1, keepdims=True)
         # 0.6745: the median of the size of a standard normal variable.
-        bound = WILD * np.maximum(np.median(scaled, axis=1, keepdims=True) / 0.6745, 1.0) * self.scattering.sd
+        bound = WILD * np.maximum(typical / 0.6745, 1.0) * self.scattering.sd
         return np.asarray(np.clip(rest, -bound, bound))
 
     def _squares(self, turned: FloatArray, grid: int) -> FloatArray:
         whole = ((turned * self.scattering.weights[grid]) ** 2).sum(axis=1)
-        return np.asarray(whole - ((turned @ self._of_base(grid)[1]) ** 2).sum(axis=1))
+        return np.asarray(whole - ((turned @ self.of_base(grid)[1]) ** 2).sum(axis=1))
 
-    def _excess(self, turned: FloatArray, target: FloatArray) -> NDArray[np.int64]:
+    def _excess(self, turned: FloatArray, target: FloatArray) -> IntArray:
         """(m,) index of the smallest excess that brings the sum of squares of rows (m, n) down to the target (m,)."""
-        chosen = np.full(len(turned), len(EXCESSES) - 1)
-        open_rows = np.arange(len(turned))
+        chosen, left = np.full(len(turned), len(EXCESSES) - 1), np.arange(len(turned))
         for grid in range(len(EXCESSES)):
-            good = self._squares(turned[open_rows], grid) <= target[open_rows]
-            chosen[open_rows[good]] = grid
-            open_rows = open_rows[~good]
-            if len(open_rows) == 0:
+            good = self._squares(turned[left], grid) <= target[left]
+            chosen[left[good]] = grid
+            left = left[~good]
+            if not len(left):
                 break
         return chosen
 
-    def statistics(self, residuals: FloatArray) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
+    def statistics(self, residuals: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
         """Of rows (m, n) of residuals: (m, patterns) t, (m,) index of the excess, (m,) factor on the noise."""
         turned = self.scattering.turned(self.tamed(residuals))
         inflation = np.ones(len(turned))
-        if self.scattering.repeated >= FEWEST_REPEATED:
+        if len(residuals.T) - self.scattering.places.count >= FEWEST_REPEATED:
             inflation = np.maximum(self._squares(turned, -1) / self._within, 1.0)
         chosen = self._excess(turned, self._target * inflation)
         t = np.zeros((len(turned), self._turned.shape[1]))
@@ -345,30 +312,39 @@ class _Fit:
         return t / factor[:, None], chosen, factor
 
 
-def _orthonormal(columns: FloatArray) -> FloatArray:
-    """(n, r) orthonormal basis of columns (n, m) of any rank."""
-    if columns.shape[1] == 0:
-        return np.zeros((len(columns), 0))
-    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(left[:, singular > 1e-9 * max(float(singular[0]), 1e-300)])
+@dataclass(frozen=True)
+class FoundPatterns:
+    """All answers under one noise model.
 
-
-def find_structure(
-    residual: FloatArray,
-    patterns: list[Pattern],
-    scattering: Scattering,
-) -> FoundPatterns:
-    """Which patterns residuals (n,) show beyond scatter.
-
-    Parameters
+    Attributes
     ----------
-    residual
-        ln(measured / modelled).
-    patterns
-        What is looked for.
     scattering
-        The scatter.
+        What residuals were held against.
+    patterns
+        Patterns that stand out, one after the other.
+    tests
+        Every pattern on its own.
+    excess, excess_left
+        Relative sd from place to place beyond the noise, before and after taking the patterns out.
+    probability
+        Of residuals this large in scatter alone.
     """
+
+    scattering: Scattering
+    patterns: tuple[FoundPattern, ...]
+    tests: tuple[FoundPattern, ...]
+    excess: float
+    excess_left: float
+    probability: float
+
+    def least_p(self, pattern: Pattern) -> float:
+        """Smallest adjusted probability that a pattern got, tested alone or beside others."""
+        same = (test for test in (*self.tests, *self.patterns) if test.pattern is pattern)
+        return min((test.p_adjusted for test in same), default=1.0)
+
+
+def find_structure(residual: FloatArray, patterns: list[Pattern], scattering: Scattering) -> FoundPatterns:
+    """Which of the patterns residuals (n,), ln(measured / modelled), show beyond scatter."""
     columns = np.array([pattern.values for pattern in patterns])
     base = np.zeros((0, len(residual)))
     detections: list[FoundPattern] = []
@@ -376,40 +352,44 @@ def find_structure(
     excess = left = 0.0
     for step in range(MOST_PATTERNS + 1):
         fit = _Fit(scattering, columns, base)
-        statistic, grid, factor = fit.statistics(residual[None])
-        t, excess_index = statistic[0], int(grid[0])
-        left = float(EXCESSES[excess_index])
+        (t,), (grid,), (factor,) = fit.statistics(residual[None])
+        left = float(EXCESSES[grid])
         drawn = np.abs(fit.statistics(scattering.draws(left))[0]).max(axis=1)
         p = (1.0 + (drawn[:, None] >= np.abs(t)[None, :] - 1e-12).sum(axis=0)) / (1.0 + len(drawn))
-        x, sizes, _ = fit.columns(excess_index)
-        sizes = sizes / float(factor[0])
-        alike = np.abs(x.T @ x) > ALIKE
+        x, sizes, _ = fit.columns(int(grid))
+        coefficients, alike = t * float(factor) / sizes, np.abs(x.T @ x) > ALIKE
         np.fill_diagonal(alike, val=False)
         answers = [
-            FoundPattern(pattern, float(t[i]), float(p[i]), float(t[i] / sizes[i]),
+            FoundPattern(pattern, float(t[i]), float(p[i]), float(coefficients[i]),
                          tuple(patterns[j] for j in np.flatnonzero(alike[i])))
             for i, pattern in enumerate(patterns)
         ]  # fmt: skip
         if step == 0:
-            excess = left
-            tests = tuple(test for test, size in zip(answers, sizes, strict=True) if np.isfinite(size))
+            excess, tests = left, tuple(answers[i] for i in np.flatnonzero(np.isfinite(sizes)))
         best = int(np.argmax(np.abs(t) >= (1.0 - TIED) * np.abs(t).max()))
         if p[best] >= SIGNIFICANT or step == MOST_PATTERNS:
             break
         detections.append(answers[best])
         base = np.concatenate([base, columns[[best]]])
-    square = float(scattering.covariance.precision.squares(residual))
     simulated = scattering.covariance.precision.squares(scattering.draws(0.0))
-    probability = (1.0 + float((simulated >= square).sum())) / (1.0 + len(simulated))
-    return FoundPatterns(tuple(detections), tests, excess, left, probability)
+    larger = float((simulated >= float(scattering.covariance.precision.squares(residual))).sum())
+    probability = (1.0 + larger) / (1.0 + len(simulated))
+    return FoundPatterns(scattering, tuple(detections), tests, excess, left, probability)
 
 
-def far_off(
-    residual: FloatArray, scattering: Scattering, structure: FoundPatterns
-) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
+def shared_tests(structures: Sequence[FoundPatterns]) -> tuple[FoundPattern, ...]:
+    """Every pattern on its own under the last noise model, with the largest probability of any."""
+    by_noise = [{test.pattern: test.p_adjusted for test in structure.tests} for structure in structures]
+    return tuple(
+        replace(test, p_adjusted=max(of_noise.get(test.pattern, test.p_adjusted) for of_noise in by_noise))
+        for test in structures[-1].tests
+    )
+
+
+def far_off(residual: FloatArray, structure: FoundPatterns) -> tuple[FloatArray, IntArray, FloatArray]:
     """(n,) residuals with the patterns found taken out, rows far from nought, the furthest first, and (n,) in sd."""
     columns = np.array([answer.pattern.values for answer in structure.patterns]).reshape(-1, len(residual)).T
     rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0] if columns.size else residual
-    ratio = rest / np.sqrt(scattering.covariance.diagonal + structure.excess_left**2)
+    ratio = rest / np.sqrt(structure.scattering.covariance.diagonal + structure.excess_left**2)
     order = np.argsort(-np.abs(ratio), kind="stable")
     return rest, order[np.abs(ratio[order]) > FAR_OFF], ratio

@@ -8,27 +8,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
-from toolpath_stiff.comparison.loop_readings import BesideTip
-from toolpath_stiff.comparison.principles import CheckOutcome, NotChecked
-from toolpath_stiff.comparison.residuals import Residuals, directions, plane_heights_mm, planes
-from toolpath_stiff.comparison.structure import (
-    EXCESSES,
-    SIGNIFICANT,
-    FoundPattern,
-    FoundPatterns,
-    Pattern,
-    Scattering,
-    far_off,
-)
+from toolpath_stiff.comparison.loop_readings import LoopMean
+from toolpath_stiff.comparison.principles import CheckOutcome
+from toolpath_stiff.comparison.residuals import directions, plane_heights_mm, planes
+from toolpath_stiff.comparison.structure import EXCESSES, SIGNIFICANT, FoundPatterns, far_off
 from toolpath_stiff.comparison.words import sentence
 from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.errors import deviation_percent, error_figures, errors_text
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.inference.prediction import scaled_law
+from toolpath_stiff.inference.fits import base_fit
+from toolpath_stiff.inference.noise import Noise, Scatter
+from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.inference.slips import SuspectEntry, suspect_entries, suspect_rows
-from toolpath_stiff.readings.history import StrutHistory
+from toolpath_stiff.machine.model import StrutLaw
+from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
+
+FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted
 
 
 @dataclass(frozen=True)
@@ -64,20 +60,6 @@ class AllErrors(GroupErrors):
 
 
 @dataclass(frozen=True)
-class PatternTest:
-    """A pattern on its own."""
-
-    pattern: str
-    variable: str
-    direction: str
-    kind: str
-    readings: int
-    same: list[str]
-    statistic: float
-    p_adjusted: float
-
-
-@dataclass(frozen=True)
 class PatternFinding:
     """A pattern in words."""
 
@@ -107,14 +89,6 @@ class FarReading:
 
 
 @dataclass(frozen=True)
-class ModelFree:
-    """Checks that need no stiffness model, and those that these data do not allow."""
-
-    checks: list[CheckOutcome]
-    cannot_check: list[NotChecked]
-
-
-@dataclass(frozen=True)
 class NoiseFigures:
     """A noise model."""
 
@@ -127,13 +101,16 @@ class NoiseFigures:
     @classmethod
     def of(cls, noise: Noise) -> NoiseFigures:
         """Of a noise model in relative standard deviations."""
-        repeat, clamping, spread = (100.0 * s for s in (noise.typical_repeat, noise.clamping, noise.strut_spread))
+        repeat, clamping, spread = (100.0 * sd for sd in (noise.typical_repeat, noise.clamping, noise.strut_spread))
         return cls(noise.name, repeat, clamping, spread, noise.origin)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ComparisonSummary:
-    """The content of compare.json."""
+    """The content of compare.json.
+
+    `model_free`: checks that need no stiffness model; `not_checked`: those that these data do not allow -> why.
+    """
 
     machine: str
     effects: list[str]
@@ -146,12 +123,10 @@ class ComparisonSummary:
     by_setup: dict[str, GroupErrors]
     by_plane_and_direction: dict[str, GroupErrors]
     findings: list[PatternFinding]
-    by_noise: dict[str, list[PatternFinding]]
-    tests: list[PatternTest]
     outliers: list[FarReading]
-    loops: BesideTip
-    history: StrutHistory
-    model_free: ModelFree
+    loops: Sequence[LoopMean] = ()
+    model_free: list[CheckOutcome]
+    not_checked: dict[str, str]
     noise: list[NoiseFigures]
     not_tested: list[str]
     assumptions: list[str]
@@ -166,69 +141,51 @@ class ComparisonSummary:
 MOST_ALIKE = 6  # patterns named as not to be told apart
 
 
-@dataclass(frozen=True)
-class Answer:
-    """Everything under one noise model."""
-
-    noise: Noise
-    scattering: Scattering
-    structure: FoundPatterns
-    law: Fit | None
-    model_free: list[CheckOutcome]
-    problem: Problem
-
-    def least_p(self, pattern: Pattern) -> float:
-        """Smallest adjusted probability that a pattern got, tested alone or beside others."""
-        tests = (*self.structure.tests, *self.structure.patterns)
-        return min((test.p_adjusted for test in tests if test.pattern is pattern), default=1.0)
-
-
 def summary_of(
-    residuals: Residuals,
-    answers: Sequence[Answer],
-    cannot: list[NotChecked],
-    beside: tuple[BesideTip, StrutHistory],
+    predictor: Predictor,
+    values: FloatArray,
+    structures: Sequence[FoundPatterns],
+    outcomes: Sequence[Sequence[CheckOutcome]],
+    not_checked: dict[str, str],
+    notes: Sequence[str],
     seed: int,
 ) -> ComparisonSummary:
     """The content of compare.json, its figures not rounded yet.
 
     Parameters
     ----------
-    residuals
-        Of n readings.
-    answers
-        One a noise model.
-    cannot
-        Checks without a model that the data do not allow.
-    beside
-        Readings of other loops; struts alone over their dates.
+    predictor, values
+        Model and n readings; their residuals.
+    structures, outcomes
+        Under each noise model: what they show, and the checks without a model.
+    not_checked, notes
+        Checks without a model that the data do not allow; what was left out of the search for patterns.
     seed
         Of the simulated scatter.
     """
-    data, last, values = residuals.predictor.data, answers[-1], residuals.values
-    question_text = question(residuals.predictor)
+    data, last, question_text = predictor.data, structures[-1], question(predictor)
 
     def by(label: TextArray) -> dict[str, GroupErrors]:
-        return {str(level): _errors(values, answers, label == level) for level in np.unique(label)}
+        return {str(level): _errors(values, structures, label == level) for level in np.unique(label)}
 
     where, along = planes(data), directions(data)
-    baseline = _baseline(values, answers)
-    by_noise = {
-        answer.noise.name: [
-            _finding(detection, values, first=i == 0) for i, detection in enumerate(answer.structure.patterns)
-        ]
-        for answer in answers
-    }
-    findings, tests = _shared_findings(answers, by_noise), _tests(answers)
-    noises = [NoiseFigures.of(answer.noise) for answer in answers]
-    suspects = suspect_entries([] if last.law is None else suspect_rows(last.problem, last.law), data, left_out=None)
-    doubts = [*dict.fromkeys(answer.noise.remark for answer in answers if answer.noise.remark)]
+    problem = Problem(predictor, Scatter.of(last.scattering.noise, last.scattering.covariance))
+    law = base_fit(problem, law_free=True) if len(values) >= FEWEST_TO_REFIT else None
+    baseline = AllErrors(
+        **vars(_errors(values, structures, np.ones(len(values), dtype=bool))),
+        probability={found.scattering.noise.name: found.probability for found in structures},
+        excess_scatter_percent={found.scattering.noise.name: 100.0 * found.excess for found in structures},
+        strut_law_refitted=None if law is None else _refitted(predictor.machine.strut_law, law),
+    )
+    findings, noises = _findings(structures, values), [found.scattering.noise for found in structures]
+    suspects = suspect_entries([] if law is None else suspect_rows(problem, law), data, left_out=None)
+    doubts = [*dict.fromkeys(noise.remark for noise in noises if noise.remark)]
     doubts += [suspect.words for suspect in suspects]
-    text = [question_text, overall_text(baseline, noises, pattern=bool(findings))]
+    text = [question_text, overall_text(baseline, pattern=bool(findings))]
     text += [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in doubts]
     return ComparisonSummary(
-        machine=residuals.predictor.machine.name,
-        effects=residuals.predictor.effects_that_act,
+        machine=predictor.machine.name,
+        effects=predictor.effects_that_act,
         data=list(dict.fromkeys(data.file.tolist())),
         readings=len(data),
         seed=seed,
@@ -238,15 +195,12 @@ def summary_of(
         by_setup=by(data.setup),
         by_plane_and_direction=by(np.array([f"{p} / {d}" for p, d in zip(where, along, strict=True)])),
         findings=findings,
-        by_noise=by_noise,
-        tests=tests,
-        outliers=_far_readings(residuals, last),
-        loops=beside[0],
-        history=beside[1],
-        model_free=ModelFree(_checks(answers), cannot),
-        noise=noises,
-        not_tested=[*(f"no column {name}" for name in data.missing), *residuals.notes],
-        assumptions=_assumptions([answer.noise for answer in answers]),
+        outliers=_far_readings(data, values, last),
+        model_free=[_outcome(of_noises) for of_noises in zip(*outcomes, strict=True)],
+        not_checked=not_checked,
+        noise=[NoiseFigures.of(noise) for noise in noises],
+        not_tested=[*(f"no column {name}" for name in data.missing), *notes],
+        assumptions=_assumptions(noises),
         warnings=list(data.warnings),
         notes=[*data.notes, *doubts],
         suspect_rows=suspects,
@@ -255,9 +209,9 @@ def summary_of(
     )
 
 
-def _errors(values: FloatArray, answers: Sequence[Answer], rows: BoolArray) -> GroupErrors:
+def _errors(values: FloatArray, structures: Sequence[FoundPatterns], rows: BoolArray) -> GroupErrors:
     """Errors of some readings, and what scatter alone would give."""
-    squares = {answer.noise.name: float(answer.scattering.square[rows].mean()) for answer in answers}
+    squares = {f.scattering.noise.name: float(f.scattering.square[rows].mean()) for f in structures}
     measured = max(float((values[rows] ** 2).mean()), 1e-300)
     return GroupErrors(
         readings=int(rows.sum()),
@@ -267,75 +221,52 @@ def _errors(values: FloatArray, answers: Sequence[Answer], rows: BoolArray) -> G
     )
 
 
-def _baseline(values: FloatArray, answers: Sequence[Answer]) -> AllErrors:
-    """The machine file as it stands, over all readings."""
-    return AllErrors(
-        **vars(_errors(values, answers, np.ones(len(values), dtype=bool))),
-        probability={answer.noise.name: answer.structure.probability for answer in answers},
-        excess_scatter_percent={answer.noise.name: 100.0 * answer.structure.excess for answer in answers},
-        strut_law_refitted=_refitted(answers[-1]),
+def _refitted(given: StrutLaw, fit: Fit) -> LawRefitted:
+    """What refitting the strut law's constants would leave, as in a diagnosis."""
+    law = scaled_law(given, fit.law)
+    return LawRefitted(
+        **error_figures(fit.residual),
+        # Of a constant law one, which belongs to no length.
+        at_mm=[] if law.constant else [mm_from_m(law.length_1), mm_from_m(law.length_2)],
+        N_per_um=[n_per_um_from_n_per_m(k) for k in (law.stiffness_1, law.stiffness_2)][: len(law.parameters)],
     )
 
 
-def _refitted(last: Answer) -> LawRefitted | None:
-    """What refitting the strut law's constants would leave, as in a diagnosis; None with too few readings."""
-    if last.law is None:
-        return None
-    law = scaled_law(last.problem.predictor.machine.strut_law, last.law.law)
-    lengths = [] if law.constant else [mm_from_m(law.length_1), mm_from_m(law.length_2)]
-    stiffness = [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)]
-    # Of a constant law one, which belongs to no length.
-    return LawRefitted(**error_figures(last.law.residual), at_mm=lengths, N_per_um=stiffness[: len(law.parameters)])
+def _outcome(of_noises: Sequence[CheckOutcome]) -> CheckOutcome:
+    """A check without a model: it holds if it does under any noise model."""
+    holds = any(outcome.holds for outcome in of_noises)
+    text = [outcome.text for outcome in of_noises if outcome.holds == holds][-1]
+    return replace(of_noises[-1], holds=holds, p_adjusted=max(outcome.p_adjusted for outcome in of_noises), text=text)
 
 
-def _checks(answers: Sequence[Answer]) -> list[CheckOutcome]:
-    """The checks without a model; one holds if it does under any noise model."""
-    checks = []
-    for outcomes in zip(*(answer.model_free for answer in answers), strict=True):
-        holds, p = any(outcome.holds for outcome in outcomes), max(outcome.p_adjusted for outcome in outcomes)
-        text = [outcome.text for outcome in outcomes if outcome.holds == holds][-1]
-        checks.append(replace(outcomes[-1], holds=holds, p_adjusted=p, text=text))
-    return checks
+def _findings(structures: Sequence[FoundPatterns], values: FloatArray) -> list[PatternFinding]:
+    """Findings that hold under every noise model, with the largest of their probabilities."""
+    fewest = min(structures, key=lambda structure: len(structure.patterns))
+    findings = []
+    for found in fewest.patterns:
+        pattern = found.pattern
+        p = max([found.p_adjusted, *(other.least_p(pattern) for other in structures if other is not fewest)])
+        text, size = sentence(found, values, first=found is fewest.patterns[0])
+        finding = PatternFinding(
+            text=text,
+            statistic=found.statistic,
+            p_adjusted=p,
+            pattern=pattern.name,
+            variable=pattern.variable,
+            direction=pattern.direction,
+            kind=pattern.kind,
+            readings=int(pattern.rows.sum()),
+            size_percent=size,
+            indistinguishable_from=[*pattern.same, *(other.name for other in found.alike)][:MOST_ALIKE],
+        )
+        findings += [finding] if p < SIGNIFICANT else []
+    return findings
 
 
-def _tests(answers: Sequence[Answer]) -> list[PatternTest]:
-    """Every pattern on its own, the strongest first; probabilities are the larger of the noise models."""
-    p = [{test.pattern: test.p_adjusted for test in answer.structure.tests} for answer in answers]
-
-    def tested(test: FoundPattern) -> PatternTest:
-        worst = max(of_noise.get(test.pattern, test.p_adjusted) for of_noise in p)
-        return PatternTest(*_about(test.pattern), list(test.pattern.same), test.statistic, worst)
-
-    tests = [tested(test) for test in answers[-1].structure.tests]
-    return sorted(tests, key=lambda test: -abs(test.statistic))
-
-
-def _about(pattern: Pattern) -> tuple[str, str, str, str, int]:
-    return pattern.name, pattern.variable, pattern.direction, pattern.kind, int(pattern.rows.sum())
-
-
-def _finding(test: FoundPattern, values: FloatArray, *, first: bool) -> PatternFinding:
-    """A pattern as compare.json has it; `first` as of `sentence`."""
-    text, size = sentence(test, values, first)
-    alike = [*test.pattern.same, *(other.name for other in test.alike)][:MOST_ALIKE]
-    return PatternFinding(text, test.statistic, test.p_adjusted, *_about(test.pattern), size, alike)
-
-
-def _shared_findings(answers: Sequence[Answer], by_noise: dict[str, list[PatternFinding]]) -> list[PatternFinding]:
-    """Findings that hold under every noise model, with the larger of their probabilities."""
-    fewest = min(answers, key=lambda answer: len(answer.structure.patterns))
-    kept = []
-    for detection, finding in zip(fewest.structure.patterns, by_noise[fewest.noise.name], strict=True):
-        others = [answer.least_p(detection.pattern) for answer in answers if answer is not fewest]
-        kept.append(replace(finding, p_adjusted=max([finding.p_adjusted, *others])))
-    return [finding for finding in kept if finding.p_adjusted < SIGNIFICANT]
-
-
-def _far_readings(residuals: Residuals, last: Answer) -> list[FarReading]:
-    rest, far, ratio = far_off(residuals.values, last.scattering, last.structure)
-    data = residuals.predictor.data
-    numbers, off = np.arange(1, len(data) + 1), deviation_percent(rest)
-    columns = (data.file, data.line, numbers, data.point, directions(data), off, ratio)
+def _far_readings(data: Readings, values: FloatArray, last: FoundPatterns) -> list[FarReading]:
+    rest, far, ratio = far_off(values, last)
+    columns = (data.file, data.line, np.arange(1, len(data) + 1), data.point, directions(data),
+               deviation_percent(rest), ratio)  # fmt: skip
     return [FarReading(*row) for row in zip(*(column[far].tolist() for column in columns), strict=True)]
 
 
@@ -351,21 +282,18 @@ def _assumptions(noises: Sequence[Noise]) -> list[str]:
     ]
 
 
-def overall_text(figures: AllErrors, noises: Sequence[NoiseFigures], *, pattern: bool) -> str:
+def overall_text(figures: AllErrors, *, pattern: bool) -> str:
     """Error, bias and what scatter explains, in a few sentences; `pattern`: one stands out."""
     bias, refit = figures.bias_percent, figures.strut_law_refitted
     side = f"{abs(bias):.1f} % {'softer' if bias < 0.0 else 'stiffer'}"
     balance = "neither softer nor stiffer" if abs(bias) < 0.05 else side
     errors = errors_text(figures.mean_abs_error_percent, None if refit is None else refit.mean_abs_error_percent)
-    parts = []
-    for name in (noise.name for noise in noises):
-        guesses = {"low": "with the low guess of the noise", "high": "with the high guess"}
-        parts.append(
-            f"{guesses.get(name, f'with the noise as {name}')}, scatter alone would leave "
-            f"{figures.scatter_rms_percent[name]:.1f} % rms, {figures.explained_by_scatter_percent[name]:.0f} % of the "
-            f"mean square (p = {figures.probability[name]:.2g})"
-        )
-    scatter = "; ".join(parts)
+    guesses = {"low": "with the low guess of the noise", "high": "with the high guess"}
+    scatter = "; ".join(
+        f"{guesses.get(name, f'with the noise as {name}')}, scatter alone would leave {rms:.1f} % rms, "
+        f"{figures.explained_by_scatter_percent[name]:.0f} % of the mean square (p = {figures.probability[name]:.2g})"
+        for name, rms in figures.scatter_rms_percent.items()
+    )
     return (
         f"Mean error {errors} ({figures.readings} reading{'' if figures.readings == 1 else 's'}). As given, "
         f"{balance} than modelled on balance, rms {figures.rms_percent:.1f} %. {scatter[0].upper()}{scatter[1:]}."

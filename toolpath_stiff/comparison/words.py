@@ -18,30 +18,24 @@ def sentence(finding: FoundPattern, residual: FloatArray, first: bool) -> tuple[
 
     `first`: nothing was found before it, so that what it says is what the readings show as they are.
     """
-    pattern = finding.pattern
+    pattern, coefficient = finding.pattern, finding.coefficient
     who = {ALL: "all directions", "oblique": "oblique directions"}.get(pattern.direction, f"along {pattern.direction}")
     mean, count = float(residual[pattern.rows].mean()), int(pattern.rows.sum())
     readings = f"({count} reading{'' if count == 1 else 's'})"
     if pattern.given is None:
         return _level(finding, _capital(who), mean, readings, first)
-    x = pattern.values[pattern.rows]
+    x, values = pattern.values[pattern.rows], pattern.given[pattern.rows]
     if pattern.kind == "curve":
-        middle, ends = finding.coefficient * float(x.min()), finding.coefficient * float(x.max())
-        size = percent(middle - ends)
-        how = "stiffer" if middle > ends else "softer"
+        size = percent(coefficient * float(x.min()) - coefficient * float(x.max()))
         return (
-            f"{_capital(who)} {how} against the model at middling values of {pattern.place} than at its extremes, by "
-            f"{abs(size):.2g} % {readings}"
+            f"{_capital(who)} {_side(size)} against the model at middling values of {pattern.place} than at its "
+            f"extremes, by {abs(size):.2g} % {readings}"
         ), size
-    values = pattern.given[pattern.rows]
-    ends_at = [int(np.argmin(values)), int(np.argmax(values))]
-    low, high = values[ends_at].tolist()
-    first_end, last_end = (mean + finding.coefficient * float(x[i]) for i in ends_at)
-    size = percent(last_end - first_end)
-    unit = f" {pattern.unit}".rstrip()
-    largest = float(np.abs(values).max())
+    ends = [int(np.argmin(values)), int(np.argmax(values))]
+    (low, high), (first_end, last_end) = values[ends].tolist(), (mean + coefficient * x[ends]).tolist()
+    size, unit, largest = percent(last_end - first_end), f" {pattern.unit}".rstrip(), float(np.abs(values).max())
     text = (
-        f"{who} {'stiffer' if size > 0 else 'softer'} against the model as {pattern.place} grows, from "
+        f"{who} {_side(size)} against the model as {pattern.place} grows, from "
         f"{percent(first_end):+.2g} % at {_short(low, largest)}{unit} to "
         f"{percent(last_end):+.2g} % at {_short(high, largest)}{unit} {readings}"
     )
@@ -57,9 +51,8 @@ def _as_if(pattern: Pattern, first: float, last: float, low: float, high: float)
     if not pattern.variable.startswith(SHARE) or pattern.direction != ALL or high <= low:
         return ""
     change = last - first
-    without = first - change * low / (high - low)
     softer = 1.0 + float(np.expm1(-change)) / (high - low)
-    if softer <= 0.0 or abs(without) > NOUGHT * abs(change):
+    if softer <= 0.0 or abs(first - change * low / (high - low)) > NOUGHT * abs(change):
         return ""
     off = 100.0 * (1.0 / softer - 1.0)
     strut = pattern.variable.removeprefix(SHARE)
@@ -73,8 +66,10 @@ def _level(finding: FoundPattern, who: str, mean: float, readings: str, first: b
     whole = f"{abs(size):.2g} % {_side(size)} than modelled"
     if first or (mean * coefficient > 0 and abs(mean) > 0.5 * abs(coefficient)):
         return f"{who} {whole}{place} {readings}", size
-    text = f"{who} {abs(beside):.2g} % {_side(beside)}{place} than the findings above explain: {whole} {readings}"
-    return text, beside
+    return (
+        f"{who} {abs(beside):.2g} % {_side(beside)}{place} than the findings above explain: {whole} {readings}",
+        beside,
+    )
 
 
 def _capital(text: str) -> str:

@@ -145,7 +145,7 @@ def _without_slips(
     clear = [suspect for suspect in suspects if suspect.clear]
     clear = [suspect for suspect in clear if suspect not in slips.alone(data, clear)]
     kept = np.ones(len(data), dtype=bool)
-    kept[[row for suspect in clear for row in suspect.rows]] = False
+    kept[[int(row) for suspect in clear for row in suspect.rows]] = False
     if clear and kept.sum() >= FEWEST:
         # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
         progress("once more with the rows mended that look mistyped")

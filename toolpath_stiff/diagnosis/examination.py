@@ -1,11 +1,11 @@
 """What a diagnosis has found: judgements under each noise model, fits, errors held out, and what stands behind them."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.comparison.loop_readings import BesideTip
+from toolpath_stiff.comparison.loop_readings import LoopMean
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.confounding import Confounding
 from toolpath_stiff.inference.detectable import Detectable
@@ -93,7 +93,7 @@ class Examination:
     alike: Alike | None = None
     unexcluded: tuple[Unexcluded, ...] = ()
     suspects: tuple[SuspectEntry, ...] = ()
-    loops: BesideTip = field(default_factory=BesideTip)
+    loops: tuple[LoopMean, ...] = ()
     inputs: tuple[str, ...] = ()
 
     @property

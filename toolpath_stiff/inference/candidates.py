@@ -144,8 +144,7 @@ class Candidate:
     def subsets(self) -> Iterator[tuple[int, ...]]:
         """Sets of components that are not neutral."""
         count = len(self.components)
-        sizes = range(1, count + 1) if count <= MOST_COMPONENTS else (1, count)
-        for size in sizes:
+        for size in range(1, count + 1) if count <= MOST_COMPONENTS else (1, count):
             yield from combinations(range(count), size)
 
 
@@ -173,19 +172,16 @@ def candidates_of(effect: Effect, data: Readings) -> list[Candidate]:
     discrete = [parameter for parameter in effect.parameters if parameter.discrete]
     if not discrete:
         return [Candidate(effect, (), real)] if real else []
-    alone, names = len(discrete) == 1, sorted(set(data.setup.tolist()) - {""})
-    defaults: dict[str, Any] = {parameter.name: "" if parameter.kind == "text" else 0 for parameter in discrete}
-    candidates = []
+    alone, setups = len(discrete) == 1, sorted(set(data.setup.tolist()) - {""})
+    defaults: dict[str, str | int] = {parameter.name: "" if parameter.kind == "text" else 0 for parameter in discrete}
+    choices: list[dict[str, str | int]] = []
     for parameter in discrete:
-        choices: list[Any] = names
         if parameter.kind != "text":
             low, high = (int(bound) for bound in parameter.bounds)
-            choices = [value for value in range(low, high + 1) if alone or value != 0]
-        elif not alone and len(names) == 1:  # a single set-up is all readings, which other choices cover
-            continue
-        for value in choices:
-            candidates.append(Candidate(effect, tuple((defaults | {parameter.name: value}).items()), real))
-    return candidates
+            choices += [{parameter.name: value} for value in range(low, high + 1) if alone or value != 0]
+        elif alone or len(setups) > 1:  # a single set-up is all readings, which other choices cover
+            choices += [{parameter.name: name} for name in setups]
+    return [Candidate(effect, tuple((defaults | choice).items()), real) for choice in choices]
 
 
 def spline(knots: FloatArray, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
@@ -254,12 +250,10 @@ class CandidateTable:
 
     def slope(self, sizes: FloatArray) -> FloatArray:
         """(n, p) d delta / d size at sizes (p,)."""
-        if not self.knots:
-            return self.columns
         size = float(sizes[0])
-        step = 1e-4 * max(abs(size), 1e-12)
-        if size == 0.0:
+        if not self.knots or size == 0.0:
             return self.columns
+        step = 1e-4 * max(abs(size), 1e-12)
         ends = self.delta(np.array([[size + step], [size - step]]))
         return np.asarray((ends[0] - ends[1])[:, None] / (2.0 * step))
 
@@ -277,8 +271,7 @@ def tabulate(
     candidate: Candidate, predictor: Predictor, law: FloatArray, beside: Sequence[ActiveEffect] = ()
 ) -> CandidateTable | None:
     """The candidate's table at a strut law, beside other effects; None where it does nothing to these data."""
-    base = predictor.log_stiffness(law, beside)
-    compliance = np.exp(-base)
+    compliance = np.exp(-predictor.log_stiffness(law, beside))
 
     def along(unit: FloatArray) -> Delta:
         def delta(size: float) -> FloatArray | None:
@@ -288,16 +281,14 @@ def tabulate(
         return delta
 
     components = candidate.components
-    columns, starts = np.zeros((len(base), len(components))), {}
+    columns, starts = np.zeros((len(compliance), len(components))), {}
     for j, component in enumerate(components):
         for sign in component.signs:
             delta = along(sign * np.eye(len(components))[j])
             start = _size_for(component, sign, delta, compliance)
             added = None if start is None else delta(start)
-            if start is None or added is None:
-                continue
-            columns[:, j] = added / (start * sign)
-            starts[sign] = start
+            if start is not None and added is not None:
+                columns[:, j], starts[sign] = added / (start * sign), start
     if not columns.any():
         return None
 
@@ -344,13 +335,12 @@ def _knots(component: Component, sign: float, start: float, delta: Delta, compli
     share = 1.0 - (1.0 - np.linspace(0.0, 1.0, POINTS)) ** CROWDED
     sizes = start * (max(end, 1.01 * start) / start) ** share
     sizes[-1] = min(sizes[-1], component.reach(sign))
-    logs, ratios = [], []
+    ratios: list[FloatArray] = []
     for size in sizes:
         added = delta(sign * size)
         if added is None:
             break
-        logs.append(np.log(size))
         ratios.append(added / (sign * size))
-    if len(logs) < 2:
-        logs, ratios = [np.log(start), np.log(1.01 * start)], [ratios[0], ratios[0]]
-    return np.array(logs), np.array(ratios)
+    if len(ratios) < 2:
+        return np.log([start, 1.01 * start]), np.array([ratios[0], ratios[0]])
+    return np.log(sizes[: len(ratios)]), np.array(ratios)

@@ -50,8 +50,8 @@ def confounding(problem: Problem, families: Sequence[Family]) -> Confounding:
         for table in family.tables:
             rows = (table.columns / problem.base_compliance[:, None]).T
             weighted = precision.times(rows)
-            lengths = np.sqrt(np.maximum((rows * weighted).sum(axis=1), 0.0))
-            kept = lengths > 1e-9 * lengths.max()
+            squares = (rows * weighted).sum(axis=1)
+            kept = squares > 1e-18 * squares.max()
             if kept.any():
                 root = inverse_root(weighted[kept] @ rows[kept].T, SEPARATE)
                 bases[family.name].append((root.T @ rows[kept], root.T @ weighted[kept]))

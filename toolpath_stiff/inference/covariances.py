@@ -17,14 +17,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
 
-Rows = NDArray[np.int64]
+Rows = IntArray
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class Groups:
     of: Rows
 
     @classmethod
-    def by(cls, labels: NDArray[Any]) -> Groups:
+    def by(cls, labels: AnyArray) -> Groups:
         """Readings with equal labels (n,) together."""
         return cls(np.unique(labels, return_inverse=True)[1].reshape(-1).astype(np.int64))
 
@@ -66,14 +64,9 @@ class Groups:
         sizes = np.diff(self._starts, append=len(self.of))
         return int(sizes[0]) if len(sizes) and (sizes == sizes[0]).all() else 0
 
-    @cached_property
-    def _in_order(self) -> bool:
-        """Whether each group's readings follow each other, the groups in the order of their numbers."""
-        return bool((np.diff(self.of) >= 0).all())
-
     def sums(self, rows: FloatArray) -> FloatArray:
         """(..., groups) of rows (..., n)."""
-        ordered = rows if self._in_order else rows[..., self._order]
+        ordered = rows[..., self._order]
         if not self._width:
             return np.asarray(np.add.reduceat(ordered, self._starts, axis=-1))
         # A third of the time of `reduceat`, which goes from group to group.
@@ -222,10 +215,8 @@ class Precision:
         own_variance, of = self.own_variance[columns], self.groups.of[columns]
         factors = np.moveaxis(self.factors[:, columns], 0, -2)
         same = of[..., :, None] == of[..., None, :]
-        blocks = -(same * (self.pull[of] / own_variance)[..., None, :]) / own_variance[..., :, None]
-        diagonal = np.arange(columns.shape[-1])
-        blocks[..., diagonal, diagonal] += 1.0 / own_variance
-        return np.asarray(blocks - np.swapaxes(factors, -1, -2) @ factors)
+        blocks = np.eye(columns.shape[-1]) - same * (self.pull[of] / own_variance)[..., None, :]
+        return np.asarray(blocks / own_variance[..., :, None] - np.swapaxes(factors, -1, -2) @ factors)
 
     def beside(self, fitted: FloatArray, prior: FloatArray) -> Precision:
         """P = A - A J (J^T A J + prior)^-1 J^T A: of what a fit of p unknowns leaves of the readings.

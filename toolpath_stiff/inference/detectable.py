@@ -48,16 +48,15 @@ def detectable_sizes(problem: Problem, families: Sequence[Family], gain_threshol
     detectable = []
     for family in sorted(families, key=lambda family: family.name):
         for j in range(len(family.tables[0].candidate.components)):
-            worst: Detectable | None = None
-            for table in family.tables:
-                for sign in problem.prior(table, j).log_sizes:
-                    smallest = _smallest(problem, table, j, sign, wanted)
-                    # Hardest to see: not at all, else by the largest change; of two alike the first.
-                    if worst is None or (
-                        smallest.rms > (1.0 + TIED) * worst.rms if smallest.seen == worst.seen else not smallest.seen
-                    ):
-                        worst = smallest
-            detectable += [worst] if worst else []
+            smallest = [
+                _smallest(problem, table, j, sign, wanted)
+                for table in family.tables
+                for sign in problem.prior(table, j).log_sizes
+            ]
+            # Hardest to see: not at all, else by the largest change; of two alike the first.
+            hidden = [size for size in smallest if not size.seen] or smallest
+            largest = max((size.rms for size in hidden), default=0.0)
+            detectable += [size for size in hidden if size.rms >= (1.0 - TIED) * largest][:1]
     return detectable
 
 
@@ -67,5 +66,5 @@ def _smallest(problem: Problem, table: CandidateTable, j: int, sign: float, want
     if lengths[-1] < wanted:
         return Detectable(name, component.parameter, float("nan"), float(rms[-1]), seen=False)
     log_size = float(np.interp(wanted, lengths, logs))
-    change = float(np.interp(log_size, logs, rms))
-    return Detectable(name, component.parameter, component.value(sign * float(np.exp(log_size))), change, seen=True)
+    value = component.value(sign * float(np.exp(log_size)))
+    return Detectable(name, component.parameter, value, float(np.interp(log_size, logs, rms)), seen=True)

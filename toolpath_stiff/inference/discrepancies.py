@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import AnyArray, FloatArray
 from toolpath_stiff.inference.prediction import Predictor
 
 # Ranges over which a smooth discrepancy stays alike; assumed: about half a workspace, half a tilting range, a few
@@ -28,10 +26,10 @@ def discrepancy_forms(predictor: Predictor) -> dict[str, FloatArray]:
     """
     key = ("forms of discrepancy",)
     if key not in predictor.tables:
-        kernels = {words: kernel for words, kernel in _kernels(predictor).items() if kernel.varies}
         predictor.tables[key] = {
             words: kernel.features(MOST_POINTS if words == POINT_TO_POINT else MOST_FEATURES)
-            for words, kernel in kernels.items()
+            for words, kernel in _kernels(predictor).items()
+            if kernel.varies
         }
     forms: dict[str, FloatArray] = predictor.tables[key]
     return forms
@@ -49,7 +47,7 @@ def _kernels(predictor: Predictor) -> dict[str, Kernel]:
     linear = linear_kernel(place)
     in_order = gaussian_kernel(np.linspace(0.0, 1.0, len(data))[:, None] / RANGE_ORDER)
     share = predictor.strut_columns()
-    struts = linear_kernel(share)
+    struts, lengths = linear_kernel(share), predictor.strut_lengths() / RANGE_LENGTH
     forms = {
         "smooth over the workspace": near,
         "smooth over the workspace, different by direction": near * same_direction,
@@ -61,7 +59,11 @@ def _kernels(predictor: Predictor) -> dict[str, Kernel]:
         "in the course of the campaign, different by direction": in_order * same_direction,
         "in the course of the campaign, over the workspace": in_order * linear * same_direction,
         "of single struts in the course of the campaign": struts * in_order,
-        "of single struts with their length": _by_length(share, predictor.strut_lengths() / RANGE_LENGTH),
+        # Each strut's own course, as far as the strut has a share in the compliance.
+        "of single struts with their length": Kernel(
+            lambda i: (share * share[i] * np.exp(-0.5 * (lengths - lengths[i]) ** 2)).sum(axis=1),
+            (share**2).sum(axis=1),
+        ),
         "of struts in tension against compression": linear_kernel(share * np.sign(predictor.strut_forces())),
         "of single struts over the workspace": struts * near,
     }
@@ -72,28 +74,14 @@ def _kernels(predictor: Predictor) -> dict[str, Kernel]:
         columns["with the temperature"] = data.temperature
     columns |= {f"with the column {name}": column for name, column in data.extra.items()}
     for words, column in columns.items():
-        forms |= _by_column(column, words, same_direction, near)
+        if np.isfinite(column).all() and np.ptp(column) > 0.0:
+            product = linear_kernel(_centred(column[:, None] / float(np.ptp(column))))
+            forms[words] = product
+            forms[f"{words}, different by direction"] = product * same_direction
+            forms[f"{words}, over the workspace"] = product * near * same_direction
     if len(set(data.setup.tolist())) > 1:
         forms["between set-ups, different by direction"] = same_kernel(data.setup) * same_direction
     return forms
-
-
-def _by_length(share: FloatArray, length: FloatArray) -> Kernel:
-    """Each strut's own course over its length (n, 6), as far as the strut has a share (n, 6) in the compliance."""
-    return Kernel(
-        lambda i: (share * share[i] * np.exp(-0.5 * (length - length[i]) ** 2)).sum(axis=1), (share**2).sum(axis=1)
-    )
-
-
-def _by_column(column: FloatArray, words: str, same_direction: Kernel, near: Kernel) -> dict[str, Kernel]:
-    if not np.isfinite(column).all() or np.ptp(column) == 0.0:
-        return {}
-    product = linear_kernel(_centred(column[:, None] / float(np.ptp(column))))
-    return {
-        words: product,
-        f"{words}, different by direction": product * same_direction,
-        f"{words}, over the workspace": product * near * same_direction,
-    }
 
 
 def _centred(x: FloatArray) -> FloatArray:
@@ -117,10 +105,9 @@ class Kernel:
     @property
     def varies(self) -> bool:
         """Whether it is finite, and more than one number throughout."""
-        first, scale = self.column(0), float(self.diagonal.mean())
-        finite = np.isfinite(first).all() and np.isfinite(self.diagonal).all()
-        off = max(np.abs(first - self.diagonal[0]).max(), np.abs(self.diagonal - self.diagonal[0]).max())
-        return bool(finite and scale > 1e-12 and off > 1e-9 * scale)
+        values, scale = np.concatenate([self.column(0), self.diagonal]), float(self.diagonal.mean())
+        off = np.abs(values - self.diagonal[0]).max()
+        return bool(np.isfinite(values).all() and scale > 1e-12 and off > 1e-9 * scale)
 
     def features(self, most: int) -> FloatArray:
         """(n, r) L with L L^T the covariance, scaled to a mean diagonal of 1.
@@ -135,8 +122,7 @@ class Kernel:
             pivot = int(np.argmax(left))
             if left.sum() <= LEFT * len(left) or left[pivot] <= 0.0:
                 return rows[:r].T
-            column = self.column(pivot) / scale - rows[:r, pivot] @ rows[:r]
-            rows[r] = column / np.sqrt(left[pivot])
+            rows[r] = (self.column(pivot) / scale - rows[:r, pivot] @ rows[:r]) / np.sqrt(left[pivot])
             left = np.maximum(left - rows[r] ** 2, 0.0)
             left[pivot] = 0.0
         return rows.T
@@ -152,6 +138,6 @@ def linear_kernel(x: FloatArray, power: int = 1) -> Kernel:
     return Kernel(lambda i: (x @ x[i]) ** power, (x**2).sum(axis=1) ** power)
 
 
-def same_kernel(labels: NDArray[Any]) -> Kernel:
+def same_kernel(labels: AnyArray) -> Kernel:
     """Alike for readings with the same label (n,)."""
     return Kernel(lambda i: (labels == labels[i]).astype(float), np.ones(len(labels)))

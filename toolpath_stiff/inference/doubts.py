@@ -30,13 +30,7 @@ FEWEST_FOLLOWING = 6  # readings that differ in what mechanics sees
 
 def question(predictor: Predictor) -> str:
     """Whether these are readings of this machine, with the reason to ask; "" where there is none."""
-    reason = _unlike(predictor)
-    return f"Are these readings of this machine? {reason}." if reason else ""
-
-
-def _unlike(predictor: Predictor) -> str:
-    """In what the readings are unlike the model's, a sentence without its full stop; "" where they may be its own."""
-    tip = predictor.data.tip
+    tip, asked = predictor.data.tip, "Are these readings of this machine?"
     model, which = predictor.log_stiffness()[tip], np.unique(predictor.distinct[tip], return_inverse=True)[1]
     residual = np.log(predictor.data.stiffness[tip]) - model
     if not np.isfinite(residual).all():
@@ -44,18 +38,17 @@ def _unlike(predictor: Predictor) -> str:
     ratio = float(np.exp(np.median(residual)))
     if not 1.0 / FACTOR < ratio < FACTOR:
         times = f"{ratio:.2g} times" if ratio > 1.0 else f"1 / {1.0 / ratio:.2g} of"
-        return f"The median reading is {times} what the model says"
-    count = np.bincount(which)
-    modelled, off = (np.bincount(which, weights=values) / count for values in (model, residual))
-    if len(count) < FEWEST_FOLLOWING or float(modelled.std()) < TELLS:
+        return f"{asked} The median reading is {times} what the model says."
+    modelled, off = (np.bincount(which, weights=values) / np.bincount(which) for values in (model, residual))
+    if len(modelled) < FEWEST_FOLLOWING or float(modelled.std()) < TELLS:
         return ""
     alike = float((modelled + off).std()) <= NOTHING * float(modelled.std())
     correlation = 0.0 if alike else float(np.corrcoef(modelled, modelled + off)[0, 1])
     if correlation >= FOLLOWS:
         return ""
     return (
-        f"They do not follow the model from pose to pose and direction to direction: the correlation of "
-        f"their logarithms is {correlation:.2f}, of this machine it would be {FOLLOWS:g} or more"
+        f"{asked} They do not follow the model from pose to pose and direction to direction: the correlation of their "
+        f"logarithms is {correlation:.2f}, of this machine it would be {FOLLOWS:g} or more."
     )
 
 
@@ -83,9 +76,8 @@ def noise_doubt(problem: Problem, noise: Noise, gate: Gate, verdict: str, seed: 
     """
     if noise.name != "stated":
         return "", 1.0
-    size = 100.0 * noise.typical
+    size, factor = 100.0 * noise.typical, float(np.sqrt(gate.squares / np.median(gate.simulated)))
     if float((gate.simulated <= gate.squares).mean()) < TOO_QUIET:
-        factor = float(np.sqrt(gate.squares / np.median(gate.simulated)))
         return (
             f"the stated noise of {size:.2g} % is too large: what the model leaves is about {factor:.2g} times what "
             f"such a noise would leave; {factor * size:.2g} % would fit, and small effects would show"
@@ -111,7 +103,6 @@ def _gate_at(problem: Problem, noise: Noise, factor: float, seed: int) -> Gate:
     """The absolute test of the model alone under a noise `factor` times as large."""
     larger = replace(noise, repeat=factor * noise.repeat, clamping=factor * noise.clamping)
     scaled = Problem.of(problem.predictor, larger)
-    base = scaled.score_base()
+    base, draws = scaled.score_base(), simulate(larger, scaled.scatter.covariance, seed)
     forms = Forms(discrepancy_forms(problem.predictor), scaled.scatter.precision)
-    draws = simulate(larger, scaled.scatter.covariance, seed)
     return absolute_gate(scaled, base.residual, base.jacobian, draws, forms)

@@ -1,7 +1,6 @@
 """Errors of a model over some readings, in figures and in words."""
 
 from collections.abc import Sequence
-from typing import TypedDict
 
 import numpy as np
 
@@ -15,15 +14,7 @@ def deviation_percent(residual: FloatArray) -> FloatArray:
     return np.asarray(100.0 * np.expm1(residual))
 
 
-class ErrorFigures(TypedDict):
-    """Errors of a model over some readings; %."""
-
-    mean_abs_error_percent: float
-    bias_percent: float
-    rms_percent: float
-
-
-def error_figures(residual: FloatArray) -> ErrorFigures:
+def error_figures(residual: FloatArray) -> dict[str, float]:
     """Errors of a model in per cent, of residuals ln(measured / modelled).
 
     Mean and rms of |modelled - measured| / measured, as the paper counts it; `bias_percent` is the mean of
@@ -39,8 +30,8 @@ def error_figures(residual: FloatArray) -> ErrorFigures:
 
 def errors_text(as_given: float, refitted: float | None, rest: Sequence[tuple[str, float]] = ()) -> str:
     """Mean errors (%) step by step: "as given 4.60 %, strut law refitted 3.73 %, with weak_strut 2.32 %"."""
-    steps = [(AS_GIVEN, as_given), *([] if refitted is None else [(LAW_REFITTED, refitted)]), *rest]
-    return ", ".join(f"{name} {value:.2f} %" for name, value in steps)
+    law = [] if refitted is None else [(LAW_REFITTED, refitted)]
+    return ", ".join(f"{name} {value:.2f} %" for name, value in [(AS_GIVEN, as_given), *law, *rest])
 
 
 def scatter_text(floor: float, error: float, guess: str = "") -> str:

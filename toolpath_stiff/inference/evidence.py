@@ -11,7 +11,8 @@ chapters 27 and 28). An effect of several parameters is tried with each subset o
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -102,6 +103,11 @@ class Fit:
         return tuple(c.name for c in self.candidates)
 
     @property
+    def name(self) -> str:
+        """Of an effect, or of several: "a + b"."""
+        return " + ".join(sorted(self.names))
+
+    @property
     def effects(self) -> tuple[ActiveEffect, ...]:
         """The effects with their values."""
         return tuple(c.active(s) for c, s in zip(self.candidates, self.sizes, strict=True))
@@ -179,7 +185,7 @@ class Problem:
         self.observed = np.log(predictor.data.stiffness)
         self.base_compliance = np.exp(-predictor.log_stiffness())
         self.rest = self.base_compliance - predictor.strut_part()
-        self._priors: dict[tuple[int, int], tuple[CandidateTable, SizePrior]] = {}
+        self.prior = cache(self._prior)
         jacobian = self.law_jacobian(np.zeros(2), self.base_compliance)
         self.sight = Sight(self.base_compliance, self.projected(jacobian))
 
@@ -195,12 +201,9 @@ class Problem:
         """
         return self.scatter.precision.beside(jacobian.T, law_prior(jacobian.shape[1]))
 
-    def prior(self, table: CandidateTable, j: int) -> SizePrior:
+    def _prior(self, table: CandidateTable, j: int) -> SizePrior:
         """Prior of a component's size, worked out once."""
-        key = (id(table), j)
-        if key not in self._priors:
-            self._priors[key] = (table, SizePrior.of(table, j, self.sight))
-        return self._priors[key][1]
+        return SizePrior.of(table, j, self.sight)
 
     def compliance(self, law: FloatArray, delta: FloatArray) -> FloatArray:
         """(..., n) for laws (..., 2) and added compliances (..., n)."""
@@ -236,15 +239,14 @@ class Problem:
         scatter, law = self.scatter, np.zeros(2)
         none = np.zeros((1, len(self.observed)))
         for _ in range(BASE_ROUNDS):
-            laws, residuals, information = self.fit_law(none, scatter.precision, law)
-            law, residual = laws[0], residuals[0]
+            (law,), (residual,), (information,) = self.fit_law(none, scatter.precision, law)
             scatter, wild = self.scatter.with_wild(residual), scatter.wild
             if scatter.wild == wild:
                 break
         return Fit(
             (), (), (), law, residual, self.law_jacobian(law, self.compliance(law, none[0])),
-            np.asarray(np.linalg.inv(information[0]), dtype=float), scatter,
-            log_evidence=float(scatter.log_likelihood(residual)) + float(law_terms(law[None], information)[0]),
+            np.asarray(np.linalg.inv(information), dtype=float), scatter,
+            log_evidence=float(scatter.log_likelihood(residual)) + float(law_terms(law[None], information[None])[0]),
         )  # fmt: skip
 
     def score_subset(
@@ -256,11 +258,10 @@ class Problem:
         `start`; else at 0.
         """
         every = [(table, j) for table in tables for j in range(len(table.candidate.components))]
-        chosen = [every[i] for i in free]
         x, unknowns = np.concatenate([start.law, np.zeros(len(every))]), [0, 1, *(2 + i for i in free)]
+        scatter = self.scatter
         if sizes is not None:
-            x[unknowns[2:]] = sizes[list(free)]
-        scatter = self.scatter if sizes is None else start.scatter
+            x[unknowns[2:]], scatter = sizes[list(free)], start.scatter
         for last in range(MOST_ROUNDS, -1, -1):
             converged = self._gauss_newton(tables, x, unknowns, scatter.precision)
             if converged is None:
@@ -270,61 +271,54 @@ class Problem:
             if not last or again is scatter:
                 break
             scatter = again
-        covariance = np.asarray(scaled_inverse(equations.information), dtype=float)
-        deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
-        components = [table.candidate.components[j] for table, j in chosen]
-        near = [len(tables) > 1 and _just_beyond(c, x[i]) for c, i in zip(components, unknowns[2:], strict=True)]
-        if any(near):  # put onto their bounds, the others once more beside them
-            for component, i, held in zip(components, unknowns[2:], near, strict=True):
-                x[i] = np.clip(x[i], *component.bounds) if held else x[i]
-            rest = [0, 1, *(i for i, held in zip(unknowns[2:], near, strict=True) if not held)]
+        components = [every[i][0].candidate.components[every[i][1]] for i in free]
+        bounded = dict(zip(unknowns[2:], components, strict=True))
+        # A little beyond its bound: tables of two effects describe neither exactly.
+        out = [i for i, component in bounded.items() if len(tables) > 1 and not component.allows(x[i])]
+        beyond = [i for i in out if bounded[i].allows(x[i] / (1.0 + BEYOND))]
+        if beyond:  # put onto their bounds, the others once more beside them
+            for i in beyond:
+                x[i] = np.clip(x[i], *bounded[i].bounds)
+            rest = [i for i in unknowns if i not in beyond]
             x, residual, _ = self._gauss_newton(tables, x, rest, scatter.precision) or (x, residual, equations)
-        fitted, law = x[unknowns[2:]], x[:2]
-        possible = all(c.allows(size) for c, size in zip(components, fitted.tolist(), strict=True))
+        possible = all(component.allows(float(x[i])) for i, component in bounded.items())
         if not possible and len(free) > 1:
             return None
-        peak = float(scatter.log_likelihood(residual)) - 0.5 * float(law @ law) / LAW_PRIOR**2 - 2.0 * np.log(LAW_PRIOR)
         candidates, parts = zip(*((table.candidate, part) for table, part in split(tables, x[2:].copy())), strict=True)
-        return Fit(
-            candidates, parts, free, law.copy(), residual, equations.jacobian, covariance, scatter,
-            tables=tuple(tables), possible=possible,
-            log_evidence=self._integrated(peak, tables, chosen, fitted, deviations, equations.information),
+        fit = Fit(
+            candidates, parts, free, x[:2].copy(), residual, equations.jacobian,
+            np.asarray(scaled_inverse(equations.information), dtype=float), scatter, tables=tuple(tables),
+            possible=possible,
         )  # fmt: skip
+        chosen = [every[i] for i in free]
+        return replace(fit, log_evidence=self._integrated(fit, chosen, equations.information))
 
-    def _integrated(
-        self,
-        peak: float,
-        tables: Sequence[CandidateTable],
-        chosen: Sequence[tuple[CandidateTable, int]],
-        sizes: FloatArray,
-        deviations: FloatArray,
-        information: FloatArray,
-    ) -> float:
-        """The log posterior of law and sizes (p,) at its peak integrated over them; `information` (2 + p, 2 + p)."""
+    def _integrated(self, fit: Fit, chosen: Sequence[tuple[CandidateTable, int]], information: FloatArray) -> float:
+        """The log posterior of law and free sizes (p,) at its peak integrated over them.
+
+        `chosen`: table and component of each free size; `information` (2 + p, 2 + p).
+        """
+        sizes = np.concatenate(fit.sizes)[list(fit.free)]
+        deviations = np.array([fit.deviation(i) for i in fit.free])
+        peak = fit.log_posterior - 2.0 * np.log(LAW_PRIOR)
         if len(chosen) == 1:
             # By quadrature, which holds for sizes next to nothing as well, with the profile as a parabola.
             mean = self.prior(*chosen[0]).log_mean_likelihood(float(sizes[0]), float(deviations[0]))
-            return peak - 0.5 * float(np.linalg.slogdet(information[:2, :2])[1]) + mean
+            return float(peak - 0.5 * np.linalg.slogdet(information[:2, :2])[1] + mean)
         evidence = peak - 0.5 * float(np.linalg.slogdet(information)[1]) + 0.5 * len(chosen) * np.log(2.0 * np.pi)
         around = np.sign(sizes) * np.maximum(np.abs(sizes), deviations)
-        for table in tables:
+        for table in fit.tables:
             rows = [i for i, (owner, _) in enumerate(chosen) if owner is table]
-            if not rows:
-                continue
             # The strongest component by itself, the others comparable to it.
-            changes = [self._rms_alone(*chosen[i], around[i]) for i in rows]
-            first = rows[int(np.argmax(changes))]
-            evidence += self.prior(*chosen[first]).log_density_around(float(sizes[first]), float(deviations[first]))
-            for i, change in zip(rows, changes, strict=True):
-                if i != first:
-                    evidence += log_comparable(change / max(changes)) - np.log(abs(around[i]))
+            units = {i: around[i] * np.eye(len(table.candidate.components))[chosen[i][1]] for i in rows}
+            changes = {i: float(np.sqrt(np.mean(self.sight.change(table.delta(u)) ** 2))) for i, u in units.items()}
+            first = max(rows, key=lambda i: changes[i], default=-1)
+            for i in rows:
+                if i == first:
+                    evidence += self.prior(*chosen[i]).log_density_around(float(sizes[i]), float(deviations[i]))
+                else:
+                    evidence += log_comparable(changes[i] / changes[first]) - np.log(abs(around[i]))
         return float(evidence)
-
-    def _rms_alone(self, table: CandidateTable, j: int, size: float) -> float:
-        """Rms change of ln stiffness by one component alone."""
-        unit = np.zeros(len(table.candidate.components))
-        unit[j] = size
-        return float(np.sqrt(np.mean(self.sight.change(table.delta(unit)) ** 2)))
 
     def _gauss_newton(
         self, tables: Sequence[CandidateTable], start: FloatArray, unknowns: Sequence[int], precision: Precision
@@ -334,16 +328,15 @@ class Problem:
         None where that fails.
         """
 
-        def added(x: FloatArray) -> FloatArray:
-            deltas = (table.delta(sizes) for table, sizes in split(tables, x[2:]))
-            return sum(deltas, np.zeros(len(self.observed)))
+        def compliance(x: FloatArray, part: FloatArray) -> FloatArray:
+            return self._held(part + sum((table.delta(sizes) for table, sizes in split(tables, x[2:])), 0.0))
 
         def equations(x: FloatArray) -> NormalEquations:
             part, by_law = self.predictor.strut_part_and_slopes(x[:2])
-            compliance = self._held(part + added(x))
+            whole = compliance(x, part)
             slopes = [table.slope(sizes) for table, sizes in split(tables, x[2:])]
-            jacobian = -np.concatenate([by_law.T, *slopes], axis=1)[:, unknowns] / compliance[:, None]
-            return normal_equations(jacobian, self.observed + np.log(compliance), x[:2], precision)
+            jacobian = -np.concatenate([by_law.T, *slopes], axis=1)[:, unknowns] / whole[:, None]
+            return normal_equations(jacobian, self.observed + np.log(whole), x[:2], precision)
 
         def move(x: FloatArray, here: NormalEquations) -> tuple[FloatArray, FloatArray]:
             scale = here.scale
@@ -360,18 +353,13 @@ class Problem:
             x, last = gauss_newton(start, equations, move, TABLE_STEPS, TABLE_TOLERANCE)
         except np.linalg.LinAlgError:
             return None
-        return x, self.observed + np.log(self.compliance(x[:2], added(x))), last
+        return x, self.observed + np.log(compliance(x, self.predictor.strut_part(x[:2]))), last
 
 
 def split(tables: Sequence[CandidateTable], sizes: FloatArray) -> Iterator[tuple[CandidateTable, FloatArray]]:
     """Each table with its own of the sizes (p,)."""
     ends = np.cumsum([len(table.candidate.components) for table in tables])
     return zip(tables, np.split(sizes, ends[:-1]), strict=True)
-
-
-def _just_beyond(component: Component, size: float) -> bool:
-    """Of a size a little beyond its bound: tables of two effects describe neither exactly."""
-    return not component.allows(size) and component.allows(size / (1.0 + BEYOND))
 
 
 def normal_equations(

@@ -79,8 +79,9 @@ class _Model:
         """
         step = np.asarray(scaled_inverse(equations.information) @ equations.gradient)
         low, high = (limit[unknowns] - x[unknowns] for limit in (self.low, self.high))
-        within = ((step >= low) & (step <= high)).all()
-        return step if within else bounded_step(equations.information, equations.gradient, low, high)
+        if ((step >= low) & (step <= high)).all():
+            return step
+        return bounded_step(equations.information, equations.gradient, low, high)
 
     def moved(
         self, x: FloatArray, residual: FloatArray, unknowns: Sequence[int], step: FloatArray, scatter: Scatter
@@ -141,28 +142,25 @@ def fit_effects(
     model, unknowns = _Model(problem, tuple(candidates), law_free), [0, 1, *(2 + index for index in free)]
     x = np.clip(np.concatenate([law if law_free else np.zeros(2), *sizes]).astype(float), model.low, model.high)
     residual = model.residual(x)
-    scatter = problem.scatter.with_wild(residual) if scatter is None else scatter
+    noise = problem.scatter.with_wild(residual) if scatter is None else scatter
     Point = tuple[FloatArray, FloatArray]  # x, residual
-
-    def equations(point: Point) -> NormalEquations:
-        return model.equations(*point, unknowns, scatter)
 
     def move(point: Point, here: NormalEquations) -> tuple[Point, FloatArray] | None:
         step = model.newton_step(point[0], unknowns, here)
-        moved = model.moved(*point, unknowns, step, scatter)
+        moved = model.moved(*point, unknowns, step, noise)
         return None if moved is None else (moved, step)
 
-    (x, residual), _ = gauss_newton((x, residual), equations, move, STEPS, TOLERANCE)
-    last = equations((x, residual))
-    absent = {}
+    start = x, residual
+    (x, residual), _ = gauss_newton(start, lambda at: model.equations(*at, unknowns, noise), move, STEPS, TOLERANCE)
+    last, absent = model.equations(x, residual, unknowns, noise), {}
     if len(unknowns) < len(x):  # where the data would pull the others, were all sizes free
-        every = model.equations(x, residual, range(len(x)), scatter)
+        every = model.equations(x, residual, range(len(x)), noise)
         inverse = scaled_inverse(every.information)
         pulled, sd = x + inverse @ every.gradient, np.sqrt(np.maximum(np.diag(inverse), 0.0))
         absent = {i - 2: (float(pulled[i]), float(sd[i])) for i in range(len(x)) if i not in unknowns}
     return Fit(
         tuple(model.candidates), model.sizes(x), tuple(free), x[:2].copy(), residual, last.jacobian,
-        scaled_inverse(last.information), scatter, law_free, absent,
+        scaled_inverse(last.information), noise, law_free, absent,
     )  # fmt: skip
 
 
@@ -211,9 +209,12 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
         start = np.array([_start(component, share) for component in candidate.components])
         fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
         x = np.concatenate([fit.law, *fit.sizes])
-        scale = normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter.precision, prior_of(law_free)).scale
+        near = (
+            TOLERANCE
+            / normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter.precision, prior_of(law_free)).scale
+        )
         # Two starts mostly end in one place, and go on from there alike.
-        if not any((np.abs(x - other) < TOLERANCE * (1.0 / scale)).all() for other in seen):
+        if not any((np.abs(x - other) < near).all() for other in seen):
             yield fit
         seen.append(x)
 
@@ -221,7 +222,7 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
 def _start(component: Component, share: float) -> float:
     usual, sign = component.typical()[1], component.signs[-1]
     reach = component.reach(sign)
-    known = usual if np.isfinite(usual) and usual > 0.0 else reach
+    known = usual if 0.0 < usual < np.inf else reach
     return sign * min(share * (known if np.isfinite(known) else 1.0), reach)
 
 
@@ -230,10 +231,9 @@ def _settled(problem: Problem, fit: Fit) -> Fit:
     for _ in range(ROUNDS):
         scatter = problem.scatter.with_wild(fit.residual, known=fit.scatter)
         again = fit_effects(problem, fit.candidates, fit.sizes, fit.free, fit.law, scatter, fit.law_free)
-        done = set(scatter.wild) == set(fit.scatter.wild) and again.log_posterior < fit.log_posterior + 1e-4
+        if set(scatter.wild) == set(fit.scatter.wild) and again.log_posterior < fit.log_posterior + 1e-4:
+            return again
         fit = again
-        if done:
-            break
     return fit
 
 

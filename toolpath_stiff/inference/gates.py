@@ -13,7 +13,7 @@ The bootstrapped distribution of the smallest p value makes one test of them.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -22,7 +22,6 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Covariance, Precision
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.noise import Noise, Scatter
-from toolpath_stiff.inference.tails import surprise
 
 DRAWS = 400
 
@@ -39,6 +38,12 @@ CHANCE = 0.05  # share of campaigns in which the best of all candidates gains as
 
 
 HOPELESS = 1.3  # times the largest simulated sum of squares
+
+
+FAR = 1e-290  # tail probability below which the continued fraction takes over from SciPy's, which ends there
+
+
+TERMS = 100  # of that fraction
 
 
 @dataclass(frozen=True)
@@ -71,8 +76,7 @@ class Gate:
 
 def simulate(noise: Noise, covariance: Covariance, seed: int, draws: int = DRAWS) -> FloatArray:
     """(draws, n) simulated scatter of ln readings, each draw already divided by the error of its noise estimate."""
-    rng = np.random.default_rng(seed)
-    shape = (draws, len(covariance))
+    rng, shape = np.random.default_rng(seed), (draws, len(covariance))
     shared = covariance.draw(rng, draws)
     wide = np.where(rng.random(shape) < noise.outliers, noise.outlier_width, 1.0)
     scatter = shared + noise.repeat * wide * rng.standard_normal(shape)
@@ -125,13 +129,6 @@ class Forms:
         self.solved = np.ascontiguousarray(np.concatenate([*solved, np.zeros((len(precision), 0))], axis=1))  # A L
         ends = np.cumsum([0, *(form.shape[1] for form in solved)])
         self.slices = [slice(*pair) for pair in pairwise(ends.tolist())]
-        self._drawn: tuple[FloatArray | None, FloatArray] = None, np.zeros((0, 0))
-
-    def of_draws(self, draws: FloatArray) -> FloatArray:
-        """(s, all features) L^T A r of simulated residuals (s, n), kept for the next fit."""
-        if self._drawn[0] is not draws:
-            self._drawn = draws, draws @ self.solved
-        return self._drawn[1]
 
 
 class FormStatistics:
@@ -154,13 +151,9 @@ class FormStatistics:
         reached = self.reached[:, self.forms.slices[k]]
         return np.asarray(self.forms.grams[k] - reached.T @ reached)
 
-    def loads(self, residuals: FloatArray, taken: FloatArray, known: FloatArray | None = None) -> FloatArray:
-        """(s, all features) L^T P (r - taken) of residuals (s, n); `known`: L^T A r."""
-        whole = residuals @ self.forms.solved if known is None else known.copy()
-        for s in np.flatnonzero(taken.any(axis=1)).tolist():
-            some = np.flatnonzero(taken[s])  # few readings of each set
-            whole[s] -= taken[s, some] @ self.forms.solved[some]
-        return np.asarray(whole - (residuals - taken) @ self.removed.T @ self.reached)
+    def loads(self, residuals: FloatArray) -> FloatArray:
+        """(s, all features) L^T P r of residuals (s, n)."""
+        return np.asarray(residuals @ self.forms.solved - residuals @ self.removed.T @ self.reached)
 
     def surprises(self, loads: FloatArray) -> FloatArray:
         """(s, forms) of loads (s, all features)."""
@@ -168,6 +161,24 @@ class FormStatistics:
             return np.zeros((len(loads), 1))
         value = np.stack([(loads[:, part] ** 2).sum(axis=1) for part in self.forms.slices], axis=1)
         return surprise(value * 2.0 * self.means / self.variances, 2.0 * self.means**2 / self.variances)
+
+
+def surprise(value: FloatArray, freedom: FloatArray) -> FloatArray:
+    """(s, k) -ln P(chi-square of `freedom` (k,) > value (s, k)), not rounded to infinity far out.
+
+    P is the incomplete gamma function Q(a, x), a = freedom / 2, x = value / 2; far out by its continued fraction
+    (NIST Digital Library of Mathematical Functions, 8.9.2). Without degrees of freedom any value is too much.
+    """
+    from scipy.special import gammaincc, gammaln
+
+    a, x = np.broadcast_arrays(0.5 * freedom, np.maximum(0.5 * value, 1e-300))
+    near = gammaincc(a, x)
+    fraction = x + 2 * TERMS + 1.0 - a
+    for k in range(TERMS, 0, -1):
+        fraction = x + 2 * k - 1.0 - a - k * (k - a) / fraction
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = gammaln(a) + x - a * np.log(x) + np.log(fraction)
+        return np.where(a > 0.0, np.where(near > FAR, -np.log(near), far), np.inf)
 
 
 def absolute_gate(
@@ -195,23 +206,27 @@ def absolute_gate(
     pulls, taken = set_wild_aside(projected.times(draws), projected, scatter)
     observed_squares, squares = float(squares_of(*observed)[0]), squares_of(pulls, taken)
     structure = FormStatistics(forms, projected)
-    seen = structure.surprises(structure.loads(residual[None], observed[1]))
+    seen = structure.surprises(structure.loads(residual[None] - observed[1]))
     # Squares far beyond all simulated ones settle it; what the structure would look like by chance matters no more.
     simulated = np.zeros((len(squares), seen.shape[1]))
     if signatures or observed_squares <= HOPELESS * squares.max():
-        simulated = structure.surprises(structure.loads(draws, taken, forms.of_draws(draws)))
+        simulated = structure.surprises(structure.loads(draws - taken))
     # Rows: the data, then every draw; columns: what may look bad, larger is worse.
     looks = [np.concatenate([[observed_squares], squares]), np.concatenate([seen, simulated]).max(axis=1)]
     if signatures:
         looks.append(np.concatenate([[gain], largest_gain(pulls, projected, signatures)]))
     ranked = np.stack([_tail(look, look[1:]) for look in looks], axis=1)
     smallest = ranked.min(axis=1)
-    probability = float(max((smallest[1:] <= smallest[0] + 1e-12).mean(), 0.5 / len(squares)))
-    worst = forms.names[int(np.argmax(seen[0]))] if forms.names else ""
-    squared, structured, *gains = ranked[0].tolist()
-    gate = Gate(probability, observed_squares, squares, squared, structured, worst)
-    threshold = float(np.quantile(looks[-1][1:], 1.0 - CHANCE))
-    return replace(gate, gain_probability=gains[0], gain_threshold=threshold) if signatures else gate
+    return Gate(
+        float(max((smallest[1:] <= smallest[0] + 1e-12).mean(), 0.5 / len(squares))),
+        observed_squares,
+        squares,
+        squares_probability=float(ranked[0, 0]),
+        structure_probability=float(ranked[0, 1]),
+        worst=forms.names[int(np.argmax(seen[0]))] if forms.names else "",
+        gain_probability=float(ranked[0, 2]) if signatures else 1.0,
+        gain_threshold=float(np.quantile(looks[2][1:], 1.0 - CHANCE)) if signatures else 0.0,
+    )
 
 
 def gain_threshold(
@@ -233,15 +248,14 @@ def _tail(values: FloatArray, simulated: FloatArray) -> FloatArray:
 def largest_gain(pulls: FloatArray, projected: Precision, signatures: Sequence[Sequence[FloatArray]]) -> FloatArray:
     """(s,) largest likelihood-ratio gain over candidates; each a list of matrices (n, p) with sizes >= 0."""
     best = np.zeros(len(pulls))
-    for subsets in signatures:
-        for columns in subsets:
-            slope = pulls @ columns
-            information = projected.times(columns.T) @ columns
-            scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-            try:
-                sizes = np.linalg.solve(information / np.outer(scale, scale), (slope / scale).T).T
-            except np.linalg.LinAlgError:
-                continue
-            gain = np.einsum("sp,sp->s", sizes, slope / scale)
-            best = np.maximum(best, np.where((sizes > 0.0).all(axis=1), gain, 0.0))
+    for columns in (columns for subsets in signatures for columns in subsets):
+        information = projected.times(columns.T) @ columns
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        slope = pulls @ columns / scale
+        try:
+            sizes = np.linalg.solve(information / np.outer(scale, scale), slope.T).T
+        except np.linalg.LinAlgError:
+            continue
+        gain = np.einsum("sp,sp->s", sizes, slope)
+        best = np.maximum(best, np.where((sizes > 0.0).all(axis=1), gain, 0.0))
     return best

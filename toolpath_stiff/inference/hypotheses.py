@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import erfc, sqrt
 
 import numpy as np
 
@@ -56,10 +55,10 @@ def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
     best: Fit | None = None
     subsets: tuple[tuple[Fit, float], ...] = ()
     for table in tables:
-        scores = _scores(problem, table, base)
-        evidences += [score.log_evidence + log_weight for score, log_weight in scores]
-        possible = [(score, log_weight) for score, log_weight in scores if score.possible]
-        likeliest = max((score for score, _ in possible), key=lambda score: score.log_evidence, default=None)
+        fits = _fits_of_subsets(problem, table, base)
+        evidences += [fit.log_evidence + log_weight for fit, log_weight in fits]
+        possible = [(fit, log_weight) for fit, log_weight in fits if fit.possible]
+        likeliest = max((fit for fit, _ in possible), key=lambda fit: fit.log_evidence, default=None)
         if likeliest is not None and (best is None or likeliest.log_evidence > best.log_evidence):
             best, subsets = likeliest, tuple(possible)
     if not tables:
@@ -68,19 +67,19 @@ def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
     return Family(effect, tuple(tables), best, total, subsets)
 
 
-def _scores(problem: Problem, table: CandidateTable, base: Fit) -> list[tuple[Fit, float]]:
+def _fits_of_subsets(problem: Problem, table: CandidateTable, base: Fit) -> list[tuple[Fit, float]]:
     """Fits of one candidate with the log prior weight of each subset of components."""
     if table.knots:
         return [(score_single(problem, table, base), 0.0)]
-    subsets, scores = list(table.candidate.subsets()), []
+    subsets, fits = list(table.candidate.subsets()), []
     start, sizes = base, None
     for free in subsets:
-        score = problem.score_subset([table], free, start, sizes)
-        if score is not None:
-            scores.append((score, -float(np.log(len(subsets)))))
+        fit = problem.score_subset([table], free, start, sizes)
+        if fit is not None:
+            fits.append((fit, -float(np.log(len(subsets)))))
             # The next subset begins where this one has ended, with the readings that it takes for wild.
-            start, sizes = score, score.sizes[0]
-    return scores
+            start, sizes = fit, fit.sizes[0]
+    return fits
 
 
 def score_single(problem: Problem, table: CandidateTable, start: Fit) -> Fit:
@@ -134,7 +133,7 @@ def _scanned(
         more = np.linspace(low, high, 8)[1:-1]
         known = with_more(more[(more != 0.0) & (more != sizes[peak])])
     peak = int(np.argmax(known[1]))
-    size = float(known[0][peak])
+    size = known[0][peak]
     more = size + _width(known[0], known[1], peak) * np.linspace(-4.5, 4.5, 14)
     more = more[(more * size > 0.0) & (np.abs(more) <= table.reach(float(np.sign(size))))]
     return with_more(more) if len(more) else known
@@ -157,21 +156,20 @@ def score_families(problem: Problem, effects: Iterable[Effect], base: Fit) -> li
 
 def tables_of(problem: Problem, effect: Effect) -> list[CandidateTable]:
     """The tables of an effect, one a choice that does something to these data."""
-    candidates = candidates_of(effect, problem.predictor.data)
-    return list(filter(None, (table_of(candidate, problem.predictor) for candidate in candidates)))
+    tables = (table_of(candidate, problem.predictor) for candidate in candidates_of(effect, problem.predictor.data))
+    return list(filter(None, tables))
 
 
 def signatures(problem: Problem, tables: Iterable[CandidateTable]) -> list[list[FloatArray]]:
     """One-sided small-size signatures d ln k / d size of every candidate: subsets of columns (n, p), sizes >= 0."""
     signs = []
     for table in tables:
-        columns = -table.columns / problem.base_compliance[:, None]
-        components = table.candidate.components
+        columns, components = -table.columns / problem.base_compliance[:, None], table.candidate.components
         if len(components) == 1:
             signs.append([columns * sign for sign in components[0].signs])
         else:
-            toward = np.array([c.signs[-1] for c in components])
-            signs.append([(columns * toward)[:, list(subset)] for subset in table.candidate.subsets()])
+            toward = columns * np.array([c.signs[-1] for c in components])
+            signs.append([toward[:, list(subset)] for subset in table.candidate.subsets()])
     return signs
 
 
@@ -200,47 +198,34 @@ def averaged_interval(family: Family, j: int) -> FloatArray | None:
     """
     if family.best is None or len(family.subsets) < 2:
         return None
-    logs = np.array([score.log_evidence + weight for score, weight in family.subsets])
-    shares = np.exp(logs - logs.max())
-    shares /= shares.sum()
-    low, high = family.best.candidates[0].components[j].bounds
-    parts, absent = [], 0.0
-    for (score, _), share in zip(family.subsets, shares, strict=True):
-        if j in score.free:
-            row = 2 + score.free.index(j)
-            sd = float(np.sqrt(max(score.covariance[row, row], 1e-300)))
-            parts.append((float(share), float(score.sizes[0][j]), sd))
-        else:
-            absent += float(share)
-    if not parts:
+    logs = np.array([fit.log_evidence + weight for fit, weight in family.subsets])
+    share = np.exp(logs - logs.max())
+    held = np.array([j in fit.free for fit, _ in family.subsets])
+    if not held.any():
         return np.zeros(2)
-    far = max(abs(size) + 8.0 * sd for _, size, sd in parts)
-    bracket = (max(low, -far), min(high, far))
+    present, absent = share[held] / share.sum(), float(share[~held].sum() / share.sum())
+    fits = [fit for fit, _ in family.subsets if j in fit.free]
+    mean, sd = np.array([(fit.sizes[0][j], max(fit.deviation(j), 1e-150)) for fit in fits]).T
+    far = float((np.abs(mean) + 8.0 * sd).max())
+    low, high = family.best.candidates[0].components[j].bounds
+    ends = np.array([max(low, -far), min(high, far)])
     tail = 0.5 * (1.0 - SHARE)
-    return np.array([_quantile(parts, absent, bracket, share) for share in (tail, 1.0 - tail)])
+    return np.array([_quantile((present, mean, sd), absent, ends, share) for share in (tail, 1.0 - tail)])
 
 
-def _quantile(
-    parts: list[tuple[float, float, float]], absent: float, bracket: tuple[float, float], share: float
-) -> float:
-    """Size up to which the mixture of cut-off normals (share, mean, sd) and of zero holds `share`."""
+def _quantile(parts: tuple[FloatArray, ...], absent: float, ends: FloatArray, share: float) -> float:
+    """Size up to which the mixture of normals (share, mean, sd), cut off at the ends, and of zero holds `share`."""
+    from scipy.special import ndtr
 
-    def normal(x: float) -> float:
-        return 0.5 * erfc(-x / sqrt(2.0))
-
-    def below(size: float) -> float:
-        total = absent if size >= 0.0 else 0.0
-        for part, mean, sd in parts:
-            first, last, here = ((x - mean) / sd for x in (*bracket, size))
-            start = normal(first)
-            total += part * (normal(here) - start) / max(normal(last) - start, 1e-300)
-        return total
-
-    low, high = bracket
+    present, mean, sd = parts
+    first, last = ndtr((ends[:, None] - mean) / sd)
+    low, high = ends.tolist()
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if below(middle) < share else (low, middle)
-    return 0.0 if abs(high) <= 1e-12 * (bracket[1] - bracket[0]) else high
+        within = (ndtr((middle - mean) / sd) - first) / np.maximum(last - first, 1e-300)
+        below = float(present @ within) + (absent if middle >= 0.0 else 0.0) < share
+        low, high = (middle, high) if below else (low, middle)
+    return 0.0 if abs(high) <= 1e-12 * float(np.ptp(ends)) else float(high)
 
 
 AMPLITUDES = np.geomspace(0.003, 0.3, 9)  # rms of a discrepancy of ln k; as wide as the effects' own prior
@@ -258,22 +243,19 @@ def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[fl
 
     averaged over amplitudes and forms.
     """
+    if not forms.names:
+        return score.log_evidence, ""
     projected = problem.projected(score.jacobian)
     _, taken = set_wild_aside(projected.times(score.residual[None]), projected, problem.scatter)
     structure = FormStatistics(forms, projected)
-    loads = structure.loads(score.residual[None], taken)
+    loads = structure.loads(score.residual[None] - taken)
+    order = np.argsort(structure.surprises(loads)[0])[::-1][:FORMS].tolist()
     gains = []
-    order = np.argsort(structure.surprises(loads)[0])[::-1][:FORMS] if forms.names else np.zeros(0, dtype=int)
-    for index in order.tolist():
+    for index in order:
         values, turn = np.linalg.eigh(structure.inner(index))
-        values = np.maximum(values, 0.0)
         turned = (turn.T @ loads[0, forms.slices[index]]) ** 2
-        squared = AMPLITUDES[:, None] ** 2
-        each = -0.5 * np.log1p(squared * values).sum(axis=1) + 0.5 * (squared * turned / (1.0 + squared * values)).sum(
-            axis=1
-        )
+        squared, widths = AMPLITUDES[:, None] ** 2, 1.0 + AMPLITUDES[:, None] ** 2 * np.maximum(values, 0.0)
+        each = 0.5 * (squared * turned / widths).sum(axis=1) - 0.5 * np.log(widths).sum(axis=1)
         gains.append(float(np.logaddexp.reduce(each)) - np.log(len(AMPLITUDES)))
-    if not gains:
-        return score.log_evidence, ""
-    likeliest = forms.names[int(order[int(np.argmax(gains))])]
-    return score.log_evidence + float(np.logaddexp.reduce(gains)) - np.log(len(forms.names)), likeliest
+    gain = float(np.logaddexp.reduce(gains)) - np.log(len(forms.names))
+    return score.log_evidence + gain, forms.names[order[int(np.argmax(gains))]]

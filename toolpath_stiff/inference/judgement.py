@@ -39,7 +39,7 @@ from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.inference.several import Combination, search_pairs, search_triples
+from toolpath_stiff.inference.several import search_pairs, search_triples
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
 from toolpath_stiff.stiffness.contract import Effect
 
@@ -128,7 +128,7 @@ class Judgement:
     families: tuple[Family, ...]
     gates: dict[str, Gate]
     fits: dict[str, Fit]
-    pairs: tuple[Combination, ...]
+    pairs: tuple[Fit, ...]
     probability: dict[str, float]
     form: str
     question: str = ""
@@ -215,9 +215,8 @@ class Candidates:
 def find_candidates(problem: Problem, effects: Sequence[Effect]) -> Candidates:
     """Fit every effect with each of its choices beside the strut law."""
     base = problem.score_base()
-    families = score_families(problem, effects, base)
     forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
-    return Candidates(base, tuple(families), forms)
+    return Candidates(base, tuple(score_families(problem, effects, base)), forms)
 
 
 @dataclass
@@ -241,8 +240,8 @@ class Gates:
     base: Gate
     none_stands: bool = True
     singles: tuple[str, ...] = ()
-    pairs: tuple[Combination, ...] = ()
-    tried: tuple[Combination, ...] = ()
+    pairs: tuple[Fit, ...] = ()
+    tried: tuple[Fit, ...] = ()
     by_name: dict[str, Gate] = field(default_factory=dict)
     fits: dict[str, Fit] = field(default_factory=dict)
 
@@ -251,22 +250,22 @@ class Gates:
         """Whether the model explains the data without a further effect."""
         return self.base.probability > FALSE_ALARM
 
-    def add(self, combinations: Sequence[Combination], evidence: Evidence, passes: Callable[[str, Fit], bool]) -> None:
+    def add(self, combinations: Sequence[Fit], evidence: Evidence, passes: Callable[[str, Fit], bool]) -> None:
         """Try pairs or triples: those of the likeliest that beat each of their parts and pass stand.
 
         What two effects do to each other is not in their tables: the final fit says how much more likely it makes the
         data.
         """
         tried = list(combinations)
-        for k, combination in enumerate(combinations[:TESTED]):
-            parts = [log for names, log in evidence.items() if set(names) < set(combination.names)]
-            if combination.log_evidence <= max(parts) + SURVIVES:
+        for k, fit in enumerate(combinations[:TESTED]):
+            parts = [log for names, log in evidence.items() if set(names) < set(fit.names)]
+            if fit.log_evidence <= max(parts) + SURVIVES:
                 continue
-            passed = passes(combination.name, combination.score)
-            more = self.fits[combination.name].log_posterior - combination.score.log_posterior
-            tried[k] = replace(combination, log_evidence=combination.log_evidence + more)
+            passed = passes(fit.name, fit)
+            more = self.fits[fit.name].log_posterior - fit.log_posterior
+            tried[k] = replace(fit, log_evidence=fit.log_evidence + more)
             self.pairs += (tried[k],) if passed else ()
-        self.tried += tuple(sorted(tried, key=lambda several: (-several.log_evidence, several.names)))
+        self.tried += tuple(sorted(tried, key=lambda fit: (-fit.log_evidence, fit.name)))
 
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: int) -> Gates:
@@ -319,12 +318,12 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
         return _posterior(problem, noise, candidates, True, [f.name for f in families]), ""
     outside, form = (-np.inf, "") if gates.singles else _outside(problem, candidates)
 
-    def posterior(standing: Sequence[Combination]) -> dict[str, float]:
+    def posterior(standing: Sequence[Fit]) -> dict[str, float]:
         if gates.singles:
             return _posterior(problem, noise, candidates, gates.none_stands, gates.singles, standing)
         evidences = {OUTSIDE: outside} | {several.name: several.log_evidence for several in standing}
-        prior = {OUTSIDE: PRIOR_OUTSIDE} | {several.name: _prior(families, len(several.names)) for several in standing}
-        return probabilities(evidences, prior)
+        prior = {several.name: _prior(families, len(several.names)) for several in standing}
+        return probabilities(evidences, {OUTSIDE: PRIOR_OUTSIDE} | prior)
 
     posteriors = _sparing(gates, posterior)
     if gates.pairs and posteriors.get(OUTSIDE, 1.0) < STANDS:  # ruled out
@@ -332,9 +331,9 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
     return posteriors, form
 
 
-def _sparing(gates: Gates, posterior: Callable[[Sequence[Combination]], dict[str, float]]) -> dict[str, float]:
+def _sparing(gates: Gates, posterior: Callable[[Sequence[Fit]], dict[str, float]]) -> dict[str, float]:
     """Probabilities without triples that are not likelier enough than the best pair, and pairs than the best effect."""
-    standing: Sequence[Combination] = gates.pairs
+    standing: Sequence[Fit] = gates.pairs
     weights = posterior(standing)
     for count in (2, 1):
         fewer = gates.singles if count == 1 else [several.name for several in standing if len(several.names) == count]
@@ -351,13 +350,12 @@ def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
     Alone, or beside one of the two best effects. That a further one is missing beside an effect is as rare as of two
     effects, and it may be any of them: who picks the best of fifteen without that price makes the unknown too likely.
     """
-    beside = PRIOR_PAIRS / PRIOR_SINGLES / max(len(candidates.families), 1)
-    evidences = [discrepancy_evidence(problem, candidates.base, candidates.forms)]
+    price = float(np.log(PRIOR_PAIRS / PRIOR_SINGLES / max(len(candidates.families), 1)))
+    outside = [discrepancy_evidence(problem, candidates.base, candidates.forms)]
     for _, best in candidates.offered[:2]:
-        evidence, words = discrepancy_evidence(problem, best, candidates.forms)
-        evidences.append((evidence + float(np.log(beside)), words))
-    _, likeliest = max(evidences, key=lambda pair: pair[0])
-    return float(np.logaddexp.reduce([evidence for evidence, _ in evidences])), likeliest
+        evidence, form = discrepancy_evidence(problem, best, candidates.forms)
+        outside.append((evidence + price, form))
+    return float(np.logaddexp.reduce([evidence for evidence, _ in outside])), max(outside, key=lambda pair: pair[0])[1]
 
 
 def _posterior(
@@ -366,21 +364,17 @@ def _posterior(
     candidates: Candidates,
     none: bool,
     names: Sequence[str],
-    pairs: Sequence[Combination] = (),
+    pairs: Sequence[Fit] = (),
 ) -> dict[str, float]:
     """Probabilities of the base model (if it stands), of single effects and of pairs; 0 for all others."""
-    base, families = candidates.base, candidates.families
-
-    def evidence(log_evidence: float, fit: Fit) -> float:
-        return _with_unknown_noise(problem, noise, log_evidence, fit)
-
-    evidences = {f.name: evidence(f.log_evidence, f.best or base) for f in families}
-    evidences |= {pair.name: evidence(pair.log_evidence, pair.score) for pair in pairs}
-    prior = {name: _prior(families, 1) for name in names}
+    families = candidates.families
+    hypotheses = {NONE: (candidates.base.log_evidence, candidates.base)}
+    hypotheses |= {family.name: (family.log_evidence, family.best or candidates.base) for family in families}
+    hypotheses |= {pair.name: (pair.log_evidence, pair) for pair in pairs}
+    prior = {NONE: PRIOR_NONE} if none else {}
+    prior |= {name: _prior(families, 1) for name in names}
     prior |= {pair.name: _prior(families, len(pair.names)) for pair in pairs}
-    return probabilities(
-        {NONE: evidence(base.log_evidence, base)} | evidences, prior | ({NONE: PRIOR_NONE} if none else {})
-    )
+    return probabilities({name: _with_unknown_noise(problem, noise, *of) for name, of in hypotheses.items()}, prior)
 
 
 def _prior(families: Sequence[Family], count: int) -> float:
@@ -394,11 +388,11 @@ def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit
     Integrated over it, the normal likelihood exp(-q / 2) of the weighted squares q of n readings becomes Student's,
     (1 + q / freedom)^(-(freedom + n) / 2): many readings that fit badly say as much of the noise as of the model.
     """
-    freedom, n = noise.freedom, len(fit.residual)
-    if not np.isfinite(freedom):
+    if not np.isfinite(noise.freedom):
         return log_evidence
     squares = -2.0 * fit.log_likelihood - problem.scatter.covariance.log_determinant
-    return log_evidence + 0.5 * squares - 0.5 * (freedom + n) * float(np.log1p(max(squares, 0.0) / freedom))
+    student = (noise.freedom + len(fit.residual)) * float(np.log1p(max(squares, 0.0) / noise.freedom))
+    return log_evidence + 0.5 * squares - 0.5 * student
 
 
 def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str, ...]]:
@@ -427,11 +421,10 @@ def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
     name = next((name for name in judgement.explanations if name == NONE or name in judgement.fits), "")
     if not name:
         return ()
-    count = 0 if name == NONE else len(name.split(" + "))
-    families = judgement.families
+    count, families = 0 if name == NONE else len(name.split(" + ")), judgement.families
     before = _prior(families, min(count, 2)) if count else PRIOR_NONE
-    odds, fit = _prior(families, min(count + 1, 3)) / before, judgement.fits.get(name, judgement.base)
-    hidden = not_excluded(judgement.problem, families, fit, odds)
+    odds = _prior(families, min(count + 1, 3)) / before
+    hidden = not_excluded(judgement.problem, families, judgement.fits.get(name, judgement.base), odds)
     return tuple(effect for effect in hidden if effect.effect.name not in judgement.plausible)
 
 
@@ -440,11 +433,5 @@ def _smallest_set(posterior: Mapping[str, float], named: float = NAMED) -> tuple
     ranked = sorted(posterior.items(), key=lambda item: (-item[1], item[0]))
     if ranked and ranked[0][1] >= named:
         return (ranked[0][0],)
-    names: list[str] = []
-    held = 0.0
-    for name, weight in ranked:
-        if held >= HELD or weight <= 0.0:
-            break
-        names.append(name)
-        held += weight
-    return tuple(names)
+    before = np.cumsum([0.0, *(weight for _, weight in ranked)]).tolist()
+    return tuple(name for (name, weight), held in zip(ranked, before, strict=False) if held < HELD and weight > 0.0)

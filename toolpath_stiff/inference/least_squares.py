@@ -78,8 +78,7 @@ def bounded_step(information: FloatArray, gradient: FloatArray, low: FloatArray,
     low, high = low * scale, high * scale
     x, held = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
     for _ in range(10 * len(pull)):
-        free = np.flatnonzero(~held)
-        wanted = x.copy()
+        free, wanted = np.flatnonzero(~held), x.copy()
         if len(free):
             rest = pull[free] - matrix[np.ix_(free, np.flatnonzero(held))] @ x[held]
             wanted[free] = np.linalg.pinv(matrix[np.ix_(free, free)], rcond=1e-12, hermitian=True) @ rest
@@ -91,8 +90,7 @@ def bounded_step(information: FloatArray, gradient: FloatArray, low: FloatArray,
             x = x + shares[first] * (wanted - x)
             x[first], held[first] = over[first], True
             continue
-        x = wanted
-        slope = pull - matrix @ x  # downhill
+        x, slope = wanted, pull - matrix @ wanted  # downhill
         leave = np.where(held, np.where(x >= high, -slope, slope), 0.0)
         worst = int(np.argmax(leave))
         if leave[worst] <= 1e-12 * max(float(np.abs(pull).max()), 1e-300):

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.inference.covariances import Groups, Precision
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
 
@@ -31,14 +30,14 @@ class HeldOut:
 
     residual: FloatArray
     moves: FloatArray
-    point: NDArray[np.str_]
+    point: TextArray
 
     @property
     def errors(self) -> FloatArray:
         """(n,) |modelled - measured| / measured."""
         return np.abs(np.expm1(-self.residual))
 
-    def of_readings(self, rows: NDArray[np.bool_]) -> HeldOut:
+    def of_readings(self, rows: BoolArray) -> HeldOut:
         """Of some of the readings."""
         return HeldOut(self.residual[rows], self.moves, self.point[rows])
 
@@ -53,12 +52,12 @@ class HeldOut:
         return float(np.sqrt(np.mean(np.expm1(-self.residual) ** 2)))
 
 
-def of_readings(fit: Fit, rows: NDArray[np.bool_]) -> Fit:
+def of_readings(fit: Fit, rows: BoolArray) -> Fit:
     """A fit with the residuals of some of its readings alone: for counting errors, no longer for fitting."""
     return fit if rows.all() else replace(fit, residual=fit.residual[rows], jacobian=fit.jacobian[rows])
 
 
-def held_out(fit: Fit, point: NDArray[np.str_]) -> HeldOut:
+def held_out(fit: Fit, point: TextArray) -> HeldOut:
     """Leave each point out in turn; with fewer than three points nothing can be left out and all is nan."""
     points = Groups.by(point)
     residual = np.full(len(fit.residual), np.nan)
@@ -69,8 +68,7 @@ def held_out(fit: Fit, point: NDArray[np.str_]) -> HeldOut:
     prior[:2, :2] = np.eye(2) * (1.0 / LAW_PRIOR**2 if fit.law_free else 1e12)
     precision = fit.scatter.precision
     scale = np.sqrt(np.maximum(precision.squares(fit.jacobian.T) + np.diag(prior), 1e-300))
-    columns = fit.jacobian / scale
-    for which, out, products in products_without(precision, columns, fit.residual, points):
+    for which, out, products in products_without(precision, fit.jacobian / scale, fit.residual, points):
         pull = products[..., -1]
         pull[:, :2] -= (prior[:2, :2] @ fit.law) / scale[:2]
         information = products[..., :-1] + prior / np.outer(scale, scale)
@@ -81,7 +79,7 @@ def held_out(fit: Fit, point: NDArray[np.str_]) -> HeldOut:
 
 def products_without(
     precision: Precision, columns: FloatArray, residual: FloatArray, points: Groups
-) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]]:
+) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
     """For points left out in turn, those of k readings together: the points (m,), their readings (m, k), products.
 
     The products are (m, p, p + 1) J^T A [J, r] of the readings that stay. Their inverse covariance is the Schur
@@ -92,12 +90,11 @@ def products_without(
     whole = solved[:-1] @ np.concatenate([columns, residual[:, None]], axis=1)
     members = points.members()
     sizes = np.array([len(out) for out in members])
-    for size in np.unique(sizes).tolist():
+    for size in np.unique(sizes):
         which = np.flatnonzero(sizes == size)
         out = np.array([members[k] for k in which])
         part = np.moveaxis(solved[:, out], 0, 1)  # (m, p + 1, k)
-        taken = part[:, :-1] @ np.linalg.solve(precision.block(out), np.swapaxes(part, 1, 2))
-        yield which, out, whole - taken
+        yield which, out, whole - part[:, :-1] @ np.linalg.solve(precision.block(out), np.swapaxes(part, 1, 2))
 
 
 def error_falls(before: HeldOut, after: HeldOut) -> FloatArray:
@@ -108,8 +105,7 @@ def error_falls(before: HeldOut, after: HeldOut) -> FloatArray:
 
 def gain_in_standard_errors(before: HeldOut, after: HeldOut) -> float:
     """Mean fall of the held-out error over its standard error, paired by point; nan with fewer than three points."""
-    labels = np.unique(before.point)
-    fallen = error_falls(before, after)
+    labels, fallen = np.unique(before.point), error_falls(before, after)
     falls = np.array([fallen[before.point == label].mean() for label in labels])
     if len(labels) < 3 or not np.isfinite(falls).all():
         return float("nan")

@@ -20,9 +20,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.covariances import Covariance, Groups, Precision
@@ -92,7 +91,7 @@ class Noise:
     freedom: float
     origin: str
     remark: str = ""
-    tip: NDArray[np.bool_] | None = None
+    tip: BoolArray | None = None
 
     @property
     def guess(self) -> str:
@@ -122,7 +121,7 @@ class Noise:
     def _of_tip(self, values: FloatArray) -> FloatArray:
         return values if self.tip is None or not self.tip.any() else values[self.tip]
 
-    def select(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> Noise:
+    def select(self, rows: BoolArray | IntArray) -> Noise:
         """The noise of some of the readings."""
         return replace(self, repeat=self.repeat[rows], tip=None if self.tip is None else self.tip[rows])
 
@@ -154,11 +153,10 @@ def noise_models(
         return models
     # Each loop beside the tip scatters on its own. Its reading is a clamping of its own (`measurements.with_offsets`),
     # whose scatter is counted beside this one.
-    relative, with_loops = data.sd[~data.tip] / data.stiffness[~data.tip], []
+    relative, with_loops = data.sd / data.stiffness, []
     for noise in models:
-        repeat = np.empty(len(data))
+        repeat = np.sqrt(np.maximum(relative**2 - noise.clamping**2, LEAST**2))
         repeat[data.tip] = noise.repeat
-        repeat[~data.tip] = np.sqrt(np.maximum(relative**2 - noise.clamping**2, LEAST**2))
         with_loops.append(replace(noise, repeat=repeat, tip=data.tip))
     return tuple(with_loops)
 
@@ -166,16 +164,16 @@ def noise_models(
 def _noise_of_tip(
     data: Readings, stated: float | tuple[float, float] | None, strut_spread: float, joint_error: float
 ) -> tuple[Noise, ...]:
-    n, copies = len(data), copied(data)
+    copies, relative = copied(data), data.sd / data.stiffness
     repeats = None if copies else from_repeats(data)
-    wild = OUTLIERS if repeats is None else repeats.wild
 
     def model(
         name: str, repeat: float | FloatArray, clamping: float, freedom: float, origin: str, remark: str = ""
     ) -> Noise:
-        every = np.maximum(np.full(n, repeat), LEAST)
+        every = np.maximum(np.full(len(data), repeat), LEAST)
         if np.min(repeat) < LEAST:
             origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
+        wild = OUTLIERS if repeats is None else repeats.wild
         return Noise(name, every, clamping, strut_spread, joint_error, wild, OUTLIER_WIDTH, freedom, origin, remark)
 
     remark = ""
@@ -186,30 +184,24 @@ def _noise_of_tip(
         remark = "" if repeats is None else _disagreement(repeats, *both, "noise stated with --noise")
         if not remark:
             return (model("stated", *both, STATED_FREEDOM, f"stated: {_percent(*both)}"),)
-    relative = data.sd / data.stiffness
-    rows = np.isfinite(relative) & (stated is None)  # that state how far they scatter
-    total = float(np.sqrt(np.mean(relative[rows] ** 2))) if rows.any() else np.nan
+    known = np.isfinite(relative) & (stated is None)  # readings that state how far they scatter
+    total = float(np.sqrt(np.mean(relative[known] ** 2))) if known.any() else np.nan
     if repeats is not None:
-        if rows.any():
-            used = "instead" if rows.all() else "for the readings that state nothing"
-            remark = _disagreement(repeats, *_shared(total), "sd_N_per_mm stated in the file", used)
+        if known.any():
+            remark = _disagreement(repeats, *_shared(total), "sd_N_per_mm stated in the file")
         origin = f"estimated from {repeats.differences} differences between repeats: "
         origin += _percent(repeats.repeat, repeats.clamping)
         origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
-        repeat, freedom = np.full(n, repeats.repeat), repeats.freedom
-        if rows.any() and not rows.all():  # each stands for its own readings, trusted as far as the less certain one
-            repeat[rows], freedom = _parts(relative[rows])[0], min(STATED_FREEDOM, freedom)
-            origin += f", and from sd_N_per_mm of {int(rows.sum())} readings, {_percent(*_shared(total))}"
-        return (model("measured", repeat, repeats.clamping, freedom, origin, remark),)
-    if rows.any():
-        stating, clamping = _parts(relative[rows])
-        repeat = np.full(n, np.sqrt(np.mean(stating**2)))
-        repeat[rows] = stating
+        return (model("measured", repeats.repeat, repeats.clamping, repeats.freedom, origin, remark),)
+    if known.any():
+        relative = np.where(known, relative, total)
+        clamping = min(CLAMPING, float(np.median(relative)) / np.sqrt(2.0))
+        repeat = np.sqrt(np.maximum(relative**2 - clamping**2, 0.5 * relative**2))
         origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of which {100 * clamping:.2g} % is "
         origin += "assumed to be clamping"
-        if not rows.all():
-            origin += f"; {n - int(rows.sum())} readings do not state it and are assumed to scatter as the others do"
-        return (model("stated", repeat, clamping, STATED_FREEDOM, origin),)
+        if not known.all():
+            origin += f"; {int((~known).sum())} readings do not state it and are assumed to scatter as the others do"
+        return (model("stated", repeat, float(clamping), STATED_FREEDOM, origin),)
     why = "the repeats agree exactly, as copies do" if copies else "the data hold neither repeats nor sd_N_per_mm"
     return tuple(
         model(name, *_shared(guess), GUESSED_FREEDOM, f"a {name} guess, {_percent(*_shared(guess))}: {why}")
@@ -217,14 +209,8 @@ def _noise_of_tip(
     )
 
 
-def _parts(relative: FloatArray) -> tuple[FloatArray, float]:
-    """Stated relative sds (n,) as repeat noise (n,) and clamping."""
-    clamping = min(CLAMPING, float(np.median(relative)) / np.sqrt(2.0))
-    return np.sqrt(np.maximum(relative**2 - clamping**2, 0.5 * relative**2)), float(clamping)
-
-
-def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str, used: str = "instead") -> str:
-    """That repeats contradict a stated noise, in a sentence; "" where they do not. `used`: where theirs is taken.
+def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str) -> str:
+    """That repeats contradict a stated noise, in a sentence; "" where they do not.
 
     Both are estimates: the stated one to `STATED_FREEDOM`, the repeats' to theirs (sd of a ratio's logarithm).
     """
@@ -232,13 +218,11 @@ def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str, u
     if repeats.clamps:
         total, shown = float(np.hypot(repeat, clamping)), float(np.hypot(repeats.repeat, repeats.clamping))
     ratio = shown / total
-    sd = np.sqrt(0.5 / STATED_FREEDOM + 0.5 / repeats.freedom)
-    if abs(np.log(ratio)) < CONTRADICTED * sd:
+    if abs(np.log(ratio)) < CONTRADICTED * np.sqrt(0.5 / STATED_FREEDOM + 0.5 / repeats.freedom):
         return ""
-    small = ratio > 1.0
     return (
-        f"the {what} is too {'small' if small else 'large'}: {100 * total:.2g} %, where {repeats.differences} "
-        f"differences between repeats scatter {ratio:.2g} times as much; what the repeats show is used {used}"
+        f"the {what} is too {'small' if ratio > 1.0 else 'large'}: {100 * total:.2g} %, where {repeats.differences} "
+        f"differences between repeats scatter {ratio:.2g} times as much; what the repeats show is used instead"
     )
 
 
@@ -254,10 +238,9 @@ def _percent(repeat: float, clamping: float) -> str:
 
 def covariance(noise: Noise, predictor: Predictor) -> Covariance:
     """Of ln readings."""
-    struts = noise.strut_spread * predictor.strut_columns()
-    shifted = noise.joint_error * predictor.joint_columns
-    shared = np.ascontiguousarray(np.concatenate([struts, shifted], axis=1).T)
-    return Covariance(noise.repeat**2, Groups.by(predictor.data.clamp), noise.clamping**2, shared)
+    shared = [noise.strut_spread * predictor.strut_columns(), noise.joint_error * predictor.joint_columns]
+    rows = np.ascontiguousarray(np.concatenate(shared, axis=1).T)
+    return Covariance(noise.repeat**2, Groups.by(predictor.data.clamp), noise.clamping**2, rows)
 
 
 MOST_WILD = 0.05  # share of readings that may be taken for wild; more where more of them are
@@ -299,11 +282,11 @@ class Scatter:
     @classmethod
     def of(cls, noise: Noise, covariance: Covariance) -> Scatter:
         """From a noise model and its covariance."""
-        widening = (noise.outlier_width**2 - 1.0) * noise.repeat**2
-        price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else NEVER
         wide = noise.outlier_width**2
-        beyond = (2.0 * price + np.log(wide)) * wide / (wide - 1.0)
-        return cls(covariance, widening, float(price), (), float(beyond), max(MOST_WILD, OFTEN_WILD * noise.outliers))
+        price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else NEVER
+        beyond = float((2.0 * price + np.log(wide)) * wide / (wide - 1.0))
+        most = max(MOST_WILD, OFTEN_WILD * noise.outliers)
+        return cls(covariance, (wide - 1.0) * noise.repeat**2, float(price), (), beyond, most)
 
     @property
     def precision(self) -> Precision:

@@ -29,9 +29,6 @@ from toolpath_stiff.stiffness.trial import failures, own_effects
 NO_CHANGE = (0.0, 0.0)  # of the strut law
 
 
-ANSWERS_KEPT = 64
-
-
 JOINT_STEP = 0.5e-3  # m, for differences: the size of the joint errors that the columns are used for
 
 
@@ -90,12 +87,11 @@ class Predictor:
         self.effect_files = tuple(effect_files)
         self.base = build_model(machine, self.effect_files)
         failed = failures(own_effects(self.base, self.effect_files), machine)
-        warnings = (*failed, *data.warnings, *idle_on(self.base, data).values())
+        warnings = [*failed, *data.warnings, *idle_on(self.base, data).values()]
         self.data = replace(data, warnings=tuple(dict.fromkeys(warnings)))
         self._timeless = _prepare(self.base, data, timed=False)
         self._timed = _prepare(self.base, data, timed=True)
         self.tables: dict[tuple[Any, ...], Any] = {}
-        self._answers: dict[tuple[Any, ...], FloatArray] = {}
 
     @property
     def distinct(self) -> NDArray[np.int64]:
@@ -105,25 +101,14 @@ class Predictor:
     @property
     def effects_that_act(self) -> list[str]:
         """Effects and instruments of the machine file that change these readings, for headings."""
-        idle = idle_on(self.base, self.data)
-        names = [active.effect.name for active in (*self.base.effects, *self.base.instruments)]
-        return [name for name in names if name not in idle]
+        every, idle = (*self.base.effects, *self.base.instruments), idle_on(self.base, self.data)
+        return [active.effect.name for active in every if active.effect.name not in idle]
 
     def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
         """(n,) ln(N/m) that the readings should show; nan where the model has no answer.
 
-        `effects` come on top of those of the machine file; instruments among them change the readings only. The last
-        answers are kept: a fit begins where the one before it ended, and asks for the same again.
+        `effects` come on top of those of the machine file; instruments among them change the readings only.
         """
-        chosen = tuple((active.effect.name, *active.values.items()) for active in effects)
-        key = (*np.asarray(law, dtype=float).tolist(), chosen)
-        if key not in self._answers:
-            while len(self._answers) >= ANSWERS_KEPT:
-                self._answers.pop(next(iter(self._answers)))
-            self._answers[key] = self._solved(law, effects)
-        return self._answers[key].copy()
-
-    def _solved(self, law: ArrayLike, effects: Sequence[ActiveEffect]) -> FloatArray:
         machine = self.machine.with_changes(strut_law=scaled_law(self.machine.strut_law, law))
         model = build_model(machine, self.effect_files, effects)
         prepared = self._timed if any("time_min" in a.effect.needs for a in model.effects) else self._timeless
@@ -166,15 +151,15 @@ class Predictor:
 
     def strut_columns(self) -> FloatArray:
         """(n, 6) d ln k / d ln(stiffness of strut i) at the machine file's strut law: its share of the compliance."""
-        prepared = self._timeless
-        softness = 1.0 / self.machine.strut_law.stiffness(prepared.path.struts.lengths)
+        prepared, law = self._timeless, self.machine.strut_law
+        softness = 1.0 / law.stiffness(prepared.path.struts.lengths)
         return np.asarray((prepared.products * softness * np.exp(self._base_log)[:, None])[prepared.which])
 
     def struts_carry_all(self, effects: Iterable[Effect]) -> bool:
         """Whether these effects and the machine file's leave geometry, equilibrium and readings as they are."""
+        every = (*effects, *(active.effect for active in (*self.base.effects, *self.base.instruments)))
         hooks = ("geometry", "parallel_stiffness", "reading")
-        mine = (active.effect for active in (*self.base.effects, *self.base.instruments))
-        return not any(hook in effect.hooks for effect in (*effects, *mine) for hook in hooks)
+        return not any(hook in effect.hooks for effect in every for hook in hooks)
 
     def law_columns(self, log_stiffness: FloatArray, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(n, 2) d ln k / d law where the model says `log_stiffness` (n,).
@@ -186,8 +171,7 @@ class Predictor:
 
     def strut_part(self, law: ArrayLike = NO_CHANGE) -> FloatArray:
         """(..., n) m/N that the struts contribute to the compliance along each reading, for laws (..., 2)."""
-        first, second = self._law_terms(law)
-        return np.asarray((self._squared_forces / (first + second)).sum(axis=-2)[..., self._timeless.which])
+        return self.strut_part_and_slopes(law)[0]
 
     def strut_part_and_slopes(self, law: ArrayLike = NO_CHANGE) -> tuple[FloatArray, FloatArray]:
         """`strut_part`, and its derivatives (..., 2, n) to the law's logarithms: they add up to minus the part."""
@@ -229,10 +213,9 @@ class Predictor:
             for strut, axis in np.ndindex(6, 3):
                 joints = np.array(getattr(given, name))
                 joints[strut, axis] += JOINT_STEP
-                moved = replace(
-                    self.base, machine=given.with_changes(**{name: joints}), control=self.base.control or given
-                )
-                stiffness = mechanical_stiffness(moved, measured_path(moved, prepared.data), prepared.data)
+                moved = given.with_changes(**{name: joints})
+                model = replace(self.base, machine=moved, control=self.base.control or given)
+                stiffness = mechanical_stiffness(model, measured_path(model, prepared.data), prepared.data)
                 columns.append((np.log(stiffness) - self._base_log)[prepared.which] / JOINT_STEP)
         return np.stack(columns, axis=1)
 
@@ -249,24 +232,21 @@ def idle_on(model: StiffnessModel, data: Readings) -> dict[str, str]:
 
 def _prepare(model: StiffnessModel, data: Readings, timed: bool) -> _Prepared:
     """Rows that differ in nothing that mechanics sees are solved once: repeats cost nothing."""
-    setups = np.unique(data.setup, return_inverse=True)[1].astype(float)
-    columns = [data.position, data.angles, data.direction, data.force[:, None], data.tool_extension[:, None]]
-    columns += [setups[:, None], np.nan_to_num(data.temperature, nan=-1e3)[:, None]]
-    if timed:
-        columns.append(np.nan_to_num(data.time, nan=-1.0)[:, None])
-    beside = data.beside
-    if beside is not None:
-        columns += [beside.which[:, None].astype(float), beside.offset[:, None], beside.toward[:, None]]
-        columns.append(np.nan_to_num(beside.length)[:, None])
-    keys = np.concatenate(columns, axis=1)
+    setups = np.unique(data.setup, return_inverse=True)[1]
+    columns = [data.angles, data.direction, data.force, data.tool_extension, setups]
+    columns += [np.nan_to_num(data.temperature, nan=-1e3)]
+    columns += [np.nan_to_num(data.time, nan=-1.0)] if timed else []
+    if data.beside is not None:
+        beside = data.beside
+        columns += [beside.which, beside.offset, beside.toward, np.nan_to_num(beside.length)]
+    keys = np.column_stack([data.position, *columns])
     _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     distinct = data.select(first)
     path = measured_path(model, distinct)
     wrenches = np.zeros((len(distinct), 6, 1))
     wrenches[:, :3, 0] = distinct.direction
     _, forces = exact.respond(path, *exact.assemble_links(model, path), wrenches)
-    products = forces[..., 0] ** 2
-    if distinct.beside is not None:
-        few = distinct.beside
+    products, few = forces[..., 0] ** 2, distinct.beside
+    if few is not None:
         products = law_products(forces[..., 0], few.loops, few.which) * few.toward[:, None]
     return _Prepared(distinct, which.reshape(-1).astype(np.int64), path, forces[..., 0], products)

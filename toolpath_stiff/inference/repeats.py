@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.readings.measurements import Readings
@@ -51,7 +50,7 @@ ALIKE = ("position", "angles", "direction", "force", "tool_extension", "setup", 
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 
-def repeat_groups(data: Readings, apart: Sequence[str] = ()) -> NDArray[np.int64]:
+def repeat_groups(data: Readings, apart: Sequence[str] = ()) -> IntArray:
     """(n,) number of each reading's group: the same pose, direction, load, tool, set-up and loop.
 
     `apart`: those of `ALIKE` in which the readings of a group may differ.
@@ -60,8 +59,7 @@ def repeat_groups(data: Readings, apart: Sequence[str] = ()) -> NDArray[np.int64
     for values in (getattr(data, name) for name in ALIKE if name not in apart):
         numbers = values if values.dtype.kind == "f" else np.unique(values, return_inverse=True)[1] * 1.0
         columns.append(np.round(numbers.reshape(len(data), -1), 6))
-    groups = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
-    return np.asarray(groups.reshape(-1), dtype=np.int64)
+    return np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
 
 def copied(data: Readings) -> bool:
@@ -108,31 +106,27 @@ def from_repeats(data: Readings) -> Repeats | None:
     estimate; scatter and share of wild readings are then weighed together over all differences.
     """
     groups = repeat_groups(data)
-    every = kept = np.bincount(groups)[groups] > 1
-    kept = kept.copy()
-    result = None
+    every, result = np.bincount(groups)[groups] > 1, None
+    kept = every
     for _ in range(MOST_TRIMS):
-        if not kept.any():
-            break
-        contrasts = _Contrasts(data.select(kept), groups[kept])
-        if contrasts.count < FEWEST_CONTRASTS:
+        contrasts = _Contrasts(data.select(kept), groups[kept]) if kept.any() else None
+        if contrasts is None or contrasts.count < FEWEST_CONTRASTS:
             break
         repeat, clamping, clamps = _maximum_likelihood(contrasts)
         result = Repeats(repeat, clamping if clamps else min(CLAMPING, repeat), contrasts.count, clamps, OUTLIERS)
         wild = contrasts.deviations(result.repeat, result.clamping) > WILD
         if not wild.any():
             break
-        indices = np.flatnonzero(kept)
-        kept[indices[wild]] = False
-        kept &= np.bincount(groups, weights=kept, minlength=groups.max() + 1)[groups] > 1
+        left = np.delete(np.flatnonzero(kept), np.flatnonzero(wild))
+        kept = np.isin(np.arange(len(data)), left) & (np.bincount(groups[left], minlength=groups.max() + 1)[groups] > 1)
     if result is None:
         return None
-    whole = _Contrasts(data.select(every), groups[every])
-    factor, share = _mixture(whole.deviations(result.repeat, result.clamping), np.bincount(groups)[groups[every]])
+    deviations = _Contrasts(data.select(every), groups[every]).deviations(result.repeat, result.clamping)
+    factor, share = _mixture(deviations, np.bincount(groups)[groups[every]])
     return replace(result, repeat=factor * result.repeat, wild=share)
 
 
-def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, float]:
+def _mixture(deviations: FloatArray, size: IntArray) -> tuple[float, float]:
     """Factor on the scatter, and share of wild readings, from deviations (n,) of repeats.
 
     A reading's deviation from the others of its group of `size` (n,) is wild with itself or with one of them; for pairs
@@ -140,15 +134,14 @@ def _mixture(deviations: FloatArray, size: NDArray[np.int64]) -> tuple[float, fl
     logarithms; the factor's prior is flat in its logarithm.
     """
     squared, wide = np.minimum(deviations, FARTHEST)[:, None, None] ** 2, OUTLIER_WIDTH**2
-    factors, shares = FACTORS[:, None], SHARES
     own_share = 1.0 - 1.0 / size[:, None, None]  # of the variance of a deviation
-    total = np.zeros(np.broadcast_shapes(squared.shape, factors.shape, shares.shape))
-    for mine, chance in ((wide, shares), (1.0, 1.0 - shares)):
-        for others, odds in ((wide, shares), (1.0, 1.0 - shares)):
-            sd = factors * np.sqrt(own_share * mine + (1.0 - own_share) * others)
-            total = total + chance * odds * np.exp(-0.5 * squared / sd**2) / sd
+    total = np.zeros((len(size), len(FACTORS), len(SHARES)))
+    for mine, chance in ((wide, SHARES), (1.0, 1.0 - SHARES)):
+        for others, odds in ((wide, SHARES), (1.0, 1.0 - SHARES)):
+            sd = FACTORS[:, None] * np.sqrt(own_share * mine + (1.0 - own_share) * others)
+            total += chance * odds * np.exp(-0.5 * squared / sd**2) / sd
     logs = (np.log(np.maximum(total, 1e-300)) * own_share).sum(axis=0)
-    logs = logs - 0.5 * (np.log(shares / OUTLIERS) / OUTLIER_SPREAD) ** 2
+    logs = logs - 0.5 * (np.log(SHARES / OUTLIERS) / OUTLIER_SPREAD) ** 2
     weights = np.exp(logs - logs.max())
     of_factor, of_share = weights.sum(axis=1) / weights.sum(), weights.sum(axis=0) / weights.sum()
     return float(np.exp(of_factor @ np.log(FACTORS))), float(np.exp(of_share @ np.log(SHARES)))
@@ -176,7 +169,7 @@ class _Contrasts:
         Whether every reading was clamped by itself: the differences then hold clamping too.
     """
 
-    def __init__(self, data: Readings, groups: NDArray[np.int64]) -> None:
+    def __init__(self, data: Readings, groups: IntArray) -> None:
         means, clamps = Groups.by(groups), Groups.by(data.clamp)
         sizes = np.bincount(means.of)
 

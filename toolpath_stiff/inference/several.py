@@ -51,25 +51,24 @@ STRAIGHT = 0.999  # correlation of what an effect adds at two sizes above which 
 BLOCK = 4000  # sets that are searched side by side
 
 
-# Of the linear search: indices of tables, sizes (one array a table), log evidence above that of no effect, about.
-TableSet = tuple[tuple[int, ...], tuple[FloatArray, ...], float]
-
-
 @dataclass(frozen=True)
-class Combination:
-    """Two or three effects together."""
+class TableSet:
+    """A set of tables, one an effect, as the linear search ranks it.
 
-    names: tuple[str, ...]
-    score: Fit
-    log_evidence: float
+    Attributes
+    ----------
+    tables, sizes
+        Indices of the tables, and the sizes of their components, one array each.
+    score
+        Log evidence above that of no effect, about.
+    """
 
-    @property
-    def name(self) -> str:
-        """The effects: "a + b"."""
-        return " + ".join(self.names)
+    tables: tuple[int, ...]
+    sizes: tuple[FloatArray, ...]
+    score: float
 
 
-def search_pairs(problem: Problem, families: Sequence[Family], base: Fit) -> tuple[list[Combination], LinearSearch]:
+def search_pairs(problem: Problem, families: Sequence[Family], base: Fit) -> tuple[list[Fit], LinearSearch]:
     """The pairs worth looking at, the most likely first, each pair of effects once; and the search, for triples."""
     search = LinearSearch(problem, families, base)
     owner = np.array(search.owner)
@@ -78,20 +77,20 @@ def search_pairs(problem: Problem, families: Sequence[Family], base: Fit) -> tup
     return search.scored(search.ranked), search
 
 
-def search_triples(search: LinearSearch, only_better: bool = False) -> list[Combination]:
+def search_triples(search: LinearSearch, only_better: bool = False) -> list[Fit]:
     """The triples worth looking at that hold one of the best pairs of the search.
 
     `only_better`: those that the linear search finds likelier than every pair; a pair explains the readings already.
     """
-    least = search.ranked[0][2] if only_better and search.ranked else -np.inf
+    least = search.ranked[0].score if only_better and search.ranked else -np.inf
     triples = {
-        tuple(sorted((*pair, k)))
-        for pair, *_ in search.ranked[:SEEDS]
+        tuple(sorted((*pair.tables, k)))
+        for pair in search.ranked[:SEEDS]
         for k in range(len(search.tables))
-        if search.owner[k] not in {search.owner[i] for i in pair}
+        if search.owner[k] not in {search.owner[i] for i in pair.tables}
     }
     search.search(np.array(sorted(triples), dtype=np.int64).reshape(-1, 3))
-    return search.scored([triple for triple in search.ranked if triple[2] > least])
+    return search.scored([triple for triple in search.ranked if triple.score > least])
 
 
 class LinearSearch:
@@ -147,7 +146,7 @@ class LinearSearch:
             solved = scatter.precision.beside(law.T, prior).times(flat)
             self.ranked = self._ranked(sets, solved @ flat.T, solved @ residual)
             left = residual.copy()
-            for table, sizes in zip(*self.ranked[0][:2], strict=True):
+            for table, sizes in zip(self.ranked[0].tables, self.ranked[0].sizes, strict=True):
                 left -= sizes @ self.columns[table, : len(sizes)]
             weighted = scatter.precision.times(law.T)
             left -= law @ np.linalg.solve(weighted @ law + prior, weighted @ left)
@@ -165,12 +164,13 @@ class LinearSearch:
             rows = (part[:, :, None] * p + np.arange(p)).reshape(len(part), -1)  # columns of each set
             sizes, scores = self._bounded(rows, information, pull)
             for k in np.argsort(-scores, kind="stable").tolist():
-                names = tuple(sorted(self.owner[t] for t in part[k]))
-                if names not in best or best[names][2] < scores[k]:
-                    each = zip(part[k].tolist(), np.split(sizes[k], part.shape[1]), strict=True)
+                tables = tuple(part[k].tolist())
+                names = tuple(sorted(self.owner[t] for t in tables))
+                if names not in best or best[names].score < scores[k]:
+                    each = zip(tables, np.split(sizes[k], len(tables)), strict=True)
                     cut = tuple(x[: self.tables[t].columns.shape[1]].copy() for t, x in each)
-                    best[names] = tuple(part[k].tolist()), cut, float(scores[k])
-        return sorted(best.values(), key=lambda ranked: (-ranked[2], ranked[0]))
+                    best[names] = TableSet(tables, cut, float(scores[k]))
+        return sorted(best.values(), key=lambda ranked: (-ranked.score, ranked.tables))
 
     def _bounded(self, rows: IntArray, information: FloatArray, pull: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Sizes (k, q) within their bounds that gain most, and scores (k,), of sets of columns (k, q)."""
@@ -182,7 +182,7 @@ class LinearSearch:
         with np.errstate(invalid="ignore"):
             low = np.where(visible, self.low.ravel() * scale, 0.0)[rows]
             high = np.where(visible, self.high.ravel() * scale, 0.0)[rows]
-        sizes, rest = np.zeros(rows.shape), wanted.copy()
+        sizes, rest, eye = np.zeros(rows.shape), wanted.copy(), np.eye(rows.shape[1])
         for _ in range(SWEEPS):
             for j in range(rows.shape[1]):
                 move = np.clip(sizes[:, j] + rest[:, j], low[:, j], high[:, j]) - sizes[:, j]
@@ -190,46 +190,38 @@ class LinearSearch:
                 rest -= matrix[:, :, j] * move[:, None]
         present = np.abs(sizes) > NEGLIGIBLE
         gains = (sizes * (wanted + rest)).sum(axis=1)
-        both = present[:, :, None] & present[:, None, :]
-        eye = np.eye(rows.shape[1])
-        volume = np.linalg.slogdet(np.where(both, matrix, eye) + 1e-9 * eye)[1]
+        volume = np.linalg.slogdet(np.where(present[:, :, None] & present[:, None, :], matrix, eye) + 1e-9 * eye)[1]
         price = np.where(present, np.log(np.maximum(np.abs(sizes), 1.0)) + PER_SIZE, 0.0).sum(axis=1)
-        subsets = np.log(2.0) * (high > low).sum(axis=1)
         p = self.columns.shape[1]
-        choices = np.log([self.choices[name] for name in self.owner])[rows[:, ::p] // p].sum(axis=1)
+        price += np.log(2.0) * (high > low).sum(axis=1)  # of subsets of components, then of choices
+        price += np.log([self.choices[name] for name in self.owner])[rows[:, ::p] // p].sum(axis=1)
         # A set with an absent effect is a smaller set.
-        parts = np.all(present.reshape(len(rows), -1, p).any(axis=2), axis=1)
-        scores = 0.5 * gains - 0.5 * volume - price - subsets - choices
-        return sizes / scale[rows], np.where(parts, scores, -np.inf)
+        whole = np.all(present.reshape(len(rows), -1, p).any(axis=2), axis=1)
+        return sizes / scale[rows], np.where(whole, 0.5 * gains - 0.5 * volume - price, -np.inf)
 
-    def scored(self, sets: Sequence[TableSet]) -> list[Combination]:
-        """The first of what the search found, fitted on tables; the most likely first."""
-        combinations = []
-        for tables, sizes, score in sets[:SCORED]:
-            fit = self._likeliest_subset(*self._side_by_side(tables, sizes)) if np.isfinite(score) else None
-            if fit is None:
-                continue
-            names = tuple(self.owner[t] for t in tables)
-            evidence = fit.log_evidence - sum(np.log(self.choices[name]) for name in names)
-            combinations.append(Combination(tuple(sorted(names)), fit, float(evidence)))
-        return sorted(combinations, key=lambda combination: (-combination.log_evidence, combination.names))
+    def scored(self, sets: Sequence[TableSet]) -> list[Fit]:
+        """The first of what the search found, fitted on tables; the most likely first, what is on offer paid for."""
+        fits = []
+        for ranked in sets[:SCORED]:
+            fit = self._likeliest_subset(*self._side_by_side(ranked)) if np.isfinite(ranked.score) else None
+            if fit is not None:
+                price = sum(np.log(self.choices[self.owner[t]]) for t in ranked.tables)
+                fits.append(replace(fit, log_evidence=float(fit.log_evidence - price)))
+        return sorted(fits, key=lambda fit: (-fit.log_evidence, fit.name))
 
-    def _side_by_side(
-        self, chosen: Sequence[int], sizes_of: Sequence[FloatArray]
-    ) -> tuple[list[CandidateTable], FloatArray]:
+    def _side_by_side(self, ranked: TableSet) -> tuple[list[CandidateTable], FloatArray]:
         """Tables that may be added up, with their sizes: an instrument's acts on what the others before it have added.
 
         Sizes are held to 0.9 of their bounds: at a bound the model may have no answer.
         """
         known: list[tuple[CandidateTable, FloatArray]] = []
-        parts = [(self.tables[t], sizes) for t, sizes in zip(chosen, sizes_of, strict=True)]
-        for table, sizes in sorted(parts, key=lambda part: part[0].candidate.effect.is_instrument):
-            bounds = np.array([component.bounds for component in table.candidate.components])
-            beside = [other.candidate.active(held) for other, held in known]
-            moved = None
-            if known and table.candidate.effect.is_instrument:
-                moved = tabulate(table.candidate, self.problem.predictor, self.base.law, beside)
-            known.append((moved or table, np.clip(sizes, 0.9 * bounds[:, 0], 0.9 * bounds[:, 1])))
+        parts = [(self.tables[t], sizes) for t, sizes in zip(ranked.tables, ranked.sizes, strict=True)]
+        for given, sizes in sorted(parts, key=lambda part: part[0].candidate.effect.is_instrument):
+            table, bounds = given, np.array([component.bounds for component in given.candidate.components])
+            if known and given.candidate.effect.is_instrument:
+                beside = [other.candidate.active(held) for other, held in known]
+                table = tabulate(given.candidate, self.problem.predictor, self.base.law, beside) or given
+            known.append((table, np.clip(sizes, 0.9 * bounds[:, 0], 0.9 * bounds[:, 1])))
         return [table for table, _ in known], np.concatenate([sizes for _, sizes in known])
 
     def _likeliest_subset(self, tables: Sequence[CandidateTable], sizes: FloatArray) -> Fit | None:
@@ -251,11 +243,11 @@ class LinearSearch:
             if not droppable:
                 return best
             if fit is not None:  # which would be missed least
-                faint = {i: abs(fit.parts[i][1]) / max(fit.deviation(i), 1e-300) for i in droppable}
+                faint = {abs(fit.parts[i][1]) / max(fit.deviation(i), 1e-300): i for i in reversed(droppable)}
             else:
                 changes = np.abs(columns * sizes / self.problem.base_compliance[:, None]).mean(axis=0)
-                faint = {i: float(changes[i]) for i in droppable}
-            free = tuple(i for i in free if i != min(faint, key=lambda i: faint[i]))
+                faint = {float(changes[i]): i for i in reversed(droppable)}
+            free = tuple(i for i in free if i != faint[min(faint)])
 
 
 def _linear_pieces(table: CandidateTable, compliance: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -266,13 +258,11 @@ def _linear_pieces(table: CandidateTable, compliance: FloatArray) -> Iterator[tu
     components = table.candidate.components
     yield table.columns, np.array([c.bounds for c in components])
     for sign, (logs, ratios) in table.knots.items():
-        rms = np.sqrt(np.mean((ratios * np.exp(logs)[:, None] / compliance) ** 2, axis=1))
-        before = table.columns[:, 0]
+        shares, before = ratios / compliance, table.columns[:, 0] / compliance
+        rms = np.sqrt(np.mean((shares * np.exp(logs)[:, None]) ** 2, axis=1))
+        reach = components[0].reach(sign)
         for wanted in LARGE:
-            column = ratios[int(np.argmin(np.abs(np.log(rms / wanted))))]
-            scale = np.linalg.norm(column / compliance)
-            alike = float(column / compliance @ (before / compliance))
-            if alike < STRAIGHT * scale * float(np.linalg.norm(before / compliance)):
-                before = column
-                bounds = [0.0, components[0].reach(sign)] if sign > 0.0 else [-components[0].reach(sign), 0.0]
-                yield column[:, None], np.array([bounds])
+            k = int(np.argmin(np.abs(np.log(rms / wanted))))
+            if float(shares[k] @ before) < STRAIGHT * float(np.linalg.norm(shares[k]) * np.linalg.norm(before)):
+                before = shares[k]
+                yield ratios[k][:, None], np.array([[0.0, reach] if sign > 0.0 else [-reach, 0.0]])

@@ -103,8 +103,7 @@ class SizePrior:
             if table.knots and sign not in table.knots:
                 continue
             logs[sign] = np.log(_sizes(table, j, sign, sight))
-            sizes = np.zeros((len(logs[sign]), len(table.candidate.components)))
-            sizes[:, j] = sign * np.exp(logs[sign])
+            sizes = (sign * np.exp(logs[sign]))[:, None] * np.eye(len(table.candidate.components))[j]
             change = sight.change(table.delta(sizes))
             rms[sign], lengths[sign] = np.sqrt(np.mean(change**2, axis=1)), sight.length(change)
             density[sign] = log_expected(rms[sign]) + log_usual(sizes[:, j], component.typical())
@@ -112,9 +111,7 @@ class SizePrior:
         if longest >= VISIBLE:  # else all sizes are alike: even the longest is not visible
             for sign, length in lengths.items():
                 density[sign] = density[sign] - 0.5 * (np.maximum(VISIBLE - length, 0.0) / FADES) ** 2
-        weights = {sign: np.exp(density[sign]) for sign in logs}
-        pieces = (0.5 * (w[1:] + w[:-1]) * np.abs(np.diff(logs[sign])) for sign, w in weights.items())
-        mass = max(sum(float(piece.sum()) for piece in pieces), 1e-300)
+        mass = max(sum(_trapezoid(np.exp(density[sign]), logs[sign]) for sign in logs), 1e-300)
         return cls(logs, {sign: density[sign] - np.log(mass) for sign in logs}, rms, lengths)
 
     def log_at(self, sizes: FloatArray) -> FloatArray:
@@ -139,13 +136,12 @@ class SizePrior:
             nodes = np.unique(np.concatenate([logs, np.log(fine[inside])]))
             likelihood = np.exp(-0.5 * ((sign * np.exp(nodes) - peak) / sd) ** 2)
             values = np.exp(np.interp(nodes, logs, self.log_density[sign])) * likelihood
-            total += float((0.5 * (values[1:] + values[:-1]) * np.diff(nodes)).sum())
+            total += _trapezoid(values, nodes)
         return float(np.log(max(total, 1e-300)))
 
     def log_density_around(self, size: float, sd: float) -> float:
         """Log density at a size; where the posterior is wide, at its width."""
-        around = np.sign(size) * max(abs(size), sd)
-        return float(max(self.log_at(np.array([around]))[0], -60.0))
+        return float(max(self.log_at(np.array([np.sign(size) * max(abs(size), sd)]))[0], -60.0))
 
 
 def likely_interval(sizes: FloatArray, log_likelihood: FloatArray) -> FloatArray:
@@ -155,12 +151,14 @@ def likely_interval(sizes: FloatArray, log_likelihood: FloatArray) -> FloatArray
     of a likelihood ratio, the interval reaches to the bound and is one-sided.
     """
     _, cumulative = _log_integral(sizes, log_likelihood)
-    at_bounds = [float(log_likelihood[end] - log_likelihood.max()) > -0.5 * LIKELY for end in (0, -1)]
-    if at_bounds[0] == at_bounds[1]:
-        ends = np.interp([0.025, 0.975], cumulative, sizes)
-        return np.array([sizes[0], sizes[-1]]) if at_bounds[0] else ends
-    low, high = np.interp([0.05, 0.95], cumulative, sizes)
-    return np.array([sizes[0], high]) if at_bounds[0] else np.array([low, sizes[-1]])
+    to_low, to_high = (log_likelihood[end] - log_likelihood.max() > -0.5 * LIKELY for end in (0, -1))
+    tail = 0.025 if to_low == to_high else 0.05
+    low, high = np.interp([tail, 1.0 - tail], cumulative, sizes)
+    return np.array([sizes[0] if to_low else low, sizes[-1] if to_high else high])
+
+
+def _trapezoid(values: FloatArray, x: FloatArray) -> float:
+    return float((0.5 * (values[1:] + values[:-1]) * np.diff(x)).sum())
 
 
 def _log_integral(sizes: FloatArray, logs: FloatArray) -> tuple[float, FloatArray]:
@@ -178,10 +176,8 @@ def _sizes(table: CandidateTable, j: int, sign: float, sight: Sight) -> FloatArr
     if table.knots:
         logs = table.knots[sign][0]
         return np.exp(np.linspace(logs[0], logs[-1], 96))
-    unit = np.zeros(len(table.candidate.components))
-    unit[j] = sign
     # Linear in its components: the rms change of a unit tells which sizes make a few per cent.
-    scale = float(np.sqrt(np.mean((table.delta(unit) / sight.compliance) ** 2)))
-    largest = min(20.0 * EXPECTED[1] / max(scale, 1e-300), table.candidate.components[j].reach(sign))
-    smallest = min(0.05 * EXPECTED[0] / max(scale, 1e-300), 0.1 * largest)
-    return np.geomspace(smallest, largest, 160)
+    unit = sign * np.eye(len(table.candidate.components))[j]
+    scale = max(float(np.sqrt(np.mean((table.delta(unit) / sight.compliance) ** 2))), 1e-300)
+    largest = min(20.0 * EXPECTED[1] / scale, table.candidate.components[j].reach(sign))
+    return np.geomspace(min(0.05 * EXPECTED[0] / scale, 0.1 * largest), largest, 160)

@@ -75,6 +75,8 @@ class Slip:
         What is wrong: a column, what stands there and what it would be (of the first row).
     mended
         Column of the readings -> (k, 3) or (k,) as it would be, where it is another.
+    words, log_odds
+        Of a suspect: all that it may be in a sentence, and the odds against the rows being as they should be, or wild.
     """
 
     rows: Rows
@@ -82,23 +84,8 @@ class Slip:
     stands: str
     meant: str
     mended: Mapping[str, FloatArray]
-
-
-@dataclass(frozen=True, eq=False)
-class Suspect:
-    """Rows that look mistyped: the likeliest slip, all that it may be in a sentence, and the log odds.
-
-    Odds are against the rows being as they should be, or wild.
-    """
-
-    slip: Slip
-    words: str
-    log_odds: float
-
-    @property
-    def rows(self) -> tuple[int, ...]:
-        """Indices."""
-        return tuple(self.slip.rows.tolist())
+    words: str = ""
+    log_odds: float = -np.inf
 
     @property
     def clear(self) -> bool:
@@ -121,49 +108,47 @@ class SuspectEntry:
     left_out: bool
 
 
-def mended(data: Readings, suspects: Sequence[Suspect]) -> Readings:
+def mended(data: Readings, suspects: Sequence[Slip]) -> Readings:
     """The readings with the likeliest slip of each suspect mended."""
     columns = {name: getattr(data, name).copy() for name in MENDED}
-    for slip in (suspect.slip for suspect in suspects):
-        for name, values in slip.mended.items():
-            columns[name][slip.rows] = values
+    for suspect in suspects:
+        for name, values in suspect.mended.items():
+            columns[name][suspect.rows] = values
     return replace(data, **columns)
 
 
-def alone(data: Readings, suspects: Sequence[Suspect]) -> tuple[Suspect, ...]:
+def alone(data: Readings, suspects: Sequence[Slip]) -> tuple[Slip, ...]:
     """Those whose rows are, with the other suspects' rows, all that there is of a tool, a set-up, a loop or a load.
 
     An effect of that tool, set-up or load would look like their slip, and no other reading says which of the two it is.
     """
     rest = np.ones(len(data), dtype=bool)
-    rest[[row for suspect in suspects for row in suspect.rows]] = False
+    for suspect in suspects:
+        rest[suspect.rows] = False
     columns = (data.tool_extension, data.setup, data.loop, data.force)
     return tuple(
         suspect
         for suspect in suspects
-        if not all(np.isin(column[suspect.slip.rows], column[rest]).all() for column in columns)
+        if not all(np.isin(column[suspect.rows], column[rest]).all() for column in columns)
     )
 
 
-def suspect_entries(
-    suspects: Sequence[Suspect], data: Readings, left_out: Sequence[Suspect] | None
-) -> list[SuspectEntry]:
+def suspect_entries(suspects: Sequence[Slip], data: Readings, left_out: Sequence[Slip] | None) -> list[SuspectEntry]:
     """Suspects for a document; `left_out`: those that were left out of the judgement, None where there was none."""
     entries = []
-    for suspect in suspects:
-        slip, words = suspect.slip, suspect.words
-        out = left_out is not None and suspect in left_out
+    for slip in suspects:
+        words, out = slip.words, left_out is not None and slip in left_out
         if left_out is not None:
             missing = "kept: it may as well be what is missing from the model that stands out there"
-            kept = missing if suspect.clear else "kept, for it may be chance"
+            kept = missing if slip.clear else "kept, for it may be chance"
             words += f"; {'left out of the judgement' if out else kept}"
-        rows = [int((data.file[: row + 1] == data.file[row]).sum()) for row in suspect.rows]
-        file, lines = str(data.file[slip.rows[0]]), data.line[slip.rows].tolist()
-        entries.append(SuspectEntry(file, rows[0], rows, lines, slip.column, slip.stands, slip.meant, words, out))
+        file, lines = data.file[slip.rows[0]], data.line[slip.rows].tolist()
+        rows = [int((data.file[: row + 1] == data.file[row]).sum()) for row in slip.rows]
+        entries.append(SuspectEntry(str(file), rows[0], rows, lines, slip.column, slip.stands, slip.meant, words, out))
     return entries
 
 
-def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
+def suspect_rows(problem: Problem, fit: Fit) -> tuple[Slip, ...]:
     """Rows of which one typical slip, mended, brings the readings back into the noise; the clearest first.
 
     Parameters
@@ -173,14 +158,15 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
     fit
         The best explanation: what else the readings hold.
     """
-    suspects: list[Suspect] = []
+    suspects: list[Slip] = []
     data = problem.predictor.data
     taken = np.zeros(len(data), dtype=bool)
+    tried = len(data) * len(list(_slips_of_row(data, np.array([0]))))  # slips of single rows that there may be
     for _ in range(MOST_SLIPS):
         slips = list(_slips(data, *_looked_at(problem, fit, taken)))
         if not slips:
             break
-        odds = _log_odds(problem, fit, slips, taken) + np.log(SLIPPED / _tried(data))
+        odds = _log_odds(problem, fit, slips, taken) + np.log(SLIPPED / tried)
         together: dict[tuple[int, ...], list[int]] = defaultdict(list)
         for k in np.argsort(-odds, kind="stable").tolist():
             if np.isfinite(odds[k]):
@@ -192,7 +178,7 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Suspect, ...]:
             break
         first, *others = together[rows]
         ways = [slips[first], *(slips[k] for k in others if odds[k] > odds[first] - AS_WELL)]
-        suspects.append(Suspect(ways[0], _words(data, ways), totals[rows]))
+        suspects.append(replace(ways[0], words=_words(data, ways), log_odds=totals[rows]))
         taken[list(rows)] = True
     return tuple(suspects)
 
@@ -205,11 +191,6 @@ def _words(data: Readings, ways: Sequence[Slip]) -> str:
     return f"line {lines} of {data.file[rows[0]]} may be mistyped: {either} would fit all other readings"
 
 
-def _tried(data: Readings) -> int:
-    """How many slips of single rows there may be."""
-    return len(data) * len(list(_slips_of_row(data, np.array([0]))))
-
-
 def _looked_at(problem: Problem, fit: Fit, taken: BoolArray) -> tuple[list[Rows], list[Rows]]:
     """Rows that are far off, and clampings whose rows together are; the furthest of them."""
     projected, inflated = problem.projected(fit.jacobian), _inflation(fit)
@@ -218,11 +199,10 @@ def _looked_at(problem: Problem, fit: Fit, taken: BoolArray) -> tuple[list[Rows]
     order = np.argsort(-squared, kind="stable")[:MOST_ROWS]
     clampings = []
     for members in Groups.by(problem.predictor.data.clamp).members():
-        if len(members) < 2 or taken[members].any():
-            continue
-        weighted = np.linalg.lstsq(projected.block(members), pulls[members], rcond=1e-10)[0]
-        excess = float(pulls[members] @ weighted) / inflated
-        clampings.append(((excess - len(members)) / np.sqrt(2.0 * len(members)), members))
+        if len(members) > 1 and not taken[members].any():
+            weighted = np.linalg.lstsq(projected.block(members), pulls[members], rcond=1e-10)[0]
+            excess = float(pulls[members] @ weighted) / inflated
+            clampings.append(((excess - len(members)) / np.sqrt(2.0 * len(members)), members))
     clampings.sort(key=lambda pair: (-pair[0], int(pair[1][0])))
     rows = [np.array([row]) for row in order.tolist() if squared[row] > FAR_OFF]
     return rows, [members for far, members in clampings[:MOST_CLAMPS] if far > 2.0]
@@ -330,6 +310,6 @@ def _gain_of_wild(scatter: Scatter, rows: Rows, block: FloatArray, pull: FloatAr
     if not far.any():
         return 0.0
     inner, part, widening = block[np.ix_(far, far)], pull[far], scatter.widening[rows[far]]
-    gain = float(part @ np.linalg.solve(np.diag(1.0 / widening) + inner, part))
-    volume = float(np.linalg.slogdet(np.eye(len(part)) + widening[:, None] * inner)[1])
-    return 0.5 * (gain - volume) - len(part) * scatter.price
+    gain = part @ np.linalg.solve(np.diag(1.0 / widening) + inner, part)
+    volume = np.linalg.slogdet(np.eye(len(part)) + widening[:, None] * inner)[1]
+    return float(0.5 * (gain - volume) - len(part) * scatter.price)

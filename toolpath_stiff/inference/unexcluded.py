@@ -59,15 +59,15 @@ def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_o
     """
     beside = _Beside(problem, fit)
     odds: dict[str, float] = {}
-    widest: dict[str, Unexcluded] = {}
+    widest: list[Unexcluded] = []
     for family in families:
         if family.name not in fit.names:
             seen = ((table, np.flatnonzero(table.columns.any(axis=0)).tolist()) for table in family.tables)
             rooms = [beside.room(table, j) for table, components in seen for j in components]
             odds[family.name] = prior_odds * float(np.mean([mean for _, mean in rooms]))
-            widest[family.name] = max((room for room, _ in rooms), key=lambda room: room.rms)
+            widest.append(max((room for room, _ in rooms), key=lambda room: room.rms))
     whole = 1.0 + sum(odds.values())
-    hidden = [replace(room, probability=odds[name] / whole) for name, room in widest.items() if room.rms >= MATTERS]
+    hidden = [replace(room, probability=odds[room.effect.name] / whole) for room in widest if room.rms >= MATTERS]
     return sorted(hidden, key=lambda room: (-room.probability, room.effect.name))
 
 
@@ -92,13 +92,11 @@ class _Beside:
 
         And the mean of the likelihood over the prior of the size, 1 where the readings say nothing.
         """
-        component = table.candidate.components[j]
+        component, candidate, sides = table.candidate.components[j], table.candidate, []
         none, gain, mass = float(self._squares(self.fit.residual[None])[0]), 0.0, 0.0
-        sides = []
+        whole = self.problem.base_compliance if candidate.effect.is_instrument else self.compliance
         for sizes in self._sizes(table, j):
-            every = np.zeros((len(sizes), len(table.candidate.components)))
-            every[:, j] = sizes
-            whole = self.problem.base_compliance if table.candidate.effect.is_instrument else self.compliance
+            every = sizes[:, None] * np.eye(len(candidate.components))[j]
             change = np.log1p(np.maximum(table.delta(every) / whole, -0.9))
             squares = self._squares(self.fit.residual + change)
             changes = np.sqrt(np.mean(change[:, self.tip] ** 2, axis=1))
@@ -109,21 +107,20 @@ class _Beside:
             gain, mass = gain + float(weights @ np.exp(0.5 * (none - squares))), mass + float(weights.sum())
         most = min(none, *(float(squares.min()) for *_, squares in sides)) + LIKELY
         size, rms = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
-        candidate, value = table.candidate, component.value(size)
-        return Unexcluded(candidate.effect, candidate, component.parameter, value, rms), gain / mass
+        room = Unexcluded(candidate.effect, candidate, component.parameter, component.value(size), rms)
+        return room, gain / mass
 
     def _sizes(self, table: CandidateTable, j: int) -> Iterator[FloatArray]:
         """Sizes (g,) of each sign, rising."""
         component = table.candidate.components[j]
         for sign in component.signs:
-            if table.knots:
-                if sign in table.knots:
-                    logs = table.knots[sign][0]
-                    yield sign * np.exp(np.linspace(logs[0], logs[-1], SIZES))
-                continue
-            scale = float(np.sqrt(np.mean((table.columns[self.tip, j] / self.compliance[self.tip]) ** 2)))
-            ends = np.minimum(np.array([SMALLEST, LARGEST]) / max(scale, 1e-300), component.reach(sign))
-            yield sign * np.geomspace(min(ends[0], 0.1 * ends[1]), ends[1], SIZES)
+            if not table.knots:
+                scale = float(np.sqrt(np.mean((table.columns[self.tip, j] / self.compliance[self.tip]) ** 2)))
+                ends = np.minimum(np.array([SMALLEST, LARGEST]) / max(scale, 1e-300), component.reach(sign))
+                yield sign * np.geomspace(min(ends[0], 0.1 * ends[1]), ends[1], SIZES)
+            elif sign in table.knots:
+                logs = table.knots[sign][0]
+                yield sign * np.exp(np.linspace(logs[0], logs[-1], SIZES))
 
     def _squares(self, residuals: FloatArray) -> FloatArray:
         """(g,) squares that are left of residuals (g, n) once law and sizes have moved to fit them best."""

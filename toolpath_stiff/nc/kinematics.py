@@ -153,8 +153,7 @@ def read_kinematics(toml: TomlReader) -> PostedKinematics | None:
     where = "kinematics.tolerance_mm"
     tolerance = toml.number(where, table.get("tolerance_mm", TOLERANCE_MM), LARGEST_MM)
     if not LEAST_TOLERANCE_MM <= tolerance <= LARGEST_TOLERANCE_MM:
-        bounds = f"{LEAST_TOLERANCE_MM:g} to {LARGEST_TOLERANCE_MM:g}"
-        raise toml.error(f"{where} = {tolerance:g}", bounds, where=where)
+        raise toml.error(f"{where} = {tolerance:g}", f"{LEAST_TOLERANCE_MM:g} to {LARGEST_TOLERANCE_MM:g}", where=where)
     return PostedKinematics(kind, axes, tcp, points, m_from_mm(tolerance))
 
 

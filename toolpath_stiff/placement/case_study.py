@@ -8,6 +8,7 @@ regions of one's own, but for the non-planar variants, which are those of the pa
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -19,15 +20,13 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.results import Analysis, analyze
-from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.documents import Document, number
-from toolpath_stiff.errors import InputError, ProgramError, UnreachableError
+from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.poses import Pose, pose_in_si
-from toolpath_stiff.results import FolderResult
+from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
-from toolpath_stiff.tables import Columns, read_table
 from toolpath_stiff.units import mm_from_m
 
 if TYPE_CHECKING:
@@ -94,9 +93,7 @@ class CaseStudy(FolderResult):
 
     def to_frame(self) -> pd.DataFrame:
         """The regions, one a row."""
-        import pandas as pd
-
-        return pd.DataFrame(self.summary["regions"])
+        return frame_of(self.summary["regions"])
 
     def _short(self) -> str:
         held = [conclusion["holds"] for conclusion in self.summary["conclusions"] if conclusion["holds"] is not None]
@@ -166,40 +163,39 @@ def run_case_study(
     custom = read is not None or regions is not None
     packaged, places = case_study_program(), dict(regions or REGIONS)
 
-    def at(place: Region) -> Analysis:
+    def analyzed(place: Region) -> Analysis:
         origin = origin_of(*place)
         return analyze(model, read(origin) if read else packaged, origin=origin, step=step)
 
     analyses = {}
     for name, place in places.items():
         try:
-            analyses[name] = at(place)
+            analyses[name] = analyzed(place)
         except UnreachableError as error:
             hint = "give regions that the machine reaches: --region NAME:X,Y,Z[,TURN]"
             raise UnreachableError(
                 f"region {name}: {error.found}", hint=hint, file=error.file, line=error.line
             ) from None
-    rows = [_row(name, place, analyses[name]) for name, place in places.items()]
+    rows = _rows(places, analyses)
     x, y, height, turn = next(iter(places.values()))
     heights = []
     for z in _heights(model, height) if custom else HEIGHTS_MM:
         with suppress(UnreachableError):
-            heights.append({"z_mm": z, **_figures(at((x, y, z, turn)))})
+            heights.append({"z_mm": z, **_figures(analyzed((x, y, z, turn)))})
+    own, ours = "path and regions as given", "the paper does not print its path; path and regions are ours"
     summary = {
         "program": next(iter(analyses.values())).program.name,
         "machine": model.machine.name,
         "step_mm": round(mm_from_m(step), 6),
         **effects_stated(model),
         "warnings": condition_warnings(model),
-        "note": "path and regions as given"
-        if custom
-        else "the paper does not print its path; path and regions are ours",
+        "note": own if custom else ours,
         "regions": rows,
         "conclusions": conclusions(rows),
         "heights": heights,
         "limits_of_the_conclusions": {
-            "largest_mean_at_z_mm": max(heights, key=lambda row: row["mean_N_per_mm"])["z_mm"],
-            "largest_range_at_z_mm": max(heights, key=lambda row: row["range_N_per_mm"])["z_mm"],
+            f"largest_{figure}_at_z_mm": max(heights, key=lambda row: row[f"{figure}_N_per_mm"])["z_mm"]
+            for figure in ("mean", "range")
         },
         "non_planar": [] if custom else [_wave(model, amplitude, step) for amplitude in WAVES_MM],
     }
@@ -215,67 +211,47 @@ def _heights(model: StiffnessModel, of_path: float) -> list[float]:
     return sorted({of_path, *(step * i for i in steps)})
 
 
-def read_regions(file: str) -> dict[str, Region]:
-    """Regions of a table (CSV or FILE.xlsx[#SHEET]): x_mm, y_mm, z_mm, and if there rotation_deg and region, its name.
-
-    `case_study.csv` is such a table.
-
-    Raises
-    ------
-    InputError
-        A column is missing, a cell is no number, or a name stands twice; with line.
-    """
-    table = read_table(file, "regions", Columns(REGION_COLUMNS, ("region",)))
-    regions: dict[str, Region] = {}
-    for row_number, (line, cells) in enumerate(table.rows, 1):
-        row = {"rotation_deg": "0", **table.record(cells)}
-        name = row.get("region") or str(row_number)
-        try:
-            x, y, z, turn = (float(row[column]) for column in REGION_COLUMNS)
-        except (KeyError, ValueError):
-            x = y = z = turn = math.nan
-        if name in regions or not math.isfinite(x + y + z + turn):
-            expected = f"a name once, and finite numbers: {', '.join(REGION_COLUMNS)}"
-            raise InputError(f"region {name}: {', '.join(cells)}", expected=expected, file=file, line=line)
-        regions[name] = (x, y, z, turn)
-    return regions
-
-
-def _row(name: str, place: Region, analysis: Analysis) -> Document:
-    return {"region": name, **dict(zip(REGION_COLUMNS, place, strict=True)), **_figures(analysis)}
+def _rows(places: Mapping[str, Region], analyses: Mapping[str, Analysis]) -> list[Document]:
+    columns = ("region", *REGION_COLUMNS)
+    return [{**dict(zip(columns, (name, *places[name]), strict=True)), **_figures(a)} for name, a in analyses.items()]
 
 
 def _figures(analysis: Analysis) -> dict[str, float]:
-    figures = stiffness_figures(analysis, analysis.headline)
-    if figures["mean_N_per_mm"] is None:
+    if analysis.figures["mean_N_per_mm"] is None:
         raise ProgramError("no cut moves the tool tip", file=analysis.program.name)
-    return {key: round(float(figures[key]), DECIMALS) for key in FIGURES}
+    return {key: round(analysis.figures[key], DECIMALS) for key in FIGURES}
 
 
 def conclusions(regions: Sequence[Document]) -> list[Document]:
     """The paper's three statements, each with the numbers that decide it; None where no two regions can."""
-    above: dict[tuple[float, ...], list[Document]] = {}
-    for row in regions:
-        above.setdefault((row["x_mm"], row["y_mm"], row["rotation_deg"]), []).append(row)
-    steps = [pair for rows in above.values() for pair in pairwise(sorted(rows, key=lambda row: row["z_mm"]))]
-    statements = []
-    for figure in ("mean", "range"):
-        key = f"{figure}_N_per_mm"
-        words = [
-            f"region {low['region']} to {high['region']}: {number(low[key])} to {number(high[key])} N/mm"
-            for low, high in steps
-        ]
-        risen, nothing = [high[key] > low[key] for low, high in steps], "no two regions differ in height alone"
-        statements.append(_statement(f"the {figure} rises with z", risen, words, nothing))
-    pairs = _in_plane(regions)
-    agree = [_apart(a, b) < MEANS_AGREE and a["range_N_per_mm"] != b["range_N_per_mm"] for a, b in pairs]
-    words = [
-        f"regions {a['region']} and {b['region']}: means apart by {100 * _apart(a, b):.2f} %, ranges "
-        f"{number(a['range_N_per_mm'])} and {number(b['range_N_per_mm'])} N/mm"
-        for a, b in pairs
+    above: dict[tuple[float, ...], list[Document]] = defaultdict(list)
+    for row in sorted(regions, key=lambda row: row["z_mm"]):
+        above[row["x_mm"], row["y_mm"], row["rotation_deg"]].append(row)
+    steps = [pair for rows in above.values() for pair in pairwise(rows)]
+    statements = [
+        _statement(
+            f"the {figure} rises with z",
+            [high[key] > low[key] for low, high in steps],
+            [
+                f"region {low['region']} to {high['region']}: {number(low[key])} to {number(high[key])} N/mm"
+                for low, high in steps
+            ],
+            "no two regions differ in height alone",
+        )
+        for figure, key in (("mean", "mean_N_per_mm"), ("range", "range_N_per_mm"))
     ]
-    alike = "at one height means agree closely and ranges differ a little"
-    return [*statements, _statement(alike, agree, words, "no two regions are at one height")]
+    key, pairs = "range_N_per_mm", _in_plane(regions)
+    alike = _statement(
+        "at one height means agree closely and ranges differ a little",
+        [_apart(a, b) < MEANS_AGREE and a[key] != b[key] for a, b in pairs],
+        [
+            f"regions {a['region']} and {b['region']}: means apart by {100 * _apart(a, b):.2f} %, ranges "
+            f"{number(a[key])} and {number(b[key])} N/mm"
+            for a, b in pairs
+        ],
+        "no two regions are at one height",
+    )
+    return [*statements, alike]
 
 
 def _statement(statement: str, held: Sequence[bool], words: Sequence[str], nothing: str) -> Document:
@@ -286,24 +262,23 @@ def _in_plane(regions: Sequence[Document]) -> list[tuple[Document, Document]]:
     """The two regions of each height whose means are farthest apart."""
     pairs = []
     for z in sorted({row["z_mm"] for row in regions}):
-        rows = sorted((row for row in regions if row["z_mm"] == z), key=lambda row: float(row["mean_N_per_mm"]))
+        rows = [row for row in regions if row["z_mm"] == z]
+        ends = [end(rows, key=lambda row: row["mean_N_per_mm"]) for end in (min, max)]
         if len(rows) > 1:
-            first, second = sorted((rows[0], rows[-1]), key=regions.index)
+            first, second = sorted(ends, key=regions.index)
             pairs.append((first, second))
     return pairs
 
 
 def _apart(a: Document, b: Document) -> float:
-    return abs(float(b["mean_N_per_mm"]) / float(a["mean_N_per_mm"]) - 1.0)
+    return float(abs(b["mean_N_per_mm"] / a["mean_N_per_mm"] - 1.0))
 
 
 def _wave(model: StiffnessModel, amplitude: float, step: float) -> Document:
     """The wavy square in the four regions, and whether its mean still does not depend on where it lies."""
     program = wavy_program(amplitude)
-    rows = [
-        _row(name, place, analyze(model, program, origin=origin_of(*place), step=step))
-        for name, place in REGIONS.items()
-    ]
+    analyses = {name: analyze(model, program, origin=origin_of(*at), step=step) for name, at in REGIONS.items()}
+    rows = _rows(REGIONS, analyses)
     return {
         "amplitude_mm": amplitude,
         "regions": [{key: row[key] for key in ("region", *FIGURES)} for row in rows],

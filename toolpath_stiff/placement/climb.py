@@ -16,7 +16,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray, product
 from toolpath_stiff.placement.evaluator import Evaluator, PlacedRows
-from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules
+from toolpath_stiff.placement.goals import Bounds, Goal, SearchRules
 from toolpath_stiff.placement.linear_programmes import Programme, least_costs
 
 DIFFERENCE = 1e-6  # of each range, for the derivatives
@@ -74,7 +74,7 @@ class Climber:
 
     evaluator: Evaluator
     bounds: Bounds
-    rules: PlacementRules
+    rules: SearchRules
 
     @cached_property
     def free(self) -> IntArray:

@@ -8,7 +8,7 @@ direction asks the compliance, and what is near singular, goes to `analysis.pose
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -66,10 +66,10 @@ class PlacementFigures(ArrayColumns):
 
 @dataclass(frozen=True)
 class PlacedRows(ArrayColumns):
-    """Rows of k placements, a column a sample: rigid samples first (m), then the anchored rapids (q). SI.
+    """Rows of k placements, a column a sample (k, n). SI.
 
-    `stiffness` (k, m), nan but at headline samples; `law` (k, m) m, how far the struts are inside the lengths of their
-    law; `margin` (k, m + q); `clearance` (k, m + q) m, inf without keep-outs.
+    `stiffness`, nan but at headline samples; `law` m, how far the struts are inside the lengths of their law; `margin`;
+    `clearance` m, inf without keep-outs.
     """
 
     stiffness: FloatArray
@@ -87,12 +87,7 @@ class Evaluator:
     """Evaluates placements of one path and counts the poses that this took."""
 
     def __init__(
-        self,
-        model: StiffnessModel,
-        path: WorkPath,
-        load: Load,
-        force: float,
-        keepouts: tuple[KeepOut, ...] = (),
+        self, model: StiffnessModel, path: WorkPath, load: Load, force: float, keepouts: tuple[KeepOut, ...] = ()
     ) -> None:
         self.model, self.path, self.load, self.force, self.keepouts = model, path, load, force, keepouts
         self.poses = 0
@@ -101,56 +96,41 @@ class Evaluator:
         still = ~np.asarray(path.tangent.any(axis=1))
         tangent = np.where(still[:, None], np.array([0.0, 0.0, 1.0]), path.tangent)
         self.position, self.tangent = (np.ascontiguousarray(values.T) for values in (path.position, tangent))
-        abc = np.concatenate([path.abc, path.anchored.abc])
-        self.turned = np.ascontiguousarray(np.moveaxis(rotation_matrices(abc), 0, -1)) if abc.any() else None
-        tool_length = np.concatenate([path.tool_length, path.anchored.tool_length])
-        self.of_one_tool = _groups(tool_length)
-        cutting = np.concatenate([path.cutting, np.zeros(len(path.anchored), dtype=bool)])
+        self.turned = np.ascontiguousarray(np.moveaxis(rotation_matrices(path.abc), 0, -1)) if path.abc.any() else None
+        self.of_one_tool = core.rows_of_tools(path.tool_length)
         self.head, self.rest = _columns(path.headline), _columns(~path.headline)
-        self.cuts, self.rapids = _columns(cutting), _columns(~cutting)
-
-    def __len__(self) -> int:
-        """Samples, the anchored ones among them."""
-        return len(self.path) + len(self.path.anchored)
+        self.cuts, self.rapids = _columns(path.cutting), _columns(~path.cutting)
 
     def figures(self, placements: FloatArray) -> PlacementFigures:
         """Figures of placements (k, 6) m and rad."""
-        return PlacementFigures.joined([self.summary(rows) for rows in self.groups(placements)])
-
-    def groups(self, placements: FloatArray) -> Iterator[PlacedRows]:
-        """The rows of placements (k, 6) m and rad, some of the placements at a time."""
-        group = max(1, POSES_AT_A_TIME // max(len(self), 1))
-        for start in range(0, max(len(placements), 1), group):
-            yield self.rows(placements[start : start + group])
+        group = max(1, POSES_AT_A_TIME // max(len(self.path), 1))
+        starts = range(0, max(len(placements), 1), group)
+        return PlacementFigures.joined([self.summary(self.rows(placements[i : i + group])) for i in starts])
 
     def rows(self, placements: FloatArray) -> PlacedRows:
         """Rows of placements (k, 6) m and rad; all in memory at once."""
-        path, k = self.path, len(placements)
-        m, n = len(path), len(self)
+        k, n = len(placements), len(self.path)
         self.poses += k * n
         turn = rotation_matrices(placements[:, 3:])
-        position, motion = np.empty((3, k, n)), np.empty((3, k, n))
-        np.add(_turned(turn, self.position), placements[:, :3].T[:, :, None], out=position[:, :, :m])
-        position[:, :, m:] = np.moveaxis(path.anchored.placed(turn, placements[:, :3]), -1, 0)
-        motion[:, :, :m], motion[:, :, m:] = _turned(turn, self.tangent), np.array([0.0, 0.0, 1.0])[:, None, None]
-        rotation = self._orientations(placements, turn)
+        position = _turned(turn, self.position) + placements[:, :3].T[:, :, None]
+        motion, rotation = _turned(turn, self.tangent), self._orientations(placements, turn)
         along, margin, law = np.empty((3, k, n))
-        for rows, tool in self.of_one_tool:
+        for tool, rows in self.of_one_tool:
             some = None if rotation is None else rotation[:, :, rows].reshape(9, -1)
             tip, towards = position[:, :, rows].reshape(3, -1), motion[:, :, rows].reshape(3, -1)
             for column, values in zip((along, margin, law), self._kernel_rows(tool, tip, towards, some), strict=True):
                 column[:, rows] = values.reshape(k, -1)
         if self.direct:
             with np.errstate(divide="ignore"):
-                stiffness = np.divide(1.0, along[:, :m])
+                stiffness = np.divide(1.0, along)
             stiffness[:, self.rest] = np.nan
         else:
-            stiffness = np.full((k, m), np.nan)
+            stiffness = np.full((k, n), np.nan)
             stiffness[:, self.head] = self._with_effects(position, motion, rotation, margin)
         clearance = np.broadcast_to(np.inf, (k, n))
         for box in self.keepouts:
             clearance = np.minimum(clearance, box.clearances(np.moveaxis(position, 0, -1)))
-        return PlacedRows(stiffness, law[:, :m], margin, clearance)
+        return PlacedRows(stiffness, law, margin, clearance)
 
     def summary(self, rows: PlacedRows) -> PlacementFigures:
         """Figures of placements from what each of their samples does."""
@@ -187,8 +167,8 @@ class Evaluator:
         return np.unique([part[int(np.argmin(values[part]))] for part, values in parts])
 
     def _orientations(self, placements: FloatArray, turn: FloatArray) -> FloatArray | None:
-        """(9, k, m + q) rows of R' = Q R Rz(-C), the rule of `path`; None: all vertical."""
-        k, n = len(placements), len(self)
+        """(9, k, n) rows of R' = Q R Rz(-C), the rule of `path`; None: all vertical."""
+        k, n = len(placements), len(self.path)
         if self.turned is None:
             if not placements[:, 3:5].any():
                 return None
@@ -242,7 +222,7 @@ class Evaluator:
         turns, tools = _matrices(turn), np.tile(self.path.tool_length[head], len(possible))
         direction, known = geometric_directions(self.load, tip, turns, towards)
         values = np.full(len(tip), np.nan)
-        for rows, tool in _groups(tools) if self.load.kind not in COMPLIANCE_DECIDES else []:
+        for tool, rows in core.rows_of_tools(tools) if self.load.kind not in COMPLIANCE_DECIDES else []:
             there, along = (np.ascontiguousarray(columns[rows].T) for columns in (tip, direction))
             leaning = None if turn is None else np.ascontiguousarray(turn[:, rows])
             values[rows] = 1.0 / core.compliance_with_effects(self.model, there, along, leaning, tool, self.force)
@@ -277,11 +257,3 @@ def _columns(those: BoolArray) -> IntArray | slice:
     if len(columns) and columns[-1] - columns[0] + 1 == len(columns):
         return slice(int(columns[0]), int(columns[-1]) + 1)
     return columns
-
-
-def _groups(tool_length: FloatArray) -> list[tuple[IntArray | slice, float]]:
-    """Rows of each tool length, and the length; nan counts as one."""
-    lengths, number = np.unique(tool_length, return_inverse=True)
-    if len(lengths) == 1:
-        return [(slice(None), float(lengths[0]))]
-    return [(np.flatnonzero(number == i), float(length)) for i, length in enumerate(lengths)]

@@ -76,18 +76,33 @@ class Bounds:
 
 
 @dataclass(frozen=True)
-class PlacementRules:
-    """Rules that a placement has to keep.
+class SearchRules:
+    """Rules and wishes of the user.
 
     Attributes
     ----------
+    objective
+        One of `defaults.OBJECTIVES`, for the recommendation.
     margin
-        Smallest margin to any limit, as a share of its span; cuts and rapids alike.
+        Smallest margin to any limit, as a share of its span.
+    allow_extrapolation
+        Whether struts may leave the lengths of their law at more samples than now.
+    keepouts
+        Boxes that the path must stay out of.
+    seed
+        Of the search; the same seed gives the same placements.
+    points
+        Most points of the front.
     extrapolated
-        Largest share of samples outside the strut law; inf: any.
+        Largest share of samples outside the strut law; inf: any. The search finds out.
     """
 
-    margin: float = 0.0
+    objective: str = defaults.OBJECTIVE
+    margin: float = defaults.MARGIN
+    allow_extrapolation: bool = False
+    keepouts: tuple[KeepOut, ...] = ()
+    seed: int = defaults.PLACEMENT_SEED
+    points: int = defaults.FRONT_POINTS
     extrapolated: float = np.inf
 
     def violation(self, figures: PlacementFigures) -> FloatArray:
@@ -121,31 +136,3 @@ class Goal:
             return np.zeros(len(figures))
         below = np.maximum((self.floors - figures.objectives).max(axis=1), 0.0)
         return np.asarray(np.where(np.isnan(below), np.inf, below))
-
-
-@dataclass(frozen=True)
-class SearchRules:
-    """Rules and wishes of the user.
-
-    Attributes
-    ----------
-    objective
-        One of `defaults.OBJECTIVES`, for the recommendation.
-    margin
-        Smallest margin to any limit, as a share of its span.
-    allow_extrapolation
-        Whether struts may leave the lengths of their law at more samples than now.
-    keepouts
-        Boxes that the path must stay out of.
-    seed
-        Of the search; the same seed gives the same placements.
-    points
-        Most points of the front.
-    """
-
-    objective: str = defaults.OBJECTIVE
-    margin: float = defaults.MARGIN
-    allow_extrapolation: bool = False
-    keepouts: tuple[KeepOut, ...] = ()
-    seed: int = defaults.PLACEMENT_SEED
-    points: int = defaults.FRONT_POINTS

@@ -1,39 +1,26 @@
-"""Placing a program: search or an earlier search's front, one placement chosen, analyzed, the program written for it.
+"""Placing a program: the search, the placement that it recommends analyzed, the program written for it."""
 
-`place_program` searches; `place_again` takes another point of a front that was found before, and refuses where
-anything has changed since that search.
-"""
-
-import json
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from toolpath_stiff.analysis.loads import plunging_rows
 from toolpath_stiff.analysis.results import Analysis, analyze
-from toolpath_stiff.analysis.statistics import stiffness_figures
+from toolpath_stiff.analysis.statistics import share, stiffness_figures
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
-from toolpath_stiff.placement.paths import work_path
-from toolpath_stiff.placement.result import Placement, Written
-from toolpath_stiff.placement.rows import (
-    FIGURES,
-    PLACEMENT,
-    PlacementRow,
-    analyzed_row,
-    numbered_rows,
-    placement_mm_deg,
-)
-from toolpath_stiff.placement.search import search_placements
-from toolpath_stiff.placement.task import PlacementTask, Rewriting, SearchRecord
+from toolpath_stiff.placement.evaluator import Evaluator
+from toolpath_stiff.placement.paths import WorkPath, work_path
+from toolpath_stiff.placement.result import COLUMNS, FIGURES, Placement, PlacementRow, PlacementTask, Written
+from toolpath_stiff.placement.search import PlacementResult, search_placements
 from toolpath_stiff.placement.working import Search
-from toolpath_stiff.poses import Pose
-from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
-
-AGAIN = "search again, without --pick"
+from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
+from toolpath_stiff.rewriting.program import RewrittenProgram, check_rewritable, rewrite_program
+from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
 
 def place_program(task: PlacementTask, progress: Callable[[int, int], None] | None = None) -> Placement:
@@ -52,6 +39,7 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     >>> from toolpath_stiff.machine.file import load_machine
     >>> from toolpath_stiff.nc.reader import parse_program
     >>> from toolpath_stiff.placement.goals import Bounds, SearchRules
+    >>> from toolpath_stiff.placement.result import PlacementTask
     >>> from toolpath_stiff.stiffness.model import build_model
     >>> present = (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)
     >>> slot = parse_program("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nM2\n", "slot.nc", origin=present)
@@ -66,83 +54,81 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     >>> placed.warnings[0].partition(",")[0]
     'WORSE: at the recommended placement the mean is lower than at the present one'
     """
-    task.check()
-    path = work_path(task.program, task.step, task.load, task.present, task.read)
+    _check(task)
+    path = work_path(task.program, task.step, task.load)
     search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, np.array(task.present))
     search.report = progress or search.report
-    front = search_placements(search)
-    number = front.best + 1
-    record = SearchRecord(task.options(), number, search.left_out, search.poses, front.searches, front.alone)
-    return _placed(task, numbered_rows(task.model, path, task.load, front, task.force), record, number)
-
-
-def place_again(
-    task: PlacementTask, earlier: Placement | Mapping[str, Any] | str | Path | None, number: int
-) -> Placement:
-    """Place the program at point `number` (from 1) of the front of an earlier search, without a search.
-
-    Raises
-    ------
-    InputError
-        The earlier search was another one's (program, machine or options differ), or has no such point.
-    """
-    task.check()
-    front, search = _earlier_search(earlier)
-    differ = [name for name, value in task.options().items() if search.options.get(name) != value]
-    if differ:
-        raise InputError(
-            f"--pick: the earlier search differs in {', '.join(differ)}",
-            expected="the same program, machine and options as in the search",
-            hint="repeat the search's own command with --pick added, or search again without it",
-        )
-    if not 1 <= number <= len(front):
-        raise InputError(f"--pick {number}", expected=f"1 to {len(front)}, the points of the front in placements.csv")
-    placed, row = _placed(task, front, search, number), front[number - 1]
-    changes = [getattr(row, key) - getattr(placed.chosen, key) for key in FIGURES.values()]
-    if max(map(abs, changes)) > 1e-6 * abs(row.mean_N_per_mm):
-        raise InputError(
-            f"--pick {number}: the figures of this point have changed since the search (the model is another one)",
-            hint=AGAIN,
-        )
-    return placed
-
-
-def _earlier_search(
-    earlier: Placement | Mapping[str, Any] | str | Path | None,
-) -> tuple[list[PlacementRow], SearchRecord]:
-    """Front and search of a result, of the content of `placement.json`, or of that file. Raises `InputError`."""
-    if isinstance(earlier, Placement):
-        return earlier.front, earlier.search
-    where = f" in {earlier}" if isinstance(earlier, str | Path) else ""
-    try:
-        document = earlier if isinstance(earlier, Mapping) else json.loads(Path(earlier or "").read_text("utf-8"))
-        search = {**document["search"], "rapids_left_out": tuple(document["search"]["rapids_left_out"])}
-        return [PlacementRow(**row) for row in document["front"]], SearchRecord(**search)
-    except (OSError, ValueError, KeyError, TypeError):
-        raise InputError(f"--pick: there is no earlier search of this version{where}", hint=AGAIN) from None
-
-
-def _placed(task: PlacementTask, rows: Sequence[PlacementRow], search: SearchRecord, number: int) -> Placement:
-    """Analyze, before and at the chosen point."""
+    found = search_placements(search)
+    front = numbered_rows(task, path, found)
     before, reason = _analyzed(task, task.program, task.present)
-    origin = rows[number - 1].origin
-    program = task.read(origin) if task.program.moves.from_machine.any() else task.program
-    best, beyond = _analyzed(task, program, origin)
+    row = front[found.best]
+    program = task.read(row.origin) if task.program.moves.from_machine.any() else task.program
+    best, beyond = _analyzed(task, program, row.origin)
     if best is None:
-        raise UnreachableError(f"placement {number} of the front: {beyond}", hint="search again")
-    rewritten, written = (None, None) if task.rewriting is None else _rewritten(task.rewriting, best, task.present)
+        raise UnreachableError(f"placement {row.number} of the front: {beyond}", hint="search again")
+    rewritten, written = _rewritten(task, best) if task.write else (None, None)
     return Placement(
         task=task,
-        front=list(rows),
-        search=search,
-        chosen=analyzed_row(best, number, rows[number - 1]),
-        present=analyzed_row(before) if before else None,
+        front=front,
+        searches=found.searches,
+        pose_evaluations=search.poses,
+        nothing_better=found.alone,
+        chosen=_analyzed_row(best, row),
+        present=_analyzed_row(before) if before else None,
         present_reason=reason,
         best=best,
         before=before,
         rewritten=rewritten,
         written=written,
     )
+
+
+def _check(task: PlacementTask) -> None:
+    """Raise `InputError` for what can be told before a search."""
+    if not task.write:
+        return
+    check_rewritable(task.program)
+    if task.program.interpreter != "builtin":
+        raise InputError(
+            f"--write: {task.program.name} was read by LinuxCNC's interpreter; its blocks cannot be rewritten",
+            hint="leave --write out and set the work offset",
+        )
+
+
+def numbered_rows(task: PlacementTask, path: WorkPath, found: PlacementResult) -> list[PlacementRow]:
+    """The front, numbered from 1 by rising mean."""
+    figures, nothing = found.figures, np.full(len(found.front), np.nan)
+    stiffnesses = [figures.mean, figures.spread, figures.lowest]
+    plunging = plunging_rows(task.load, path.tangent, path.abc, path.cutting & (path.weight > 0.0)) & ~path.headline
+    if plunging.any():  # a class of their own
+        plunges = Evaluator(task.model, path.alone(plunging), task.load, task.force).figures(found.front)
+        stiffnesses += [plunges.mean, plunges.lowest]
+    else:
+        stiffnesses += [nothing, nothing]
+    columns = [n_per_mm_from_n_per_m(values) for values in stiffnesses]
+    columns.insert(3, um_from_m(task.force * figures.compliance))
+    columns += [figures.extrapolated, figures.margin, figures.rapid_margin]
+    rows = []
+    for i, values in enumerate(np.stack(columns, axis=1).tolist()):
+        cells: list[Any] = [value if np.isfinite(value) else None for value in values]
+        rows.append(PlacementRow(i + 1, *_mm_deg(found.front[i]), *cells))
+    return rows
+
+
+def _analyzed_row(analysis: Analysis, like: PlacementRow | None = None) -> PlacementRow:
+    """Placement and figures of an analysis, headline and plunges; number and margins are those of a row `like` it."""
+    headline, plunges = (stiffness_figures(analysis, rows) for rows in (analysis.headline, analysis.set_aside))
+    cells: list[Any] = [headline[key] for key in (*FIGURES.values(), "mean_deflection_um")]
+    cells += [plunges["mean_N_per_mm"], plunges["min_N_per_mm"]]
+    cells.append(share(analysis.at.extrapolated, analysis.samples.cutting))
+    margins: dict[str, Any] = {"margin": like.margin, "rapid_margin": like.rapid_margin} if like else {}
+    return PlacementRow(like.number if like else None, *_mm_deg(analysis.origin), *cells, **margins)
+
+
+def _mm_deg(placement: Pose | FloatArray) -> ShopPose:
+    """A placement (6,) in mm and degrees; the rotation within 0 to 360."""
+    x, y, z, a, b, c = pose_in_mm(map(float, placement))
+    return x, y, z, a, b, c % 360.0
 
 
 def _analyzed(task: PlacementTask, program: ReadProgram, origin: Pose) -> tuple[Analysis | None, str]:
@@ -153,22 +139,16 @@ def _analyzed(task: PlacementTask, program: ReadProgram, origin: Pose) -> tuple[
         return None, str(error)
 
 
-def _rewritten(writing: Rewriting, best: Analysis, present: Pose) -> tuple[bytes | None, Written]:
+def _rewritten(task: PlacementTask, best: Analysis) -> tuple[bytes | None, Written]:
     """The transformed program's bytes, and how it compares; or why there are none."""
+    numbers: dict[str, Any] = {"decimals": task.decimals, "linearise": task.linearise}
     try:
-        rewritten = rewrite_program(
-            best.program,
-            best.origin,
-            present,
-            decimals=writing.decimals,
-            linearise=writing.linearise,
-            control=writing.control,
-        )
-        differences = rewriting_differences(best, rewritten, present, writing.control)
+        rewritten = rewrite_program(best.program, best.origin, task.present, **numbers, control=task.control)
+        differences = rewriting_differences(best, rewritten, task.present, task.control)
     except InputError as error:
-        return None, Written(writing.file, refused=str(error))
-    zero = dict(zip(PLACEMENT, placement_mm_deg(present), strict=True))
-    return rewritten.content, Written(writing.file, zero, differences, tuple(rewritten.notes))
+        return None, Written(task.write, refused=str(error))
+    zero = dict(zip(COLUMNS[1:7], _mm_deg(task.present), strict=True))
+    return rewritten.content, Written(task.write, zero, differences, tuple(rewritten.notes))
 
 
 def rewriting_differences(

@@ -2,42 +2,111 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import number, to_dict
+from toolpath_stiff.documents import Document, number, to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.placement.goals import Bounds
-from toolpath_stiff.placement.rows import FIGURES, PlacementRow
-from toolpath_stiff.placement.task import VARIED, PlacementTask, SearchRecord
-from toolpath_stiff.poses import ShopPose, pose_in_mm
-from toolpath_stiff.results import FolderResult
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.moves import ReadProgram
+from toolpath_stiff.placement.goals import Bounds, SearchRules
+from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm, pose_in_si
+from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
-from toolpath_stiff.stiffness.model import effects_stated
+from toolpath_stiff.stiffness.model import StiffnessModel, effects_stated
 from toolpath_stiff.units import mm_from_m
 
 if TYPE_CHECKING:
     import pandas as pd
 
+# The three objectives and where their values stand.
+FIGURES = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "weakest": "min_N_per_mm"}
 WORSE = {"mean": "the mean is lower", "range": "the range is wider", "weakest": "the weakest place is softer"}
+SEARCH = ("pose_evaluations", "searches", "nothing_better")  # what placement.json says of the search
+VARIED = ("--x", "--y", "--z", "--tilt-a", "--tilt-b", "--rotate")  # options of the columns of a placement
 ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less
 AT_BOUND = 1e-3  # of a bound's span: this near the search has ended on it
 
 
 @dataclass(frozen=True)
-class Worsening:
-    """A figure that is worse at the chosen placement than at the present one: mean, range or weakest."""
+class PlacementTask:
+    """A program to be placed: the machine, the bounds and rules, the load. SI.
 
-    figure: str
-    chosen_N_per_mm: float  # noqa: N815
-    before_N_per_mm: float  # noqa: N815
-    worse_by_N_per_mm: float  # noqa: N815
+    Attributes
+    ----------
+    model, program
+        Machine and effects; the program as read where its zero sits now.
+    present
+        Where that is.
+    read
+        Reads the program for another zero: moves to machine coordinates depend on it.
+    bounds, rules
+        What may vary; what a placement must keep and be good at.
+    load, step, force
+        As `analyze` takes them.
+    write
+        Name of the file that the program itself is written to; "": it is not.
+    decimals, linearise
+        Of its numbers; within so much of arcs its chords, m.
+    control
+        What the program was read with.
+    """
+
+    model: StiffnessModel
+    program: ReadProgram
+    present: Pose
+    read: Callable[[Pose], ReadProgram]
+    bounds: Bounds
+    rules: SearchRules
+    load: Load
+    step: float
+    force: float
+    write: str = ""
+    decimals: int | None = None
+    linearise: float | None = None
+    control: Controller = UNKNOWN_CONTROL
+
+
+@dataclass(frozen=True)
+class PlacementRow:
+    """A placement and its figures. The present one has no number, and no margins beside the front's."""
+
+    number: int | None
+    x_mm: float
+    y_mm: float
+    z_mm: float
+    a_deg: float
+    b_deg: float
+    rotation_deg: float
+    mean_N_per_mm: float  # noqa: N815
+    range_N_per_mm: float  # noqa: N815
+    min_N_per_mm: float  # noqa: N815
+    mean_deflection_um: float
+    plunge_mean_N_per_mm: float | None  # noqa: N815
+    plunge_min_N_per_mm: float | None  # noqa: N815
+    extrapolated_share: float
+    margin: float | None = None
+    rapid_margin: float | None = None
+
+    @property
+    def origin_mm_deg(self) -> ShopPose:
+        """X, Y, Z in mm, A, B, C in degrees."""
+        return self.x_mm, self.y_mm, self.z_mm, self.a_deg, self.b_deg, self.rotation_deg
+
+    @property
+    def origin(self) -> Pose:
+        """The placement in m and rad."""
+        return pose_in_si(self.origin_mm_deg)
+
+
+COLUMNS = tuple(field.name for field in fields(PlacementRow))
 
 
 @dataclass(frozen=True)
@@ -61,8 +130,10 @@ class Placement(FolderResult):
         What was to be placed, and how, in SI.
     front
         Placements of which none is better than another in all three figures, by rising mean.
-    search
-        The search, as `placement.json` has it.
+    searches, pose_evaluations
+        Searches from the beginning, poses evaluated in them.
+    nothing_better
+        Whether nothing but the present placement was found, in spite of all of them.
     chosen, present
         The chosen placement and the present one, which is None where it is out of reach.
     present_reason
@@ -87,8 +158,8 @@ class Placement(FolderResult):
     ('', 'G0 X0 Y0 Z5')
     >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
     (1, ['placements.csv', 'placement.json'], 'balanced')
-    >>> found.picked, list(found.trade_offs), found.machine_stated["machine"]
-    (False, ['mean', 'range', 'weakest'], 'nist')
+    >>> found.fixed[:8], list(found.trade_offs), found.machine_stated["machine"]
+    ('--x=0 --', ['mean', 'range', 'weakest'], 'nist')
     >>> found.offsets.linuxcnc[:3]
     'G21'
     >>> type(found.plot()).__name__
@@ -100,7 +171,9 @@ class Placement(FolderResult):
 
     task: PlacementTask
     front: list[PlacementRow]
-    search: SearchRecord
+    searches: int
+    pose_evaluations: int
+    nothing_better: bool
     chosen: PlacementRow
     present: PlacementRow | None
     present_reason: str
@@ -116,40 +189,45 @@ class Placement(FolderResult):
         return self.chosen.origin_mm_deg
 
     @property
-    def picked(self) -> bool:
-        """Another one of the front than the recommended placement is chosen."""
-        return self.chosen.number != self.search.recommended
+    def fixed(self) -> str:
+        """The options that fix the chosen placement."""
+        return " ".join(f"{name}={value:.6g}" for name, value in zip(VARIED, self.origin_mm_deg, strict=True))
 
     @cached_property
-    def worse(self) -> list[Worsening]:
+    def worse(self) -> list[Document]:
         """Figures that are worse there than at the present placement, and by how much."""
-        if self.present is None:
-            return []
-        worse = []
-        for figure, key in FIGURES.items():
+        worse: list[Document] = []
+        for figure, key in FIGURES.items() if self.present is not None else ():
             chosen, before = getattr(self.chosen, key), getattr(self.present, key)
-            worse_by = chosen - before if figure == "range" else before - chosen
-            if worse_by > ROUNDING * self.present.mean_N_per_mm:
-                worse.append(Worsening(figure, chosen, before, worse_by))
+            by = chosen - before if figure == "range" else before - chosen
+            if by > ROUNDING * max(chosen, before):
+                values = {"chosen_N_per_mm": chosen, "before_N_per_mm": before, "worse_by_N_per_mm": by}
+                worse.append({"figure": figure, **values})
         return worse
 
     @cached_property
     def warnings(self) -> list[str]:
         """Sentences that deserve a look, what gets worse first."""
-        warnings = [nothing_better_words(self.search)] if self.search.nothing_better else []
-        warnings += [self._worse_words(worse) for worse in self.worse]
-        if self.worse and not self.picked:
+        warnings = []
+        if self.nothing_better:
+            warnings.append(
+                "nothing better than the present placement was found within the bounds, in "
+                f"{self.searches} searches from the beginning, {self.pose_evaluations} poses evaluated"
+            )
+        for row in self.worse:
+            chosen, before = row["chosen_N_per_mm"], row["before_N_per_mm"]
+            warnings.append(
+                f"WORSE: at the recommended placement {WORSE[row['figure']]} than at the present one, {number(chosen)} "
+                f"instead of {number(before)} N/mm ({100.0 * row['worse_by_N_per_mm'] / before:.1f} % worse)"
+            )
+        if self.worse:
             warnings.append("no placement was found within the bounds that is as good as the present one in all three")
-        warnings += [
-            f"line {line}: no placement within the bounds keeps this rapid within reach; it does not follow the work, "
-            "and was left out of the search"
-            for line in self.search.rapids_left_out
-        ]
-        if self.present is None:
+        if self.before is None:
             nothing = "the present placement is out of reach, so nothing says what must not get worse"
             warnings.append(f"{nothing}: {self.present_reason}")
         else:
-            warnings += self._present_words()
+            warnings += self._rules_broken(self.before, "present")
+        warnings += self._rules_broken(self.best, "recommended")
         if self.chosen.extrapolated_share:
             warnings.append(
                 f"the strut law is extrapolated at {100.0 * self.chosen.extrapolated_share:.0f} % of the samples: "
@@ -162,28 +240,23 @@ class Placement(FolderResult):
             )
         return list(dict.fromkeys([*warnings, *self.best.warnings]))
 
-    def _present_words(self) -> list[str]:
-        """Rules that the present placement itself does not keep, in sentences."""
-        words, margin, before = [], self.task.rules.margin, self.before
-        assert before is not None
-        least = float(before.at.reach.margin.min())
+    def _rules_broken(self, analysis: Analysis, which: str) -> list[str]:
+        """Rules that a placement does not keep: rapids that do not follow the work are held to none in the search."""
+        words, margin, line = [], self.task.rules.margin, analysis.samples.line
+        nearest = int(np.argmin(analysis.at.reach.margin))
+        least = float(analysis.at.reach.margin[nearest])
         if least < margin:
             words.append(
-                f"the present placement has a margin of {100.0 * least:.2f} % of a limit's span, less than the "
-                f"{100.0 * margin:g} % asked for with --margin"
+                f"the {which} placement has a margin of {100.0 * least:.2f} % of a limit's span in line "
+                f"{line[nearest]}, less than the {100.0 * margin:g} % asked for with --margin"
             )
-        depths = [-float(box.clearances(before.samples.position).min()) for box in self.task.rules.keepouts]
-        if max(depths, default=0.0) > 0.0:
-            words.append(f"the present placement runs {mm_from_m(max(depths)):.1f} mm deep into a keep-out")
+        for box in self.task.rules.keepouts:
+            clearance = box.clearances(analysis.samples.position)
+            deepest, depth = int(np.argmin(clearance)), mm_from_m(-float(clearance.min()))
+            if depth > 0.0:
+                into = f"the keep-out {box.name} in line {line[deepest]}"
+                words.append(f"the {which} placement runs {depth:.1f} mm deep into {into}")
         return words
-
-    def _worse_words(self, worse: Worsening) -> str:
-        share = 100.0 * worse.worse_by_N_per_mm / max(abs(worse.before_N_per_mm), 1e-12)
-        return (
-            f"WORSE: at the {'picked' if self.picked else 'recommended'} placement {WORSE[worse.figure]} than at the "
-            f"present one, {number(worse.chosen_N_per_mm)} instead of {number(worse.before_N_per_mm)} N/mm "
-            f"({share:.1f} % worse)"
-        )
 
     @property
     def program_bytes(self) -> bytes:
@@ -233,15 +306,13 @@ class Placement(FolderResult):
                 "force_N": self.best.force,
                 "objective": self.task.rules.objective,
                 "chosen": self.chosen,
-                "picked": self.picked,
-                "recommended": self.front[self.search.recommended - 1],
                 "before": self.present,
                 "before_reason": self.present_reason or None,
                 "trade_offs": self.trade_offs,
                 "front": self.front,
                 "offset_blocks": {name: text or None for name, text in vars(self.offsets).items()},
                 "written": self.written,
-                "search": self.search,
+                "search": {name: getattr(self, name) for name in SEARCH},
                 "assumptions": self.best.to_dict()["assumptions"],
             }
         )
@@ -249,39 +320,27 @@ class Placement(FolderResult):
 
     def to_frame(self) -> pd.DataFrame:
         """The front, one placement a row, as in `placements.csv`."""
-        import pandas as pd
-
-        return pd.DataFrame(self.front)
+        return frame_of(self.front)
 
     def _short(self) -> str:
         words = [f"{axis}{value:.6g}" for axis, value in zip("XYZABC", self.origin_mm_deg, strict=True)]
         return f"{self.best.program.name}, {' '.join(words)} of {len(self.front)} placements"
 
 
-def nothing_better_words(search: SearchRecord) -> str:
-    """A sentence: the front is the present placement alone, and how hard another was looked for."""
-    return (
-        f"nothing better than the present placement was found within the bounds, in {search.searches} searches from "
-        f"the beginning, {search.pose_evaluations} poses evaluated"
-    )
-
-
 def bound_warnings(bounds: Bounds, placement: ShopPose, workspace: FloatArray) -> list[str]:
     """Bounds of the search that a placement lies on, with the options that widen them by half."""
     words = []
     lows, highs = (pose_in_mm(ends.tolist()) for ends in (bounds.low, bounds.high))
-    reach = [*mm_from_m(workspace).T.tolist(), *[(-np.inf, np.inf)] * 3]
+    least, most = (
+        np.append(mm_from_m(ends), [far] * 3) for ends, far in zip(workspace, (-np.inf, np.inf), strict=True)
+    )
     for i in bounds.free:
         if bounds.round[i] or (i == 2 and bounds.heights):
             continue
-        low, high, (least, most), value = lows[i], highs[i], reach[i], placement[i]
-        value = low + (value - low + 1e-6) % 360.0 - 1e-6 if i == 5 else value  # the file's is within 0 to 360
-        half = 0.5 * (high - low)
-        for end, at_end, wider in (
-            (low, value - low, (max(low - half, least), high)),
-            (high, high - value, (low, min(high + half, most))),
-        ):
-            if at_end <= AT_BOUND * (high - low) and wider != (low, high):  # else the machine's own end
+        low, high, half = lows[i], highs[i], 0.5 * (highs[i] - lows[i])
+        value = low + (placement[i] - low + 1e-6) % 360.0 - 1e-6 if i == 5 else placement[i]  # the row's: 0 to 360
+        for end, wider in ((low, (max(low - half, least[i]), high)), (high, (low, min(high + half, most[i])))):
+            if abs(value - end) <= AT_BOUND * (high - low) and wider != (low, high):  # else the machine's own end
                 words.append(
                     f"the search ended on its own bound of {VARIED[i][2:]}, {round(end, 3):g} "
                     f"{'mm' if i < 3 else 'degrees'}: widen it with {VARIED[i]}={wider[0]:.6g}:{wider[1]:.6g}"

@@ -1,21 +1,28 @@
 """The search for placements: a front of mean, range and weakest place, and one recommendation that is never worse.
 
 Mean up, range down and weakest up are in conflict, so there is a front. Many placements at random and a small
-evolution on a hundred-odd samples that stand for the path find where it lies; climbs (`ascents`) then finish its ends
+evolution on a hundred-odd samples that stand for the path find where it lies; climbs then finish its ends
 and the recommendation on the whole path. Every figure that is returned was computed on the whole path.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.placement.ascents import climbed
+from toolpath_stiff.errors import UnreachableError
+from toolpath_stiff.machine.kinematics import solve_struts
+from toolpath_stiff.machine.limits import reach
+from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import PlacementFigures
-from toolpath_stiff.placement.goals import Goal, PlacementRules
-from toolpath_stiff.placement.unreachable import infeasible, let_go
+from toolpath_stiff.placement.goals import Goal
+from toolpath_stiff.placement.paths import placed_path, with_rows
 from toolpath_stiff.placement.working import ENDS, NO_FLOORS, Search
+from toolpath_stiff.poses import pose_in_mm
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.units import mm_from_m
 
 SCOUTS = 250  # placements tried at random before the evolution, for each that is free of x, y, z, A, B, C
 LEGS, GENERATIONS, CHILDREN, ARCHIVE = 3, 12, 60, 120  # after each leg the few samples hear of what they missed
@@ -24,6 +31,16 @@ SEARCHES = 3  # with other seeds, while nothing but the present placement is fou
 WHOLE_POSES = 2_000_000  # about, of the whole path to which the front's candidates are thinned
 NO_WORSE = 1e-9  # of the mean: what rounding does to a figure that stays as it was
 SAME = 1e-7  # of the mean: figures that differ by less count as equal; the order of the coordinates decides
+# Climbs to one goal, for each that is free: on few samples, from the best of these on more, from the best on all.
+STARTS, FLOORED_STARTS, FINALISTS = (4, 3, 12, 3), 2, 3  # of each objective; the range has most hills
+HEATS, CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 3, 4, 6, 6
+APART = 0.1  # of each range, where they start
+BASIN = 0.02  # of each range: climbs that end nearer to each other than this went up the same hill
+FINAL_REGION = 0.01  # of each range, about where the climb on fewer samples ended
+SHORT = 3000  # samples of a path that is climbed on as a whole; of a longer one, on what stands for it
+ROUNDS, STRETCHES = 2, 120  # of that: how often it is told anew, and stretches whose extremes join it
+EXCHANGES = 4  # at most, until the samples that stand for the path miss nothing at the finalists
+MISSED = 1e-3  # of the mean: a figure that they put so much too high is missed
 
 
 @dataclass(frozen=True)
@@ -40,8 +57,6 @@ class PlacementResult:
         Row of the recommended placement.
     present
         Figures of the present placement (one row); None if none was given.
-    rules
-        What every placement of the front keeps.
     searches
         Searches from the beginning, each with a seed of its own.
     alone
@@ -52,7 +67,6 @@ class PlacementResult:
     figures: PlacementFigures
     best: int
     present: PlacementFigures | None
-    rules: PlacementRules
     searches: int = 1
     alone: bool = False
 
@@ -72,7 +86,7 @@ def search_placements(search: Search) -> PlacementResult:
     """
     now, start = search.now, search.start
     for searches in range(1, SEARCHES + 1):
-        result = _result(search, _candidates(search, np.random.default_rng(search.wanted.seed + searches - 1)))
+        result = _result(search, _candidates(search, np.random.default_rng(search.rules.seed + searches - 1)))
         gain = result.figures.objectives - (now.objectives if now is not None and len(start) else NO_FLOORS)
         same = len(gain) == 1 and (np.abs(gain) <= SAME * result.figures.mean[0]).all()
         alone = bool(len(search.bounds.free) and same)
@@ -87,14 +101,14 @@ def _candidates(search: Search, rng: np.random.Generator) -> FloatArray:
     bounds = search.bounds
     unit = rng.uniform(size=(max(SCOUTS * len(bounds.free), 1), len(bounds.free)))
     scouts = np.vstack([search.start, bounds.placements(unit)])
-    known = let_go(search, scouts)
+    known = search.few.figures(scouts)
     search.rules = replace(search.rules, extrapolated=_extrapolation_allowed(search, scouts, known))
     search.report(1, 4)
     archive, figures = _evolved(search, scouts, known, rng)
     search.report(2, 4)
     ends = climbed(search, np.vstack([archive, scouts]), PlacementFigures.joined([figures, known]))
     search.report(3, 4)
-    most = max(search.wanted.points, WHOLE_POSES // max(len(search.path), 1))
+    most = max(search.rules.points, WHOLE_POSES // max(len(search.path), 1))
     if len(archive) > most:  # of a long path no more than the front needs
         figures = search.evaluators["middle"].figures(archive)
         rows = front_rows(figures, search.rules_for("middle").violation(figures) == 0.0)
@@ -107,19 +121,18 @@ def _result(search: Search, candidates: FloatArray) -> PlacementResult:
     candidates = candidates[np.lexsort(np.round(candidates.T[::-1], 9))]  # of equals the first stands
     figures = search.whole.figures(candidates)
     if not search.kept(figures).any():
-        raise infeasible(search, candidates[int(np.argmin(search.rules.violation(figures)))])
+        raise _infeasible(search, candidates[int(np.argmin(search.rules.violation(figures)))])
     best = _recommended(search, figures)
     rows = front_rows(_rounded(figures), search.kept(figures))
     if best not in rows:  # equal to another in all three
         rows = np.append(rows, best)
     rows = rows[np.argsort(figures.mean[rows], kind="stable")]
-    rows = thin(figures.take(rows).objectives, rows, search.wanted.points, best)
+    rows = thin(figures.take(rows).objectives, rows, search.rules.points, best)
     return PlacementResult(
         front=candidates[rows],
         figures=figures.take(rows),
         best=int(np.flatnonzero(rows == best)[0]),
         present=search.now,
-        rules=search.rules,
     )
 
 
@@ -155,7 +168,7 @@ def _extrapolation_allowed(search: Search, scouts: FloatArray, few: PlacementFig
     `few` are the figures of the scouts on few samples.
     """
     now = search.now
-    if search.wanted.allow_extrapolation or now is None:
+    if search.rules.allow_extrapolation or now is None:
         return np.inf
     if now.margin[0] >= 0.0:
         return float(now.extrapolated[0])
@@ -206,7 +219,7 @@ def _survivors(
 
 def _recommended(search: Search, figures: PlacementFigures) -> int:
     """Row of the recommendation: the best of those that are no worse in anything, else the least worse."""
-    goal, now = Goal(defaults.OBJECTIVES[search.wanted.objective], NO_FLOORS), search.now
+    goal, now = Goal(defaults.OBJECTIVES[search.rules.objective], NO_FLOORS), search.now
     possible = np.flatnonzero(search.kept(figures))
     if now is not None and search.present is not None:
         fall = (now.objectives[0] - figures.objectives[possible]).max(axis=1)
@@ -221,3 +234,132 @@ def _rounded(figures: PlacementFigures) -> PlacementFigures:
     unit = SAME * float(np.nanmax(figures.mean))
     mean, spread, lowest = (np.round(v / unit) * unit for v in (figures.mean, figures.spread, figures.lowest))
     return replace(figures, mean=mean, spread=spread, lowest=lowest)
+
+
+def climbed(search: Search, candidates: FloatArray, figures: PlacementFigures) -> FloatArray:
+    """The ends of the front and what each objective recommends, climbed to from candidates with figures on few samples.
+
+    Whichever objective is asked for, all are climbed to: no answer may be beaten by the end of another one's front.
+    """
+    ends = _climbed_to(search, candidates, figures, ENDS, STARTS)
+    if search.now is not None and search.present is not None:
+        floors = search.now.objectives[0]
+        below = [goal for goal, tops in zip(ENDS, ends, strict=True) if _falls(search, tops, floors)]
+        if below:
+            goals = [Goal(goal.weights, floors) for goal in below]
+            ends += _climbed_to(search, candidates, figures, goals, [FLOORED_STARTS] * len(goals))
+            if _falls(search, np.vstack(ends), floors):
+                ends += _climbed_to(search, candidates, figures, [Goal(None, floors)], STARTS[:1])
+    return np.vstack(ends)
+
+
+def _falls(search: Search, placements: FloatArray, floors: FloatArray) -> bool:
+    """True where each of some placements is worse in something than the floors."""
+    return bool((Goal(ENDS[0].weights, floors).worsening(search.whole.figures(placements)) > 0.0).all())
+
+
+def _climbed_to(
+    search: Search, candidates: FloatArray, figures: PlacementFigures, goals: Sequence[Goal], starts: Sequence[int]
+) -> list[FloatArray]:
+    """Ends of climbs from the best candidates to each goal: many on few samples, few on more, one on the whole path.
+
+    `figures` are those of the candidates on few samples. There are several hills, and a slope that few samples show is
+    not always the whole path's. All climb together, each to its own goal.
+    """
+    few, free = search.climber("few"), len(search.bounds.free)
+    tops = [
+        search.best_apart(candidates, figures, goal, count * free, APART)
+        for goal, count in zip(goals, starts, strict=True)
+    ]
+    for _ in range(HEATS):  # the better half of the climbs, those up the same hill counted once, goes on
+        ends = _together(few, tops, goals, CLIMB_STEPS)
+        known = few.evaluator.figures(np.vstack(ends))
+        last = np.cumsum([len(placements) for placements in ends]).tolist()
+        tops = [
+            search.best_apart(
+                placements, known.take(slice(stop - len(placements), stop)), goal,
+                max((len(placements) + 1) // 2, FINALISTS), BASIN,
+            )
+            for placements, stop, goal in zip(ends, last, goals, strict=True)
+        ]  # fmt: skip
+    tops = [placements[:FINALISTS] for placements in tops]
+    if search.evaluators["middle"] is not search.whole:
+        tops = _exchanged(search, tops, goals)
+    best = [
+        placements[search.ranked(goal, search.whole.figures(placements))[0]]
+        for placements, goal in zip(tops, goals, strict=True)
+    ]
+    return [np.vstack(pair) for pair in zip(tops, _finished(search, best, goals), strict=True)]
+
+
+def _exchanged(search: Search, tops: list[FloatArray], goals: Sequence[Goal]) -> list[FloatArray]:
+    """Ends of climbs on more samples, to which what decides at these ends is added until they miss nothing there."""
+    for _ in range(EXCHANGES):
+        search.heed(np.vstack([placements[:1] for placements in tops]))
+        climber = search.climber("middle")
+        tops = _together(climber, tops, goals, POLISH_STEPS)
+        best = np.vstack([placements[:1] for placements in tops])
+        seen, true = climber.evaluator.figures(best), search.whole.figures(best)
+        missed = (seen.objectives - true.objectives > MISSED * true.mean[:, None]).any(axis=1) | ~search.kept(true)
+        if not missed.any():
+            break
+    return tops
+
+
+def _together(climber: Climber, first: list[FloatArray], goals: Sequence[Goal], steps: int) -> list[FloatArray]:
+    """Ends of climbs from placements (k, 6) to each goal."""
+    each = [goal for goal, placements in zip(goals, first, strict=True) for _ in placements]
+    ends = climber.climb(np.vstack(first), each, steps)
+    return np.split(ends, np.cumsum([len(placements) for placements in first])[:-1])
+
+
+def _finished(search: Search, best: list[FloatArray], goals: Sequence[Goal]) -> list[FloatArray]:
+    """For each goal (k, 6) the end of a climb on the whole path, from a placement (6,) near its top.
+
+    A long path is climbed on samples that stand for it, to which those are added that decide on it there: the extremes
+    of each of its stretches (an exchange method of semi-infinite programming; Hettich and Kortanek, SIAM Review 35
+    (1993) 380).
+    """
+    if len(search.path) <= SHORT:
+        tops = search.climber("whole").climb(np.array(best), goals, FINAL_STEPS, FINAL_REGION)
+        return [placement[None] for placement in tops]
+    ends = []
+    for first, goal in zip(best, goals, strict=True):
+        tops = first[None]
+        for _ in range(ROUNDS):
+            deciding = search.whole.deciding_rows(tops[-1], STRETCHES)
+            path = with_rows(search.evaluators["middle"].path, search.path, deciding)
+            climber = Climber(search.evaluator(path), search.bounds, search.rules)
+            tops = np.vstack([tops, climber.climb(tops[-1:], goal, FINAL_STEPS, FINAL_REGION)])
+        ends.append(tops[1:])
+    return ends
+
+
+def _infeasible(search: Search, placement: FloatArray) -> UnreachableError:
+    """The error that names the rule, the line and by how much, at the least bad placement."""
+    path, rules, machine = search.path, search.rules, search.model.machine
+    position, _, abc = placed_path(path, placement)
+    rotation = rotation_matrices(abc)
+    limits = reach(machine, position, solve_struts(machine, position, rotation, path.tool_length), rotation)
+    rows, row = search.whole.rows(placement[None]), int(np.argmin(limits.margin))
+    margin, clearance = float(limits.margin[row]), rows.clearance[0]
+    hint = "widen the bounds, or cut the part in two set-ups"
+    if margin < 0.0:
+        fault = f"breaks a limit: {limits.describe(row)}"
+    elif clearance.min() < 0.0:
+        row = int(np.argmin(clearance))
+        box = min(rules.keepouts, key=lambda box: float(box.clearances(position[row])))
+        fault = f"runs {mm_from_m(-float(clearance[row])):.1f} mm deep into the keep-out {box.name}"
+    elif margin < rules.margin:
+        fault = f"has a margin of {100.0 * margin:.2f} % of the limit's span: {limits.describe(row)}"
+        hint = f"widen the bounds, or ask for less than --margin {100.0 * rules.margin:g}"
+    else:
+        room = np.where(path.cutting, rows.law[0], np.inf)
+        row, hint = int(np.argmin(room)), "widen the bounds, or allow it with --allow-extrapolation"
+        fault = f"takes a strut {mm_from_m(-float(room[row])):.3g} mm out of the lengths of its law"
+    x, y, z, _, _, turned = pose_in_mm(placement.tolist())
+    return UnreachableError(
+        f"no placement is feasible: at the least bad one (X{x:.1f} Y{y:.1f} Z{z:.1f}, turned by {turned:.1f} degrees) "
+        f"{'' if path.cutting[row] else 'the rapid of '}line {int(path.line[row])} {fault}",
+        hint=hint,
+    )

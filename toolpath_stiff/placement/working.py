@@ -10,7 +10,7 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
-from toolpath_stiff.placement.goals import Bounds, Goal, PlacementRules, SearchRules
+from toolpath_stiff.placement.goals import Bounds, Goal, SearchRules
 from toolpath_stiff.placement.paths import WorkPath, representative_path, with_rows
 from toolpath_stiff.stiffness.model import StiffnessModel
 
@@ -28,56 +28,46 @@ class Search:
     ----------
     model, path, load, force
         The machine, the path in the set-up frame, the load.
-    bounds, wanted
-        What may vary; what a placement must keep and is to be good at.
+    bounds, rules
+        What may vary; what a placement must keep and is to be good at. The rules get their largest share of
+        extrapolated samples when the scouts are back.
     present
         (6,) where program zero sits now: what the recommendation must not be worse than; None where it is out of reach.
     report
         Called with (stages done, stages in all).
     start, now
         The present placement where it lies within the bounds, (0, 6) or (1, 6); its figures, within them or not.
-    left_out
-        Lines of rapids that no placement within the bounds keeps within reach.
-    rules
-        Get their largest share of extrapolated samples when the scouts are back.
     """
 
     model: StiffnessModel
     path: WorkPath
     load: Load
     bounds: Bounds
-    wanted: SearchRules = field(default_factory=SearchRules)
+    rules: SearchRules = field(default_factory=SearchRules)
     force: float = defaults.FORCE
     present: FloatArray | None = None
     report: Callable[[int, int], None] = lambda done, total: None
     start: FloatArray = field(init=False)
     now: PlacementFigures | None = None
-    rules: PlacementRules = field(init=False)
     evaluators: dict[str, Evaluator] = field(default_factory=dict)
     made: list[Evaluator] = field(default_factory=list)
     heeded: IntArray = field(init=False)
-    left_out: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
-        self.rules, self.start = PlacementRules(self.wanted.margin), np.zeros((0, 6))
-        self.sample(self.path)
+        self.start, self.heeded = np.zeros((0, 6)), np.zeros(0, dtype=np.int64)
+        self.evaluators["whole"] = self.evaluator(self.path)
+        for name, count in (("middle", POLISH_SAMPLES), ("few", SCOUT_SAMPLES)):
+            short = len(self.path) <= count
+            self.evaluators[name] = self.whole if short else self.evaluator(representative_path(self.path, count))
         if self.present is not None:
             self.now = self.whole.figures(self.present[None])
             self.start = self.present[None] if self.bounds.holds(self.present) else self.start
             self.present = self.present if self.now.margin[0] >= 0.0 else None
 
-    def sample(self, path: WorkPath) -> None:
-        """Take a path, and samples that stand for it."""
-        self.path, self.heeded = path, np.zeros(0, dtype=np.int64)
-        self.evaluators = {"whole": self.evaluator(path)}
-        for name, count in (("middle", POLISH_SAMPLES), ("few", SCOUT_SAMPLES)):
-            short = len(path) <= count
-            self.evaluators[name] = self.whole if short else self.evaluator(representative_path(path, count))
-
     def heed(self, placements: FloatArray) -> None:
         """Add to the samples that stand for the path those that decide on the whole of it at some placements."""
         deciding = [self.whole.deciding_rows(placement, HEEDED) for placement in placements]
-        rows = np.setdiff1d(np.concatenate([self.heeded[:0], *deciding]), self.heeded)
+        rows = np.setdiff1d(np.concatenate(deciding), self.heeded)
         self.heeded = np.concatenate([self.heeded, rows])
         for name, evaluator in self.evaluators.items():
             if evaluator is not self.whole:
@@ -85,7 +75,7 @@ class Search:
 
     def evaluator(self, path: WorkPath) -> Evaluator:
         """An evaluator of a part of the path."""
-        self.made.append(Evaluator(self.model, path, self.load, self.force, self.wanted.keepouts))
+        self.made.append(Evaluator(self.model, path, self.load, self.force, self.rules.keepouts))
         return self.made[-1]
 
     @property
@@ -107,7 +97,7 @@ class Search:
         """A climber on some of the samples."""
         return Climber(self.evaluators[name], self.bounds, self.rules_for(name))
 
-    def rules_for(self, name: str) -> PlacementRules:
+    def rules_for(self, name: str) -> SearchRules:
         """The rules as some samples see them: of those that stand for the path another share is outside the law."""
         if name == "whole" or self.present is None or not 0.0 < self.rules.extrapolated < np.inf:
             return self.rules

@@ -308,7 +308,7 @@ def _key(numbers: Sequence[float], setup: str, loop: str) -> Key:
 
 def _log(row: Row, offset: float, toward: float) -> float:
     """Ln k of a row as the plan compares it; nan where it has not been taken."""
-    if row.of_tip:
-        return float(np.log(row.stiffness))
-    joined = offset + toward * row.compliance
+    if not row.labels["loop"]:
+        return float(np.log(row.value))
+    joined = offset + toward * row.value
     return float(-np.log(joined)) if joined > 0.0 else float("nan")

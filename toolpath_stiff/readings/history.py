@@ -1,50 +1,31 @@
 """Struts measured alone again and again: which changed, when, at once or slowly; tension against compression."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import certain
+from toolpath_stiff.readings.dates import date_text
 from toolpath_stiff.readings.strut_series import (
     FEWEST_DIFFERENCES,
     MOUNTING,
     RESOLUTION,
     SURE,
-    Change,
     DateScatter,
-    Kind,
-    Series,
+    StrutChange,
     StrutReadings,
-    chance_of_t,
+    chance_text,
     changes_of,
+    n_per_mm,
     series_of,
+    slope_of,
 )
 
 # Relative sd, the same on all dates, of a difference of tension and compression; assumed: load cell, indicator and
 # friction are not alike on both sides of zero.
 BOTH_SIDES = 0.01
-
-
-LEAST_TOLD = 1e-4  # probability: further digits than simulations have would say nothing
-
-
-@dataclass(frozen=True)
-class StrutChange:
-    """A change of a strut; of a step the dates are those between which it lies (95 %)."""
-
-    kind: Kind
-    after: str
-    before: str
-    change_percent: float
-    low_percent: float
-    high_percent: float
-    percent_per_year: float | None
-    from_N_per_mm: float
-    to_N_per_mm: float
-    p: float
-    text: str
 
 
 @dataclass(frozen=True)
@@ -60,18 +41,8 @@ class StrutSides:
 
 
 @dataclass(frozen=True)
-class DateMean:
-    """The mean of one date."""
-
-    date: str
-    day: float
-    stiffness_N_per_mm: float
-    readings: int
-
-
-@dataclass(frozen=True)
 class StrutOverTime:
-    """One strut; `judged_on`: what its dates were compared by, as "secant"; "" of readings that are not raw records."""
+    """One strut; `dates`: N/mm in the mean of each."""
 
     strut: str
     readings: int
@@ -79,12 +50,10 @@ class StrutOverTime:
     scatter_percent: float | None
     drift_percent_per_year: float | None
     drift_sd_percent_per_year: float | None
-    smallest_step_percent: float | None
-    dates: list[DateMean]
+    dates: dict[str, float]
     changes: list[StrutChange]
     wild_dates: list[str]
     sides: StrutSides | None
-    judged_on: str
     text: str
 
 
@@ -99,10 +68,9 @@ class StrutHistory:
     @property
     def sentences(self) -> list[str]:
         """Strut by strut: changes or none, and tension against compression where they differ."""
-        texts = [
-            (strut.text, strut.sides.text if strut.sides and strut.sides.p < SURE else "") for strut in self.struts
-        ]
-        return [text for both in texts for text in both if text]
+        texts = [(strut.text, strut.sides) for strut in self.struts]
+        both = [(text, sides.text if sides and sides.p < SURE else "") for text, sides in texts]
+        return [text for pair in both for text in pair if text]
 
 
 def history(readings: StrutReadings, sides: StrutReadings | None = None, seed: int = 0) -> StrutHistory:
@@ -128,105 +96,67 @@ def history(readings: StrutReadings, sides: StrutReadings | None = None, seed: i
     if not len(readings.strut):
         return StrutHistory()
     compared, series = _sides(readings if sides is None else sides), series_of(readings)
-    dated = [strut for strut in series if len(strut.day) > 1]
+    dated = [strut for strut in series.values() if len(strut.dates) > 1]
     scatter = DateScatter.of(dated, seed)
-    struts = [_strut(strut, scatter, readings, compared.get(strut.name)) for strut in series]
-    written: StrutHistory = certain(
-        StrutHistory(100.0 * scatter.sd if dated else None, scatter.source if dated else "", struts)
-    )
+    struts = [_strut(name, strut, scatter, compared.get(name)) for name, strut in series.items()]
+    written: StrutHistory = certain(StrutHistory(100.0 * scatter.sd if dated else None, scatter.source, struts))
     return written
 
 
-def _strut(series: Series, scatter: DateScatter, readings: StrutReadings, sides: StrutSides | None) -> StrutOverTime:
+def _strut(strut: str, series: StrutReadings, scatter: DateScatter, sides: StrutSides | None) -> StrutOverTime:
     """What is said of one strut."""
-    n, name = len(series.day), series.name.replace(" alone", "")
-    rows = readings.strut == series.name
-    ln = series.mean if n else readings.log_stiffness[rows]
-    raw_changes, wild = changes_of(series.day, series.mean, scatter)
-    changes = [_change(change, readings.text) for change in raw_changes]
+    n, name = len(series.dates), strut.replace(" alone", "")
+    levels = series.means if n else series.log_stiffness
+    changes, wild = changes_of(series.dates, series.means, scatter)
     sentences = [f"{name} {change.text}" for change in changes]
-    sentences += [f"{name}: {readings.text(day)} stands out alone: measure again" for day in wild]
-    slope = sd = least = None
+    sentences += [f"{name}: {date_text(day)} stands out alone: measure again" for day in wild]
+    slope = sd = None
     if n > 1:
-        slope, sd = (100.0 * figure for figure in series.slope(scatter.sd))
-        least = 100.0 * float(np.expm1(scatter.smallest_step(n)))
+        slope, sd = (100.0 * figure for figure in slope_of(series.dates, series.means, scatter.sd))
         if not changes:
+            least = 100.0 * math.expm1(scatter.smallest_step(n))
             sentences.append(f"{name}: no change found in {n} dates; a step of {least:.2g} % halfway would show")
     return StrutOverTime(
-        strut=series.name,
-        readings=int(series.count.sum()) if n else int(rows.sum()),
-        stiffness_N_per_mm=_n_per_mm(ln.mean()),
-        scatter_percent=100.0 * float(ln.std(ddof=1)) if len(ln) > 1 else None,
+        strut=strut,
+        readings=sum(map(len, series.of_dates)) if n else len(levels),
+        stiffness_N_per_mm=n_per_mm(levels.mean()),
+        scatter_percent=100.0 * float(levels.std(ddof=1)) if len(levels) > 1 else None,
         drift_percent_per_year=slope,
         drift_sd_percent_per_year=sd,
-        smallest_step_percent=least,
-        dates=[
-            DateMean(readings.text(day), float(day - series.day[0]), _n_per_mm(mean), int(count))
-            for day, mean, count in zip(series.day, series.mean, series.count, strict=True)
-        ],
+        dates={date_text(day): n_per_mm(mean) for day, mean in zip(series.dates, series.means, strict=True)},
         changes=changes,
-        wild_dates=[readings.text(day) for day in wild],
+        wild_dates=[date_text(day) for day in wild],
         sides=sides,
-        judged_on="",
         text="; ".join(sentences),
     )
 
 
-def _n_per_mm(ln: float) -> float:
-    return 1e-3 * float(np.exp(ln))
-
-
-def _change(change: Change, text: Callable[[float], str]) -> StrutChange:
-    """A change in words; `text` writes a day."""
-    size = change.ends[1] - change.ends[0]
-    share, low, high = (100.0 * float(np.expm1(v)) for v in (size, size - 1.96 * change.sd, size + 1.96 * change.sd))
-    (after, before), (first, last) = map(text, change.days), map(_n_per_mm, change.ends)
-    a_year = None if change.slope is None else 100.0 * float(np.expm1(change.slope))
-    way = "softer" if share < 0.0 else "stiffer"
-    if change.kind == "drift":
-        words = f"grew {way} by {abs(a_year or 0.0):.2g} % a year from {after} to {before}"
-    else:
-        words = f"became {abs(share):.2g} % {way} between {after} and {before}"
-        words += " (95 %)" if change.kind == "step" else "; at once or slowly is not told"
-    words += f": {first:,.0f} to {last:,.0f} N/mm ({_chance_text(change.p)})"
-    return StrutChange(change.kind, after, before, share, low, high, a_year, first, last, change.p, words)
-
-
-def _chance_text(p: float) -> str:
-    return f"p = {p:.2g}" if p >= LEAST_TOLD else f"p < {LEAST_TOLD:g}"
-
-
 def _sides(readings: StrutReadings) -> dict[str, StrutSides]:
     """Strut -> tension against compression, of those measured under both: the mean of dates' differences."""
-    compared: dict[str, tuple[FloatArray, float]] = {}  # differences, and ln stiffness in the middle
-    for name in sorted(set(readings.strut.tolist())):
-        rows = readings.strut == name
-        # Readings without a date are a group of their own.
-        day = np.nan_to_num(np.floor(readings.day[rows]), nan=-np.inf)
-        ln, side = readings.log_stiffness[rows], readings.side[rows]
-        pulled, pushed = side > 0.0, side < 0.0
-        if not (pulled.any() and pushed.any()):
-            continue
-        both = [d for d in np.unique(day) if (pulled & (day == d)).any() and (pushed & (day == d)).any()]
-        groups = [day == d for d in both] or [np.ones(len(day), dtype=bool)]
-        apart = np.array([ln[pulled & group].mean() - ln[pushed & group].mean() for group in groups])
-        compared[name] = apart, 0.5 * (float(ln[pulled].mean()) + float(ln[pushed].mean()))
-    freedom = sum(len(apart) - 1 for apart, _ in compared.values())
-    if freedom >= FEWEST_DIFFERENCES:
-        squares = sum(float(((apart - apart.mean()) ** 2).sum()) for apart, _ in compared.values())
-        of_date = max((squares / freedom) ** 0.5, RESOLUTION)
-    else:
-        of_date, freedom = MOUNTING * 2.0**0.5, 10**6
+    from scipy.special import stdtr
+
+    apart, middle = {}, {}
+    for name, strut in readings.by_strut().items():
+        pulled, pushed = (strut.log_stiffness[sign * strut.side > 0.0] for sign in (1.0, -1.0))
+        if len(pulled) and len(pushed):
+            by_date = strut.sides_apart()
+            apart[name] = by_date if len(by_date) else np.array([pulled.mean() - pushed.mean()])
+            middle[name] = 0.5 * float(pulled.mean() + pushed.mean())
+    sd_of_date, freedom = MOUNTING * 2.0**0.5, 10**6
+    differences = sum(len(by_date) - 1 for by_date in apart.values())
+    if differences >= FEWEST_DIFFERENCES:
+        squares = sum(float(((by_date - by_date.mean()) ** 2).sum()) for by_date in apart.values())
+        sd_of_date, freedom = max((squares / differences) ** 0.5, RESOLUTION), differences
     entries = {}
-    for name, (apart, middle) in compared.items():
-        sd, mean = float(np.hypot(of_date / len(apart) ** 0.5, BOTH_SIDES)), float(apart.mean())
-        p = min(1.0, len(compared) * chance_of_t(abs(mean) / sd, freedom))
-        tension, compression = (_n_per_mm(middle + sign * 0.5 * mean) for sign in (1.0, -1.0))
-        share, strut = 100.0 * float(np.expm1(mean)), name.replace(" alone", "")
+    for name, by_date in apart.items():
+        sd, mean = float(np.hypot(sd_of_date / len(by_date) ** 0.5, BOTH_SIDES)), float(by_date.mean())
+        p = min(1.0, len(apart) * 2.0 * float(stdtr(freedom, -abs(mean) / sd)))
+        tension, compression = (n_per_mm(middle[name] + sign * 0.5 * mean) for sign in (1.0, -1.0))
         numbers = f"{tension:,.0f} against {compression:,.0f} N/mm"
-        text = f"{strut} is alike in tension and compression: {numbers}"
+        share, title = 100.0 * math.expm1(mean), name.replace(" alone", "")
+        text = f"{title} is alike in tension and compression: {numbers}"
         if p < SURE:
             way = f"{abs(share):.2g} % {'softer' if share < 0.0 else 'stiffer'}"
-            text = f"{strut} is {way} in tension than in compression: {numbers} ({_chance_text(p)})"
+            text = f"{title} is {way} in tension than in compression: {numbers} ({chance_text(p)})"
         entries[name] = StrutSides(tension, compression, share, 100.0 * sd, p, text)
     return entries

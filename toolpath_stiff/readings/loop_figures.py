@@ -1,4 +1,4 @@
-"""Figures of one loop of raw records: stiffness, play, friction, linearity, slopes of its two sides.
+"""Figures of one loop of raw records: stiffness, lost motion, friction, linearity, slopes of its two sides.
 
 With the jog y, the force F and the displacement D read by the indicator, the deflection is y - D, and the paper's
 equation 12 is its secant between the extremes:
@@ -7,22 +7,28 @@ equation 12 is its secant between the extremes:
 
 A strut measured alone on a bench is not jogged: the force is set and its own stretch D read, so that k is the slope of
 the force over D between the extremes of the force.
+
+A test rig goes up and down several times. The first way is that of a strut that was never loaded (a virgin curve), and
+seating, creep and a warm sensor carry the deflection away slowly; neither is stiffness. So with three turns or more
+(high, low, high) the secant is taken from second differences of the turns, in which a steady drift cancels, as in a
+weighing A B A (OIML R 111-1:2004, C.4), and width and linearity are those of the last closed cycle.
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
-from toolpath_stiff.readings.raw_cycles import closed_cycle, closed_cycles, ends_without_drift, turns_of
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.readings.raw_records import SAME_JOG, Loop
-from toolpath_stiff.readings.raw_sides import play_of, sides_of
 from toolpath_stiff.readings.rows import SOFTEST, STIFFEST
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
+NEAR_TURN = 0.1  # of the range: how near to an extreme a cycle must come to turn there
 CLOSED = 3  # turns of the drive, from which the records hold a closed cycle
+A_SIDE = 3  # forces on each side of zero, from which its slope is told
 
 
 @dataclass(frozen=True)
@@ -50,12 +56,7 @@ class LoopFigures:
     closure
         m, deflection at the end less that at the beginning.
     tension, compression
-        N/m, slopes of the two sides of a strut on a bench; beyond the lost motion where there is any.
-    beyond
-        N/m, what the secant of a strut on a bench would be without lost motion (`raw_sides.play_of`). nan
-        without a closed cycle that reaches both sides.
-    plays
-        Whether the record shows lost motion.
+        N/m, slopes of the two sides of a strut on a bench.
     """
 
     loop: Loop
@@ -68,8 +69,6 @@ class LoopFigures:
     closure: float = math.nan
     tension: float = math.nan
     compression: float = math.nan
-    beyond: float = math.nan
-    plays: bool = False
 
     @property
     def side(self) -> float:
@@ -87,24 +86,15 @@ def reduce_loop(loop: Loop) -> LoopFigures:
     InputError
         The loop does not reach both sides, or gives no stiffness that could be.
     """
-    drive, turns = loop.drive, turns_of(loop.drive)
+    turns = turns_of(loop.drive)
     force, deflection = _between_extremes(loop, turns)
-    cycle = loop.part(closed_cycle(turns)) if len(turns) >= CLOSED else loop
+    cycle = loop.part(slice(turns[-3], turns[-1] + 1)) if len(turns) >= CLOSED else loop
     start, end = turns_of(cycle.drive)[:2]
     way = slice(start, end + 1)  # from extreme to extreme
     width = _loop_width(cycle, way)
-    play, shown = _play(loop, turns)
-    sides = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width, gap=shown)
-    if shown:
-        # Lost motion adds the same to the compliance of both sides: their difference is kept, and together they give
-        # the deflection without it at the extremes.
-        high, low = float(drive.max()), float(drive.min())
-        apart = 1.0 / sides[0] - 1.0 / sides[1]
-        pushed = (deflection - play - apart * high) / (high - low)
-        pulled = pushed + apart
-        sides = (1.0 / pulled, 1.0 / pushed) if min(pulled, pushed) > 0.0 else (math.nan, math.nan)
-    main_force, main = cycle.force[way], cycle.deflection[way]
-    secant = main[0] + (main[-1] - main[0]) * (main_force - main_force[0]) / (main_force[-1] - main_force[0])
+    tension, compression = (math.nan, math.nan) if loop.jog is not None else _sides(loop, turns, width)
+    on_way, main = cycle.force[way], cycle.deflection[way]
+    secant = main[0] + (main[-1] - main[0]) * (on_way - on_way[0]) / (on_way[-1] - on_way[0])
     return LoopFigures(
         loop,
         stiffness=force / deflection,
@@ -114,11 +104,24 @@ def reduce_loop(loop: Loop) -> LoopFigures:
         loop_width=width,
         linearity=float(np.abs(main - secant).max() / deflection),
         closure=float(loop.deflection[-1] - loop.deflection[0]),
-        tension=sides[0],
-        compression=sides[1],
-        beyond=force / (deflection - play),
-        plays=shown,
+        tension=tension,
+        compression=compression,
     )
+
+
+def turns_of(drive: FloatArray) -> list[int]:
+    """Records at which the drive turns, high and low alternately; the first of equal ones."""
+    high, low, near = float(drive.max()), float(drive.min()), NEAR_TURN * float(np.ptp(drive))
+    turns: list[int] = []
+    last = 0.0
+    for i in np.flatnonzero((drive >= high - near) | (drive <= low + near)).tolist():
+        side = 1.0 if drive[i] >= high - near else -1.0
+        if side != last:
+            turns.append(i)
+        elif side * drive[i] > side * drive[turns[-1]]:
+            turns[-1] = i
+        last = side
+    return turns
 
 
 def _between_extremes(loop: Loop, turns: list[int]) -> tuple[float, float]:
@@ -133,12 +136,11 @@ def _between_extremes(loop: Loop, turns: list[int]) -> tuple[float, float]:
             line=loop.line,
         )
     if len(turns) >= CLOSED:
-        force, deflection = ends_without_drift(drive, loop.force, loop.deflection, turns, loop.same)
+        force, deflection = _without_drift(loop, turns)
     else:
         at_high, at_low = drive >= high - loop.same, drive <= low + loop.same
         force, deflection = (float(of[at_high].mean() - of[at_low].mean()) for of in (loop.force, loop.deflection))
-    stiffness = n_per_mm_from_n_per_m(force / deflection) if deflection else math.inf
-    if SOFTEST <= stiffness <= STIFFEST:
+    if deflection and SOFTEST <= n_per_mm_from_n_per_m(force / deflection) <= STIFFEST:
         return force, deflection
     raise MeasurementError(
         f"{loop.title}: {force:g} N over a deflection of {um_from_m(deflection):g} um",
@@ -149,6 +151,19 @@ def _between_extremes(loop: Loop, turns: list[int]) -> tuple[float, float]:
         file=loop.file or None,
         line=loop.line,
     )
+
+
+def _without_drift(loop: Loop, turns: list[int]) -> tuple[float, float]:
+    """Force (N) and deflection (m) between the extremes of three turns or more, a steady drift taken out."""
+    drive = loop.drive
+    bounds = [0, *((start + end) // 2 + 1 for start, end in pairwise(turns)), len(drive)]
+    means = []
+    for turn, (start, stop) in zip(turns, pairwise(bounds), strict=True):
+        rows = start + np.flatnonzero(np.abs(drive[start:stop] - drive[turn]) <= loop.same)
+        means.append((loop.force[rows].mean(), loop.deflection[rows].mean()))
+    signs = np.where(drive[turns[1:-1]] < drive[turns[:-2]], 1.0, -1.0)
+    force, deflection = (0.5 * (signs[:, None] * np.diff(np.array(means), 2, axis=0)).mean(axis=0)).tolist()
+    return force, deflection
 
 
 def _lost_motion(loop: Loop) -> float:
@@ -162,29 +177,29 @@ def _lost_motion(loop: Loop) -> float:
         if np.ptp(drive[outer]) < loop.same or np.ptp(force) == 0.0:
             return math.nan
         centred = force - force.mean()
-        slope = (centred @ deflection) / (centred @ centred)
-        at_zero.append(float(deflection.mean() - slope * force.mean()))
+        at_zero.append(float(deflection.mean() - (centred @ deflection) / (centred @ centred) * force.mean()))
     return at_zero[0] - at_zero[1]
 
 
-def _sides(loop: Loop, turns: list[int], width: float, gap: bool) -> tuple[float, float]:
-    """Slopes of the two sides in N/m; nan where they cannot be told from the width of a loop that does not close."""
-    if len(turns) >= CLOSED:
-        cycles = loop.part(closed_cycles(turns))
-        return sides_of(cycles.force, cycles.deflection, drift=True, gap=gap)
-    sides = sides_of(loop.force, loop.deflection)
-    farthest = min(float(loop.force.max()), -float(loop.force.min()))
-    return (math.nan, math.nan) if abs(1.0 / sides[0] - 1.0 / sides[1]) * farthest < width else sides
+def _sides(loop: Loop, turns: list[int], width: float) -> tuple[float, float]:
+    """Stiffness in N/m under tension and under compression: slopes of two straight lines that meet at zero force.
 
-
-def _play(loop: Loop, turns: list[int]) -> tuple[float, bool]:
-    """The lost motion of a strut on a bench, of all its closed cycles, as `play_of`."""
-    if loop.jog is not None or len(turns) < CLOSED or loop.side:
-        return math.nan, False
-    records = closed_cycles(turns)
-    cycles = loop.part(records)
-    way = np.searchsorted(np.array(turns), np.arange(records.start, records.stop), side="right") % 2
-    return play_of(cycles.force, cycles.deflection, np.where(way == 1, 1.0, -1.0))
+    By least squares over all closed cycles, beside a deflection that goes on steadily from record to record. Of a loop
+    that does not close nan where they cannot be told from its width, and without `A_SIDE` records of both.
+    """
+    closed = len(turns) >= CLOSED
+    cycles = loop.part(slice(turns[0], turns[-1 - (len(turns) + 1) % 2] + 1)) if closed else loop
+    force = cycles.force
+    if min(len(np.unique(force[force > 0.0])), len(np.unique(force[force < 0.0]))) < A_SIDE:
+        return math.nan, math.nan
+    order = [np.arange(len(force), dtype=float)] if closed else []
+    design = np.stack([np.ones_like(force), *order, np.maximum(force, 0.0), np.minimum(force, 0.0)], axis=1)
+    scale = np.abs(design).max(axis=0)
+    pulled, pushed = (np.linalg.lstsq(design / scale, cycles.deflection, rcond=None)[0] / scale).tolist()[-2:]
+    farthest = min(float(force.max()), -float(force.min()))
+    if min(pulled, pushed) <= 0.0 or (not closed and abs(pulled - pushed) * farthest < width):
+        return math.nan, math.nan
+    return 1.0 / pulled, 1.0 / pushed
 
 
 def _loop_width(loop: Loop, main: slice) -> float:
@@ -200,21 +215,8 @@ def _loop_width(loop: Loop, main: slice) -> float:
 
 def in_tension(loop: Loop) -> Loop:
     """A loop of a bench with tension positive; its displacement counts the way that makes a stiffness positive."""
-    if loop.jog is not None or not len(loop.force):
+    if loop.jog is not None:
         return loop
     force = -loop.force
-    way = 1.0 if float((force - force.mean()) @ (loop.displacement - loop.displacement.mean())) > 0.0 else -1.0
-    return replace(loop, force=force, displacement=way * loop.displacement)
-
-
-def reduce_loops(loops: Iterable[Loop]) -> list[LoopFigures]:
-    """Figures of every loop. Raises `InputErrors` that name all loops that give none."""
-    figures, errors = [], []
-    for loop in loops:
-        try:
-            figures.append(reduce_loop(loop))
-        except InputError as error:
-            errors.append(error)
-    if errors:
-        raise InputErrors(errors)
-    return figures
+    rises = float((force - force.mean()) @ (loop.displacement - loop.displacement.mean())) > 0.0
+    return replace(loop, force=force, displacement=loop.displacement if rises else -loop.displacement)

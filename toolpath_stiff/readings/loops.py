@@ -16,12 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.stiffness.measuring_loop import TIP, WORDS, MeasuringLoop, measuring_loop
@@ -59,37 +57,33 @@ class LoopColumns:
         (n,) m/N and 1 or -1: o and s above; 0 and 1 at the tip.
     length
         (n,) m, of a strut measured alone; nan: as the pose has it.
-    side
-        (n,) 1, or -1 of a strut measured alone under compression.
     """
 
     loops: tuple[MeasuringLoop, ...]
-    which: NDArray[np.int64]
+    which: IntArray
     offset: FloatArray
     toward: FloatArray
     length: FloatArray
-    side: FloatArray
 
-    def select(self, rows: NDArray[Any]) -> LoopColumns:
+    def select(self, rows: AnyArray) -> LoopColumns:
         """Of some of the readings."""
         return LoopColumns(self.loops, *(getattr(self, field.name)[rows] for field in fields(self)[1:]))
 
     @classmethod
-    def of(cls, names: Sequence[str], length: FloatArray, side: FloatArray | None = None) -> LoopColumns:
+    def of(cls, names: Sequence[str], length: FloatArray) -> LoopColumns:
         """Of readings' loops by name ("" is the tip), without offsets yet."""
         loops = (TIP, *(loop_of(name) for name in dict.fromkeys(names) if name))
         number = {"" if k == 0 else str(loop): k for k, loop in enumerate(loops)}
         which = np.array([number[str(name)] for name in names], dtype=np.int64)
-        ones = np.ones(len(names))
-        return cls(loops, which, np.zeros(len(names)), ones, length, ones if side is None else side)
+        return cls(loops, which, np.zeros(len(names)), np.ones(len(names)), length)
 
     @property
-    def beside(self) -> NDArray[np.bool_]:
+    def beside(self) -> BoolArray:
         """(n,) readings of loops other than the tip's."""
         return np.asarray(self.which > 0)
 
     @property
-    def straight(self) -> NDArray[np.bool_]:
+    def straight(self) -> BoolArray:
         """(n,) those compared with an offset."""
         alone = np.array([loop.kind in ("tip", "alone") for loop in self.loops])
         return ~alone[self.which]

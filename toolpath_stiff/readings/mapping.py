@@ -90,15 +90,11 @@ def _pattern(form: str) -> str:
 def as_iso(text: str, form: str) -> str:
     """A date of that form in ISO 8601; "" where it is none."""
     try:
-        if form in SINCE_1970:
-            moment = datetime.fromtimestamp(float(text) * SINCE_1970[form], UTC).replace(tzinfo=None)
-        else:
-            moment = datetime.strptime(text, _pattern(form))
+        since = SINCE_1970.get(form)
+        moment = datetime.fromtimestamp(float(text) * since, UTC) if since else datetime.strptime(text, _pattern(form))
     except (ValueError, OverflowError, OSError):
         return ""
-    if "DD" not in form and form not in SINCE_1970:
-        return moment.strftime("%Y-%m" if "MM" in form else "%Y")
-    return moment.isoformat(timespec="seconds").removesuffix("T00:00:00")
+    return moment.replace(tzinfo=None).isoformat(timespec="seconds").removesuffix("T00:00:00")
 
 
 def _with_dates(table: Table, form: str) -> Table:

@@ -19,9 +19,6 @@ SINGULAR = 1e-6  # singularity index: the tip would be a million times softer th
 SECTIONS = ("strut_length", "joint_angle", "workspace", "singularity")
 
 
-NAMED = 5  # so many poses are named in a warning
-
-
 def pose_warnings(
     machine: Hexapod,
     position: FloatArray,
@@ -47,15 +44,16 @@ def pose_warnings(
     """
     rotation = rotation_matrices(angles)
     struts = solve_struts(machine, position, rotation, tool_extension + machine.reference_tool_length)
-    index = singularity_index(machine, struts)
+    index, poses = singularity_index(machine, struts), [*map(_shown, position, angles)]
     stiffness = machine.strut_law.stiffness(struts.lengths)
     errors = []
     for i in range(len(position)):
-        where = f"pose {_shown(position[i], angles[i])}"
         if not index[i] >= SINGULAR:
-            mistake = f"{where} is singular: the struts cannot hold the platform"
+            mistake = f"pose {poses[i]} is singular: the struts cannot hold the platform"
         elif stiffness[i].min() <= 0.0:
-            mistake = f"{where} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
+            mistake = (
+                f"pose {poses[i]} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
+            )
         else:
             continue
         errors.append(MeasurementError(mistake, hint="check the pose's unit", file=places[i][0], line=places[i][1]))
@@ -66,14 +64,11 @@ def pose_warnings(
     for row in np.flatnonzero(~stand.reachable).tolist():
         beyond.setdefault(stand.limits[int(stand.limit[row])].name, []).append(row)
     warnings = []
-    for name, those in beyond.items():
-        poses = list(dict.fromkeys(_shown(position[i], angles[i]) for i in those))
-        more = f" and {len(poses) - NAMED} more" if len(poses) > NAMED else ""
-        sections = (section for section in SECTIONS if section.rpartition("_")[2] in name)
-        origin = machine.origins.get(f"limits.{next(sections, '')}", "origin not stated")
+    for name, rows in beyond.items():
+        origin = next((machine.origins.get(f"limits.{s}") for s in SECTIONS if s.rpartition("_")[2] in name), None)
         warnings.append(
-            f"measured beyond a limit of the machine file ({name}, {origin}): "
-            f"{'; '.join(poses[:NAMED])}{more}. {stand.describe(those[0])}"
+            f"measured beyond a limit of the machine file ({name}, {origin or 'origin not stated'}): {poses[rows[0]]}, "
+            f"first of {len({poses[i] for i in rows})} poses. {stand.describe(rows[0])}"
         )
     return tuple(warnings)
 

@@ -9,28 +9,37 @@ from functools import cached_property
 from importlib import resources
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import FloatArray, TextArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.readings.dates import day_of, days_since_first
+from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, offsets
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measured_poses import pose_warnings
-from toolpath_stiff.readings.rows import AXES, COLUMNS, LABELS, OPTIONAL, POSITION, Row, duplicates, read_rows
+from toolpath_stiff.readings.rows import (
+    ANGLES,
+    AXES,
+    COLUMNS,
+    LABELS,
+    OPTIONAL,
+    POSITION,
+    VECTOR,
+    Row,
+    duplicates,
+    read_rows,
+)
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import loop_compliance
 from toolpath_stiff.stiffness.model import StiffnessModel, load_path
-from toolpath_stiff.tables import Columns, parse_table
+from toolpath_stiff.tables import Columns, Table, parse_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
 
 NIST_TABLE_1 = "nist-table1"
@@ -78,8 +87,8 @@ class Readings:
         What was assumed or not used; what is doubtful. For the report.
     beside
         Which readings are of loops beside the tip, and how these are compared; None where there are none.
-    date, day
-        (n,) as in the file, "" where a reading has none; days since the first of them (nan). None where no reading has.
+    date
+        (n,) as in the file, "" where a reading has none.
     """
 
     position: FloatArray
@@ -97,20 +106,19 @@ class Readings:
     point: TextArray
     clamp: TextArray
     file: TextArray
-    line: NDArray[np.int64]
+    line: IntArray
     extra: Mapping[str, FloatArray]
     missing: tuple[str, ...]
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     beside: LoopColumns | None = None
     date: TextArray | None = None
-    day: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.position)
 
     @property
-    def tip(self) -> NDArray[np.bool_]:
+    def tip(self) -> BoolArray:
         """(n,) readings of the tool tip against the work."""
         return np.ones(len(self), dtype=bool) if self.beside is None else ~self.beside.beside
 
@@ -130,21 +138,29 @@ class Readings:
         """(n, 3, 3) orientation of the platform."""
         return rotation_matrices(self.angles)
 
+    @property
+    def day(self) -> FloatArray | None:
+        """(n,) days since the first of the dates; nan where a reading has none. None where no reading has."""
+        if self.date is None or not self.date.any():
+            return None
+        days = np.array([day_of(text) for text in self.date.tolist()])
+        return np.asarray(days - np.nanmin(days))
+
     @cached_property
-    def poses(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def poses(self) -> tuple[IntArray, IntArray]:
         """(p,) a row of each distinct pose with its tool, and (n,) which of them each reading was taken at."""
         columns = np.concatenate([self.position, self.angles, self.tool_extension[:, None]], axis=1)
         _, first, which = np.unique(columns, axis=0, return_index=True, return_inverse=True)
         return first, which.reshape(-1)
 
-    def select(self, rows: NDArray[Any]) -> Readings:
+    def select(self, rows: AnyArray) -> Readings:
         """Some of the rows, by mask or index."""
         chosen = {
             f.name: getattr(self, f.name)[rows] for f in fields(self) if isinstance(getattr(self, f.name), np.ndarray)
         }
         extra = {name: values[rows] for name, values in self.extra.items()}
-        beside = None if self.beside is None else self.beside.select(rows)
-        return replace(self, **chosen, extra=extra, beside=beside if beside and beside.beside.any() else None)
+        beside = self.beside.select(rows) if self.beside is not None and self.beside.beside[rows].any() else None
+        return replace(self, **chosen, extra=extra, beside=beside)
 
     def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
         """Effects that these data cannot test -> the columns that they lack."""
@@ -186,27 +202,22 @@ def read_measurements(
     errors: list[InputError] = []
     for name in names:
         try:
-            of_file, remarks = _rows(name, planned, columns)
+            table = _table_1() if name == NIST_TABLE_1 else mapped_table(name, "measurements", COLUMNS, columns)
+            of_file, remarks = read_rows(table, planned)
             rows += of_file
             notes += remarks
         except InputErrors as bad:  # those of all files are reported together
             errors += bad.errors
-    errors = errors or duplicates(rows, across_files=True)
+    errors = errors or duplicates(rows)
     if errors:
         raise InputErrors(errors)
     data = _columns(rows, notes, machine)
-    places = list(zip(data.file.tolist(), data.line.tolist(), strict=True))
+    places = [(row.file, row.line) for row in rows]
     warnings = pose_warnings(machine, data.position, data.angles, data.tool_extension, places)
     return with_offsets(replace(data, warnings=warnings), machine)
 
 
-def _rows(name: str, planned: bool, columns: Mapped) -> tuple[list[Row], list[str]]:
-    if name == NIST_TABLE_1:
-        return _table_1()
-    return read_rows(mapped_table(name, "measurements", COLUMNS, columns), planned)
-
-
-def _table_1() -> tuple[list[Row], list[str]]:
+def _table_1() -> Table:
     """The paper's Table 1, printed with a row a point."""
     text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
     printed = parse_table(text, NIST_TABLE_1, Columns(POSITION))
@@ -215,9 +226,13 @@ def _table_1() -> tuple[list[Row], list[str]]:
         for line, cells in printed.rows
         for axis, measured in zip(AXES, cells[3:6], strict=True)
     )
-    heading = (*POSITION, "direction", "stiffness_N_per_mm", "setup")
-    note = f"{NIST_TABLE_1}: two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
-    return read_rows(replace(printed, heading=heading, rows=rows))[0], [note]
+    note = "two set-ups, the upper plane on a riser (the paper's Figure 6), the lower without"
+    return replace(
+        printed,
+        heading=(*POSITION, "direction", "stiffness_N_per_mm", "setup"),
+        rows=rows,
+        remarks=(note,),
+    )
 
 
 def _columns(rows: list[Row], notes: Sequence[str], machine: Hexapod) -> Readings:
@@ -229,24 +244,19 @@ def _columns(rows: list[Row], notes: Sequence[str], machine: Hexapod) -> Reading
     # A strut on a bench has no pose: it is given the machine's neutral one, which its length overrules.
     pose = np.concatenate([numbers("position"), numbers("angles")], axis=1)
     pose = np.where(np.isnan(pose[:, :1]), machine.limits.neutral_pose, pose)
-    labels: dict[str, Any] = {name: np.array([row.labels[name] for row in rows], dtype=str) for name in LABELS}
-    numeric: dict[str, Any] = {name: numbers(name) for name in ("force", "sd", "time", "temperature", "tool_extension")}
+    force, sd, time, temperature, extension = map(numbers, ("force", "sd", "time", "temperature", "tool_extension"))
+    labels = {name: np.array([row.labels[name] for row in rows], dtype=str) for name in LABELS}
+    on_tip, point = labels["loop"] == "", _points(pose, labels["point"])
     given = {
-        "force_N": ~np.isnan(numeric["force"]),
-        "sd_N_per_mm": np.array([row.of_tip and not np.isnan(row.sd) for row in rows]),
-        "time_min": ~np.isnan(numeric["time"]),
-        "tool_extension_mm": ~np.isnan(numeric["tool_extension"]),
-        "temperature_C": ~np.isnan(numeric["temperature"]),
+        "force_N": ~np.isnan(force),
+        "sd_N_per_mm": on_tip & ~np.isnan(sd),
+        "time_min": ~np.isnan(time),
+        "tool_extension_mm": ~np.isnan(extension),
+        "temperature_C": ~np.isnan(temperature),
         **{name: texts != "" for name, texts in labels.items()},
     }
-    numeric["force"] = np.where(given["force_N"], numeric["force"], defaults.FORCE)
-    numeric["tool_extension"] = np.nan_to_num(numeric["tool_extension"], nan=0.0)
-    beside = None
-    if labels["loop"].any():
-        beside = LoopColumns.of(labels["loop"].tolist(), numbers("length"), numbers("side"))
-    labels["point"] = _points(pose, labels["point"])
-    labels["clamp"] = _clampings(rows, labels["point"], labels["setup"])
-    extra, dropped = _extra_columns(rows)
+    common = set.intersection(*(set(row.extra) for row in rows))
+    dropped = sorted({name for row in rows for name in row.extra} - common)
     dates = np.array([row.date for row in rows], dtype=str)
     unknown = sum(bool(np.isnan(row.length) and np.isnan(row.position[0])) for row in rows)
     bench = f"{unknown} readings of struts alone say neither length_mm nor a pose: taken at the neutral pose"
@@ -254,12 +264,26 @@ def _columns(rows: list[Row], notes: Sequence[str], machine: Hexapod) -> Reading
         position=pose[:, :3],
         angles=pose[:, 3:],
         direction=numbers("direction"),
-        stiffness=np.where(labels["loop"] == "", numbers("stiffness"), numbers("compliance")),
-        **numeric,
-        **labels,
+        stiffness=numbers("value"),
+        force=np.where(given["force_N"], force, defaults.FORCE),
+        sd=sd,
+        tool_extension=np.nan_to_num(extension, nan=0.0),
+        time=time,
+        temperature=temperature,
+        setup=labels["setup"],
+        loop=labels["loop"],
+        repeat=labels["repeat"],
+        point=point,
+        # Numbers of clampings start anew in every file; without a number, a point in a set-up is one.
+        clamp=np.array(
+            [
+                f"{row.file}: clamp {row.labels['clamp']}" if row.labels["clamp"] else f"point {p}, set-up {s}"
+                for row, p, s in zip(rows, point, labels["setup"], strict=True)
+            ]
+        ),
         file=np.array([row.file for row in rows], dtype=str),
         line=np.array([row.line for row in rows], dtype=np.int64),
-        extra=extra,
+        extra={name: np.array([row.extra[name] for row in rows]) for name in sorted(common)},
         # Set-ups and loops may go without a name; of the other columns every reading must have its own.
         missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
         notes=(
@@ -268,9 +292,8 @@ def _columns(rows: list[Row], notes: Sequence[str], machine: Hexapod) -> Reading
             *(f"column {name} is not in every file and is not used" for name in dropped),
             *[bench] * bool(unknown),
         ),
-        beside=beside,
+        beside=None if on_tip.all() else LoopColumns.of(labels["loop"].tolist(), numbers("length")),
         date=dates if (dates != "").any() else None,
-        day=days_since_first(np.array([day_of(date) for date in dates])) if (dates != "").any() else None,
     )
 
 
@@ -285,7 +308,6 @@ def with_offsets(data: Readings, machine: Hexapod, widest: float = WIDEST) -> Re
     read, sd = np.where(rows, data.stiffness, np.nan), np.where(rows, data.sd, np.nan)
     plain = StiffnessModel(machine)
     path = measured_path(plain, data)
-    tip = exact.compliance_along(plain, path, data.direction)
     # A joint moves the way its strut does, which the plain machine's joints, being rigid, do not say.
     moving = [replace(loop, kind="strut", where="") if loop.kind == "joint" else loop for loop in loops]
     toward = loop_compliance(plain, path, data.direction, moving, data.beside.which)
@@ -293,10 +315,9 @@ def with_offsets(data: Readings, machine: Hexapod, widest: float = WIDEST) -> Re
     assumed = int((np.isnan(sd) & rows & ~np.isnan(read)).sum())
     usual = np.hypot(INDICATOR_SD / data.force, LOAD_SHARE * np.where(np.isnan(read), expected, read))
     sd = np.where(np.isnan(sd), usual, sd)
+    tip = exact.compliance_along(plain, path, data.direction)
     beside = offsets(data.beside, read, sd, expected, toward, tip, widest)
     stiffness = 1.0 / beside.joined(np.where(rows, read, 1.0))
-    # A loop's indicator is not clamped with the tip's gauge: its readings scatter each on its own.
-    alone = np.char.add("loop reading ", np.arange(len(data)).astype(str))
     note = (
         f"{assumed} readings of loops beside the tip do not say how far they scatter (sd_um): "
         f"{1e6 * INDICATOR_SD:g} um and {100 * LOAD_SHARE:g} % assumed"
@@ -306,69 +327,52 @@ def with_offsets(data: Readings, machine: Hexapod, widest: float = WIDEST) -> Re
         beside=beside,
         stiffness=np.where(rows, stiffness, data.stiffness),
         sd=np.where(rows, sd * stiffness**2, data.sd),
-        clamp=np.where(rows, alone, data.clamp),
+        # A loop's indicator is not clamped with the tip's gauge: its readings scatter each on its own.
+        clamp=np.where(rows, np.char.add("loop reading ", np.arange(len(data)).astype(str)), data.clamp),
         notes=(*data.notes, note) if assumed else data.notes,
     )
 
 
-def _extra_columns(rows: list[Row]) -> tuple[dict[str, FloatArray], list[str]]:
-    """Further numeric columns that every file has; and those that some lack."""
-    common = set.intersection(*(set(row.extra) for row in rows))
-    dropped = sorted({name for row in rows for name in row.extra} - common)
-    return {name: np.array([row.extra[name] for row in rows]) for name in sorted(common)}, dropped
-
-
-def _incomplete(given: Mapping[str, NDArray[np.bool_]]) -> list[str]:
+def _incomplete(given: Mapping[str, BoolArray]) -> list[str]:
     """Remarks about columns that some readings leave empty, and about a load that is assumed."""
     n, notes = len(given["force_N"]), []
-    if not given["force_N"].all():
-        lacking = n - int(given["force_N"].sum())
-        notes.append(f"{lacking} of {n} readings do not say at which force: {defaults.FORCE:g} N assumed")
     for name, there in given.items():
-        if name not in ("force_N", "setup", "loop") and there.any() and not there.all():
-            notes.append(f"column {name} is empty in {n - int(there.sum())} of {n} readings: treated as absent there")
+        lacking = n - int(there.sum())
+        if name == "force_N" and lacking:
+            notes.append(f"{lacking} of {n} readings do not say at which force: {defaults.FORCE:g} N assumed")
+        elif name not in ("setup", "loop") and 0 < lacking < n:
+            notes.append(f"column {name} is empty in {lacking} of {n} readings: treated as absent there")
     return notes
 
 
 def _points(poses: FloatArray, labels: TextArray) -> TextArray:
     """Labels of the points; readings without one share a label if they share the pose (to 1 um and 1e-6 rad)."""
-    names: dict[tuple[float, ...], str] = {}
-    taken = set(labels.tolist())
-    points = []
-    for pose, label in zip((np.round(poses, 6) + 0.0).tolist(), labels, strict=True):
-        key = tuple(pose)
-        if not label and key not in names:
-            names[key] = next(name for n in count(len(names) + 1) if (name := f"P{n}") not in taken)
-            taken.add(names[key])
-        points.append(label or names[key])
-    return np.array(points, dtype=str)
+    keys, taken = [*map(tuple, (np.round(poses, 6) + 0.0).tolist())], set(labels.tolist())
+    unnamed = dict.fromkeys(key for key, label in zip(keys, labels, strict=True) if not label)
+    names = dict(zip(unnamed, (name for n in count(1) if (name := f"P{n}") not in taken), strict=False))
+    return np.array([label or names[key] for key, label in zip(keys, labels, strict=True)], dtype=str)
 
 
-def _clampings(rows: list[Row], point: TextArray, setup: TextArray) -> TextArray:
-    """Labels of the clampings. Numbers start anew in every file; without a number, a point in a set-up is one."""
-    numbered = [f"{row.file}: clamp {row.labels['clamp']}" if row.labels["clamp"] else "" for row in rows]
-    named = [f"point {p}, set-up {s}" for p, s in zip(point, setup, strict=True)]
-    return np.array([number or name for number, name in zip(numbered, named, strict=True)], dtype=str)
-
-
-def reading_columns(data: Readings) -> dict[str, NDArray[Any]]:
+def reading_columns(data: Readings) -> dict[str, AnyArray]:
     """Column -> values of a table of the readings, in the shop's units; those that no file has are left out."""
-    pose = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles)], axis=1)
-    columns: dict[str, NDArray[Any]] = {"file": data.file, "line": data.line, "point": data.point}
-    columns |= {name: pose[:, i] for i, name in enumerate(("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"))}
-    columns |= {f"d{axis}": data.direction[:, i] for i, axis in enumerate("xyz")}
+    pose = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles), data.direction], axis=1)
     with np.errstate(divide="ignore"):
         shown = data.stiffness if data.beside is None else 1.0 / data.compliance
-    columns |= {"stiffness_N_per_mm": n_per_mm_from_n_per_m(shown), "force_N": data.force}
-    others = {
+    columns = {
+        "file": data.file,
+        "line": data.line,
+        "point": data.point,
+        **{name: pose[:, i] for i, name in enumerate((*POSITION, *ANGLES, *VECTOR))},
+        "stiffness_N_per_mm": n_per_mm_from_n_per_m(shown),
+        "force_N": data.force,
+        **({} if data.day is None else {"date": data.date, "day": data.day}),
         "sd_N_per_mm": n_per_mm_from_n_per_m(data.sd),
         "tool_extension_mm": mm_from_m(data.tool_extension),
         "time_min": min_from_s(data.time),
         "temperature_C": data.temperature,
         **{name: getattr(data, name) for name in ("setup", "clamp", "repeat", "loop")},
     }
-    columns |= {} if data.date is None or data.day is None else {"date": data.date, "day": data.day}
-    return columns | {name: values for name, values in others.items() if name not in data.missing}
+    return {name: values for name, values in columns.items() if name == "force_N" or name not in data.missing}
 
 
 MARK = 10  # hexadecimal digits of a reading's mark: among 5,000 readings two differ in it but for one time in 90,000
@@ -399,21 +403,16 @@ def measured_path(model: StiffnessModel, data: Readings) -> LoadPath:
     A pose is solved once, however often it was measured.
     """
     first, which = data.poses
-    length = data.tool_extension + model.machine.reference_tool_length
-    path = load_path(model, data.position[first], data.rotation[first], length[first]).take(which)
-    if data.beside is not None:
-        path = replace(path, struts=data.beside.on_lengths(path.struts))
-
-    def unless_missing(name: str, values: Any) -> Any:
-        return None if name in data.missing else values
-
+    length = data.tool_extension[first] + model.machine.reference_tool_length
+    path = load_path(model, data.position[first], data.rotation[first], length).take(which)
     return replace(
         path,
+        struts=path.struts if data.beside is None else data.beside.on_lengths(path.struts),
         force=data.force,
         direction=data.direction,
-        setup=unless_missing("setup", data.setup),
-        time=unless_missing("time_min", data.time),
-        temperature=unless_missing("temperature_C", data.temperature),
+        setup=None if "setup" in data.missing else data.setup,
+        time=None if "time_min" in data.missing else data.time,
+        temperature=None if "temperature_C" in data.missing else data.temperature,
     )
 
 

@@ -13,15 +13,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.documents import to_dict
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.readings.history import StrutHistory
-from toolpath_stiff.readings.loop_figures import LoopFigures, in_tension, reduce_loops
+from toolpath_stiff.readings.loop_figures import LoopFigures, in_tension, reduce_loop
 from toolpath_stiff.readings.mapping import mapped_table
-from toolpath_stiff.readings.raw_history import remarks, struts_over_dates
-from toolpath_stiff.readings.raw_records import COLUMNS, Loop, read_raw
-from toolpath_stiff.readings.raw_rows import loop_entry, measurement_csv
-from toolpath_stiff.readings.strut_tables import is_strut_table, read_strut_table
+from toolpath_stiff.readings.raw_records import COLUMNS, STIFFNESS, read_raw
+from toolpath_stiff.readings.raw_rows import loop_entry, measurement_csv, remarks, struts_over_dates
+from toolpath_stiff.readings.strut_tables import read_strut_table
 from toolpath_stiff.results import Result, frame_of
 
 if TYPE_CHECKING:
@@ -77,11 +76,6 @@ class Reduction(Result):
     notes: list[str]
     read_as: tuple[str, ...]
     history: StrutHistory
-
-    @property
-    def loops(self) -> tuple[Loop, ...]:
-        """Records in SI."""
-        return tuple(figures.loop for figures in self.figures)
 
     @property
     def recorded(self) -> list[LoopFigures]:
@@ -152,22 +146,30 @@ def reduce(*raw: str | Path, columns: Mapped = None, compression_positive: bool 
     figures: list[LoopFigures] = []
     notes: list[str] = []
     read_as: list[str] = []
+    errors: list[InputError] = []
     for file in (file for name in raw for file in _files(str(name))):
         table = mapped_table(file, "raw records", COLUMNS, columns)
-        if is_strut_table(table):
+        if STIFFNESS[0] in table.heading and "displacement_um" not in table.heading:
             reduced, remarked = read_strut_table(table)
+            figures += reduced
             kind = "stiffnesses of struts"
         else:
             loops, remarked = read_raw(table)
-            reduced = reduce_loops([in_tension(loop) for loop in loops] if compression_positive else loops)
-            kind = f"records of {len(reduced)} loops"
-        figures += reduced
+            for loop in loops:
+                try:
+                    figures.append(reduce_loop(in_tension(loop) if compression_positive else loop))
+                except InputError as error:
+                    errors.append(error)
+            kind = f"records of {len(loops)} loops"
         notes += [*table.notes, *remarked]
         known = [name for name in table.heading if name in (*COLUMNS.numbers, *COLUMNS.texts)]
         read_as.append(f"{file}: {kind} from {', '.join(known)}")
+    if errors:
+        raise InputErrors(errors)
     over_time = struts_over_dates(figures)
-    notes += remarks(figures, over_time)
-    return Reduction(tuple(map(str, raw)), tuple(figures), notes, tuple(read_as), over_time)
+    return Reduction(
+        tuple(map(str, raw)), tuple(figures), [*notes, *remarks(figures, over_time)], tuple(read_as), over_time
+    )
 
 
 def _files(name: str) -> list[str]:
@@ -175,7 +177,7 @@ def _files(name: str) -> list[str]:
     if not Path(name).is_dir():
         return [name]
     paths = sorted(p for p in Path(name).rglob("*") if p.suffix.lower() in READ and not p.name.startswith((".", "~")))
-    files = [str(path) for path in paths if path.is_file() and not path.name.endswith(OWN_OUTPUT)]
+    files = [str(path) for path in paths if not path.name.endswith(OWN_OUTPUT)]
     if not files:
         raise InputError("a folder without records", expected=f"files {', '.join(READ)}", file=name)
     return files

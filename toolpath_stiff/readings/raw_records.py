@@ -138,20 +138,21 @@ def read_raw(table: Table) -> tuple[list[Loop], list[str]]:
     parsed, errors = parsed_rows(table, _record)
     if errors:
         raise InputErrors(errors)
-    records = [record for record in parsed if record[2]]
-    if not records:
+    groups: dict[tuple[str, ...], list[Record]] = {}
+    lost = []
+    for line, cells, values in parsed:
+        key = (*(cells.get(name, "") for name in PLACE if name != DATE), cells.get(DATE, "")[:DAY])
+        if values:
+            groups.setdefault(key, []).append((line, cells, values))
+        else:
+            lost.append(line)
+    if not groups:
         fault = "no records below the heading with a force and a displacement"
         raise MeasurementError(fault, file=table.file, line=table.heading_line)
-    lost = [line for line, _, values in parsed if not values]
     notes = unused(table, (*PLACE, *READINGS, *CONDITIONS, "strut"))
     if lost:
         fault = f"{len(lost)} records without force or displacement are passed over, from line {lost[0]}"
         notes.append(f"{table.file}: {fault}")
-    groups: dict[tuple[str, ...], list[Record]] = {}
-    for record in records:
-        cells = record[1]
-        key = (*(cells.get(name, "") for name in PLACE if name != DATE), cells.get(DATE, "")[:DAY])
-        groups.setdefault(key, []).append(record)
     loops = [_loop(part, table.file) for group in groups.values() for part in _by_time(group)]
     return sorted(loops, key=lambda loop: loop.line), notes
 
@@ -178,11 +179,9 @@ def _record(line: int, record: dict[str, str]) -> Record:
         return line, record, []
     on_bench = strut_or_loop(record).kind == "alone" and not record.get("jog_um")
     check_place(record)
-    names = (*POSITION, *(angle for angle in ANGLES if angle in record))
-    if not on_bench or any(record.get(name) for name in names):
-        for name in names:
-            number(record, name)
     if not on_bench:
+        for name in (*POSITION, *(angle for angle in ANGLES if angle in record)):
+            number(record, name)
         direction_of(record)
     values = [math.nan if on_bench and name == "jog_um" else number(record, name, LARGEST) for name in READINGS]
     return line, record, values + [optional_number(record, name) for name in CONDITIONS]
@@ -191,7 +190,7 @@ def _record(line: int, record: dict[str, str]) -> Record:
 def check_place(record: Mapping[str, str]) -> None:
     """Raise `InputError` for a date or a length that is none."""
     day_of(record.get(DATE, ""))
-    if DATE in record and not record[DATE]:
+    if record.get(DATE) == "":
         raise MeasurementError("no date", expected="one in every row")
     for name in ("tool_extension_mm", "length_mm"):
         optional_number(record, name)
@@ -213,8 +212,8 @@ def strut_or_loop(record: dict[str, str]) -> MeasuringLoop:
 def _by_time(records: list[Record]) -> list[list[Record]]:
     """Records of one day by their date-times, if these are of whole loops; a logger's clock that runs on is not."""
     times: dict[str, list[Record]] = {}
-    for record in records:
-        times.setdefault(record[1].get(DATE, ""), []).append(record)
+    for line, cells, values in records:
+        times.setdefault(cells.get(DATE, ""), []).append((line, cells, values))
     return list(times.values()) if min(map(len, times.values())) >= SHARED else [records]
 
 

@@ -1,24 +1,74 @@
-"""Reduced loops as they are written: entries of a document, rows of a measurement file."""
+"""Reduced loops as they are written: entries of a document, rows of a measurement file, struts over their dates."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from toolpath_stiff.column_files import csv_text
-from toolpath_stiff.readings.history import StrutHistory
+from toolpath_stiff.readings.dates import day_of
+from toolpath_stiff.readings.history import StrutHistory, history
 from toolpath_stiff.readings.loop_figures import LoopFigures
-from toolpath_stiff.readings.raw_history import BEYOND, sided
 from toolpath_stiff.readings.raw_records import CONDITIONS, PLACE
+from toolpath_stiff.readings.strut_series import SURE, StrutReadings
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
 
+def struts_over_dates(figures: Sequence[LoopFigures]) -> StrutHistory:
+    """Struts measured alone over their dates; those of several lengths by length, as a strut's stiffness varies."""
+    alone = [record for record in figures if record.loop.jog is None]
+    kinds: dict[str, set[tuple[str, float]]] = {}
+    for record in alone:
+        kinds.setdefault(record.loop.strut, set()).add((record.loop.place.get("length_mm", ""), record.loop.side))
+
+    def name(record: LoopFigures) -> str:
+        strut, length = record.loop.strut, record.loop.place.get("length_mm")
+        parts = [strut, f"{length} mm" if length and len({kind[0] for kind in kinds[strut]}) > 1 else ""]
+        # A record of one side alone is not held against those of both.
+        if record.loop.side and 0.0 in {kind[1] for kind in kinds[strut]}:
+            parts.append("in tension alone" if record.loop.side > 0.0 else "in compression alone")
+        return ", ".join(filter(None, parts))
+
+    def readings(rows: list[tuple[LoopFigures, float, float]]) -> StrutReadings:
+        return StrutReadings(
+            np.array([name(record) for record, _, _ in rows], dtype=str),
+            np.array([day_of(record.loop.date) for record, _, _ in rows]),
+            np.log([stiffness for _, stiffness, _ in rows]),
+            np.array([side for _, _, side in rows]),
+        )
+
+    secants = [(record, record.stiffness, record.side) for record in alone]
+    slopes = [(record, k, side) for record in alone for k, side in ((record.tension, 1.0), (record.compression, -1.0))]
+    slopes = [row for row in slopes if math.isfinite(row[1])]
+    return history(readings(secants), readings(slopes or secants))
+
+
+def _sided(figures: Sequence[LoopFigures], over_time: StrutHistory) -> set[str]:
+    """Struts that differ in tension and compression and whose loops all say so: rows of both would not be alike."""
+    lacking = {record.loop.strut for record in figures if math.isnan(record.tension)}
+    return {strut.strut for strut in over_time.struts if strut.sides is not None and strut.sides.p < SURE} - lacking
+
+
+def remarks(figures: Sequence[LoopFigures], over_time: StrutHistory) -> Iterator[str]:
+    """What stands in a measurement file in place of a secant, and which of its rows are outdated."""
+    both = sorted(_sided(figures, over_time))
+    if both:
+        yield f"tension and compression differ: a row of each side for {', '.join(both)}"
+    for strut in over_time.struts:
+        if strut.changes:
+            yield (
+                f"{strut.strut} changed: leave out its rows before {strut.changes[-1].before} for diagnose and "
+                "update, which take all dates as one"
+            )
+
+
 def loop_entry(figures: LoopFigures) -> dict[str, str | int | float | None]:
-    """A loop in the shop's units; what it cannot say is None. `slope_N_per_mm`: beyond the lost motion."""
+    """A loop in the shop's units; what it cannot say is None."""
     numbers = {
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(figures.stiffness),
         "force_N": figures.force,
         "deflection_um": um_from_m(figures.deflection),
-        "slope_N_per_mm": n_per_mm_from_n_per_m(figures.beyond if figures.plays else math.nan),
         "tension_N_per_mm": n_per_mm_from_n_per_m(figures.tension),
         "compression_N_per_mm": n_per_mm_from_n_per_m(figures.compression),
         **_further(figures),
@@ -42,29 +92,32 @@ def measurement_csv(reduced: Sequence[LoopFigures], over_time: StrutHistory) -> 
 
     A figure that some loop lacks is left out as a column.
     """
-    both_sides = sided(reduced, over_time)
-    beyond = {strut.strut for strut in over_time.struts if strut.judged_on == BEYOND}
+    both_sides = _sided(reduced, over_time)
     figures: list[LoopFigures] = []
     for record in reduced:
         if record.loop.strut in both_sides:
             figures.append(replace(record, stiffness=record.tension, force=float(record.loop.force.max())))
             figures.append(replace(record, stiffness=record.compression, force=float(record.loop.force.min())))
         else:
-            plays = record.plays and record.loop.strut in beyond
-            figures.append(replace(record, stiffness=record.beyond if plays else record.stiffness))
+            figures.append(record)
     loops = [record.loop for record in figures]
     place = [name for name in PLACE if any(loop.place.get(name) for loop in loops)]
-    # The force of a strut measured alone is along it, else at the tool tip.
-    forces = sorted({"strut_force_N" if loop.jog is None else "force_N" for loop in loops})
+    forces = sorted({_force_column(record) for record in figures})
     conditions = [name for name in CONDITIONS if all(name in loop.conditions for loop in loops)]
     further = [name for name in _further(figures[0]) if all(math.isfinite(_further(r)[name]) for r in figures)]
-    rows = []
-    for record in figures:
-        own = "strut_force_N" if record.loop.jog is None else "force_N"
-        force = f"{record.force:.2f}" if math.isfinite(record.force) else ""
-        cells = [record.loop.place.get(name, "") for name in place]
-        cells += [f"{n_per_mm_from_n_per_m(record.stiffness):.1f}"]
-        cells += [force if name == own else "" for name in forces]
-        cells += [f"{record.loop.conditions[name]:.6g}" for name in conditions]
-        rows.append([*cells, *(f"{_further(record)[name] + 0.0:.3f}" for name in further)])
+    rows = [
+        [
+            *(record.loop.place.get(name, "") for name in place),
+            f"{n_per_mm_from_n_per_m(record.stiffness):.1f}",
+            *(f"{record.force:.2f}".replace("nan", "") if name == _force_column(record) else "" for name in forces),
+            *(f"{record.loop.conditions[name]:.6g}" for name in conditions),
+            *(f"{_further(record)[name] + 0.0:.3f}" for name in further),
+        ]
+        for record in figures
+    ]
     return csv_text([*place, "stiffness_N_per_mm", *forces, *conditions, *further], rows)
+
+
+def _force_column(figures: LoopFigures) -> str:
+    """The force of a strut measured alone is along it, else at the tool tip."""
+    return "strut_force_N" if figures.loop.jog is None else "force_N"

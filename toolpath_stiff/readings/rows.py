@@ -79,10 +79,8 @@ class Row:
         Further numeric columns, as they stand.
     date
         As in the file; a date of ISO 8601.
-    stiffness
-        N/m, of a reading of the tip.
-    compliance
-        m/N per load, of a loop beside the tip.
+    value
+        N/m of a reading of the tip; m/N per load of a loop beside it. nan where a plan leaves it empty.
     length, side
         m of a strut measured alone; 1, or -1 under compression.
     """
@@ -100,15 +98,9 @@ class Row:
     line: int
     extra: Mapping[str, float]
     date: str
-    stiffness: float = math.nan
-    compliance: float = math.nan
+    value: float = math.nan
     length: float = math.nan
     side: float = 1.0
-
-    @property
-    def of_tip(self) -> bool:
-        """Whether the indicator read between tool and work."""
-        return not self.labels["loop"]
 
 
 def read_rows(table: Table, planned: bool = False) -> tuple[list[Row], list[str]]:
@@ -179,10 +171,9 @@ def _all_numbers(table: Table, column: int) -> bool:
 def _row(record: Mapping[str, str], further: Sequence[str], file: str, line: int, planned: bool) -> Row:
     loop = loop_of(record.get("loop", ""))
     day_of(record.get(DATE, ""))  # refuses what is no date
-    # A strut on a bench has no pose.
+    # A strut on a bench has neither pose nor direction.
     poseless = loop.kind == "alone" and not any(record.get(name) for name in (*POSITION, *ANGLES))
-    on_bench = poseless or (loop.kind == "alone" and bool(record.get("length_mm")))
-    undirected = on_bench and not record.get("direction", "Z" if VECTOR[0] in record else "")
+    undirected = loop.kind == "alone" and not (record.get("direction") or VECTOR[0] in record)
     row = Row(
         position=(math.nan,) * 3 if poseless else tuple(m_from_mm(number(record, name)) for name in POSITION),
         angles=(math.nan,) * 3 if poseless else tuple(_angle(record, name) for name in ANGLES),
@@ -200,7 +191,7 @@ def _row(record: Mapping[str, str], further: Sequence[str], file: str, line: int
     )
     if loop != TIP:
         return _beside_tip(row, record, loop, planned)
-    return replace(row, stiffness=n_per_m_from_n_per_mm(_stiffness(record, row.force, planned)))
+    return replace(row, value=n_per_m_from_n_per_mm(_stiffness(record, row.force, planned)))
 
 
 def _angle(record: Mapping[str, str], name: str) -> float:
@@ -225,25 +216,30 @@ def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planne
     force = own_force if alone and not math.isnan(own_force) else row.force
     if abs(force) < LEAST_FORCE:
         raise MeasurementError(f"strut_force_N = {force:g}", expected="a force: tension positive, compression negative")
-    stiffness, moved = (
-        number(record, name, bounds) if record.get(name) else math.nan for name, bounds in LOOP_BOUNDS.items()
-    )
-    empty = math.isnan(moved) and math.isnan(stiffness)
-    one_alone = math.isnan(moved) != math.isnan(stiffness) and stiffness != 0.0
-    if not (one_alone or (planned and empty)) or (math.isnan(force) and not math.isnan(moved)):
+    given = [name for name in LOOP_BOUNDS if record.get(name)]
+    values = [number(record, name, LOOP_BOUNDS[name]) for name in given]
+    lacking = math.isnan(force) if given == ["displacement_um"] else given != ["stiffness_N_per_mm"] or not values[0]
+    if lacking and not (planned and not given):
         raise MeasurementError(
             f"loop {loop}: no reading", expected="displacement_um with force_N, or else stiffness_N_per_mm, not 0"
         )
-    compliance = m_from_um(moved) / force if math.isnan(stiffness) else 1e-3 / stiffness
+    compliance = math.nan
+    if given:
+        compliance = m_from_um(values[0]) / force if given == ["displacement_um"] else 1e-3 / values[0]
     # A sign of the direction turns what does not read along the load.
     if record.get("direction", "").startswith("-") and not (loop.along_load or alone):
         compliance = -compliance
     if alone and not (planned or 1e-3 / STIFFEST <= compliance <= 1e-3 / SOFTEST):
         expected = f"{1e6 / STIFFEST:g} to {1e6 / SOFTEST:g} nm/N; longer under tension is positive"
         raise MeasurementError(f"loop {loop}: {1e9 * compliance:.4g} nm/N", expected=expected)
-    sd = m_from_um(sd) / abs(force)
-    side = math.copysign(1.0, force)
-    return replace(row, force=abs(force), sd=sd, compliance=compliance, length=m_from_mm(length), side=side)
+    return replace(
+        row,
+        force=abs(force),
+        sd=m_from_um(sd) / abs(force),
+        value=compliance,
+        length=m_from_mm(length),
+        side=math.copysign(1.0, force),
+    )
 
 
 def _stiffness(record: Mapping[str, str], force: float, planned: bool) -> float:
@@ -299,17 +295,19 @@ def optional_number(record: Mapping[str, str], name: str) -> float:
     return number(record, name) if record.get(name) else math.nan
 
 
-def duplicates(rows: list[Row], across_files: bool = False) -> list[InputError]:
+def duplicates(rows: list[Row]) -> list[InputError]:
     """Rows that say the same as an earlier one: all cells alike or, within a file, one repeat number twice."""
-    first: dict[tuple[str, ...], Row] = {}
+    first: dict[str, Row] = {}
     errors: list[InputError] = []
     for row in rows:
-        # repr: nan differs from itself, its text does not.
         cells = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels, row.date,
-                 row.compliance, row.length, row.side, None if row.of_tip else row.sd)  # fmt: skip
-        numbered = bool(row.labels["repeat"]) and not across_files
-        earlier = first.setdefault(tuple(map(repr, cells if numbered else (*cells, row.stiffness))), row)
-        if earlier is not row:
+                 row.length, row.side)  # fmt: skip
+        loop = (row.value, row.sd) if row.labels["loop"] else ()
+        # repr: nan differs from itself, its text does not.
+        keys = [repr((cells, loop, row.value)), *([repr((cells, loop, row.file))] if row.labels["repeat"] else [])]
+        earlier = next((first[key] for key in keys if key in first), None)
+        first |= {key: row for key in keys if key not in first}
+        if earlier is not None:
             place = f" of {earlier.file}" if earlier.file != row.file else ""
             errors.append(
                 MeasurementError(

@@ -16,55 +16,28 @@ dates it is assumed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray, TextArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
 from toolpath_stiff.readings.dates import date_text
 
-Kind = Literal["step", "drift", "step or drift"]
-
-
 SURE = 0.05  # probability, all struts and places counted, below which a change is told of
-
-
+LEAST_TOLD = 1e-4  # probability: further digits than simulations have would say nothing
 DRAWS = 2000  # simulated sets of series
-
-
 FEWEST_DIFFERENCES = 6  # that are left of all struts, from which the scatter is estimated
-
-
 TRIMMED = 0.2  # of a strut's differences, at least one
-
-
 MOUNTING = 0.02  # relative sd from date to date where the data cannot say; assumed: mounting, load cell, indicator
-
-
 RESOLUTION = 1e-4  # relative; no scatter is believed to be less: rounding of the readings; assumed
-
-
 SIZE = 0.1  # prior sd of a change of ln stiffness; assumed, for step and drift alike
-
-
-DECISIVE = 20.0  # ratio of marginal likelihoods, Kass and Raftery's "strong"
-
-
+DECISIVE = math.log(20.0)  # log ratio of marginal likelihoods, Kass and Raftery's "strong"
 A_SIDE = 2  # dates on either side of a step, from `SHORT` dates up
-
-
 SHORT = 4
-
-
 WILD = 4.0  # standard deviations from the median of the others, of one date that alone makes a change
-
-
 CREDIBLE = 0.95
-
-
 DAYS_PER_YEAR = 365.25  # Julian year
 
 
@@ -82,81 +55,96 @@ class StrutReadings:
         (n,) ln(N/m), at one length or reduced to one.
     side
         (n,) 1 of tension, -1 of compression, 0 of both or unknown.
-    dates
-        Day -> its text, where that is less than a day: a year or a month.
     """
 
     strut: TextArray
     day: FloatArray
     log_stiffness: FloatArray
     side: FloatArray
-    dates: Mapping[float, str] = field(default_factory=dict)
 
-    def text(self, day: float) -> str:
-        """A date as it was given."""
-        return self.dates.get(float(day)) or date_text(day)
+    def select(self, rows: BoolArray) -> StrutReadings:
+        """Some of them."""
+        return StrutReadings(self.strut[rows], self.day[rows], self.log_stiffness[rows], self.side[rows])
+
+    def by_strut(self) -> dict[str, StrutReadings]:
+        """Those of each strut."""
+        return {name: self.select(self.strut == name) for name in sorted(set(self.strut.tolist()))}
+
+    @cached_property
+    def dates(self) -> FloatArray:
+        """(dates,) days on which there are readings, rising."""
+        return np.unique(np.floor(self.day[np.isfinite(self.day)]))
+
+    @cached_property
+    def of_dates(self) -> list[FloatArray]:
+        """Ln stiffness of each date's readings."""
+        return [self.log_stiffness[np.floor(self.day) == date] for date in self.dates]
+
+    @cached_property
+    def means(self) -> FloatArray:
+        """(dates,) of ln stiffness."""
+        return np.array([logs.mean() for logs in self.of_dates])
+
+    def sides_apart(self) -> FloatArray:
+        """(dates,) ln stiffness in tension less that in compression, of each date with both; undated ones are one."""
+        day = np.nan_to_num(np.floor(self.day), nan=-np.inf)
+        sides = [[self.log_stiffness[(day == d) & (self.side * s > 0)] for s in (1, -1)] for d in np.unique(day)]
+        return np.array([pulled.mean() - pushed.mean() for pulled, pushed in sides if len(pulled) and len(pushed)])
 
 
 @dataclass(frozen=True)
-class Series:
-    """Means (n,) of ln stiffness on n dates, how many readings each holds, and these about their means."""
+class StrutChange:
+    """A change of a strut: "step", "drift" or "step or drift"; a step lies between the dates (95 %)."""
 
-    name: str
-    day: FloatArray
-    mean: FloatArray
-    count: NDArray[np.int64]
-    about: FloatArray
+    kind: str
+    after: str
+    before: str
+    change_percent: float
+    low_percent: float
+    high_percent: float
+    from_N_per_mm: float
+    to_N_per_mm: float
+    p: float
+    text: str
 
     @classmethod
-    def of(cls, name: str, day: FloatArray, ln: FloatArray) -> Series:
-        """A series of the dated readings; of undated ones alone, without dates."""
-        dates, which = np.unique(day[np.isfinite(day)], return_inverse=True)
-        dated = ln[np.isfinite(day)]
-        count = np.bincount(which, minlength=len(dates))
-        mean = np.bincount(which, dated, len(dates)) / np.maximum(count, 1)
-        return cls(name, dates, mean, count, dated - mean[which])
-
-    def slope(self, sd: float) -> tuple[float, float]:
-        """Of ln stiffness, a year, with its sd."""
-        return _slope(self.day, self.mean, sd)
-
-
-class Change(NamedTuple):
-    """A change of ln stiffness: its kind, the days between which it lies, from and to what, the sd of the difference.
-
-    `p` is its probability in mere noise; `slope` that of a drift, a year.
-    """
-
-    kind: Kind
-    days: tuple[float, float]
-    ends: tuple[float, float]
-    sd: float
-    p: float
-    slope: float | None = None
+    def of(
+        cls, kind: str, days: Sequence[float], ends: Sequence[float], sd: float, p: float, slope: float = 0.0
+    ) -> StrutChange:
+        """From ln stiffness at both ends, the sd of their difference; `slope` of ln stiffness, a year."""
+        size = ends[1] - ends[0]
+        share, low, high = (100.0 * math.expm1(ln) for ln in (size, size - 1.96 * sd, size + 1.96 * sd))
+        (after, before), (first, last) = map(date_text, days), map(n_per_mm, ends)
+        way = "softer" if share < 0.0 else "stiffer"
+        if kind == "drift":
+            words = f"grew {way} by {abs(100.0 * math.expm1(slope)):.2g} % a year from {after} to {before}"
+        else:
+            words = f"became {abs(share):.2g} % {way} between {after} and {before}"
+            words += " (95 %)" if kind == "step" else "; at once or slowly is not told"
+        words += f": {first:,.0f} to {last:,.0f} N/mm ({chance_text(p)})"
+        return cls(kind, after, before, share, low, high, first, last, p, words)
 
 
-def chance_of_t(ratio: float, freedom: float) -> float:
-    """Probability that Student's |t| is so large by chance."""
-    from scipy.special import stdtr
-
-    return 2.0 * float(stdtr(freedom, -ratio))
+def n_per_mm(ln: float) -> float:
+    """N/mm of a ln(N/m)."""
+    return 1e-3 * float(np.exp(ln))
 
 
-def series_of(readings: StrutReadings) -> list[Series]:
+def chance_text(p: float) -> str:
+    """A probability in words."""
+    return f"p = {p:.2g}" if p >= LEAST_TOLD else f"p < {LEAST_TOLD:g}"
+
+
+def series_of(readings: StrutReadings) -> dict[str, StrutReadings]:
     """One a strut; where tension and compression never share a date, one a side."""
-    series = []
-    for name in sorted(set(readings.strut.tolist())):
-        rows = readings.strut == name
-        day, ln, side = np.floor(readings.day[rows]), readings.log_stiffness[rows].copy(), readings.side[rows]
-        groups = {"": np.ones(len(day), dtype=bool)}
-        if (side > 0.0).any() and (side < 0.0).any():
-            both = [d for d in np.unique(day) if {1.0, -1.0} <= set(side[day == d].tolist())]
-            if both:
-                apart = [ln[(day == d) & (side > 0)].mean() - ln[(day == d) & (side < 0)].mean() for d in both]
-                ln -= 0.5 * side * float(np.mean(apart))
-            elif np.isfinite(day).any():
-                groups = {" in tension": side >= 0.0, " in compression": side < 0.0}
-        series += [Series.of(f"{name}{title}", day[chosen], ln[chosen]) for title, chosen in groups.items()]
+    series = {}
+    for name, strut in readings.by_strut().items():
+        apart, pulled, pushed = strut.sides_apart(), strut.side > 0.0, strut.side < 0.0
+        if len(apart) or not (pulled.any() and pushed.any() and len(strut.dates)):
+            mean = 0.5 * strut.side * float(apart.mean()) if len(apart) else 0.0
+            series[name] = replace(strut, log_stiffness=strut.log_stiffness - mean)
+        else:
+            series |= {f"{name} in tension": strut.select(~pushed), f"{name} in compression": strut.select(pushed)}
     return series
 
 
@@ -177,34 +165,35 @@ class DateScatter:
     largest: FloatArray
 
     @classmethod
-    def of(cls, series: Sequence[Series], seed: int) -> DateScatter:
+    def of(cls, series: Sequence[StrutReadings], seed: int) -> DateScatter:
         """Of all series together, each with two dates or more."""
         if not series:
             return cls(MOUNTING, "", np.zeros(1))
         rng = np.random.default_rng(seed)
         peak, squares, kept = np.zeros(DRAWS), np.zeros(DRAWS), 0
         for strut in series:
-            noise = rng.standard_normal((DRAWS, len(strut.day)))
-            peak = np.maximum(peak, np.abs(noise @ _contrasts(strut.day)).max(axis=1))
+            noise = rng.standard_normal((DRAWS, len(strut.dates)))
+            peak = np.maximum(peak, np.abs(noise @ _contrasts(strut.dates)).max(axis=1))
             left = _trimmed(np.diff(noise, axis=1))
             squares, kept = squares + left.sum(axis=1), kept + left.shape[1]
         # Of one reading within its date; 0 without repeats.
-        freedom = sum(int((strut.count - 1).sum()) for strut in series)
-        repeat = (sum(float((strut.about**2).sum()) for strut in series) / freedom) ** 0.5 if freedom else 0.0
-        of_mean = repeat / np.sqrt(np.mean(np.concatenate([strut.count for strut in series])))
+        of_dates = [logs for strut in series for logs in strut.of_dates]
+        repeat = sum(float(logs.var()) * len(logs) for logs in of_dates)
+        freedom = max(sum(len(logs) - 1 for logs in of_dates), 1)
+        of_mean = (repeat / freedom) ** 0.5 / np.mean([len(logs) for logs in of_dates]) ** 0.5
         if kept < FEWEST_DIFFERENCES:
             sd = float(np.hypot(MOUNTING, of_mean))
             return cls(sd, f"{100 * MOUNTING:g} % from date to date assumed: too few dates to tell", np.sort(peak))
         scale = np.sqrt(squares / kept)
         usual = float(np.median(scale))  # what leaving out the largest makes of a sd of 1
-        measured = sum(float(_trimmed(np.diff(strut.mean)).sum()) for strut in series)
+        measured = sum(float(_trimmed(np.diff(strut.means)).sum()) for strut in series)
         sd = max(np.sqrt(measured / kept) / usual, of_mean, RESOLUTION)
         return cls(float(sd), "differences of successive dates", np.sort(peak / scale * usual))
 
-    def probability(self, ratio: float) -> float:
-        """That mere noise shows so large a |t| somewhere (Davison and Hinkley 1997, 4.2.3)."""
-        above = len(self.largest) - int(np.searchsorted(self.largest, ratio))
-        return (1 + above) / (1 + len(self.largest))
+    def probability(self, day: FloatArray, ln: FloatArray) -> float:
+        """That mere noise shows as large a |t| somewhere as this series (Davison and Hinkley 1997, 4.2.3)."""
+        ratio = float(np.abs(ln @ _contrasts(day)).max() / self.sd)
+        return (1 + len(self.largest) - int(np.searchsorted(self.largest, ratio))) / (1 + len(self.largest))
 
     def smallest_step(self, dates: int) -> float:
         """Step of ln stiffness halfway through so many dates that would be told of."""
@@ -212,44 +201,40 @@ class DateScatter:
         return limit * self.sd * math.sqrt(1.0 / (dates // 2) + 1.0 / (dates - dates // 2))
 
 
-def changes_of(day: FloatArray, ln: FloatArray, scatter: DateScatter) -> tuple[list[Change], list[float]]:
+def changes_of(day: FloatArray, ln: FloatArray, scatter: DateScatter) -> tuple[list[StrutChange], list[float]]:
     """Changes of a series (n,) in the order of time, and days that stand out alone."""
-    if len(day) < 2:
-        return [], []
-    p = scatter.probability(float(np.abs(ln @ _contrasts(day)).max() / scatter.sd))
+    p = scatter.probability(day, ln) if len(day) > 1 else 1.0
     if p >= SURE:
         return [], []
     lone = _lone(day, ln, scatter)
     if lone is not None:
-        keep = np.arange(len(day)) != lone
-        changes, wild = changes_of(day[keep], ln[keep], scatter)
+        changes, wild = changes_of(np.delete(day, lone), np.delete(ln, lone), scatter)
         return changes, sorted([float(day[lone]), *wild])
     step, drift = _evidence(day, ln, scatter.sd)
     weights = np.exp(step - step.max())
     odds = float(step.max()) + float(np.log(weights.mean())) - drift
-    if odds < np.log(DECISIVE):
-        years = (day - day.mean()) / DAYS_PER_YEAR
-        slope, sd = _slope(day, ln, scatter.sd)
-        ends = float(ln.mean() + slope * years[0]), float(ln.mean() + slope * years[-1])
-        kind: Kind = "drift" if -odds >= np.log(DECISIVE) else "step or drift"
-        days = float(day[0]), float(day[-1])
-        return [Change(kind, days, ends, sd * float(np.ptp(years)), p, slope)], []
+    if odds < DECISIVE:
+        slope, sd = slope_of(day, ln, scatter.sd)
+        ends = [float(ln.mean() + slope * (d - day.mean()) / DAYS_PER_YEAR) for d in (day[0], day[-1])]
+        kind = "drift" if -odds >= DECISIVE else "step or drift"
+        return [StrutChange.of(kind, day[[0, -1]].tolist(), ends, sd * np.ptp(day) / DAYS_PER_YEAR, p, slope)], []
     places = np.array(_places(len(day)))
-    place = int(places[int(np.argmax(step))])
+    place = int(places[np.argmax(step)])
     before, wild_before = changes_of(day[:place], ln[:place], scatter)
     after, wild_after = changes_of(day[place:], ln[place:], scatter)
     # The fewest places that hold 95 % of the probability, all places alike beforehand.
     order = np.argsort(-weights, kind="stable")
     held = np.cumsum(weights[order]) / weights.sum()
     likely = places[np.sort(order[: int(np.searchsorted(held, CREDIBLE)) + 1])]
-    change = Change(
-        "step",
-        (float(day[likely[0] - 1]), float(day[likely[-1]])),
-        (float(ln[:place].mean()), float(ln[place:].mean())),
-        scatter.sd * (1.0 / place + 1.0 / (len(day) - place)) ** 0.5,
-        p,
-    )
-    return [*before, change, *after], [*wild_before, *wild_after]
+    days, levels = (day[likely[0] - 1], day[likely[-1]]), (ln[:place].mean(), ln[place:].mean())
+    sd = scatter.sd * (1.0 / place + 1.0 / (len(day) - place)) ** 0.5
+    return [*before, StrutChange.of("step", days, levels, sd, p), *after], [*wild_before, *wild_after]
+
+
+def slope_of(day: FloatArray, ln: FloatArray, sd: float) -> tuple[float, float]:
+    """Of ln stiffness, a year, with its sd."""
+    years = (day - day.mean()) / DAYS_PER_YEAR
+    return float(years @ ln / (years @ years)), float(sd / (years @ years) ** 0.5)
 
 
 def _trimmed(steps: FloatArray) -> FloatArray:
@@ -266,10 +251,8 @@ def _places(n: int) -> range:
 
 def _shapes(day: FloatArray) -> FloatArray:
     """(n, m): every step as 0 and 1, and last the drift from 0 to 1, less their means."""
-    order = np.arange(len(day))
-    shapes = np.stack(
-        [*((order >= place).astype(float) for place in _places(len(day))), (day - day[0]) / (day[-1] - day[0])], axis=1
-    )
+    steps = [(np.arange(len(day)) >= place).astype(float) for place in _places(len(day))]
+    shapes = np.stack([*steps, (day - day[0]) / (day[-1] - day[0])], axis=1)
     return np.asarray(shapes - shapes.mean(axis=0))
 
 
@@ -281,15 +264,11 @@ def _contrasts(day: FloatArray) -> FloatArray:
 
 def _lone(day: FloatArray, ln: FloatArray, scatter: DateScatter) -> int | None:
     """The date without which nothing is left to tell of, if it lies far from the others."""
-    if len(day) < SHORT:
-        return None
     far = np.abs(ln - np.median(ln)) / scatter.sd
     i = int(np.argmax(far))
-    keep = np.arange(len(day)) != i
-    if far[i] < WILD:
+    if len(day) < SHORT or far[i] < WILD:
         return None
-    rest = np.abs(ln[keep] @ _contrasts(day[keep])).max() / scatter.sd
-    return i if scatter.probability(float(rest)) >= SURE else None
+    return i if scatter.probability(np.delete(day, i), np.delete(ln, i)) >= SURE else None
 
 
 def _evidence(day: FloatArray, ln: FloatArray, sd: float) -> tuple[FloatArray, float]:
@@ -299,8 +278,3 @@ def _evidence(day: FloatArray, ln: FloatArray, sd: float) -> tuple[FloatArray, f
     gain = squares * (SIZE / sd) ** 2
     logs = 0.5 * (ln @ shapes) ** 2 / squares / sd**2 * gain / (1.0 + gain) - 0.5 * np.log1p(gain)
     return logs[:-1], float(logs[-1])
-
-
-def _slope(day: FloatArray, ln: FloatArray, sd: float) -> tuple[float, float]:
-    years = (day - day.mean()) / DAYS_PER_YEAR
-    return float(years @ ln / (years @ years)), float(sd / (years @ years) ** 0.5)

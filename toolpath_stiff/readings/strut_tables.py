@@ -15,11 +15,6 @@ from toolpath_stiff.units import n_per_m_from_n_per_mm
 FAILED = 0.05  # of the rows of such a table: tests that may have failed, near zero; of more the unit is wrong; assumed
 
 
-def is_strut_table(table: Table) -> bool:
-    """Whether the rows are stiffnesses, no records."""
-    return STIFFNESS[0] in table.heading and "displacement_um" not in table.heading
-
-
 def read_strut_table(table: Table) -> tuple[list[LoopFigures], list[str]]:
     """Struts alone without records; and remarks.
 
@@ -30,7 +25,6 @@ def read_strut_table(table: Table) -> tuple[list[LoopFigures], list[str]]:
     InputError, InputErrors
         Rows that are not of a strut alone, have no stiffness or none that could be; all of them.
     """
-    file = table.file
     check_needed(table, STIFFNESS[:1] if "loop" in table.heading else ("strut", STIFFNESS[0]), LAYOUTS)
 
     def strut(line: int, record: dict[str, str]) -> LoopFigures:
@@ -39,8 +33,8 @@ def read_strut_table(table: Table) -> tuple[list[LoopFigures], list[str]]:
         check_place(record)
         failed = abs(number(record, STIFFNESS[0], (-STIFFEST, STIFFEST))) < SOFTEST
         stiffness = math.nan if failed else n_per_m_from_n_per_mm(number(record, STIFFNESS[0]))
-        place, none = {name: record[name] for name in PLACE if record.get(name)}, np.empty(0)
-        loop = Loop(place, {}, None, none, none, line, file)
+        place = {name: record[name] for name in PLACE if record.get(name)}
+        loop = Loop(place, {}, None, np.empty(0), np.empty(0), line, table.file)
         return LoopFigures(loop, stiffness, optional_number(record, STIFFNESS[1]))
 
     struts, errors = parsed_rows(table, strut)
@@ -48,12 +42,12 @@ def read_strut_table(table: Table) -> tuple[list[LoopFigures], list[str]]:
     fault = f"{len(failed)} of {len(table.rows)} rows with a stiffness within {SOFTEST:g} N/mm of zero"
     if len(failed) > FAILED * len(table.rows):
         hint = f"is the unit right? At most {100 * FAILED:g} % are left out as failed tests"
-        errors.append(MeasurementError(fault, hint=hint, file=file, line=failed[0]))
+        errors.append(MeasurementError(fault, hint=hint, file=table.file, line=failed[0]))
     if errors:
         raise InputErrors(errors)
     if not struts:
-        raise MeasurementError("no rows below the heading", file=file, line=table.heading_line)
+        raise MeasurementError("no rows below the heading", file=table.file, line=table.heading_line)
     notes = unused(table, ("strut", *LABELS, DATE, "length_mm", *STIFFNESS))
     if failed:
-        notes.append(f"{file}: {fault} are left out as failed tests, from line {failed[0]}")
+        notes.append(f"{table.file}: {fault} are left out as failed tests, from line {failed[0]}")
     return [row for row in struts if not math.isnan(row.stiffness)], notes

@@ -2,10 +2,8 @@
 
 from collections.abc import Sequence
 
-from toolpath_stiff.analysis.document import compare_summaries
-from toolpath_stiff.analysis.loads import PLUNGES_ONLY
-from toolpath_stiff.analysis.results import Analysis
-from toolpath_stiff.analysis.statistics import FIGURES
+from toolpath_stiff.analysis.results import Analysis, compare_summaries
+from toolpath_stiff.analysis.statistics import FIGURES, PLUNGES_ONLY
 from toolpath_stiff.documents import Document, number
 from toolpath_stiff.report.pages import markup
 from toolpath_stiff.report.tables import LABEL, ShownTable
@@ -65,8 +63,7 @@ def _band(summary: Document) -> list[tuple[str, str]]:
     if not (band := summary.get("parameter_uncertainty")):
         return []
     mean, lowest = (" to ".join(map(number, band[f"{name}_95_N_per_mm"])) for name in ("mean", "min"))
-    widest = f"line {band['largest_sd_line']} (sd {band['largest_sd_percent']:.1f} %)"
-    return [("95 % band", f"mean {mean}, min {lowest} N/mm, from the fitted parameters alone; widest on {widest}")]
+    return [("95 % band", f"mean {mean}, min {lowest} N/mm, from the fitted parameters alone")]
 
 
 def _weakest(place: Document | None) -> list[tuple[str, str]]:

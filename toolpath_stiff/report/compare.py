@@ -9,7 +9,6 @@ from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import Variable, directions, planes
 from toolpath_stiff.comparison.summary import ComparisonSummary, GroupErrors
 from toolpath_stiff.inference.errors import deviation_percent
-from toolpath_stiff.report.history import history_section, history_text
 from toolpath_stiff.report.loops import loops_section, loops_text
 from toolpath_stiff.report.pages import Section, page_of, readings_head
 from toolpath_stiff.report.tables import ShownTable
@@ -67,7 +66,6 @@ def page(comparison: Comparison, drawn: Mapping[str, bytes]) -> str:
         "machine.png",
         ("Readings far off", far_off(summary, MOST_FAR_OFF)),
         loops_section(summary.loops),
-        history_section(summary.history),
         "variables.png",
         ("Checks without a model", _model_free(summary)),
         ("Which link takes what share of the compliance?", _load_path(comparison), LOAD_PATH_REMARK),
@@ -93,13 +91,13 @@ def _findings(summary: ComparisonSummary) -> ShownTable:
 
 
 def _load_path(comparison: Comparison) -> ShownTable:
-    nm_per_N = 1e9 * comparison.shares.compliance.T  # a row a link, a column an axis
+    nm_per_N = 1e9 * np.array([*comparison.shares.values()])  # a row a link, a column an axis
     sums = nm_per_N.sum(axis=0)
     links = (zip(parts, sums, strict=True) for parts in nm_per_N)
     rows = [[f"{part:.1f} nm/N, {100.0 * part / whole:.0f} %" for part, whole in parts] for parts in links]
     rows.append([f"{whole:.1f} nm/N" for whole in sums])
     rows.append([_measured(comparison, axis, whole) for axis, whole in zip("XYZ", sums, strict=True)])
-    names = (*comparison.shares.links, "the model in all", "measured")
+    names = (*comparison.shares, "the model in all", "measured")
     shown = [[name, *row] for name, row in zip(names, rows, strict=True)]
     return ShownTable(("link", ">along X", ">along Y", ">along Z"), shown)
 
@@ -164,9 +162,10 @@ def far_off(summary: ComparisonSummary, most: int) -> ShownTable:
 
 
 def _model_free(summary: ComparisonSummary) -> ShownTable:
-    checks, cannot = summary.model_free.checks, summary.model_free.cannot_check
+    """Checks that need no stiffness model, and why others cannot be made."""
+    checks, cannot = summary.model_free, summary.not_checked
     rows = [(check.check, check.text, f"{check.statistic:+.1f}", f"{check.p_adjusted:.2g}") for check in checks]
-    rows += [(check.check, f"not checked: {check.reason}", "", "") for check in cannot]
+    rows += [(check, f"not checked: {reason}", "", "") for check, reason in cannot.items()]
     kinds = ["" if check.holds else "finding" for check in checks] + ["out"] * len(cannot)
     return ShownTable(("principle", "result", ">t", ">p, corrected"), rows, kinds)
 
@@ -201,9 +200,9 @@ def text(comparison: Comparison) -> str:
         if finding.indistinguishable_from:
             others = ", ".join(finding.indistinguishable_from)
             lines.append(f"  ({plain(finding.pattern)} looks the same here as: {plain(others)})")
-    lines += [*loops_text(summary.loops), *history_text(summary.history), "", "checks without a model"]
-    lines += [f"  {plain(check.text)}" for check in summary.model_free.checks]
-    lines += [f"  {check.check}: {check.reason}" for check in summary.model_free.cannot_check]
+    lines += [*loops_text(summary.loops), "", "checks without a model"]
+    lines += [f"  {plain(check.text)}" for check in summary.model_free]
+    lines += [f"  {check}: {reason}" for check, reason in summary.not_checked.items()]
     if summary.outliers:
         lines += ["", "readings far off", *far_off(summary, MOST_NAMED).lines(2)]
         if len(summary.outliers) > MOST_NAMED:

@@ -78,5 +78,5 @@ def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float,
 
 def beyond_scale(analysis: Analysis, limits: tuple[float, float]) -> tuple[bool, bool]:
     """Whether headline values lie below the scale, and above."""
-    stiffness = n_per_mm_from_n_per_m(analysis.charted[0])
+    stiffness = n_per_mm_from_n_per_m(analysis.charted)
     return bool(stiffness.min() < limits[0]), bool(stiffness.max() > limits[1])

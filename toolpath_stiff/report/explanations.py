@@ -148,7 +148,7 @@ def text(diagnosis: Diagnosis) -> str:
         *_listed("plausible", [plausible_text(diagnosis.explanations)]),
         *_listed("beside it", [beside_text(diagnosis.unexcluded)]),
         *_listed("noise", ["; ".join(by_noise)] if len(by_noise) > 1 else []),
-        *_listed("beside the tip", [loop.text for loop in diagnosis.loops.by_loop]),
+        *_listed("beside the tip", [loop.text for loop in diagnosis.loops]),
         *_listed("cannot test", ["; ".join(cannot)]),
         *_listed("would show", [_would_show(diagnosis)]),
         *_listed("path", [path_text(diagnosis.path)]),

@@ -1,7 +1,6 @@
-"""Struts measured alone over their dates: lines for the terminal, a section of a page."""
+"""Struts measured alone over their dates: lines for the terminal."""
 
 from toolpath_stiff.readings.history import StrutHistory, StrutOverTime
-from toolpath_stiff.report.pages import Section
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 
@@ -41,8 +40,3 @@ def history_text(history: StrutHistory, undated: bool = False) -> list[str]:
         return []
     sentences = [f"  {plain(line)}" for line in (_remark(history), *history.sentences) if line]
     return ["", TITLE.lower(), *_table(history).lines(2, 0), *sentences]
-
-
-def history_section(history: StrutHistory) -> Section:
-    """The section of a page; empty without dates and without both signs of the force."""
-    return (TITLE, history.sentences, _table(history), _remark(history)) if _shown(history) else (TITLE,)

@@ -1,21 +1,22 @@
 """Readings of indicators beside the tip: on pages and on the terminal."""
 
-from toolpath_stiff.comparison.loop_readings import BesideTip
+from collections.abc import Sequence
+
+from toolpath_stiff.comparison.loop_readings import LoopMean
 from toolpath_stiff.report.pages import Section
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 
-MOST_ROWS = 40  # on a page; all are in the document
 REMARK = (
     "Displacement between the indicator's two points per load at the tip; of a strut alone, per force in it. By loop "
     "in the mean, counted in the direction in which the struts of the machine file would move it."
 )
 
 
-def loops_section(loops: BesideTip) -> Section:
-    """The section of a page, by loop, then reading by reading."""
+def loops_section(loops: Sequence[LoopMean]) -> Section:
+    """The section of a page, by loop."""
     by_loop = ShownTable.of(
-        loops.by_loop,
+        loops,
         {
             "loop": lambda mean: mean.loop,
             ">readings": lambda mean: mean.readings,
@@ -25,22 +26,10 @@ def loops_section(loops: BesideTip) -> Section:
             ">standard deviations": lambda mean: f"{mean.standard_deviations:+.1f}",
         },
     )
-    each = ShownTable.of(
-        loops.readings[:MOST_ROWS],
-        {
-            "line": lambda reading: f"{reading.file}:{reading.line}",
-            "loop": lambda reading: reading.loop,
-            "direction": lambda reading: reading.direction,
-            "point": lambda reading: reading.point,
-            ">read, nm/N": lambda reading: f"{reading.read_nm_per_N:.2f}",
-            ">modelled, nm/N": lambda reading: f"{reading.model_nm_per_N:.2f}",
-            ">standard deviations": lambda reading: f"{reading.standard_deviations:+.1f}",
-        },
-    )
-    return "Indicators beside the tip", by_loop, REMARK if loops.by_loop else "", each
+    return "Indicators beside the tip", by_loop, REMARK if loops else ""
 
 
-def loops_text(loops: BesideTip) -> list[str]:
+def loops_text(loops: Sequence[LoopMean]) -> list[str]:
     """Lines for the terminal; none without such readings."""
-    lines = [f"  {plain(mean.text)}" for mean in loops.by_loop]
+    lines = [f"  {plain(mean.text)}" for mean in loops]
     return ["", "indicators beside the tip", *lines] if lines else []

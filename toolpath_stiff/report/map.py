@@ -46,11 +46,10 @@ def page(planes: StiffnessMap, drawn: dict[str, bytes]) -> Iterator[str]:
     )
 
 
-def map_csv(planes: StiffnessMap) -> Iterator[str]:
-    """`map.csv`, a slice at a time."""
-    yield ",".join(DECIMALS) + "\n"
-    for columns in planes.columns():
-        yield csv_rows({**columns, "reachable": columns["reachable"].astype(int)}, DECIMALS)
+def map_csv(planes: StiffnessMap) -> str:
+    """`map.csv`."""
+    columns = planes.columns()
+    return ",".join(DECIMALS) + "\n" + csv_rows({**columns, "reachable": columns["reachable"].astype(int)}, DECIMALS)
 
 
 DATA = {"map.csv": map_csv, "map.json": StiffnessMap.to_json}
@@ -67,9 +66,4 @@ def text(planes: StiffnessMap) -> str:
             if spot := row.get(name):
                 place = f"X{spot['x_mm']:g} Y{spot['y_mm']:g}"
                 lines.append(f"  {name:<9} {spot['stiffness_N_per_mm']:8.0f} N/mm at {place}")
-        circle = row.get("circle", {})
-        if circle.get("maxima_deg"):
-            maxima, minima = (", ".join(f"{v:g}" for v in circle[f"{k}_deg"]) for k in ("maxima", "minima"))
-            about = f"on the circle of {circle['radius_mm']:g} mm"
-            lines.append(f"  {about}: maxima at {maxima} degrees, minima at {minima} degrees")
     return "\n".join(lines)

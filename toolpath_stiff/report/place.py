@@ -7,8 +7,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.documents import number
-from toolpath_stiff.placement.result import Placement, Written
-from toolpath_stiff.placement.rows import COLUMNS, PlacementRow
+from toolpath_stiff.placement.result import COLUMNS, Placement, PlacementRow, Written
 from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.place_path import drawn_path
@@ -20,7 +19,7 @@ COSTS = ("best_on_front_N_per_mm", "chosen_N_per_mm")
 
 def text(placed: Placement) -> str:
     """A placement in words: what got worse, the placement, what it brings, what it costs."""
-    first = len(placed.worse) + placed.search.nothing_better
+    first = len(placed.worse) + placed.nothing_better
     before, after = (
         [("warning", text) for text in part] for part in (placed.warnings[:first], placed.warnings[first:])
     )
@@ -31,12 +30,8 @@ def text(placed: Placement) -> str:
 def facts(placed: Placement) -> list[tuple[str, str]]:
     """The chosen placement in words, each with its label."""
     best, present, blocks = placed.chosen, placed.present, placed.offsets
-    which = (
-        f"placement {best.number} of {len(placed.front)}, picked"
-        if placed.picked
-        else f"objective {placed.task.rules.objective}"
-    )
-    zero = f"X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees ({which})"
+    which = f"(objective {placed.task.rules.objective})"
+    zero = f"X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees {which}"
     tilt = f"set-up tilted by A{best.a_deg:.3f} B{best.b_deg:.3f} degrees"
     mean, now = best.plunge_mean_N_per_mm, f", before {number(present.plunge_mean_N_per_mm)}" if present else ""
     margin = min(value for value in (best.margin, best.rapid_margin, 1.0) if value is not None)
@@ -46,7 +41,7 @@ def facts(placed: Placement) -> list[tuple[str, str]]:
     ]
     return [
         ("program", f"{placed.best.program.name} on {machine_text(placed.machine_stated)}, load {placed.best.load}"),
-        ("picked" if placed.picked else "recommended", zero),
+        ("recommended", zero),
         *([("", tilt)] if best.a_deg or best.b_deg else []),
         ("  stiffness", _figures_words(best)),
         ("  before", _figures_words(present) if present else f"out of reach: {placed.present_reason}"),
@@ -55,7 +50,7 @@ def facts(placed: Placement) -> list[tuple[str, str]]:
         ("  margin", f"{100.0 * margin:.1f} % of a limit's span at least, rapids included"),
         ("LinuxCNC", blocks.linuxcnc or blocks.linuxcnc_reason),
         ("Fanuc-style", blocks.fanuc or blocks.fanuc_reason),
-        ("front", f"{len(placed.front)} placements, {number(placed.search.pose_evaluations)} poses evaluated"),
+        ("front", f"{len(placed.front)} placements, {number(placed.pose_evaluations)} poses evaluated"),
     ]
 
 
@@ -92,8 +87,7 @@ def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
     path, note = drawn_path(placed, [*placed.front, *([present] if present else [])])
     data = {
         "front": [vars(row) for row in placed.front],
-        "chosen": (placed.chosen.number or 0) - 1,
-        "recommended": placed.search.recommended - 1,
+        "recommended": (placed.chosen.number or 0) - 1,
         "before": vars(present) if present else None,
         "before_reason": plain(placed.present_reason),
         "force": best.force,

@@ -14,8 +14,7 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.documents import Document, number
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.placement.paths import placed_path
-from toolpath_stiff.placement.result import Placement
-from toolpath_stiff.placement.rows import PlacementRow
+from toolpath_stiff.placement.result import Placement, PlacementRow
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
@@ -41,7 +40,7 @@ def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[Documen
     stiffness = n_per_mm_from_n_per_m(there.stiffness.reshape(len(rows), -1))  # nan out of reach
     counting = few.weight > 0.0
     plunge = plunging_rows(best.load, few.tangent, few.abc, counting)
-    plunge &= ~headline_rows(best.load, few.tangent, few.abc, counting)
+    plunge &= ~headline_rows(counting, plunge)
     about = np.isfinite(stiffness) & ~plunge
     about = about if about.any() else np.isfinite(stiffness)
     step = np.where(np.diff(cut) == 0, np.diff(few.s), 0.0)  # each point stands for half the way to its neighbours

@@ -85,10 +85,9 @@ def _not_about_z(program: ReadProgram, placement: Pose) -> str:
     """The reason why a turn of X and Y cannot express the placement, or ""."""
     if max(abs(placement[3]), abs(placement[4])) > VERTICAL:
         return f"the set-up is tilted, and work offsets turn X and Y alone: {USE_WRITE}"
-    moves = program.moves
-    tilted = np.flatnonzero(np.abs(np.concatenate([moves.start, moves.end], axis=1)[:, [3, 4, 5, 9, 10, 11]]).max(1))
+    tilted = np.flatnonzero(np.hstack([program.moves.start[:, 3:], program.moves.end[:, 3:]]).any(axis=1))
     if placement[5] and len(tilted):
-        line = moves.line[tilted[0]]
+        line = program.moves.line[tilted[0]]
         return f"the tool is tilted (line {line}), and work offsets turn X and Y, not its axis: {USE_WRITE}"
     return ""
 

@@ -5,7 +5,7 @@ effect alone.
 """
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,13 +18,7 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE, with_effect
-from toolpath_stiff.rig.hidden import (
-    HiddenMachine,
-    Nuisances,
-    disturb_machine,
-    disturb_readings,
-    readings,
-)
+from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, disturb_machine, disturb_readings, readings
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
 from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
@@ -189,10 +183,9 @@ def draw_case(
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
             parameters, strength = scale.draw(name, wanted, rng)
             true = with_effect(true, name, parameters)
-            effects.append({"effect": name, "parameters": parameters, **strength})
-            if name in UNKNOWNS:  # what a description may name
-                effects[-1]["links"] = sorted(UNKNOWNS[name].links)
-                effects[-1]["variables"] = sorted(UNKNOWNS[name].variables)
+            kind = UNKNOWNS.get(name)  # what a description may name
+            words = {} if kind is None else {"links": sorted(kind.links), "variables": sorted(kind.variables)}
+            effects.append({"effect": name, "parameters": parameters, **strength, **words})
     true = disturb_machine(true, nuisances, streams["machine"])
     truth = {
         "hidden": list(names),
@@ -203,13 +196,12 @@ def draw_case(
     return replace(case, rows=case.measure(table, rows, streams["noise"], stated_sd=layout == "paper"))
 
 
-def _sizes(size: float | Sequence[float] | None, count: int) -> tuple[float | None, ...]:
+def _sizes(size: float | Sequence[float] | None, count: int) -> Sequence[float | None]:
     """The size wanted of each of `count` effects."""
-    if not isinstance(size, Sequence):
-        return (size,) * count
-    if len(size) != count:
-        raise InputError(f"{len(size)} sizes for {count} hidden effects", expected="one size, or one for each effect")
-    return tuple(size)
+    sizes = size if isinstance(size, Sequence) else (size,) * count
+    if len(sizes) != count:
+        raise InputError(f"{len(sizes)} sizes for {count} hidden effects", expected="one size, or one for each effect")
+    return sizes
 
 
 def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: Generator) -> tuple[str, ...]:
@@ -217,16 +209,17 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
     if hidden is None:
         hidden = str(rng.choice(list(BLIND), p=list(BLIND.values())))
     known = effects_of_layout(layout)
-    if hidden == "none":
-        return ()
-    if hidden == "one":
-        return (str(rng.choice(known)),)
     if hidden in ("two", "three"):
         return tuple(known[i] for i in rng.choice(len(known), size=2 if hidden == "two" else 3, replace=False))
-    if hidden == "unknown":
-        return (str(rng.choice([name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)])),)
-    if hidden == "outside":
-        return (str(rng.choice([*ODDITIES, *(() if layout == "paper" else ODDITIES_IN_TIME)])),)
+    drawn: dict[str, Callable[[], Sequence[str]]] = {
+        "one": lambda: known,
+        "unknown": lambda: [name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)],
+        "outside": lambda: [*ODDITIES, *(() if layout == "paper" else ODDITIES_IN_TIME)],
+    }
+    if isinstance(hidden, str) and hidden in drawn:
+        return (str(rng.choice(drawn[hidden]())),)
+    if hidden == "none":
+        return ()
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
     everything = (*CATALOGUE, *OUTSIDE)
     if unknown := [name for name in names if name not in everything]:
@@ -234,9 +227,9 @@ def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: G
         raise InputError(f"nothing called {unknown[0]!r} to hide", expected=expected)
     if len(set(names)) < len(names) or sum(name in OUTSIDE for name in names) > 1:
         raise InputError(f"hidden effects {', '.join(names)}", expected="each once, at most one outside the catalogue")
-    needed = {column: name for name in names if name in OUTSIDE for column in OUTSIDE[name].columns}
-    needed |= {"time_min": "thermal_drift"} if "thermal_drift" in names else {}
-    for column, name in needed.items():
-        if column not in table:
-            raise InputError(f"{name} needs the column {column}", expected="layout tilted, or a plan with that column")
+    for name in names:
+        needed = ("time_min",) if name == "thermal_drift" else OUTSIDE[name].columns if name in OUTSIDE else ()
+        for column in needed:
+            if column not in table:
+                raise InputError(f"{name} needs the column {column}", expected="layout tilted, or a plan with it")
     return names

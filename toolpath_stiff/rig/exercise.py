@@ -1,19 +1,17 @@
 """A blind exercise as a folder: measurements.csv, machine.toml and sealed.bin; measuring again; opening the seal.
 
-The sealed truth is opaque to a look into the file, and tampering is noticed. It is no cryptography: the key stands
-below, so whoever wants to cheat can; the seal keeps an honest user from reading the answer by accident. The truth is
-written as JSON, compressed, padded to one length (so that the size tells nothing), scrambled with a SHA-256 key stream
-and preceded by a keyed digest.
+The sealed truth is opaque to a look into the file, and a change is noticed. It is no cryptography: whoever wants to
+cheat can; the seal keeps an honest user from reading the answer by accident. The truth is written as JSON, compressed,
+padded to one length with bytes that look the same (so that the size tells nothing) and preceded by a digest.
 """
 
 import csv
 import hashlib
-import hmac
 import io
 import json
-import math
 import re
 import zlib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +20,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.errors import InputError, InputErrors
-from toolpath_stiff.files import Content, read_bytes, read_text, write_atomically
+from toolpath_stiff.files import Content, read_bytes, read_text
 from toolpath_stiff.results_folder import Rules, write_folder
 from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, clamp_of, draw_case, rows_of
@@ -33,8 +31,7 @@ from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, rea
 from toolpath_stiff.rig.unknown import Unknown
 from toolpath_stiff.rig.unknowns import OUTSIDE
 
-MAGIC = b"tps-rig-sealed-1\n"
-KEY = b"toolpath_stiff.rig: not a secret, only a blindfold"
+MAGIC = b"tps-rig-sealed-2\n"
 DIGEST = hashlib.sha256().digest_size
 BLOCK = 8192  # bytes; several times what one case needs
 
@@ -79,34 +76,23 @@ def seal(case: DrawnCase) -> bytes:
         "clamps": int(max(case.rows.get("clamp", [0]))),
     }
     packed = zlib.compress(json.dumps(content, sort_keys=True).encode(), 9)
-    length = len(packed).to_bytes(4, "big")
-    body = (length + packed).ljust(-(-(len(packed) + 4) // BLOCK) * BLOCK, b"\0")
-    digest = hmac.digest(KEY, body, "sha256")
-    return MAGIC + digest + _scrambled(body, digest)
+    body = packed + hashlib.shake_256(packed).digest(-len(packed) % BLOCK)
+    return MAGIC + hashlib.sha256(body).digest() + body
 
 
 def unseal(file: str | Path) -> tuple[DrawnCase, Document]:
     """The case (without its rows) and what else was sealed. Raises `InputError` if the file was changed."""
     content = read_bytes(file, "the sealed truth")
-    digest = content[len(MAGIC) : len(MAGIC) + DIGEST]
-    body = _scrambled(content[len(MAGIC) + DIGEST :], digest)
-    if not content.startswith(MAGIC) or not hmac.compare_digest(digest, hmac.digest(KEY, body, "sha256")):
+    digest, body = content[len(MAGIC) : len(MAGIC) + DIGEST], content[len(MAGIC) + DIGEST :]
+    if not content.startswith(MAGIC) or hashlib.sha256(body).digest() != digest:
         raise InputError("the seal is broken: the file was changed or is no sealed truth", file=str(file))
-    sealed: Document = json.loads(zlib.decompress(body[4 : 4 + int.from_bytes(body[:4], "big")]))
-    machine: dict[str, Any] = {k: np.array(v) if isinstance(v, list) else v for k, v in sealed["machine"].items()}
-    machine["spindle"] = tuple(sealed["machine"]["spindle"])
-    if sealed["machine"]["unknown"] is not None:
-        machine["unknown"] = Unknown(**sealed["machine"]["unknown"])
+    sealed: Document = json.loads(zlib.decompressobj().decompress(body))
+    machine: Table = {
+        name: np.array(value) if isinstance(value, list) else value for name, value in sealed["machine"].items()
+    }
+    machine["unknown"] = machine["unknown"] and Unknown(**machine["unknown"])
     nominal = parse_nominal(sealed["nominal"]["text"], sealed["nominal"]["name"])
-    nuisances = Nuisances(**sealed["nuisances"])
-    return DrawnCase({}, sealed["truth"], nominal, HiddenMachine(**machine), nuisances), sealed
-
-
-def _scrambled(body: bytes, nonce: bytes) -> bytes:
-    """The body, every byte exclusive-or with a key stream; its own inverse."""
-    count = -(-len(body) // DIGEST)
-    stream = b"".join(hashlib.sha256(KEY + nonce + i.to_bytes(4, "big")).digest() for i in range(count))
-    return bytes(a ^ b for a, b in zip(body, stream, strict=False))
+    return DrawnCase({}, sealed["truth"], nominal, HiddenMachine(**machine), Nuisances(**sealed["nuisances"])), sealed
 
 
 def score(hidden: list[str], claim: list[str]) -> str:
@@ -114,14 +100,11 @@ def score(hidden: list[str], claim: list[str]) -> str:
 
     Nothing hidden is claimed by one of `SOUND`, something outside the catalogue by one of `OTHER` or by its own name.
     """
-    claimed = set(claim) - set(SOUND)
-    truth = set(hidden)
+    claimed, truth = set(claim) - set(SOUND), set(hidden)
     if claimed & set(OTHER):
         claimed = (claimed - set(OTHER)) | ((truth & {*OUTSIDE}) or {"outside"})
-    if not truth:
-        return "wrong" if claimed else "correctly none"
     if claimed == truth:
-        return "right"
+        return "right" if truth else "correctly none"
     return "partly" if claimed & truth else "wrong"
 
 
@@ -155,26 +138,24 @@ def read_plan(file: str, nominal: Nominal) -> Table:
     errors: list[InputError] = []
     table: Table = {}
     for column, name in enumerate(heading):
-        if name in RESULTS:
-            continue
         values = []
-        for line, row in body:
+        for line, row in body if name not in RESULTS else ():
             cell = row[column] if column < len(row) else ""
             try:
                 values.append(_value(name, cell))
             except ValueError as error:
                 errors.append(InputError(f"{name} {cell!r}", expected=str(error), file=file, line=line))
-        table[name] = np.array(values) if name == "clamp" or name in NUMBERS else values
-    if errors:
-        raise InputErrors(errors)
-    rows = rows_of(table)
-    for fault, wrong in {
-        f"machine {nominal.name} cannot reach this pose": ~reachable(
-            nominal, rows.position, rows.angles, rows.extension
-        ),
-        "a direction of no length": ~np.isfinite(rows.direction).all(axis=1),
-    }.items():
-        errors += [InputError(fault, file=file, line=body[k][0]) for k in np.flatnonzero(wrong)]
+        if name not in RESULTS:
+            table[name] = np.array(values) if name == "clamp" or name in NUMBERS else values
+    if not errors:
+        rows = rows_of(table)
+        within = reachable(nominal, rows.position, rows.angles, rows.extension)
+        faults = {
+            f"machine {nominal.name} cannot reach this pose": ~within,
+            "a direction of no length": ~np.isfinite(rows.direction).all(axis=1),
+        }
+        for fault, bad in faults.items():
+            errors += [InputError(fault, file=file, line=body[k][0]) for k in np.flatnonzero(bad)]
     if errors:
         raise InputErrors(errors)
     return table
@@ -182,16 +163,12 @@ def read_plan(file: str, nominal: Nominal) -> Table:
 
 def _check_heading(heading: list[str], file: str, line: int) -> None:
     known = (*NUMBERS, *TEXTS, *RESULTS)
-    fault = ""
-    for name in heading:
-        if name not in known or heading.count(name) > 1:
-            fault = f"unknown column {name!r}" if name not in known else f"column given twice: {name!r}"
     missing = [name for name in POSE[:3] if name not in heading]
+    strange = [name for name in heading if name not in known or heading.count(name) > 1]
     vectors = sum(name in heading for name in ("dx", "dy", "dz"))
-    if missing:
-        fault = f"column {missing[0]} is missing"
-    elif vectors != (0 if "direction" in heading else 3):
-        fault = "directions unclear: either direction or dx,dy,dz"
+    fault = f"unknown column {strange[0]!r}, or given twice" if strange else ""
+    if missing or vectors != (0 if "direction" in heading else 3):
+        fault = f"column {missing[0]} is missing" if missing else "directions unclear: either direction or dx,dy,dz"
     if fault:
         raise InputError(fault, expected=f"columns of {', '.join(known)}", file=file, line=line)
 
@@ -206,13 +183,10 @@ def _value(name: str, cell: str) -> float | int | str:
     low, high, default = NUMBERS[name]
     if not cell and default is not None:
         return default
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not low <= value <= high:
-        raise ValueError(f"a number from {low:g} to {high:g}")
-    return value
+    with suppress(ValueError):
+        if low <= float(cell) <= high:
+            return float(cell)
+    raise ValueError(f"a number from {low:g} to {high:g}")
 
 
 def blind_case(
@@ -233,18 +207,9 @@ def new_exercise(folder: str | Path, case: DrawnCase, rules: Rules = NO_OTHER) -
 
     `rules`: what must not be replaced. An exercise in the folder is not, by default: its sealed truth would be lost.
     """
-    contents: dict[str, Content] = {
-        MACHINE: case.nominal.text, MEASUREMENTS: csv_text(case.rows), SEALED: seal(case),
-    }  # fmt: skip
+    contents: dict[str, Content] = {MACHINE: case.nominal.text, MEASUREMENTS: csv_text(case.rows), SEALED: seal(case)}
     write_folder(folder, contents, command="rig new", rules=rules)
     return len(case.rows["x_mm"])
-
-
-def measure_again(folder: str | Path, plan_file: str, out: str | Path, visit: int = 1) -> int:
-    """Write what `measured_again` measures to a file; returns the number of rows."""
-    text, count = measured_again(folder, plan_file, visit)
-    write_atomically(out, text)
-    return count
 
 
 def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[str, int]:
@@ -269,16 +234,9 @@ def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
     """What was hidden, and how the claim scores: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
     claims = [name.strip() for name in claim.split(",") if name.strip()]
     known = (*SOUND, *OTHER, *CATALOGUE, *OUTSIDE)
-    for name in claims:
-        if name not in known:
-            raise InputError(f"a claim {name!r}", expected=f"one or several of {', '.join(known)}")
-    if not claims or (len(claims) > 1 and set(SOUND) & set(claims)):
-        raise InputError(f"a claim {claim!r}", expected="names of effects, or none alone")
+    alone = len(claims) == 1 or (claims and not {*SOUND} & {*claims})
+    if not alone or not {*claims} <= {*known}:
+        raise InputError(f"a claim {claim!r}", expected=f"none, or one or several of {', '.join(known)}")
     case, sealed = unseal(Path(folder) / SEALED)
-    return {
-        "verdict": score(case.truth["hidden"], claims),
-        "claim": claims,
-        **case.truth,
-        "seed": sealed["seed"],
-        "layout": sealed["layout"],
-    }
+    verdict = {"verdict": score(case.truth["hidden"], claims), "claim": claims}
+    return {**verdict, **case.truth, "seed": sealed["seed"], "layout": sealed["layout"]}

@@ -8,7 +8,7 @@ campaign adds, whether or not something is hidden.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -73,7 +73,7 @@ class HiddenMachine:
     tip_error: float = 0.0
     radius_error: float = 0.0
     bars: float = np.inf
-    spindle: tuple[float, float] = (0.0, 0.0)
+    spindle: Sequence[float] = (0.0, 0.0)
     overhang_exponent: float = 0.0
     joint: float = 0.0
     hertz: float = 0.0
@@ -92,8 +92,7 @@ class HiddenMachine:
 
 def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m that the gauge and the indicator show, before noise: k = factor F / (F / k_true + drift t)."""
-    stiffness = true_stiffness(nominal, hidden, rows)
-    shown = rows.force / (rows.force / stiffness + hidden.drift * rows.time)
+    shown = rows.force / (rows.force / true_stiffness(nominal, hidden, rows) + hidden.drift * rows.time)
     shown = shown * _gauge(hidden, rows)
     if hidden.unknown is not None and (read := OUTSIDE[hidden.unknown.kind].read) is not None:
         shown = shown * read(rows, hidden.unknown)
@@ -102,8 +101,7 @@ def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
 
 def true_stiffness(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m, secant stiffness between tool and workpiece along the load."""
-    place, links = assembled(nominal, hidden, rows)
-    return np.asarray(1.0 / solved(place, links, rows.direction, rows.force).compliance)
+    return np.asarray(1.0 / solved(*assembled(nominal, hidden, rows), rows.direction, rows.force)[0])
 
 
 def assembled(
@@ -151,21 +149,17 @@ def _true_geometry(
 
 def _struts(nominal: Nominal, hidden: HiddenMachine, lengths: FloatArray) -> FloatArray:
     """(n, 6, 6) N/m: the paper's law, linear in length (its equation 5), with curvature and spread."""
-    l1, l2 = nominal.law_ends
-    s = (lengths - l1) / (l2 - l1)
-    # The exponential keeps strongly curved laws positive beyond the two lengths.
-    law = _law(nominal, lengths) * np.exp(hidden.curvature * 4.0 * s * (1.0 - s))
-    return np.asarray((law * hidden.strut_factors)[:, :, None] * np.eye(6))
-
-
-def _law(nominal: Nominal, lengths: FloatArray) -> FloatArray:
-    """N/m of struts of any lengths (m) by the nominal law, which its end pieces carry on."""
+    first, last = nominal.law_ends
+    share = (lengths - first) / (last - first)
     points, stiffness = nominal.law_lengths, nominal.law_stiffnesses
-    if len(points) == 1:
-        return np.full_like(lengths, stiffness[0])
-    piece = np.clip(np.searchsorted(points, lengths, side="right") - 1, 0, len(points) - 2)
-    share = (lengths - points[piece]) / (points[piece + 1] - points[piece])
-    return np.asarray(stiffness[piece] + (stiffness[piece + 1] - stiffness[piece]) * share)
+    law = np.full_like(lengths, stiffness[0])
+    if len(points) > 1:  # its end pieces carry it on
+        piece = np.clip(np.searchsorted(points, lengths, side="right") - 1, 0, len(points) - 2)
+        within = (lengths - points[piece]) / (points[piece + 1] - points[piece])
+        law = stiffness[piece] + (stiffness[piece + 1] - stiffness[piece]) * within
+    # The exponential keeps strongly curved laws positive beyond the two lengths.
+    law = law * np.exp(hidden.curvature * 4.0 * share * (1.0 - share))
+    return np.asarray((law * hidden.strut_factors)[:, :, None] * np.eye(6))
 
 
 def _joint_law(hidden: HiddenMachine) -> Callable[[FloatArray], FloatArray]:
@@ -187,16 +181,15 @@ def _ends(nominal: Nominal, hidden: HiddenMachine, rows: Rows, place: Geometry) 
     if nominal.tool_length > 0.0:
         grown = (1.0 + rows.extension / nominal.tool_length) ** hidden.overhang_exponent
     here = (rows.setup == hidden.setup) & bool(hidden.setup)
-    along = [np.broadcast_to(axis, (n, 3)) for axis in AXES]
-    return (
-        *(
-            End("spindle", place.rotation[:, :, j], c)
-            for j, c in enumerate((radial * grown,) * 2 + (np.full(n, axial),))
-        ),
-        *(End("table", along[j], np.full(n, hidden.table[j])) for j in range(3)),
-        *(End("table", np.cross(AXES[j], place.work_point), np.full(n, hidden.rocking)) for j in range(2)),
-        *(End("table", along[j], np.where(here, hidden.setup_compliance[j], 0.0)) for j in range(3)),
-    )
+    ends: list[tuple[str, FloatArray, FloatArray | float]]
+    ends = [
+        ("spindle", place.rotation[:, :, j], c)
+        for j, c in enumerate((radial * grown, radial * grown, np.full(n, axial)))
+    ]
+    ends += [("table", AXES[j], hidden.table[j]) for j in range(3)]
+    ends += [("table", np.cross(AXES[j], place.work_point), hidden.rocking) for j in range(2)]
+    ends += [("table", AXES[j], np.where(here, hidden.setup_compliance[j], 0.0)) for j in range(3)]
+    return tuple(End(link, np.broadcast_to(lever, (n, 3)), np.broadcast_to(c, (n,))) for link, lever, c in ends)
 
 
 def _gauge(hidden: HiddenMachine, rows: Rows) -> FloatArray:

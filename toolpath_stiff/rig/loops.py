@@ -4,9 +4,7 @@ An indicator reads the displacement of one point against another. Every such pai
 elongation of a strut, so that nothing is derived: the give of a joint, a vertex of the frame, the spindle, the table.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -14,15 +12,11 @@ from numpy.random import Generator
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.campaigns import Table
-from toolpath_stiff.rig.hidden import assembled
+from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, assembled
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import Geometry, Links, Solved, solved
+from toolpath_stiff.rig.structure import Geometry, Links, solved
 from toolpath_stiff.units import m_from_mm, um_from_m
-
-if TYPE_CHECKING:
-    from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
-
 
 TIP = ("", "tip")
 LOOP_PATTERN = (
@@ -47,52 +41,45 @@ def true_displacements(
     """
     given = np.repeat(np.nan_to_num(lengths)[:, None], 6, axis=1)
     place, links = assembled(nominal, hidden, rows, given)
-    solution = solved(place, links, rows.direction, rows.force)
-    return np.array([_read(k, loop, place, links, rows, solution) for k, loop in enumerate(loops)])
+    compliance, moved, stretch = solved(place, links, rows.direction, rows.force)
+    read = np.empty(len(loops))
+    for k, loop in enumerate(loops):
+        kind, *rest = loop.split()
+        first = moved.shape[1] - links.count
+        ends, number = first + 6 + links.vertices.size, int(rest[0]) - 1 if rest else 0
+        if kind in ("spindle", "table"):
+            read[k] = _give(k, kind, links, rows, moved[k, ends:])
+        elif kind == "platform":
+            read[k] = compliance[k] - _give(k, "spindle", links, rows, moved[k, ends:])
+        elif kind == "strut":
+            alone = bool(rest[1:])
+            read[k] = np.linalg.inv(links.struts[k])[number, number] if alone else stretch[k, number] @ moved[k]
+        elif kind == "joint":  # the rig's joint is one element: each end of the strut gives half
+            read[k] = moved[k, first + number] * (0.5 if rest[1:] else 1.0)
+        elif kind == "frame":
+            read[k] = _vertex(k, number, "".join(rest[1:]), place, rows.direction[k], moved[k, first + 6 : ends])
+        else:
+            read[k] = compliance[k]
+    return read
 
 
-def _read(k: int, loop: str, place: Geometry, links: Links, rows: Rows, solution: Solved) -> float:
-    kind, *rest = loop.split()
-    unknowns, first = solution.moved[k], solution.platform_dofs
-    ends, direction = first + 6 + links.vertices.size, rows.direction[k]
-
-    def give(link: str) -> float:
-        moved = zip(links.ends, unknowns[ends:], strict=True)
-        return float(sum(direction @ end.lever[k] * size for end, size in moved if end.link == link))
-
-    if kind in TIP:
-        return float(solution.compliance[k])
-    if kind in ("spindle", "table"):
-        return give(kind)
-    if kind == "platform":
-        return float(solution.compliance[k]) - give("spindle")
-    number = int(rest[0]) - 1
-    if kind == "strut" and rest[1:]:
-        return float(np.linalg.inv(links.struts[k])[number, number])
-    if kind == "strut":
-        return float(solution.stretch[k, number] @ unknowns)
-    if kind == "joint":  # the rig's joint is one element: each end of the strut gives half
-        return float(unknowns[first + number]) * (0.5 if rest[1:] else 1.0)
-    return _vertex(k, number, "".join(rest[1:]), place, direction, unknowns[first + 6 : ends])
+def _give(k: int, link: str, links: Links, rows: Rows, unknowns: FloatArray) -> float:
+    """Displacement along the load of what sits at a link, of the unknowns of the ends."""
+    ends = zip(links.ends, unknowns, strict=True)
+    return float(sum(rows.direction[k] @ end.lever[k] * size for end, size in ends if end.link == link))
 
 
 def _vertex(k: int, number: int, way: str, place: Geometry, direction: FloatArray, unknowns: FloatArray) -> float:
     """Displacement of a vertex outwards, upwards or along the load."""
-    outward, upward = (float(value) for value in unknowns[2 * number : 2 * number + 2])
+    outward, upward = unknowns[2 * number : 2 * number + 2].tolist()
     if way:
-        return outward if way == "radial" else upward
+        return float(outward if way == "radial" else upward)
     joints = place.frame_joints[k][place.vertices == number].mean(axis=0)[:2]
-    radial = joints / np.linalg.norm(joints)
-    return float(direction[:2] @ radial) * outward + float(direction[2]) * upward
+    return float(direction[:2] @ joints / np.linalg.norm(joints) * outward + direction[2] * upward)
 
 
 def with_loops(
-    nominal: Nominal,
-    hidden: HiddenMachine,
-    measured: Table,
-    rows: Rows,
-    nuisances: Nuisances,
-    rng: Generator,
+    nominal: Nominal, hidden: HiddenMachine, measured: Table, rows: Rows, nuisances: Nuisances, rng: Generator
 ) -> Table:
     """A measured table whose rows of loops beside the tip hold what their indicators read, in um, for a stiffness."""
     loops = list(measured.get("loop", ()))
@@ -101,21 +88,19 @@ def with_loops(
         return {name: values for name, values in measured.items() if name != "loop"}
     lengths = m_from_mm(np.asarray(measured.get("length_mm", np.full(len(loops), np.nan)), dtype=float))
     where = np.flatnonzero(beside)
-    per_load = true_displacements(nominal, hidden, rows.take(where), [loops[k] for k in where], lengths[where])
-    moved = per_load * rows.force[where]
+    moved = true_displacements(nominal, hidden, rows.take(where), [loops[k] for k in where], lengths[where])
+    moved = moved * rows.force[where]
     if nuisances.repeat > 0.0:
         moved = moved * np.exp(SLANT * rng.standard_normal(len(where))) + INDICATOR * rng.standard_normal(len(where))
     shown = np.zeros(len(loops))
     shown[where] = PRINTED * np.round(um_from_m(moved) / PRINTED) if nuisances.rounded else um_from_m(moved)
+    empty = {"stiffness_N_per_mm": beside, "sd_N_per_mm": beside, "length_mm": np.isnan(lengths)}
     table: Table = {}
     for name, values in measured.items():
-        empty = name in ("stiffness_N_per_mm", "sd_N_per_mm")
-        table[name] = _emptied(values, beside) if empty else values
+        table[name] = _emptied(values, empty[name]) if name in empty else values
         if name == "stiffness_N_per_mm":
             table["displacement_um"] = _emptied(shown, ~beside)
     table.setdefault("force_N", np.full(len(loops), defaults.FORCE))
-    if "length_mm" in table:
-        table["length_mm"] = _emptied(table["length_mm"], np.isnan(lengths))
     return table
 
 

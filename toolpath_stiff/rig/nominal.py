@@ -70,15 +70,9 @@ class Nominal:
     def vertices(self) -> IntArray:
         """(6,) number of the frame vertex that holds each strut, counted from 0 in the order of the struts."""
         azimuth = np.arctan2(self.frame_joints[:, 1], self.frame_joints[:, 0])
-        angles: list[float] = []
-        numbers = np.empty(6, dtype=np.int64)
-        for strut, angle in enumerate(azimuth):
-            turns = [abs(math.remainder(angle - other, 2.0 * math.pi)) for other in angles]
-            if not turns or min(turns) > VERTEX_WIDTH:
-                angles.append(float(angle))
-                turns.append(0.0)
-            numbers[strut] = int(np.argmin(turns))
-        return numbers
+        apart = np.abs(np.mod(azimuth[:, None] - azimuth + np.pi, 2.0 * np.pi) - np.pi)
+        first = (apart <= VERTEX_WIDTH).argmax(axis=1)
+        return np.asarray(np.unique(first, return_inverse=True)[1], dtype=np.int64)
 
 
 def load_nominal(machine: str = defaults.MACHINE) -> Nominal:
@@ -104,12 +98,10 @@ def parse_nominal(text: str, file: str) -> Nominal:
     for kind in ("effect", "instrument"):
         if toml.data.get(kind):
             hint = "take the effects out; the rig adds its own hidden one"
-            fault, line = f"the machine carries [[{kind}]] already", toml.line_of(kind)
-            raise InputError(fault, expected="a nominal machine", hint=hint, file=file, line=line)
-    bars = _value(toml, "platform.bar_stiffness_N_per_m")
-    if bars not in (None, math.inf):
+            raise toml.error(f"the machine carries [[{kind}]] already", "a nominal machine", hint, where=kind)
+    where = "platform.bar_stiffness_N_per_m"
+    if (bars := _value(toml, where)) not in (None, math.inf):
         hint = "the rig's nominal platform is rigid; a flexible one is the hidden effect platform_flexibility"
-        where = "platform.bar_stiffness_N_per_m"
         raise toml.error(f"{where} = {bars}", "inf", hint, where=where)
     if _value(toml, "strut_law.length_mm") is None:  # the same at every length
         lengths, stiffnesses = np.zeros(1), _numbers(toml, "strut_law.stiffness_N_per_um")[None]

@@ -4,22 +4,30 @@ Each is one formula on struts, joints, table or readings; `size` scales it, a ra
 the purpose, with the shapes that damaged or badly set machines show; no source gives figures for them.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import Links
-from toolpath_stiff.rig.unknown import REACH, SOFT, Shape, X, Y, kind, one_strut, signed, with_ends, with_joints
-
-if TYPE_CHECKING:
-    from toolpath_stiff.rig.rows import Rows
-    from toolpath_stiff.rig.unknown import CommandedRows, Kind, Unknown
+from toolpath_stiff.rig.unknown import (
+    REACH,
+    SOFT,
+    CommandedRows,
+    Kind,
+    Unknown,
+    X,
+    Y,
+    drawn,
+    kind,
+    one_strut,
+    signed,
+    uniform,
+    with_ends,
+    with_joints,
+)
 
 ODDITIES: dict[str, Kind] = {}
 ODDITIES_IN_TIME: dict[str, Kind] = {}  # they need time or several loads, which only some campaigns have
@@ -28,10 +36,6 @@ read = partial(kind, ODDITIES, "read")
 act_in_time = partial(kind, ODDITIES_IN_TIME, "act")
 read_in_time = partial(kind, ODDITIES_IN_TIME, "read")
 REFERENCE_LOAD = 1000.0  # N
-
-
-def _wave(rng: Generator) -> Shape:
-    return {"wavelength": float(rng.uniform(0.08, 0.4)), "phase": float(rng.uniform(0.0, 2.0 * np.pi))}
 
 
 def _scaled(links: Links, factor: FloatArray) -> Links:
@@ -45,7 +49,7 @@ def loose_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_joints(links, lambda forces: np.where(forces > 0.0, u.size, 0.0))
 
 
-@act("", "", 0.8, shape=_wave)
+@act("", "", 0.8, shape=drawn(uniform("wavelength", 0.08, 0.4), uniform("phase", 0.0, 2.0 * np.pi)))
 def screw_pitch_error(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Strut stiffness varies periodically with length."""
     wave = np.sin(2.0 * np.pi * state.lengths / u.shape["wavelength"] + u.shape["phase"])

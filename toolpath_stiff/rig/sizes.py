@@ -6,6 +6,7 @@ campaign (`DETECTABLE`) to 30 %, as far as the effect's bounds allow.
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.random import Generator
@@ -35,7 +36,7 @@ class Scale:
         self.vertices = int(nominal.vertices.max()) + 1
         self.setups = sorted(set(rows.setup.tolist()))
         self.base = np.log(readings(nominal, HiddenMachine(), rows))
-        self.covariance = NuisanceCovariance(clamps, _spread(self, nuisances), nuisances)
+        self.whitened_length = whitened_length(clamps, _spread(self, nuisances), nuisances)
 
     def change(self, machine: HiddenMachine) -> FloatArray:
         """(n,) change of ln stiffness; infinite beyond `LARGEST_SINGLE`, or where an indicator would run backwards."""
@@ -85,40 +86,37 @@ class Scale:
         return strength, change
 
     def _detectability(self, change: FloatArray) -> float:
-        return self.covariance.length(change) if np.isfinite(change).all() else math.inf
+        return self.whitened_length(change) if np.isfinite(change).all() else math.inf
 
 
 def _rms(change: FloatArray) -> float:
     return float(np.sqrt(np.mean(change**2)))
 
 
-class NuisanceCovariance:
-    """Covariance of ln readings: repeat noise, clamping, strut spread, a free strut law.
+def whitened_length(clamps: IntArray, spread: FloatArray, nuisances: Nuisances) -> Callable[[FloatArray], float]:
+    """Whitened length sqrt(x^T C^-1 x) of x (n,), by the covariance of ln readings.
 
-    The first two are a multiple of the identity and one block of ones a clamp, whose inverse is known; the rest has
-    rank 8 and enters by Woodbury's identity, (N + S S^T)^-1 = N^-1 - N^-1 S (1 + S^T N^-1 S)^-1 S^T N^-1.
+    That has repeat noise, clamping, strut spread and a free strut law. The first two are a multiple of the identity and
+    one block of ones a clamp, whose inverse is known; the rest, `spread` (n, 8), enters by Woodbury's identity,
+    (N + S S^T)^-1 = N^-1 - N^-1 S (1 + S^T N^-1 S)^-1 S^T N^-1.
     """
+    noise, share = max(nuisances.repeat, 1e-3) ** 2, nuisances.clamping**2
+    pull = share / (noise + np.bincount(clamps) * share)
 
-    def __init__(self, clamps: IntArray, spread: FloatArray, nuisances: Nuisances) -> None:
-        self.clamps = clamps
-        self.noise = max(nuisances.repeat, 1e-3) ** 2
-        share = nuisances.clamping**2
-        self.pull = share / (self.noise + np.bincount(clamps) * share)
-        self.spread = spread
-        self.inner = np.eye(spread.shape[1]) + spread.T @ self._solve_noise(spread)
-
-    def _solve_noise(self, x: FloatArray) -> FloatArray:
+    def weighted(x: FloatArray) -> FloatArray:
         """N^-1 x for x (n, m)."""
-        sums = np.zeros((len(self.pull), x.shape[1]))
-        np.add.at(sums, self.clamps, x)
-        return np.asarray((x - (self.pull[:, None] * sums)[self.clamps]) / self.noise)
+        sums = np.zeros((len(pull), x.shape[1]))
+        np.add.at(sums, clamps, x)
+        return np.asarray((x - (pull[:, None] * sums)[clamps]) / noise)
 
-    def length(self, x: FloatArray) -> float:
-        """Whitened length of x (n,), sqrt(x^T C^-1 x)."""
-        solved = self._solve_noise(x[:, None])[:, 0]
-        projected = self.spread.T @ solved
-        squared = float(x @ solved - projected @ np.linalg.solve(self.inner, projected))
-        return math.sqrt(max(squared, 0.0))
+    inner = np.eye(spread.shape[1]) + spread.T @ weighted(spread)
+
+    def length(x: FloatArray) -> float:
+        white = weighted(x[:, None])[:, 0]
+        projected = spread.T @ white
+        return math.sqrt(max(float(x @ white - projected @ np.linalg.solve(inner, projected)), 0.0))
+
+    return length
 
 
 def _spread(scale: Scale, nuisances: Nuisances) -> FloatArray:
@@ -126,13 +124,12 @@ def _spread(scale: Scale, nuisances: Nuisances) -> FloatArray:
 
     (n, 7) of a law with one stiffness; of a law with more than two the points between move with the ends.
     """
-    step = 1e-4
-    columns = []
-    for strut in range(6):
-        factors = np.where(np.arange(6) == strut, 1.0 + step, 1.0)
-        columns.append(nuisances.strut_spread * scale.change(HiddenMachine(strut_factors=factors)) / step)
-    (first, last), lengths = scale.nominal.law_ends, scale.nominal.law_lengths
+    step, lengths = 1e-4, scale.nominal.law_lengths
+    first, last = scale.nominal.law_ends
     toward = (lengths - first) / (last - first)
+    columns = []
+    for strut in np.eye(6):
+        columns.append(nuisances.strut_spread * scale.change(HiddenMachine(strut_factors=1.0 + step * strut)) / step)
     for moved in [np.ones(1)] if len(lengths) == 1 else [1.0 - toward, toward]:
         stiffer = scale.nominal.law_stiffnesses * (1.0 + step * moved)
         other = dataclasses.replace(scale.nominal, law_stiffnesses=stiffer)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
@@ -51,7 +51,7 @@ VISIBLE = 5.3
 def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = None) -> tuple[Table, Shape]:
     """A measured table of a case with one slip in it.
 
-    Shape
+    Parameters
     ----------
     case
         Its nominal machine keeps poses reachable; with its nuisances for the size of the slip.
@@ -77,41 +77,41 @@ def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = 
     kind = str(rng.choice(list(SLIPS))) if kind is None else kind
     if kind not in SLIPS:
         raise InputError(f"no slip called {kind!r}", expected=", ".join(SLIPS))
-    wrong = {name: np.array(values, dtype=object) for name, values in table.items()}
     if kind == "directions_exchanged":
-        rows = _exchange(wrong, rng)
+        rows, written = _exchanged(table, rng)
     elif kind in WRITTEN_PER_N_PER_MM:
-        rows = np.array([int(rng.integers(len(wrong["x_mm"])))])
-        written = wrong["stiffness_N_per_mm"][rows].astype(float) * WRITTEN_PER_N_PER_MM[kind]
-        wrong["stiffness_N_per_mm"][rows] = np.round(written, 3)
+        rows = np.array([int(rng.integers(len(table["x_mm"])))])
+        meant = np.asarray(table["stiffness_N_per_mm"])[rows]
+        written = _with(table, "stiffness_N_per_mm", rows, np.round(meant * WRITTEN_PER_N_PER_MM[kind], 3))
     else:
-        rows = _mistype(wrong, case.nominal, kind, rng)
-    changed = [name for name in wrong if (wrong[name] != np.array(table[name], dtype=object)).any()]
-    slipped: Table = {
-        name: values.tolist() if isinstance(table[name], list) else values.astype(np.asarray(table[name]).dtype)
-        for name, values in wrong.items()
-    }
+        rows, written = _mistyped(table, case.nominal, kind, rng)
     before, after = (
         np.log(sheet["stiffness_N_per_mm"]) - np.log(readings(case.nominal, HiddenMachine(), rows_of(sheet)))
-        for sheet in (table, slipped)
+        for sheet in (table, written)
     )
     scale = Scale(case.nominal, rows_of(table), clamp_of(table), case.nuisances)
-    return slipped, {
+    changed = [name for name in table if not np.array_equal(table[name], written[name])]
+    return written, {
         "kind": kind,
         "rows": [int(row) + 1 for row in rows],
         "columns": changed,
-        "written": {name: np.asarray(slipped[name])[rows].tolist() for name in changed},
+        "written": {name: np.asarray(written[name])[rows].tolist() for name in changed},
         "meant": {name: np.asarray(table[name])[rows].tolist() for name in changed},
-        "detectability": scale.covariance.length(after - before),
+        "detectability": scale.whitened_length(after - before),
     }
+
+
+def _with(table: Table, name: str, rows: IntArray, written: FloatArray | float) -> Table:
+    """The table with other values in some rows of a column."""
+    values = np.array(table[name], dtype=float)
+    values[rows] = written
+    return {**table, name: values}
 
 
 def slipped_case(case: DrawnCase, seed: int, kind: str | None = None, count: int = 1) -> tuple[Table, list[Shape]]:
     """The rows of a case with `count` slips in different rows, and their truths."""
     rng = np.random.default_rng([seed, 5])  # beyond the streams of `draw_case`
-    table = case.rows
-    truths: list[Shape] = []
-    taken: set[int] = set()
+    table, truths, taken = case.rows, list[Shape](), set[int]()
     for _ in range(TRIES):
         if len(truths) == count:
             return table, truths
@@ -138,38 +138,32 @@ def with_stated_noise(table: Table, nuisances: Nuisances, factor: float = 1.0) -
     return stated, {"true_percent": 100.0 * true, "stated_percent": 100.0 * true * factor}
 
 
-def _exchange(wrong: Table, rng: Generator) -> IntArray:
+def _exchanged(table: Table, rng: Generator) -> tuple[IntArray, Table]:
     """Two rows of one clamping and one load get each other's stiffness."""
-    clamps = clamp_of(wrong)
-    loads = wrong.get("force_N", np.full(len(clamps), defaults.FORCE))
+    clamps, directions = clamp_of(table), np.array(table["direction"])
+    loads = table.get("force_N", np.full(len(clamps), defaults.FORCE))
     for _ in range(TRIES):
         first = int(rng.integers(len(clamps)))
-        others = np.flatnonzero(
-            (clamps == clamps[first]) & (loads == loads[first]) & (wrong["direction"] != wrong["direction"][first])
-        )
-        if len(others):
-            rows = np.array([first, int(rng.choice(others))])
-            wrong["stiffness_N_per_mm"][rows] = wrong["stiffness_N_per_mm"][rows[::-1]]
-            return np.sort(rows)
+        same = (clamps == clamps[first]) & (loads == loads[first])
+        if len(others := np.flatnonzero(same & (directions != directions[first]))):
+            rows = np.sort([first, int(rng.choice(others))])
+            return rows, _with(table, "stiffness_N_per_mm", rows, np.asarray(table["stiffness_N_per_mm"])[rows[::-1]])
     raise InputError("no two directions of one clamping and load", expected="a campaign with several")
 
 
-def _mistype(wrong: Table, nominal: Nominal, kind: str, rng: Generator) -> IntArray:
+def _mistyped(table: Table, nominal: Nominal, kind: str, rng: Generator) -> tuple[IntArray, Table]:
     """A coordinate or an angle of one row, or of all rows of a clamping, is written wrongly."""
-    columns, wrong_by, smallest = MISTYPED[kind]
-    clamps = clamp_of(wrong)
+    (columns, wrong_by, smallest), clamps = MISTYPED[kind], clamp_of(table)
     for _ in range(TRIES):
         row = int(rng.integers(len(clamps)))
         rows = np.flatnonzero(clamps == clamps[row]) if rng.random() < 0.5 else np.array([row])
-        name = str(rng.choice([column for column in columns if column in wrong]))
-        before = float(wrong[name][row])
+        name = str(rng.choice([column for column in columns if column in table]))
+        before = float(table[name][row])
         if abs(before) < smallest:
             continue
         after = round(before + float(rng.choice([-1.0, 1.0])) * wrong_by, 3) if wrong_by else -before
-        trial = dict(wrong) | {name: wrong[name].copy()}
-        trial[name][rows] = after
-        slipped = rows_of({column: np.asarray(values)[rows] for column, values in trial.items()})
-        if reachable(nominal, slipped.position, slipped.angles, slipped.extension).all():
-            wrong[name] = trial[name]
-            return rows
+        trial = _with(table, name, rows, after)
+        tried = rows_of(trial).take(rows)
+        if reachable(nominal, tried.position, tried.angles, tried.extension).all():
+            return rows, trial
     raise InputError(f"no row for the slip {kind}", expected="poses off the axis, or tilted, that stay reachable")

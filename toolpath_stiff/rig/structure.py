@@ -107,30 +107,20 @@ class Links:
         return 6 + self.vertices.size + len(self.ends)
 
 
-@dataclass(frozen=True)
-class Solved:
-    """The machine under its loads, per unit load.
+def solved(
+    place: Geometry, links: Links, direction: FloatArray, force: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The machine under loads `force` (n,) N along unit vectors `direction` (n, 3), per unit load.
 
-    Attributes
-    ----------
+    Returns
+    -------
     compliance
         (n,) m/N between tool and workpiece.
     moved
-        (n, N) the unknowns: the platform's own, then six joints, the vertices, the ends.
+        (n, N) the unknowns: the platform's own, then six joints, the vertices, the ends (`Links.count` in all).
     stretch
         (n, 6, N) what turns them into the elongation of each strut, its joints left out.
-    platform_dofs
-        How many unknowns are the platform's.
     """
-
-    compliance: FloatArray
-    moved: FloatArray
-    stretch: FloatArray
-    platform_dofs: int
-
-
-def solved(place: Geometry, links: Links, direction: FloatArray, force: FloatArray) -> Solved:
-    """The machine under loads `force` (n,) N along unit vectors `direction` (n, 3)."""
     stretch, platform_springs, platform_dofs = _struts(place, links)
     load = _load_vector(links, direction, platform_dofs)
     n, size = load.shape
@@ -160,7 +150,7 @@ def solved(place: Geometry, links: Links, direction: FloatArray, force: FloatArr
         before, compliance = compliance, np.einsum("ni,ni->n", load, moved)
         forces = force[:, None] * (per_stretch @ moved[:, :, None])[:, :, 0]
         if np.abs(compliance - before).max() <= SECANT_TOLERANCE * compliance.max():
-            return Solved(compliance, moved, stretch, platform_dofs)
+            return compliance, moved, stretch
     raise RuntimeError("the secant stiffnesses of the joints did not settle")
 
 

@@ -21,6 +21,7 @@ from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import End, Geometry, Links
 
 Shape = dict[str, Any]  # what is drawn of something hidden beside its size, by name
+Draw = Callable[[Generator], Shape]
 Physics = TypeVar("Physics", bound=Callable[..., Any])
 X, Y, Z = np.eye(3)
 
@@ -111,7 +112,7 @@ class Kind:
     act: Callable[[Links, CommandedRows, Unknown], Links] | None = None
     read: Callable[[Rows, Unknown], FloatArray] | None = None
     move: Callable[[Unknown], FloatArray] | None = None
-    shape: Callable[[Generator], Shape] = lambda rng: {}
+    shape: Draw = lambda rng: {}
     columns: tuple[str, ...] = ()
 
 
@@ -141,24 +142,27 @@ def beyond(force: FloatArray, threshold: float) -> FloatArray:
     return np.asarray(np.maximum(0.0, 1.0 - threshold / np.maximum(np.abs(force), 1e-9)))
 
 
-def uniform(name: str, low: float, high: float) -> Callable[[Generator], Shape]:
+def uniform(name: str, low: float, high: float) -> Draw:
     """One number, drawn from a range."""
     return lambda rng: {name: float(rng.uniform(low, high))}
 
 
-def one_strut(rng: Generator) -> Shape:
-    """Which strut, from 0."""
-    return {"strut": int(rng.integers(6))}
+def whole(name: str, low: int, beyond_high: int) -> Draw:
+    """One whole number, from the lowest to below the last."""
+    return lambda rng: {name: int(rng.integers(low, beyond_high))}
 
 
-def side(rng: Generator) -> Shape:
-    """Which side."""
-    return {"side": float(rng.choice([-1.0, 1.0]))}
+def either(name: str) -> Draw:
+    """1 or -1."""
+    return lambda rng: {name: float(rng.choice([-1.0, 1.0]))}
 
 
-def signed(rng: Generator) -> Shape:
-    """Which sign."""
-    return {"sign": float(rng.choice([-1.0, 1.0]))}
+def drawn(*draws: Draw) -> Draw:
+    """Several, one after the other."""
+    return lambda rng: {name: value for draw in draws for name, value in draw(rng).items()}
+
+
+one_strut, side, signed = whole("strut", 0, 6), either("side"), either("sign")  # a strut from 0
 
 
 def with_ends(links: Links, *ends: tuple[FloatArray, FloatArray | float]) -> Links:

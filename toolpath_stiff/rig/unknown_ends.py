@@ -1,9 +1,6 @@
 """Unknowns in series with the whole load: work, table, floor, the frame as one piece, spindle, tool; instruments."""
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.random import Generator
@@ -15,21 +12,23 @@ from toolpath_stiff.rig.structure import Links
 from toolpath_stiff.rig.unknown import (
     REACH,
     SOFT,
+    CommandedRows,
+    Kind,
     Shape,
+    Unknown,
     X,
     Y,
     Z,
     beyond,
+    drawn,
     kind,
     opened,
     side,
     signed,
     uniform,
+    whole,
     with_ends,
 )
-
-if TYPE_CHECKING:
-    from toolpath_stiff.rig.unknown import CommandedRows, Kind, Unknown
 
 END_KINDS: dict[str, Kind] = {}
 act = partial(kind, END_KINDS, "act")
@@ -48,20 +47,13 @@ HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
 # tangent of a circle about the axis is described by x and y as well as by the radius.
 BASE = "table,frame"
 AZIMUTH = uniform("azimuth", 0.0, 2.0 * np.pi)
+HOLDS = drawn(uniform("holds", 800.0, 2500.0), lambda rng: {"setup": "riser"})
 
 
 def _oblique(rng: Generator) -> Shape:
     """Within 25 degrees of a diagonal of X and Y, in any quadrant."""
     quadrant = 0.5 * np.pi * float(rng.integers(4))
     return {"azimuth": quadrant + float(rng.uniform(np.radians(20.0), np.radians(70.0)))}
-
-
-def _holds(rng: Generator) -> Shape:
-    return {**uniform("holds", 800.0, 2500.0)(rng), "setup": "riser"}
-
-
-def _horizontal(rng: Generator) -> Shape:
-    return {"axis": int(rng.integers(2))}
 
 
 @act(BASE, "x", SOFT)
@@ -98,7 +90,7 @@ def worn_table_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_ends(links, (lever, u.size))
 
 
-@act("table", "setup,load", SOFT, shape=_holds, columns="force_N,setup")
+@act("table", "setup,load", SOFT, shape=HOLDS, columns="force_N,setup")
 def fixture_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The fixture of one set-up holds by friction: beyond it the work gives sideways."""
     sideways = state.rows.force * np.linalg.norm(state.rows.direction[:, :2], axis=1)
@@ -120,7 +112,7 @@ def clamp_loosened(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_ends(links, (X, give), (Y, give))
 
 
-@act(BASE, "z,constant", 4 * SOFT, shape=_horizontal)
+@act(BASE, "z,constant", 4 * SOFT, shape=whole("axis", 0, 2))
 def portal_bending(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The portal that carries the frame bends about a horizontal axis at its knee: the lower the tip, the more."""
     arm = state.place.work_point - KNEE * Z

@@ -1,59 +1,42 @@
-"""Unknowns of struts, platform and frame: they act on what carries the platform."""
-
-from __future__ import annotations
+"""Unknowns of struts and their joints, platform and frame: they act on what carries the platform."""
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.rig.nominal import neutral_directions
 from toolpath_stiff.rig.structure import BARS, Links
 from toolpath_stiff.rig.unknown import (
     ALL,
     ONE,
     SOFT,
-    Shape,
+    CommandedRows,
+    Kind,
+    Unknown,
     beyond,
+    drawn,
     kind,
     one_strut,
     opened,
     side,
     signed,
     uniform,
+    whole,
     with_factors,
     with_joints,
 )
-
-if TYPE_CHECKING:
-    from toolpath_stiff.rig.unknown import CommandedRows, Kind, Unknown
 
 STRUT_KINDS: dict[str, Kind] = {}
 act = partial(kind, STRUT_KINDS, "act")
 move = partial(kind, STRUT_KINDS, "move")
 
+SWING = np.sin(np.radians(20.0)) ** 2  # squared sine of the swing at which compliances are quoted
+SLIP_LOAD = 300.0  # N, load at which a sticking joint carries half of what it does at rest (assumed)
 LEAST_FORCE = 0.1  # N, below which a secant compliance is held
 SOUND_BAR = 3e9  # N/m, the bars of a platform one of which is cracked: 1.4 % at the tip (assumed)
 PRELOAD_GROWS = 0.3  # of the campaign, time constant of a machine that warms up (assumed)
-
-
-def _vertex(rng: Generator) -> Shape:
-    return {"vertex": int(rng.integers(3))}
-
-
-def _loose(rng: Generator) -> Shape:
-    """The second or third post: loads along +X, +Y and +Z never pull the first one of the paper's machine down."""
-    return {"vertex": int(rng.integers(1, 3))}
-
-
-def _moved(rng: Generator) -> Shape:
-    return one_strut(rng) | {"axis": int(rng.integers(3))} | signed(rng)
-
-
-def _wave(rng: Generator) -> Shape:
-    return one_strut(rng) | {"wavelength": float(rng.uniform(0.12, 0.3)), "phase": float(rng.uniform(0.0, 6.28))}
 
 
 def _only(strut: int) -> FloatArray:
@@ -64,6 +47,44 @@ def _coupled(links: Links, shares: FloatArray, compliance: float) -> Links:
     """A spring that carries shares (n, 6) of the strut forces and lengthens each strut by its share: c a a^T."""
     flexibility = np.linalg.inv(links.struts) + compliance * shares[:, :, None] * shares[:, None, :]
     return dataclasses.replace(links, struts=np.asarray(np.linalg.inv(flexibility), dtype=np.float64))
+
+
+def _swing(state: CommandedRows) -> FloatArray:
+    """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
+    rest = neutral_directions(state.nominal)[1]
+    now = state.units @ state.place.rotation
+    return np.asarray(1.0 - np.minimum(np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now) ** 2, 1.0))
+
+
+@act(ALL, "tilt,radius,strut length,z", SOFT)
+def joint_swing(links: Links, state: CommandedRows, u: Unknown) -> Links:
+    """The forks of the platform joints bend the more, the further they swing out: c = c0 sin^2."""
+    compliance = u.size * _swing(state) / SWING
+    return with_joints(links, lambda forces: compliance)
+
+
+@act(ALL, "constant,tilt,radius,strut length", SOFT)
+def cardan_fork(links: Links, state: CommandedRows, u: Unknown) -> Links:
+    """A cross whose inner pin, radial on the platform, is worn: c = c0 (share of the strut's force along the pin)^2."""
+    joints = state.place.platform_joints - state.place.work_point[:, None, :]
+    axis = state.place.rotation[:, :, 2]
+    radial = joints - np.einsum("nki,ni->nk", joints, axis)[:, :, None] * axis[:, None, :]
+    pin = radial / np.linalg.norm(radial, axis=2, keepdims=True)
+    compliance = u.size * np.einsum("nki,nki->nk", state.units, pin) ** 2
+    return with_joints(links, lambda forces: compliance)
+
+
+@act("joints,struts,platform", "tilt,radius,strut length,z", 3e6)
+def joint_binding(links: Links, state: CommandedRows, u: Unknown) -> Links:
+    """Joints that bind near the end of their swing: rotational stiffness m0 sin^2."""
+    return dataclasses.replace(links, moment=links.moment + u.size * _swing(state) / SWING)
+
+
+@act("joints,struts,platform", "load", 6e6, columns="force_N")
+def joint_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
+    """Sticking joints that slip: rotational secant stiffness m0 F0 / (F0 + F), Masing's element smeared out."""
+    held = SLIP_LOAD / (SLIP_LOAD + state.rows.force)
+    return dataclasses.replace(links, moment=links.moment + u.size * held[:, None] * np.ones(6))
 
 
 @act(ONE, "strut force,load", 50e-6, shape=one_strut, columns="force_N")
@@ -78,7 +99,7 @@ def nut_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_joints(links, lambda f: u.size * beyond(f, u.shape["preload"]))
 
 
-@act(ONE, "force sign", SOFT, shape=lambda rng: one_strut(rng) | side(rng))
+@act(ONE, "force sign", SOFT, shape=drawn(one_strut, side))
 def thrust_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The thrust bearing of one screw is worn on one side: softer in tension, or in compression."""
     return with_joints(links, lambda f: u.size * opened(f * u.shape["side"]) * _only(u.shape["strut"]))
@@ -98,14 +119,14 @@ def drive_spring(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return with_joints(links, lambda forces: compliance)
 
 
-@act(ONE, "strut length", 3.0, shape=lambda rng: one_strut(rng) | signed(rng))
+@act(ONE, "strut length", 3.0, shape=drawn(one_strut, signed))
 def other_screw(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One strut was replaced: its stiffness has another slope over the length, k exp(a (s - 1/2))."""
     factor = np.where(np.arange(6) == u.shape["strut"], np.exp(u.size * (state.stretched - 0.5)), 1.0)
     return with_factors(links, factor)
 
 
-@act(ONE, "strut length", 0.85, shape=_wave)
+@act(ONE, "strut length", 0.85, shape=drawn(one_strut, uniform("wavelength", 0.12, 0.3), uniform("phase", 0.0, 6.28)))
 def screw_lead(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One screw was ground with a wavy lead: its nut's stiffness varies periodically with the length."""
     wave = 1.0 + u.size * np.sin(2.0 * np.pi * state.lengths / u.shape["wavelength"] + u.shape["phase"])
@@ -142,7 +163,7 @@ def cracked_bar(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return dataclasses.replace(links, bars=stiffness)
 
 
-@act("frame", "constant", SOFT, shape=_vertex)
+@act("frame", "constant", SOFT, shape=whole("vertex", 0, 3))
 def frame_oval(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The frame's ring goes oval: the radial loads of two posts act against each other, c (R1 - R2)^2."""
     vertices = state.nominal.vertices
@@ -152,7 +173,8 @@ def frame_oval(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return _coupled(links, np.einsum("nki,nki->nk", state.units, outward) * side, u.size)
 
 
-@act("frame", "force sign,direction", SOFT, shape=_loose)
+# The second or third post: loads along +X, +Y and +Z never pull the first one of the paper's machine down.
+@act("frame", "force sign,direction", SOFT, shape=whole("vertex", 1, 3))
 def loose_vertex_bolt(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A bolt of one post is loose: pulled down the post gives, a third as much outwards; pressed it sits."""
     vertex = u.shape["vertex"]
@@ -169,12 +191,7 @@ def loose_vertex_bolt(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return dataclasses.replace(links, loose=loose)
 
 
-@move(
-    "frame,joints,one strut",
-    "constant",
-    0.3,
-    shape=lambda rng: one_strut(rng) | {"axis": int(rng.integers(3))} | signed(rng),
-)
+@move("frame,joints,one strut", "constant", 0.3, shape=drawn(one_strut, whole("axis", 0, 3), signed))
 def joint_seat(u: Unknown) -> FloatArray:
     """One frame joint stands elsewhere than the control believes."""
     moved = np.zeros((6, 3))

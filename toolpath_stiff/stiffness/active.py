@@ -67,8 +67,7 @@ class ActiveEffect:
             if not isinstance(changed, Hexapod):
                 raise self._fault("geometry", f"returns {_kind(changed)}", "a Machine (machine.with_changes(...))")
             for joints in (changed.frame_joints, changed.platform_joints):
-                self._check_shape("geometry", joints, (6, 3))
-                if not np.isfinite(joints).all():
+                if np.shape(joints) != (6, 3) or not np.isfinite(joints).all():
                     raise self._fault("geometry", "gives joints that are not finite", "(6, 3) m")
         return changed
 
@@ -129,21 +128,19 @@ def read_parameters(effect: Effect, entry: EffectEntry, where: str) -> Values:
         `where` for an entry that stands in none.
     """
     by_key = {parameter.key: parameter for parameter in effect.parameters}
-    for key in entry.parameters:
+    for key in (*entry.parameters, *by_key):
+        mistake = expected = ""
         if key not in by_key:
-            known = f"one of {', '.join(by_key)}" if by_key else "no keys besides name and provenance"
-            raise entry.error(f"effect {effect.name}: unknown key {key}", key, expected=known, where=where)
-    values: dict[str, float | str] = {}
-    for key, parameter in by_key.items():
-        if key not in entry.parameters:
-            mistake = f"effect {effect.name}: {key} is missing"
-            raise entry.error(mistake, expected=parameter.expected, where=where)
-        value = entry.parameters[key]
-        if not _is_valid(parameter, value):
-            mistake = f"effect {effect.name}: {key} = {value!r}"
-            raise entry.error(mistake, key, expected=parameter.expected, where=where)
-        values[parameter.name] = float(value) * parameter.si if parameter.kind == "real" else value
-    return values
+            mistake = f"unknown key {key}"
+            expected = f"one of {', '.join(by_key)}" if by_key else "no keys besides name and provenance"
+        elif key not in entry.parameters:
+            mistake, expected = f"{key} is missing", by_key[key].expected
+        elif not _is_valid(by_key[key], entry.parameters[key]):
+            mistake, expected = f"{key} = {entry.parameters[key]!r}", by_key[key].expected
+        if mistake:
+            raise entry.error(f"effect {effect.name}: {mistake}", key, expected=expected, where=where)
+    given = {p: entry.parameters[p.key] for p in effect.parameters}
+    return {p.name: float(value) * p.si if p.kind == "real" else value for p, value in given.items()}
 
 
 def _is_valid(parameter: Parameter, value: object) -> bool:

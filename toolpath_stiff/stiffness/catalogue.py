@@ -14,7 +14,7 @@ from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line, options
@@ -155,14 +155,13 @@ class EffectCatalogue(Result):
         """An effect by its name."""
         return next(effect for effect in self.effects if effect.name == name)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """What each effect declares, in its own units."""
         return {"effects": [self.view.describe_effect(effect) for effect in self.effects]}
 
     def to_frame(self) -> pd.DataFrame:
         """One row an effect: link of the load path, name, title, equation, source."""
-        columns = ["link", "name", "title", "equation", "source", "load_dependent"]
-        return frame_of(self.to_dict()["effects"])[columns]
+        return frame_of(self.to_dict()["effects"])[["link", "name", "title", "equation", "source", "load_dependent"]]
 
     def _short(self) -> str:
         return f"{len(self.effects)} effects"

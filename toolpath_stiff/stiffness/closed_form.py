@@ -60,22 +60,16 @@ def prepare(machine: Hexapod, tool_length: float = np.nan) -> ClosedForm:
 
 
 def _split(machine: Hexapod) -> tuple[list[int], float]:
-    """Struts, triplet A first, by the best determinants at the neutral pose; m, the size of the arms."""
+    """Struts, triplet A first, by the best determinants at the neutral pose; m, the size of the arms.
+
+    The elimination divides by det U_A and by det S, which is det J / det U_A.
+    """
     struts = solve_struts_at(machine, machine.limits.neutral_pose)
-    directions, arms = struts.directions[0], struts.arms[0]
     arm = float(np.linalg.norm(machine.platform_joints - machine.platform_joints.mean(axis=0), axis=1).mean())
-    moments = np.cross(arms, directions)
-
-    def quality(first: tuple[int, ...]) -> float:
-        """The smaller of the two determinants that the split divides by."""
-        a, b = list(first), [i for i in range(6) if i not in first]
-        leading = np.linalg.det(directions[a])
-        if abs(leading) < 1e-12:
-            return 0.0
-        rest = moments[b].T - moments[a].T @ np.linalg.solve(directions[a].T, directions[b].T)
-        return float(min(abs(leading), abs(np.linalg.det(rest)) / arm**3))
-
-    best = max(combinations(range(6), 3), key=quality)
+    triplets = list(combinations(range(6), 3))
+    first = np.abs(np.linalg.det(struts.directions[0][np.array(triplets)]))
+    second = np.abs(np.linalg.det(struts.jacobian[0])) / arm**3 / np.maximum(first, 1e-12)
+    best = triplets[int(np.round(np.minimum(first, second), 9).argmax())]  # of equal ones the first
     return [*best, *(i for i in range(6) if i not in best)], arm
 
 

@@ -1,6 +1,6 @@
 """The closed form over poses, compiled with numba, at module level, because only then its cache on disk is found again.
 
-Import this module only through `compiled`, which does so when a kernel is first asked for.
+Import this module only through `core.compiled_columns`.
 
 What makes the loops vectorise, each worth a factor of 4 or more: poses last in the arrays, an unsigned loop variable
 (a signed one may count from the end), the per-pose functions inlined, joints hoisted into tuples, no branches. An
@@ -53,10 +53,12 @@ def inverse(a, b, c):
     """Columns of the inverse of the matrix with columns a, b, c, and its determinant."""
     bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
     by = dot(a, bc)
-    x = (bc[0] / by, ca[0] / by, ab[0] / by)
-    y = (bc[1] / by, ca[1] / by, ab[1] / by)
-    z = (bc[2] / by, ca[2] / by, ab[2] / by)
-    return (x, y, z), by
+    columns = (
+        (bc[0] / by, ca[0] / by, ab[0] / by),
+        (bc[1] / by, ca[1] / by, ab[1] / by),
+        (bc[2] / by, ca[2] / by, ab[2] / by),
+    )
+    return columns, by
 
 
 @inline

@@ -21,7 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
+from toolpath_stiff.arrays import AnyArray, ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
@@ -115,19 +115,6 @@ def compliance(name: str, largest: float, typical: tuple[float, float], source: 
     return Parameter(name, "nm/N", 1e-9, (0.0, largest), typical, source=source, meaning=meaning)
 
 
-def length_error(typical: tuple[float, float], source: str, meaning: str) -> Parameter:
-    """The parameter of an effect by which a length of the geometry is off, mm: the true one less the stated one."""
-    return Parameter("error", "mm", 1e-3, (-60.0, 60.0), typical, source=source, meaning=meaning)
-
-
-def choice(
-    name: str, bounds: tuple[int, int], source: str, meaning: str, typical: tuple[int, ...] = (), neutral: float = 0.0
-) -> Parameter:
-    """The parameter that says on which part the effect acts, a whole number."""
-    low, *_, high = typical or bounds
-    return Parameter(name, "", 1.0, bounds, (low, high), source, neutral, meaning, kind="integer")
-
-
 @dataclass(frozen=True)
 class LoadPath(ArrayColumns):
     """What an effect sees of n poses under load. SI, base axes.
@@ -208,7 +195,7 @@ class Conditions:
         """Which of `CONDITIONS` somebody has given."""
         return tuple(name for name, attribute in CONDITIONS.items() if getattr(self, attribute, None) is not None)
 
-    def columns(self, n: int) -> dict[str, Any]:
+    def columns(self, n: int) -> dict[str, AnyArray]:
         """The same for n poses, as `LoadPath` holds it."""
         given = {"setup": self.setup, "temperature": self.temperature}
         return {name: np.full(n, value) for name, value in given.items() if value is not None}

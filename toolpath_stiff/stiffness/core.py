@@ -7,13 +7,14 @@ marked by it, and the caller asks the exact route, which pivots.
 
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness import closed_form, compiled, exact
+from toolpath_stiff.stiffness import closed_form, exact
 from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
 
@@ -36,7 +37,7 @@ def choose_route(model: StiffnessModel, poses: int) -> str:
     if poses < CLOSED_FORM_FROM or not is_closed_form(model):
         return "exact"
     straight = not model.machine.strut_law.shape  # the compiled loops know no other law
-    return "compiled" if poses >= COMPILED_FROM and straight and compiled.available() else "closed_form"
+    return "compiled" if poses >= COMPILED_FROM and straight and find_spec("numba") else "closed_form"
 
 
 def tip_compliance(
@@ -109,8 +110,32 @@ def compliance_along_columns(
     """
     kernel = closed_form.prepare(machine, tool_length)
     if route == "compiled":
-        return compiled.compliance_along_columns(kernel, position, direction, rotation)
+        return compiled_columns(kernel, position, direction, rotation)
     return closed_form.compliance_along_columns(kernel, position, direction, rotation)
+
+
+def compiled_columns(
+    kernel: closed_form.ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """As `closed_form.compliance_along_columns`, of contiguous arrays and a law that is a straight line.
+
+    numba is imported when this is first called: 0.4 s, and some seconds to compile the first time on a machine; the
+    result is cached on disk.
+    """
+    from toolpath_stiff.stiffness import compiled_loops
+
+    # Tuples, which the compiled loop keeps in registers.
+    arms, frame = (tuple(map(tuple, joints.T.tolist())) for joints in (kernel.platform, kernel.frame))
+    law, n = (kernel.law.intercept, kernel.law.slope), position.shape[1]
+    loads = np.ascontiguousarray(direction if direction.ndim == 3 else direction[None])
+    out, det, lengths = np.empty((len(loads), n)), np.empty((2, n)), np.empty((6, n))
+    for load, along in zip(loads, out, strict=True):
+        compiled_loops.directed_columns((position, rotation, load), (arms, frame), law, along, det, lengths)
+    in_order = np.empty_like(lengths)
+    in_order[kernel.order] = lengths
+    # Values are nan where a strut has no stiffness above zero.
+    good = np.asarray((closed_form.well_conditioned(kernel, det[0], det[1]) & np.isfinite(out)).all(axis=0))
+    return out if direction.ndim == 3 else out[0], np.abs(det[0] * det[1]), in_order, good
 
 
 def compliance_with_effects(

@@ -76,7 +76,9 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> tuple[FloatArray, F
         strut = strut if series is None else strut + series
         form = form if loads is None else form + loads
         parallel = beside if parallel is None else parallel if beside is None else parallel + beside
-    refuse_struts_without_stiffness(model, path, strut)
+    if ((strut <= 0.0) | (strut == np.inf)).any():
+        row, i = np.argwhere((strut <= 0.0) | (strut == np.inf))[0]
+        raise _impossible(model, path, int(row), f"strut {i + 1}")
     form[:, np.arange(6), np.arange(6)] += strut
     return form, parallel
 
@@ -296,14 +298,6 @@ def is_compliance(tensor: FloatArray) -> BoolArray:
     even = np.abs(unit - turned).max(axis=(1, 2)) <= APART
     good[good] = even & (np.linalg.eigvalsh(0.5 * (unit + turned))[:, 0] > 0.0)
     return np.asarray(good)
-
-
-def refuse_struts_without_stiffness(model: StiffnessModel, path: LoadPath, strut: FloatArray) -> None:
-    """Raise `InputError` where the compliances (n, 6) m/N of struts with all effects are 0 or less, or infinite."""
-    bad = (strut <= 0.0) | (strut == np.inf)
-    if bad.any():
-        row = int(np.argmax(bad.any(axis=1)))
-        raise _impossible(model, path, row, f"strut {int(np.argmax(bad[row])) + 1}")
 
 
 def _impossible(model: StiffnessModel, path: LoadPath, row: int, part: str) -> EffectError:

@@ -5,7 +5,6 @@ model's `Conditions`. An effect without a condition that it waits for adds nothi
 every result says so in the same words.
 """
 
-import difflib
 import shlex
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -220,8 +219,7 @@ def load_path(
     if model.control is not None and n:  # the struts get the lengths that the control computes; it may not know all
         turn = np.broadcast_to(np.eye(3) if rotation is None else np.asarray(rotation, dtype=float), (n, 3, 3))
         lengths = solve_struts(model.control, tip, turn, length).lengths
-        programmed = np.concatenate([tip, roll_pitch_yaw(turn)], axis=1)
-        poses = forward_kinematics(model.machine, lengths, programmed, length)
+        poses = forward_kinematics(model.machine, lengths, np.hstack([tip, roll_pitch_yaw(turn)]), length)
         tip, rotation = poses[:, :3], rotation_matrices(poses[:, 3:])
     turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
     return LoadPath(
@@ -291,12 +289,12 @@ def condition_warnings(model: StiffnessModel) -> list[str]:
 
 def conditions_stated(model: StiffnessModel) -> list[str]:
     """What the results assume of set-up and temperature, and which effects stand aside for it."""
-    stated = []
-    if model.conditions.setup is not None:
-        stated.append(f"set-up: {model.conditions.setup or NO_SETUP}")
-    if model.conditions.temperature is not None:
-        stated.append(f"temperature: {model.conditions.temperature:g} degrees C")
-    return stated + [f"{name} does not act: {reason}" for name, reason in effects_elsewhere(model).items()]
+    setup, temperature = model.conditions.setup, model.conditions.temperature
+    return [
+        *([] if setup is None else [f"set-up: {setup or NO_SETUP}"]),
+        *([] if temperature is None else [f"temperature: {temperature:g} degrees C"]),
+        *(f"{name} does not act: {reason}" for name, reason in effects_elsewhere(model).items()),
+    ]
 
 
 def effects_stated(model: StiffnessModel) -> Document:
@@ -342,9 +340,5 @@ def check_setup(setup: str, said_by: str, *models: StiffnessModel) -> None:
     takes_any = any(SETUP in active.effect.needs and not active.setup for active in effects)
     if setup in ("", NO_SETUP, *known) or takes_any or not known:
         return
-    near = difflib.get_close_matches(setup, known, n=1)
-    raise EffectError(
-        f"{said_by}: set-up {setup!r} is not known",
-        expected=f"one of {', '.join(known)}, or {NO_SETUP}",
-        hint=f"did you mean {near[0]}?" if near else "a machine file lists its set-ups as `names` of [setup]",
-    )
+    expected = f"one of {', '.join(known)}, or {NO_SETUP}; a machine file lists them as `names` of [setup]"
+    raise EffectError(f"{said_by}: set-up {setup!r} is not known", expected=expected)

@@ -107,11 +107,9 @@ class TermEffect(Effect):
         """In series with each strut."""
         added = []
         for term, size in self._sizes(path, p, *IN_SERIES):
-            compliance = size * strut_share(term, path)
-            if term.action == "strut factor":
-                least = -LEAST_STRUT / path.machine.strut_law.stiffness(path.struts.lengths)
-                compliance = np.maximum(compliance, least)
-            added.append(compliance)
+            law = path.machine.strut_law.stiffness(path.struts.lengths)
+            least = -LEAST_STRUT / law if term.action == "strut factor" else -np.inf
+            added.append(np.maximum(size * strut_share(term, path), least))
         return np.sum(added, axis=0) if added else None
 
     def parallel_stiffness(self, path: LoadPath, p: Values) -> FloatArray | None:
@@ -146,25 +144,6 @@ class TermEffect(Effect):
         for size, term in self.terms.items():
             if term.action in actions and all(SEEN[name](path, "") is not None for name in term.variables):
                 yield term, p[size]
-
-
-def effect_of(term: Term) -> TermEffect:
-    """A term as an effect of one parameter, `size`.
-
-    Raises
-    ------
-    ValueError
-        No effect can see the term's variable (`Term.acts`).
-
-    Examples
-    --------
-    >>> tip = Term("table", "Y", "y", "slope", "give", at=(("start", -0.4), ("end", 0.4)))
-    >>> effect_of(tip).parameters[0].key
-    'size_nm_per_N'
-    """
-    if not term.acts:
-        raise ValueError(f"no effect sees the variable {' times '.join(term.variables)!r}")
-    return TermEffect(f"term: {term.key}", [(term, size_parameter(term.action, "size", f"size of {term.key}"))])
 
 
 def _needs(term: Term) -> list[str]:
@@ -261,8 +240,8 @@ def coupled(term: Term) -> tuple[int, int]:
 
 def pair_stiffness(term: Term, path: LoadPath) -> FloatArray:
     """(n,) N/m, the geometric mean of the struts of a `coupling`."""
-    stiffness = path.machine.strut_law.stiffness(path.struts.lengths[:, coupled(term)])
-    return np.asarray(np.sqrt(stiffness.prod(axis=1)))
+    pair = path.machine.strut_law.stiffness(path.struts.lengths[:, coupled(term)])
+    return np.asarray(np.sqrt(pair.prod(axis=1)))
 
 
 def reading_share(term: Term, path: LoadPath) -> FloatArray:

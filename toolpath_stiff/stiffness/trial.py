@@ -118,8 +118,7 @@ def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOut
         path = _path(model, poses)
         exact.tip_compliance(model, path)  # refused if there can be no such one
         after[words] = _shown(model, path)
-    each = (path.take(slice(i, i + 1)) for i in range(len(path)))
-    alone = np.concatenate([_shown(model, pose) for pose in each])
+    alone = np.concatenate([_shown(model, path.take(slice(i, i + 1))) for i in range(len(path))])
     yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {len(poses)} poses")
     change = float(np.abs(after["neutral"] / before - 1.0).max())
     mistake = f"there it changes the stiffness by up to {100.0 * change:.3g} %; it must not"
@@ -244,8 +243,8 @@ class EffectCheck(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """One row a check."""
-        rows = [{"effect": t["effect"], **check} for t in self.to_dict()["effects"] for check in t["checks"]]
-        return frame_of(rows)
+        trials = self.trials.items()
+        return frame_of([{"effect": name, **check} for name, made in trials for check in to_dict(made)])
 
     def __str__(self) -> str:
         return str(self.view.trials_text(self))

@@ -124,8 +124,8 @@ def tlaxis(state: CutterLocationState, statement: MajorStatement) -> None:
 
 def frame_word(state: CutterLocationState, statement: MajorStatement) -> None:
     """A second, different one is refused."""
-    numbers = tuple(state.number(argument) for argument in statement.arguments if is_number(argument))
-    one_frame(state, statement.word, numbers, statement.shown)
+    numbers = (state.number(argument) for argument in statement.arguments if is_number(argument))
+    one_frame(state, statement.word, tuple(numbers), statement.shown)
     state.note(FRAMES[statement.word])
 
 

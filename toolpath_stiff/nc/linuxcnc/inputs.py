@@ -80,8 +80,7 @@ def numbered(lines: Iterable[Line], name: str, *, block_delete: bool, prefix: Se
     Text before a tape mark that follows words, and after it, is treated as by the built-in reader: the second `%`, or
     one that follows words, ends the program. `M2` is added: LinuxCNC requires an end.
     """
-    copy = list(prefix)
-    started = False
+    copy, started = list(prefix), False
     for line in lines:
         if line.words == "%":
             if started:

@@ -276,8 +276,6 @@ def operate(operator: str, left: float | None, right: float | None, family: str)
         if any(value != round(value) or not 0 <= value < LARGEST_BITS for value in (a, b)):
             raise ValueError("its values are not whole numbers from 0")
         return float(LOGIC[operator](round(a), round(b)))
-    if operator in ("/", "MOD") and b == 0.0:
-        raise ValueError("the divisor is 0")
     if operator != "MOD":
         return float(ARITHMETIC[operator](a, b))
     if family != NGC and (a < 0.0 or b < 0.0):

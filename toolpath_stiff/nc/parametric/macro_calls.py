@@ -6,6 +6,7 @@ Fanuc's operator's manuals, "Custom macro" ("Macro call", "Argument specificatio
 from collections.abc import Callable, Iterable
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.state import Call
 from toolpath_stiff.nc.words import Word
 
 ARGUMENTS = {
@@ -17,23 +18,30 @@ LAST_LOCAL = 33
 WHOLE_ARGUMENTS = frozenset("DHMST")  # numbers of tools, offsets and speeds: no decimal point belongs to them
 
 
-def arguments_of(
-    words: Iterable[Word], increments: bool, fault: Callable[[Word, str, str], InputError]
-) -> dict[int, float | None]:
-    """The local variables that the words of a macro call give.
+MACRO_CALLS = ("G65", "G66", "G67")
+LARGEST_NUMBER = 99_999_999  # of a program, or of repeats
+Fault = Callable[[Word, str, str], InputError]  # makes the error of a word: what is wrong with it, what was expected
 
-    Parameters
-    ----------
-    words
-        Those after G65 or G66.
-    increments
-        Whether numbers without a decimal point count increments on the control.
-    fault
-        Makes the error of a word: what is wrong with it, what was expected.
-    """
+
+def call_of(code: Word, words: Iterable[Word], modal: bool, increments: bool, fault: Fault) -> Call:
+    """The call that G65 or G66 and the words after it make; `increments`: numbers without a point count those."""
+    given = {word.letter: word for word in words if word.letter in "PL"}
+    if "P" not in given:
+        raise fault(code, "without P", "P with the number of the macro")
+    program, repeats = (_count(given[letter], fault) if letter in given else 1 for letter in "PL")
+    return Call(program, repeats, code.column, arguments=arguments_of(words, increments, fault), modal=modal)
+
+
+def _count(word: Word, fault: Fault) -> int:
+    if word.value != round(word.value) or not 1 <= word.value <= LARGEST_NUMBER:
+        raise fault(word, "is not a count", "a whole number from 1")
+    return int(word.value)
+
+
+def arguments_of(words: Iterable[Word], increments: bool, fault: Fault) -> dict[int, float | None]:
+    """The local variables that the words of a macro call give."""
     words = [word for word in words if word.letter not in "PL"]
-    letters = [word.letter for word in words]
-    second = any(letters.count(letter) > 1 for letter in "IJK")
+    second = any(sum(word.letter == letter for word in words) > 1 for letter in "IJK")
     arguments: dict[int, float | None] = {}
     triple, previous = -1, "K"
     for word in words:

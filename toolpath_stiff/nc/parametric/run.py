@@ -17,8 +17,8 @@ from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.expressions import EQUAL, number
 from toolpath_stiff.nc.parametric.families import NGC, family_of
-from toolpath_stiff.nc.parametric.macro_calls import arguments_of
-from toolpath_stiff.nc.parametric.statements import Assignment, Statement, Steering, computed_word, read_statement
+from toolpath_stiff.nc.parametric.macro_calls import MACRO_CALLS, call_of
+from toolpath_stiff.nc.parametric.statements import Assignment, Statement, Steering, read_statement, worked_out
 from toolpath_stiff.nc.parametric.structure import Structure, structure_of
 from toolpath_stiff.nc.parametric.variables import Variables
 from toolpath_stiff.nc.place import Place
@@ -30,9 +30,6 @@ from toolpath_stiff.nc.words import Block, Word
 MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
 MOST_IDLE = 100_000  # blocks of loops that run without a move between; a program that works out values needs far fewer
 SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
-LARGEST_NUMBER = 99_999_999  # of a program, or of repeats
-WHOLE_WORDS = frozenset("GMTL")  # codes and numbers, which a value must be
-MACRO_CALLS = ("G65", "G66", "G67")
 
 
 class ParametricRun(ProgramRun):
@@ -77,26 +74,10 @@ class ParametricRun(ProgramRun):
     def _read(self, row: int) -> Block:
         """The block with its values; its variables are set."""
         statement = self._statement(row)
-        words = []
-        for index, word in enumerate(statement.block.words):
-            if index not in statement.computed:
-                words.append(word)
-                continue
-            value = statement.computed[index](self.variables)
-            if value is not None:  # else an empty variable: the word is as if it were not there (Macro B)
-                words.append(computed_word(word, self._whole(word, value) if word.letter in WHOLE_WORDS else value))
+        block = worked_out(statement, self.variables, self._place(row))
         self._assign(statement.assignments)
         line = statement.block.line if row < self._main_lines else self._line_of_call()
-        return replace(statement.block, line=line, words=tuple(words))
-
-    def _whole(self, word: Word, value: float) -> float:
-        """The code or number that a value stands for, as LinuxCNC's interpreter rounds it."""
-        whole = round(value, 1 if word.letter in "GM" else 0)
-        if abs(whole - value) > EQUAL or whole < 0.0:
-            code = f"a code such as {word.letter}1 or {word.letter}59.3"
-            expected = code if word.letter in "GM" else "a whole number from 0"
-            raise self._word_fault(word, f"is {word.letter}{value:g}", expected)
-        return whole
+        return replace(block, line=line)
 
     def _assign(self, assignments: tuple[Assignment, ...]) -> None:
         """Set variables, once all values are known (LinuxCNC, "Numbered Parameters")."""
@@ -137,21 +118,11 @@ class ParametricRun(ProgramRun):
         if code == "G67":
             self._modal = None
             return self._act(replace(block, words=after))
-        given = {w.letter: w for w in after if w.letter in "PL"}
-        if "P" not in given:
-            raise self._word_fault(word, "without P", "P with the number of the macro")
-        program, repeats = (self._count(given[letter]) if letter in given else 1 for letter in "PL")
-        arguments = arguments_of(after, self.state.dialect.increments, self._word_fault)
-        call = Call(program, repeats, word.column, arguments=arguments, modal=code == "G66")
+        call = call_of(word, after, code == "G66", self.state.dialect.increments, self._word_fault)
         if not call.modal:
             return call
         self._modal = call
         return Flow.NEXT
-
-    def _count(self, word: Word) -> int:
-        if word.value != round(word.value) or not 1 <= word.value <= LARGEST_NUMBER:
-            raise self._word_fault(word, "is not a count", "a whole number from 1")
-        return int(word.value)
 
     def _begin(self, level: Subprogram, row: int, column: int) -> None:
         super()._begin(level, row, column)

@@ -6,11 +6,11 @@ A block is read once, to a `Statement`; running it works out its values.
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from toolpath_stiff.nc.controller import Dialect
-from toolpath_stiff.nc.parametric.expressions import Scanner, Value
+from toolpath_stiff.nc.parametric.expressions import EQUAL, Scanner, Value
 from toolpath_stiff.nc.parametric.families import MACRO_B, NGC, NGC_WORDS
 from toolpath_stiff.nc.parametric.variables import Variables
 from toolpath_stiff.nc.place import Place
@@ -31,6 +31,7 @@ _N_WORD = re.compile(r"N\d+(?:\.\d+)?", re.ASCII)
 _LOOP = re.compile(r"(?:DO|END)\d+", re.ASCII)
 LONGEST_BLOCK = 255  # characters without comments and blanks: what LinuxCNC reads
 MOST_VALUES = 30  # of a call
+WHOLE_WORDS = frozenset("GMTL")  # codes and numbers, which a value must be
 
 # `#which = value`: works both out; what that gives sets the variable. In a block all are worked out before any is set.
 Assignment = Callable[[Variables], Callable[[], None]]
@@ -218,7 +219,29 @@ def _assignment(scanner: Scanner) -> Assignment:
     return lambda variables: partial(variables.set, which(variables), value(variables), place)
 
 
-def computed_word(word: Word, value: float) -> Word:
+def worked_out(statement: Statement, variables: Variables, place: Place) -> Block:
+    """The block with the values of its words; one with an empty variable is as if it were not there (Macro B)."""
+    words = []
+    for index, word in enumerate(statement.block.words):
+        if index not in statement.computed:
+            words.append(word)
+            continue
+        value = statement.computed[index](variables)
+        if value is not None:
+            words.append(_computed_word(word, _whole(word, value, place) if word.letter in WHOLE_WORDS else value))
+    return replace(statement.block, words=tuple(words))
+
+
+def _whole(word: Word, value: float, place: Place) -> float:
+    """The code or number that a value stands for, as LinuxCNC's interpreter rounds it."""
+    whole = round(value, 1 if word.letter in "GM" else 0)
+    if abs(whole - value) > EQUAL or whole < 0.0:
+        expected = f"a code such as {word.letter}1" if word.letter in "GM" else "a whole number from 0"
+        raise place.fail(f"{word.text} is {word.letter}{value:g}", expected, column=word.column)
+    return whole
+
+
+def _computed_word(word: Word, value: float) -> Word:
     """A computed word with its value, which stands beside its text too, always with a decimal point.
 
     So a computed number never counts increments.

@@ -26,7 +26,7 @@ function placed(row, stiffness) {
   return { row, zero, stiffness, xyz: [0, 1, 2].map((k) => Float32Array.from(points, (p) => p[k])), axes: [0, 1, 2]
     .map((k) => q.map((r) => r[k])), tools };
 }
-let chosen = d.chosen;
+let chosen = d.recommended;
 const places = d.front.map((row, i) => placed(row, d.stiffness[i]));
 const before = d.before ? placed(d.before, d.stiffness[d.stiffness.length - 1]) : null;
 const n = d.position.length;
@@ -132,8 +132,7 @@ const weakColour = (v) => coloursNow()[Math.min(d.colours.length - 1,
   Math.floor((v - weakEnds[0]) / (weakEnds[1] - weakEnds[0] || 1) * d.colours.length))];
 const nameOf = (row, i) =>
   `number ${row.number}: mean ${group(row.mean_N_per_mm)}, range ${group(row.range_N_per_mm)}, `
-    + `weakest ${group(row.min_N_per_mm)} N/mm` + (i === d.recommended ? ", recommended" : "")
-    + (i === d.chosen && i !== d.recommended ? ", picked" : "");
+    + `weakest ${group(row.min_N_per_mm)} N/mm` + (i === d.recommended ? ", recommended" : "");
 let dots = [];
 function drawFront() {
   const W = widthOf(front), H = Math.round(Math.min(340, 0.85 * W)), [L, R, T, B] = [66, 14, 24, 44],
@@ -223,7 +222,7 @@ function drawFacts(row) {
   const origin = document.createElement("code"), last = body.appendChild(document.createElement("tr")).appendChild(
     document.createElement("th"));
   last.colSpan = columns.length + 1; origin.textContent = "--origin " + [row.x_mm, row.y_mm, row.z_mm, row.a_deg,
-    row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6)).join(",") + ` or --pick ${row.number}`;
+    row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6)).join(",");
     last.appendChild(origin);
 }
 // What is pointed at, in both drawings and the profile.
@@ -251,8 +250,8 @@ function draw() {
   profile.redraw();
   drawFacts(place.row);
   mark();
-  $("chosen-title").textContent = (chosen === d.recommended ? "Recommended placement, " : chosen === d.chosen
-    ? "Picked placement, " : "Placement ") + `${chosen + 1} of ${places.length}`;
+  $("chosen-title").textContent = (chosen === d.recommended ? "Recommended placement, "
+    : "Placement ") + `${chosen + 1} of ${places.length}`;
   chosenView.overlay.setAttribute("aria-label", "Path, coloured by stiffness; " + nameOf(place.row, chosen));
   $("weak-ramp").style.background = $("ramp").style.background = ramp(coloursNow());
 }
@@ -265,7 +264,7 @@ $("weak-high").textContent = group(weakEnds[1]);
 function fromAddress() {
   const [name, zoom] = location.hash.slice(1).split(","), i = name === "recommended" ? d.recommended : Number(name) - 1;
   for (const radio of document.querySelectorAll("input[name=zoom]")) if (radio.value === zoom) radio.checked = true;
-  choose(Number.isInteger(i) && i >= 0 && i < places.length ? i : d.chosen, false);
+  choose(Number.isInteger(i) && i >= 0 && i < places.length ? i : d.recommended, false);
 }
 const { digits } = ticks(d.scale[0], d.scale[1], 30);
 $("low").textContent = (d.beyond[0] ? "\u2264 " : "") + group(d.scale[0], digits);

@@ -9,8 +9,7 @@ from matplotlib.lines import Line2D
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import ReadingNames, Variable, directions
-from toolpath_stiff.comparison.structure import SIGNIFICANT
-from toolpath_stiff.comparison.summary import PatternTest
+from toolpath_stiff.comparison.structure import SIGNIFICANT, FoundPattern
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.colours import DIRECTIONS, MUTED, RED
 from toolpath_stiff.report.pictures.before_after import MAPS, maps, one_to_one, panels
@@ -76,7 +75,7 @@ def variables(comparison: Comparison) -> Figure:
     panels: list[tuple[float, float, Variable | ReadingNames]] = []
     held_against: list[Variable | ReadingNames] = [*comparison.numbers, *comparison.names]
     for variable in held_against:
-        tests = [test for test in comparison.summary.tests if _about(test, variable.name)]
+        tests = [test for test in comparison.tests if _about(test, variable.name)]
         strongest = max((abs(test.statistic) for test in tests), default=0.0)
         panels.append((-strongest, min((test.p_adjusted for test in tests), default=1.0), variable))
     panels.sort(key=lambda panel: panel[0])
@@ -114,9 +113,9 @@ def _key(figure: Figure, comparison: Comparison) -> None:
         figure.text(left, low, f"\u25cf {axis}", color=DIRECTIONS[axis], **style)
 
 
-def _about(test: PatternTest, name: str) -> bool:
+def _about(test: FoundPattern, name: str) -> bool:
     """Whether a pattern is about this variable, or a level of this label, or the same as one that is."""
-    about = [test.variable, *(same.partition(": ")[2] for same in test.same)]
+    about = [test.pattern.variable, *(same.partition(": ")[2] for same in test.pattern.same)]
     return any(variable == name or variable.startswith(f"{name} ") for variable in about)
 
 

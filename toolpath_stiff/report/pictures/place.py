@@ -48,7 +48,7 @@ def setup_sheet(placed: Placement) -> Figure:
 
 def _heading(figure: Figure, placed: Placement) -> float:
     title = textwrap.wrap(f"Set-up of {plain(placed.best.program.name)}", 52)
-    which = "picked from the front" if placed.picked else f"recommended, objective {placed.task.rules.objective}"
+    which = f"recommended, objective {placed.task.rules.objective}"
     machine = f"machine {machine_text(placed.machine_stated)}: {plain(placed.best.machine.title)}"
     about = [*textwrap.wrap(machine, FULL_LETTERS), f"placement {placed.chosen.number} of {len(placed.front)}, {which}"]
     top = _down(figure, 0.945, title, 0.026, fontsize=18, weight="bold")

@@ -34,5 +34,4 @@ class ContactNonlinearity(Effect):
         """Secant compliance of the contacts under the present strut forces."""
         if path.strut_forces is None:
             return None
-        force = np.maximum(np.abs(path.strut_forces), IDLE)
-        return np.asarray(p["compliance"] * np.cbrt(REFERENCE_FORCE / force))
+        return np.asarray(p["compliance"] * np.cbrt(REFERENCE_FORCE / np.maximum(np.abs(path.strut_forces), IDLE)))

@@ -5,9 +5,10 @@ from functools import lru_cache
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Values, choice, compliance
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Parameter, Values, compliance
 from toolpath_stiff.stiffness.sizes import sizes_in_words
 
+NUMBERED = "numbered by the lowest strut that they hold"
 BUILT = f"{EXPERIENCE}: stiff machine frames are built for 100 to 500 N/um"
 
 
@@ -24,7 +25,7 @@ class FrameCompliance(Effect):
     equation = "c += sum_v F_v^T diag(c_r, 0, c_z) F_v, F_v = f_i u_i + f_j u_j in the vertex's cylindrical axes"
     source = "springs in series; the octahedral frame's vertices carry two struts each"
     parameters = (
-        choice("vertex", (0, 3), "numbered by the lowest strut that they hold", "which vertex; 0 is all three"),
+        Parameter("vertex", "", 1.0, (0, 3), (0, 3), NUMBERED, 0.0, "which vertex; 0 is all three", "integer"),
         compliance("radial", 200.0, (2.0, 10.0), BUILT, "compliance of a vertex towards the machine's axis"),
         compliance("vertical", 200.0, (2.0, 10.0), BUILT, "compliance of a vertex up and down"),
     )
@@ -37,8 +38,7 @@ class FrameCompliance(Effect):
                 carried = np.zeros((len(path), 2, 12))  # outward and upward pull of the two struts
                 carried[:, 0, pair] = path.struts.directions[:, pair] @ radial
                 carried[:, 1, pair] = path.struts.directions[:, pair, 2]
-                springs = np.array([p["radial"], p["vertical"]])
-                form += np.einsum("k,nki,nkj->nij", springs, carried, carried)
+                form += np.einsum("k,nki,nkj->nij", [p["radial"], p["vertical"]], carried, carried)
         return form
 
     def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:

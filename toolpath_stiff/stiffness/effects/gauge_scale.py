@@ -4,7 +4,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import EffectError
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, choice, setup_parameter
+from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, setup_parameter
 from toolpath_stiff.stiffness.sizes import about
 
 ALONG = 0.999  # |d_axis| from which a reading counts as taken along that axis: 2.6 degrees, no one aligns better
@@ -27,7 +27,7 @@ class GaugeScale(Effect):
     equation = "k_read = (1 + s) k, for one direction, one set-up, or both"
     source = "wrong range, unit or lever of a force gauge or indicator"
     parameters = (
-        choice("direction", (0, 3), "direction of the measurements", WHICH, typical=(1, 3)),
+        Parameter("direction", "", 1.0, (0, 3), (1, 3), "direction of the measurements", 0.0, WHICH, "integer"),
         setup_parameter('name of the set-up; "": every one'),
         Parameter("scale", "%", 0.01, (-20.0, 20.0), (-5.0, 5.0), SOURCE, meaning="how much too high the readings are"),
     )

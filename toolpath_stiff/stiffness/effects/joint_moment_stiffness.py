@@ -46,16 +46,9 @@ class JointMomentStiffness(Effect):
 
 def end_rotations(path: LoadPath) -> FloatArray:
     """(n, 6, 6, 6) B of each strut: its rotation against the frame and against the platform, 3 each, of a tip twist."""
-    axis = path.struts.directions
-    move = np.concatenate([np.broadcast_to(np.eye(3), (len(path), 6, 3, 3)), -_cross(path.struts.arms)], axis=-1)
-    against_frame = _cross(axis) @ move / path.struts.lengths[..., None, None]
+    axis, each = path.struts.directions[..., None, :], np.broadcast_to(np.eye(3), (len(path), 6, 3, 3))
+    move = np.concatenate([each, np.cross(np.eye(3), path.struts.arms[..., None, :])], axis=-2)  # of six unit twists
+    against_frame = np.cross(axis, move) / path.struts.lengths[..., None, None]
     against_platform = against_frame.copy()
-    against_platform[..., 3:] -= np.eye(3) - axis[..., :, None] * axis[..., None, :]
-    return np.concatenate([against_frame, against_platform], axis=2)
-
-
-def _cross(vector: FloatArray) -> FloatArray:
-    """(..., 3, 3) matrices [v x] with [v x] w = v x w."""
-    matrix = np.zeros((*vector.shape, 3))
-    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -vector[..., 2], vector[..., 1], -vector[..., 0]
-    return np.asarray(matrix - np.swapaxes(matrix, -1, -2))
+    against_platform[..., 3:, :] -= np.eye(3) - axis * np.swapaxes(axis, -1, -2)
+    return np.swapaxes(np.concatenate([against_frame, against_platform], axis=-1), -1, -2)

@@ -67,17 +67,14 @@ def platform_nodes(platform_joints: FloatArray) -> FloatArray:
 
     `platform_joints` (6, 3) m, relative to the tip. The hub lies on the tool axis at the joints' mean height.
     """
-    hub = np.array([0.0, 0.0, platform_joints[:, 2].mean()])
-    return np.vstack([platform_joints, hub, np.zeros(3)])
+    return np.vstack([platform_joints, [0.0, 0.0, platform_joints[:, 2].mean()], np.zeros(3)])
 
 
 def platform_bars(platform_joints: FloatArray) -> list[tuple[int, int]]:
     """The 19 bars as pairs of nodes; the rim joins joints that are neighbours in angle about the tool axis."""
     order = np.argsort(np.arctan2(platform_joints[:, 1], platform_joints[:, 0]), kind="stable")
     rim = [(int(order[i]), int(order[(i + 1) % 6])) for i in range(6)]
-    spokes = [(i, HUB) for i in range(6)]
-    legs = [(i, TIP) for i in range(6)]
-    return [*rim, *spokes, *legs, (HUB, TIP)]
+    return [*rim, *((i, HUB) for i in range(6)), *((i, TIP) for i in range(6)), (HUB, TIP)]
 
 
 def free_platform_flexibility(platform_joints: FloatArray) -> FloatArray:

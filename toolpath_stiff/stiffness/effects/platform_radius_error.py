@@ -3,7 +3,9 @@
 import numpy as np
 
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, Values, length_error
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, Parameter, Values
+
+MEANING = "true radius less that of the machine file"
 
 
 class PlatformRadiusError(Effect):
@@ -20,7 +22,7 @@ class PlatformRadiusError(Effect):
     source = "geometry"
     unknown_to_control = True
     clause = "the platform's joints stand about {error} mm further {error:out/in} than in the machine file"
-    parameters = (length_error((-3.0, 3.0), EXPERIENCE, "true radius less that of the machine file"),)
+    parameters = (Parameter("error", "mm", 1e-3, (-60.0, 60.0), (-3.0, 3.0), EXPERIENCE, meaning=MEANING),)
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """Joints on the wider circle; one on the tool axis has no outward direction and stays."""

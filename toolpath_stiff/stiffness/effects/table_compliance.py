@@ -39,5 +39,5 @@ class TableCompliance(Effect):
         moment = np.zeros((len(path), 2, 3))  # (p x F)_x and (p x F)_y per component of F
         moment[:, 0, 1], moment[:, 0, 2] = -z, y
         moment[:, 1, 0], moment[:, 1, 2] = z, -x
-        shift = np.diag([p["x"], p["y"], p["z"]])
-        return at_the_tip(path, shift + p["rocking"] * np.swapaxes(moment, 1, 2) @ moment)
+        rocking = p["rocking"] * np.swapaxes(moment, 1, 2) @ moment
+        return at_the_tip(path, rocking + np.diag([p["x"], p["y"], p["z"]]))

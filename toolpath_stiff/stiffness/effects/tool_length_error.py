@@ -3,9 +3,10 @@
 import numpy as np
 
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, Values, length_error
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, Parameter, Values
 
 POCKET = f"{EXPERIENCE}: the tool of the neighbouring pocket"
+MEANING = "true tool length less the entered one"
 
 
 class ToolLengthError(Effect):
@@ -18,7 +19,7 @@ class ToolLengthError(Effect):
     source = "geometry"
     unknown_to_control = True
     clause = "the tool is about {error} mm {error:longer/shorter} than the length that was entered"
-    parameters = (length_error((-10.0, 10.0), POCKET, "true tool length less the entered one"),)
+    parameters = (Parameter("error", "mm", 1e-3, (-60.0, 60.0), (-10.0, 10.0), POCKET, meaning=MEANING),)
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """Platform joints further above the tip."""

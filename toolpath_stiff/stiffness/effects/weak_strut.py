@@ -3,7 +3,7 @@
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Parameter, Values, choice
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Parameter, Values
 from toolpath_stiff.stiffness.sizes import about
 
 MEANING = "stiffness of this strut over that of the others"
@@ -18,7 +18,7 @@ class WeakStrut(Effect):
     equation = "k_s(L) = factor k_linear(L) for strut s"
     source = "worn nut, lost preload"
     parameters = (
-        choice("strut", (1, 6), "number of the strut", "which strut", neutral=1),
+        Parameter("strut", "", 1.0, (1, 6), (1, 6), "number of the strut", 1.0, "which strut", "integer"),
         Parameter("factor", "", 1.0, (0.3, 1.0), (0.4, 0.9), EXPERIENCE, 1.0, MEANING),
     )
 
