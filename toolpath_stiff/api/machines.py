@@ -41,12 +41,6 @@ if TYPE_CHECKING:
 FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the paper's Figure 2
 
 
-def _named(text: str) -> str:
-    if not text.strip():
-        raise ValueError("a set-up, or none")
-    return text.strip()
-
-
 @dataclass(frozen=True)
 class Machine(Result):
     """A machine with the physical effects that act on it, and what it runs under.
@@ -141,7 +135,7 @@ class Machine(Result):
     @checked
     def under(
         self,
-        setup: Annotated[str | None, Option("--setup", "NAME", read=_named)] = None,
+        setup: Annotated[str | None, Option("--setup", "NAME", read=str.strip)] = None,
         temperature_C: Annotated[float | None, Option("--temperature", "C", at_least=-50, at_most=200)] = None,
     ) -> Machine:
         """The same machine under a set-up and a temperature.

@@ -24,7 +24,6 @@ from toolpath_stiff.tables import Columns, read_table
 from toolpath_stiff.toml_reader import shortened
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
-FARTHEST = FARTHEST_MM  # mm and degrees of a pose
 MOST_POINTS = 2001  # along a side of a map
 
 
@@ -51,7 +50,7 @@ def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
     """
     name = str(file)
     table = read_table(name, "poses", Columns(POSE_COLUMNS))
-    expected = f"numbers within +-{FARTHEST:g}: {', '.join(POSE_COLUMNS[:3])}, and angles or none"
+    expected = f"numbers within +-{FARTHEST_MM:g}: {', '.join(POSE_COLUMNS[:3])}, and angles or none"
     poses, errors = np.zeros((len(table.rows), len(POSE_COLUMNS))), []
     for pose, (line, cells) in zip(poses, table.rows, strict=True):
         row = {**dict.fromkeys(POSE_COLUMNS[3:], "0"), **dict(zip(table.heading, cells, strict=False))}
@@ -59,7 +58,7 @@ def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
             pose[:] = [float(row[column]) for column in POSE_COLUMNS]
         except (KeyError, ValueError):
             pose[:] = np.nan
-        if not (np.abs(pose) <= FARTHEST).all():
+        if not (np.abs(pose) <= FARTHEST_MM).all():
             errors.append(InputError(f"pose {', '.join(cells)}", expected=expected, file=name, line=line))
     if errors:
         raise InputErrors(errors)
@@ -104,8 +103,8 @@ def pose(pose_mm_deg: ArrayLike, machine: Machine | str | Path = "nist", *, forc
     except (TypeError, ValueError):
         given = np.zeros(0)
     shaped = given.ndim in (1, 2) and given.shape[-1] in (3, 6)
-    if not shaped or not np.abs(given).max(initial=0.0) <= FARTHEST:
-        expected = f"X Y Z or X Y Z A B C, numbers within +-{FARTHEST:g}"
+    if not shaped or not np.abs(given).max(initial=0.0) <= FARTHEST_MM:
+        expected = f"X Y Z or X Y Z A B C, numbers within +-{FARTHEST_MM:g}"
         raise InputError(f"a pose {shortened(pose_mm_deg)}", expected=expected)
     single, rows = given.ndim == 1, np.atleast_2d(given)
     poses = np.concatenate([rows, np.zeros((len(rows), 6 - rows.shape[1]))], axis=1)

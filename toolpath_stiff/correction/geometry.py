@@ -6,7 +6,6 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
@@ -83,6 +82,8 @@ def recover_geometry(starts: int = 20, seed: int = 1) -> Document:
     What was found, in mm and N/mm, ready for JSON: lengths with standard errors, how many starts agree, residuals, the
     centre strut lengths that the fit never saw, what stays unidentified.
     """
+    from scipy.optimize import least_squares
+
     position, table = table_1()
     rng, law = np.random.default_rng(seed), load_machine("nist").strut_law
     # Unknowns are measured in units of their scatter: in metres and N/mm a solver would stop at once.
