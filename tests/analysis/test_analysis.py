@@ -186,7 +186,7 @@ def test_machine_coordinates_need_the_origin_they_were_read_for():
 def test_assumptions_are_said():
     text = " ".join(str(a) for a in analyse_text(SQUARE).to_dict()["assumptions"])
     for words in (
-        "default; --origin (origin_mm_deg)",
+        "default; --origin",
         "reference_tool assumed",
         "limits.strut_length assumed",
         "recovered",

@@ -213,8 +213,8 @@ def test_command(tmp_path, monkeypatch, capsys):
         (["--keep-out", "vice:5,0,0,1,1,1"], "is not above"),
         (["--objective", "best"], "expected one of balanced"),
         (["--objective", "min"], "range, weakest"),
-        (["--margin", "60"], "expected 0 to less than 50"),
-        (["--points", "1"], "2 to 1000"),
+        (["--margin", "60"], "less than 50"),
+        (["--points", "1"], "at least 2 and at most 1000"),
         (["--x", "1900:2000", "--y", "0", "--z", "800"], "no placement is feasible"),
     ],
 )

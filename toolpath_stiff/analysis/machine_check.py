@@ -133,12 +133,18 @@ def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
 
 
 def _struts(machine: Hexapod) -> list[str]:
-    """Stiffnesses of a strut that no strut has, at the lengths that the file gives."""
-    struts = [(mm_from_m(length), n_per_um_from_n_per_m(stiffness)) for length, stiffness in machine.strut_law.points]
+    """Stiffnesses of a strut that no strut has, at the lengths that the file gives, else at the ends of the travel."""
+    law = machine.strut_law
+    ends = [(x, float(law.stiffness(np.array(x)))) for x in machine.limits.strut_length if np.isfinite(x)]
+    return _implausible("[strut_law]", law.points) or _implausible("the strut law at an end of the travel", ends)
+
+
+def _implausible(where: str, struts: list[tuple[float, float]]) -> list[str]:
+    values = [(mm_from_m(length), n_per_um_from_n_per_m(stiffness)) for length, stiffness in struts]
     return [
-        f"[strut_law]: a strut of {length:g} mm with {value:g} N/um; expected {STRUT_SOFTEST:g} to "
-        f"{STRUT_STIFFEST:g} N/um; is it in {'N/mm' if value > STRUT_STIFFEST else 'kN/um'}?"
-        for length, value in struts
+        f"{where}: a strut of {length:g} mm with {value:g} N/um; expected {STRUT_SOFTEST:g} to {STRUT_STIFFEST:g} "
+        f"N/um; is it in {'N/mm' if value > STRUT_STIFFEST else 'kN/um'}?"
+        for length, value in values
         if not STRUT_SOFTEST <= value <= STRUT_STIFFEST
     ]
 
