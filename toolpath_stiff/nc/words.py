@@ -1,10 +1,19 @@
-"""Lines to blocks, blocks to words, each with its true column."""
+"""Lines to blocks, blocks to words. The only module that knows pygcode.
+
+pygcode 0.2.1 (unmaintained since 2017) fails on comments of both styles in one line, on `X+1` and on spaces inside
+words, drops the E of `1.5E2`, and ignores what it does not know. So comments, spaces, signs, exponents and N words are
+handled before it is called, each word keeps its true column, and every word that pygcode does not return is an error.
+"""
 
 import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import NamedTuple
+
+from pygcode.exceptions import GCodeWordStrError
+from pygcode.words import text2words
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.place import Place
@@ -13,8 +22,9 @@ NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
 WORD = re.compile(rf"([A-Z@^]|,[CR])({NUMBER})(E[+-]?\d++)?", re.ASCII)
 AXES = "XYZABC"
-POLAR = "@^"  # LinuxCNC's polar words
+POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
 CORNERS = (",C", ",R")  # chamfer and rounding of the corner to the next block (Fanuc, Haas)
+NOT_PYGCODES = (*POLAR, *CORNERS)
 LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *POLAR, *CORNERS))
 COMMENT = re.compile("[();]")
 EXPRESSION = re.compile(r"[#\[]")
@@ -22,7 +32,6 @@ NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
 # Longer is no block.
 LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
 MOST_DIGITS = 9  # of a program number, its O included
-NUMBERED = {"G": 1, "M": 1, "L": 0, "T": 0}  # decimals of words that number something
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
 
 
@@ -85,7 +94,7 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     if slash > 0:
         rest = len(words)
         words += _tokens(compact, columns, behind, text, place)
-    check_numbers(words, place)
+    through_pygcode(words, place)
     return Block(line, tuple(words), optional=slash == 0, switch=switch, rest=rest)
 
 
@@ -197,13 +206,25 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
     return place.fail(f"{compact[position : position + 12]!r} is not a word", "a letter and a number", column=column)
 
 
-def check_numbers(words: Sequence[Word], place: Place) -> None:
-    """Refuse numbers that no code, tool or count has."""
-    for letter, value, column, text in words:
-        decimals = NUMBERED.get(letter)
-        if decimals is not None and (value < 0.0 or value != round(value, decimals)):
-            raise place.fail(
-                f"word {text!r} cannot be read",
-                f"a code such as {letter}1 or {letter}59.3" if decimals else "a whole number that is not negative",
-                column=column,
-            )
+def through_pygcode(words: Sequence[Word], place: Place) -> None:
+    """Let pygcode read the normalised words; what it does not return exactly is an error."""
+    known = [word for word in words if word.letter not in NOT_PYGCODES]
+    returned: list[tuple[str, float]] = []
+    try:
+        for word in text2words(" ".join([_plain(word) for word in known])):
+            returned.append((word.letter, float(word.value)))
+    except (GCodeWordStrError, ValueError):
+        returned.append(("", math.nan))
+    for word, read in zip(known, [*returned, ("", math.nan)], strict=False):
+        if read != (word.letter, word.value):
+            code = f"a code such as {word.letter}1 or {word.letter}59.3"
+            expected = code if word.letter in "GM" else "a whole number that is not negative"
+            raise place.fail(f"word {word.text!r} cannot be read", expected, column=word.column)
+
+
+def _plain(word: Word) -> str:
+    """The word as pygcode can read it: no plus, no exponent, whole numbers where it wants them."""
+    number = repr(word.value)
+    if "e" in number:
+        number = format(Decimal(number), "f")
+    return word.letter + number.removesuffix(".0")

@@ -20,8 +20,8 @@ from toolpath_stiff.nc.words import (
     Block,
     Word,
     block_delete,
-    check_numbers,
     program_number,
+    through_pygcode,
     without_comments,
 )
 
@@ -122,7 +122,7 @@ def read_statement(text: str, place: Place, family: str, dialect: Dialect) -> St
             computed[len(words)] = value
         words.append(word)
     # The numbers that codes and tools may have, as in any other program.
-    check_numbers([word for index, word in enumerate(words) if index not in computed], place)
+    through_pygcode([word for index, word in enumerate(words) if index not in computed], place)
     block = Block(place.line, tuple(words), optional=start > 0, switch=switch)
     return Statement(block, computed, tuple(assignments), steering)
 
