@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +21,8 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.report.folder import names
 from toolpath_stiff.results_folder import MANIFEST
 from toolpath_stiff.rig import case, exercise
+
+PROGRAM = Path(__file__).parents[1] / "programs" / "case_study.nc"
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +52,8 @@ def strut(files, tmp_path_factory):
 @pytest.fixture(scope="module")
 def spindle(files, tmp_path_factory):
     """Figures alone; printed is the document."""
-    return diagnosed(files / "spindle.csv", tmp_path_factory.mktemp("spindle") / "o", "--json", "--no-plots")
+    options = ("--json", "--no-plots", "--program", str(PROGRAM))
+    return diagnosed(files / "spindle.csv", tmp_path_factory.mktemp("spindle") / "o", *options)
 
 
 def test_it_writes_a_report_and_says_what_it_found(strut):

@@ -23,7 +23,6 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, finite_number, names, numbers, words_of
-from toolpath_stiff.placement.case_study import case_study_program
 from toolpath_stiff.planning.menu import COSTS, Menu
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.result import plan as plan_visits
@@ -183,8 +182,7 @@ def diagnose(
     noise_percent, strut_spread_percent, seed
         As of `compare`.
     program, origin_mm_deg
-        Where several explanations remain, how much the choice matters is worked out on this program, placed there;
-        unless given, on the packaged case study.
+        Where several explanations remain, how much the choice matters is worked out on this program, placed there.
     progress
         Called with what is being done.
 
@@ -213,9 +211,9 @@ def diagnose(
     ]
     conditions, tell = on.running(part).conditions, teller(progress)
     diagnosis = with_plan(question.diagnosed(tell, *words, inputs=part.inputs if part else ()), tell)
-    if diagnosis.verdict != "ambiguous":
+    if part is None or diagnosis.verdict != "ambiguous":
         return diagnosis
-    moves = case_study_program() if part is None else part.moves(origin, question.model.default_origin)
+    moves = part.moves(origin, question.model.default_origin)
     return replace(diagnosis, path=choice_on_path(diagnosis, moves, origin, conditions))
 
 

@@ -90,6 +90,9 @@ def headline(diagnosis: Diagnosis) -> str:
     return HEADLINES[diagnosis.verdict]
 
 
+_UNTRIED = "--program PART tells how much the choice matters along that program"
+
+
 def path_text(path: Document | None) -> str:
     """How far apart the plausible explanations are on a tool path, in one sentence; "" where it was not tried."""
     if path is None:
@@ -151,7 +154,7 @@ def text(diagnosis: Diagnosis) -> str:
         *_listed("beside the tip", [loop.text for loop in diagnosis.loops]),
         *_listed("cannot test", ["; ".join(cannot)]),
         *_listed("would show", [_would_show(diagnosis)]),
-        *_listed("path", [path_text(diagnosis.path)]),
+        *_listed("path", [path_text(diagnosis.path) or _UNTRIED] if diagnosis.verdict == "ambiguous" else []),
         *_hints("next", [*next_steps(diagnosis), *_next_readings(diagnosis)]),
         *_listed("assumptions", [f"{len(assumptions(diagnosis))}, listed in diagnose.json"]),
         *_listed("warning", diagnosis.predictor.data.warnings),
