@@ -13,7 +13,6 @@ from toolpath_stiff.hints import options
 from toolpath_stiff.nc.controller import ALL_SWITCHES, Controller, dialect_named, read_controller
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.moves import ReadProgram, move_columns
-from toolpath_stiff.nc.reader import read
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 from toolpath_stiff.options import Option, arguments_of, checked, switches
@@ -211,6 +210,8 @@ class Program:
         >>> len(read.moves), read.unsupported
         (1, ())
         """
+        from toolpath_stiff.nc.reader import read  # with the tables of codes, for those alone who read a program
+
         key = (origin, tuple(default_origin))
         if not self._last or self._last[0][0] != key:
             self._last[:] = [(key, read(self.placed(origin, default_origin)))]
