@@ -15,7 +15,7 @@ from toolpath_stiff.portrait.portrait import Portrait, Sized
 from toolpath_stiff.portrait.words import portrait_text, term_words
 from toolpath_stiff.report import explanations as words
 from toolpath_stiff.report.loops import loops_section
-from toolpath_stiff.report.pages import Head, Hints, Part, Section, markup, page_of
+from toolpath_stiff.report.pages import Head, Part, Section, hints, markup, page_of
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, significant
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
@@ -67,7 +67,7 @@ def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
         ("What can these data not tell apart?", *_alike(diagnosis)),
         ("What could be there unseen?", *_unseen(diagnosis)),
         loops_section(diagnosis.loops),
-        ("What to measure or do next", Hints(next_steps(diagnosis)), _next_readings(diagnosis)),
+        ("What to measure or do next", hints(next_steps(diagnosis)), _next_readings(diagnosis)),
         ("What these data cannot test", _cannot_test(diagnosis)),
         ("How much the choice matters on the tool path", *_path(diagnosis)),
         ("How much readings scatter", *_noise(diagnosis)),

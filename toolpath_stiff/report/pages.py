@@ -33,15 +33,8 @@ LONG_LIST = 20_000  # entries
 FINER = 1.5  # pixels of a picture to one of the page
 
 
-@dataclass(frozen=True)
-class Hints:
-    """Sentences of a section, the command of each set as one, to be copied."""
-
-    texts: Sequence[str]
-
-
 # Of a section: a table, a list of sentences, a remark, or HTML.
-Part = ShownTable | Hints | Sequence[object] | str | Markup
+Part = ShownTable | Sequence[object] | str | Markup
 Section = tuple[str, *tuple[Part, ...]] | str  # its title and its parts; or a picture's file name
 
 
@@ -113,13 +106,16 @@ def part(content: Part) -> Markup:
     if isinstance(content, ShownTable):
         rows = [*zip(content.kinds or [""] * len(content.rows), content.rows, strict=True)]
         return _macro("table", content.titles, rows, content.right) if rows else Markup()
-    if isinstance(content, Hints):
-        return _macro("hints", [parted(str(text)) for text in content.texts]) if content.texts else Markup()
     if isinstance(content, Markup):
         return content
     if isinstance(content, str):
         return markup('<p class="muted">{}</p>', content) if content else Markup()
     return _macro("bullets", content) if content else Markup()
+
+
+def hints(texts: Sequence[str]) -> Markup:
+    """Sentences, the command of each set as one, to be copied."""
+    return _macro("hints", [parted(text) for text in texts]) if texts else Markup()
 
 
 def _picture(name: str, drawn: Mapping[str, bytes], questions: Mapping[str, tuple[str, str]]) -> Markup:

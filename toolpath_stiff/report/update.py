@@ -8,7 +8,7 @@ from toolpath_stiff.correction.steps import LadderStep
 from toolpath_stiff.correction.strut_law import bar_curve_csv
 from toolpath_stiff.diagnosis.examination import FittedSize, percent_of
 from toolpath_stiff.documents import number
-from toolpath_stiff.report.pages import Hints, Section, page_of, readings_head
+from toolpath_stiff.report.pages import Section, hints, page_of, readings_head
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, WIDTH, counted, machine_text, percent, plain
 
@@ -54,7 +54,7 @@ def page(update: Update, drawn: Mapping[str, bytes]) -> str:
         ("Errors by direction", _by_direction(update), f"Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."),
         ("What was fitted", _fitted(update)),
         ("Do the data support it?", _support(update)),
-        ("What to do next", Hints(update.next)),
+        ("What to do next", hints(update.next)),
         ("Where it comes from", record),
         ("Assumptions", [*document["assumptions"], *document["notes"]]),
     ]
