@@ -1,4 +1,4 @@
-"""A case folder: what its steps make of it, undo and redo, the commands on it, what is refused."""
+"""A case folder: what its steps make of it, undo, the commands on it, what is refused."""
 
 from __future__ import annotations
 
@@ -150,6 +150,44 @@ def test_a_broken_file_leaves_the_case_as_it_was(case, tmp_path, text, said):
         case.add_data(tmp_path / "broken.csv")
     assert case.history == steps
     assert files_of(case) == files
+
+
+def test_of_several_files_none_is_kept_where_one_is_missing(case, tmp_path):
+    (tmp_path / "more.csv").write_bytes((case.folder / "exercise/measurements.csv").read_bytes())
+    steps, files = case.history, files_of(case)
+    with pytest.raises(tps.TpsError, match=r"missing\.csv"):
+        case.add_data(tmp_path / "more.csv", tmp_path / "missing.csv")
+    assert (case.history, files_of(case)) == (steps, files)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("ghost", None),
+        ("ghost", {}),
+        ("weak_strut", {"strut": 4}),
+        ("weak_strut", {"strut": 9, "factor": 0.8}),
+        ("weak_strut", {"strut": 4, "factor": -1.0}),
+    ],
+)
+@pytest.mark.parametrize("readings", [True, False])
+def test_no_switch_but_of_an_effect_that_can_be(case, tmp_path, effect, values, readings):
+    case = case if readings else tps.Case.open(tmp_path / "bare")
+    steps, files = case.history, files_of(case)
+    with pytest.raises(tps.InputError, match=effect):
+        case.switch(effect, values)
+    assert (case.history, files_of(case)) == (steps, files)
+
+
+def test_an_effect_of_the_machine_is_not_switched_on_again(tmp_path):
+    case = tps.Case.open(tmp_path)
+    case.switch("weak_strut", {"strut": 4, "factor": 0.8})
+    case.accept(case.path("machines/by-hand.toml"))
+    with pytest.raises(tps.InputError, match="weak_strut is given twice"):
+        case.switch("weak_strut", {"strut": 1, "factor": 0.9})
+    case.add_data("nist-table1")
+    with pytest.raises(tps.InputError, match="weak_strut is given twice"):
+        case.switch("weak_strut", {"strut": 1, "factor": 0.9})
 
 
 def test_another_program_s_change_is_not_written_over(case):

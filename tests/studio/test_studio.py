@@ -146,7 +146,7 @@ def test_large_bodies_are_refused_before_they_are_read(running):
         ({"do": "fit"}, "no effect is switched on"),
         ({"do": "place", "x_mm": 0, "out": "/tmp"}, "unexpected"),
         ({"do": "undo", "what": 1}, "undo"),
-        ({"do": "require", "value": "nan"}, "finite"),
+        ({"do": "require", "value": "nan"}, "require nan"),
         ({"do": "place_at", "origin": [1, 2]}, "2 numbers"),
         ({"do": "place_at", "origin": ["nan", 0, 0]}, "finite"),
         ({"do": "place_at", "origin": [10**400, 0, 0]}, "finite"),

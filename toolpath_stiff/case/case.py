@@ -13,41 +13,36 @@ No file is written twice: a change is a new file and a step that names it, so to
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, Unpack, cast
 
 import toolpath_stiff as tps
-from toolpath_stiff.api.inputs import finite, pose_si
-from toolpath_stiff.api.trust import agree
-from toolpath_stiff.case.contents import Contents
-from toolpath_stiff.case.files import (
-    copied,
-    free_name,
-    kept_if_read,
-    measurements_csv,
-    without_lines,
-)
-from toolpath_stiff.case.findings import find
-from toolpath_stiff.case.state import CASE_FILE, READING, TABLES, Step, call, case_text, read_steps
+from toolpath_stiff.api.by_hand import Preview, preview, with_effects
+from toolpath_stiff.api.inputs import pose_si
+from toolpath_stiff.api.trust import agree, is_agreed
+from toolpath_stiff.case.files import copied, free_name, kept_if_read, measurements_csv, without_lines
+from toolpath_stiff.case.state import CASE_FILE, READING, TABLES, CaseState, Step, call, case_text, read_steps
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import read_bytes, write_atomically, writing_errors
+from toolpath_stiff.files import is_file, read_bytes, write_atomically, writing_errors
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.file import packaged_machines
-from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.nc.program import Reading
-from toolpath_stiff.options import arguments_of
+from toolpath_stiff.options import arguments_of, words_of
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, json_text
 from toolpath_stiff.rig import exercise as rig
-from toolpath_stiff.stiffness.active import read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 
+Found = tuple[Any, str]  # a result, and the command line that gives it
+PLACE = ("x_mm", "y_mm", "z_mm", "tilt_a_deg", "tilt_b_deg", "rotate_deg")  # as of an origin
+DRAFT = "missing"
 
-class Case(Contents):
+
+class Case:
     r"""A folder that holds a machine, measurements, a program, and every step that was done with them.
 
     Attributes
@@ -75,6 +70,12 @@ class Case(Contents):
     ['machine', 'exercise']
     (('exercise/measurements.csv', 'data/measured.csv'), 'right')
     """
+
+    plots = False
+    _preview: tuple[object, Preview] | None = None
+
+    def __init__(self, folder: Path, history: Sequence[Step] = ()) -> None:
+        self.folder, self.history = folder, list(history)
 
     @classmethod
     def open(cls, folder: str | Path, machine: str | Path = MACHINE, trust: Iterable[str] = ()) -> Case:
@@ -123,25 +124,111 @@ class Case(Contents):
     def __repr__(self) -> str:
         return f"<Case {self.folder.name}: {len(self.history)} steps>"
 
-    def record(self, kind: str, text: str, command: str, python: str, result: str = "", **change: Any) -> None:
-        """Add a step that changes these attributes of the state, and write the case."""
-        self._write([*self.history, Step(kind, text, command, python, replace(self.state, **change), result)])
+    @property
+    def state(self) -> CaseState:
+        """What holds now."""
+        return self.history[-1].state if self.history else CaseState()
+
+    def path(self, name: str) -> str:
+        """A file of the case, as functions and commands take it."""
+        return str(self.folder / name)
+
+    @property
+    def effect_files(self) -> tuple[str, ...]:
+        """The files of own effects; raises `InputError` for one whose code this user has not agreed to run."""
+        for name in self.state.effects:
+            file = self.folder / name
+            if not is_file(file) or not is_agreed(file.read_bytes()):
+                hint = f"read it, then `{command_line('studio', *options(case=self.folder, trust=name))}`"
+                raise InputError(f"{file} is code that came with the case; you have not agreed to run it", hint=hint)
+        return tuple(map(self.path, self.state.effects))
+
+    @property
+    def machine(self) -> tps.Machine:
+        """The machine, effects of one's own included."""
+        return self.machine_of(self.state.machine)
+
+    def machine_of(self, file: str) -> tps.Machine:
+        """A machine file of the case with the effects of one's own.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.machine_of(case.state.machine)
+        <Machine nist: 6 struts, no effects>
+        """
+        return tps.Machine.load(self.path(file), effects=self.effect_files)
+
+    def machine_with(self, on: Mapping[str, Document]) -> tps.Machine:
+        """The machine with effects of these sizes; where there are readings, the strut law is refitted beside them.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     tps.Case.open(folder).machine_with({"weak_strut": {"strut": 4, "factor": 0.8}})
+        <Machine nist: 6 struts, weak_strut>
+        """
+        if not on:
+            return self.machine
+        return self.preview.machine(on) if self.state.data else with_effects(self.machine, on)
+
+    @property
+    def data(self) -> tps.Measurements:
+        """The readings in use. Raises `InputError` where there are none."""
+        if not self.state.data:
+            raise InputError("this case has no measurements", hint="add a file with add_data, or start an exercise")
+        return tps.Measurements(list(map(self.path, self.state.data_files)))
+
+    @property
+    def preview(self) -> Preview:
+        """The error of the readings in use with effects of any size, as `tps.preview`; made once for these readings."""
+        if self._preview is None or self._preview[0] != self.state.judged:
+            self._preview = (self.state.judged, preview(self.data, self.machine))
+        return self._preview[1]
+
+    @property
+    def program(self) -> tps.Program:
+        """The program. Raises `InputError` where there is none."""
+        if not self.state.program:
+            raise InputError("this case has no program", hint="add one with add_program")
+        return self._program(self.state)
+
+    def _program(self, state: CaseState) -> tps.Program:
+        reading = {key: self.path(value) if key in TABLES else value for key, value in state.reading.items()}
+        if not state.program:  # the tables are read all the same
+            return tps.Program.from_text("M2", **cast("Reading", reading))
+        return tps.Program.read(self.path(state.program), **cast("Reading", reading))
+
+    def latest(self, kind: str) -> str:
+        """Folder of the latest result of a kind; "" without one."""
+        return next((step.result for step in reversed(self.history) if step.kind == kind and step.result), "")
+
+    def record(self, kind: str, text: str, python: str, command: str = "", result: str = "", **change: Any) -> None:
+        """Add a step that changes these attributes of the state, and write the case.
+
+        Without a command, it is the one that shows what the readings or the program give with the change.
+        """
+        state = replace(self.state, **change)
+        command = command or (state.question("compare") if kind in ("data", "aside") else state.program_line())
+        self._write([*self.history, Step(kind, text, command, python, state, result)])
 
     def undo(self) -> Step | None:
         """Take back the last step that changed something, and what was found since; None where there is none."""
-        for number in range(len(self.history) - 1, 0, -1):
-            step = self.history[number]
-            if step.state != self.history[number - 1].state:
-                self._write(self.history[:number])
-                return step
-        return None
+        changes = [n for n, step in enumerate(self.history) if n and step.state != self.history[n - 1].state]
+        undone = self.history[changes[-1]] if changes else None
+        if undone:
+            self._write(self.history[: changes[-1]])
+        return undone
 
     def _write(self, history: list[Step]) -> None:
         file = self.folder / CASE_FILE
         if file.is_file() and file.read_bytes() != case_text(self.history).encode():
-            raise InputError(
-                f"{CASE_FILE} was changed by another program since it was opened", hint="open the case again"
-            )
+            raise InputError(f"{CASE_FILE} was changed by another program since then", hint="open the case again")
         write_atomically(file, case_text(history))
         self.history = history
 
@@ -165,11 +252,9 @@ class Case(Contents):
         name = copied(self.folder, packaged_machines().get(str(machine), machine), "machines")
         with kept_if_read(self.folder, [name]):
             self.machine_of(name)
-        python = call("set_machine", machine)
-        if not self.history:
-            python = f"case = tps.Case.open({self.folder.resolve().name!r}, {str(machine)!r})"
-        line = command_line("machine", "check", name)
-        self.record("machine", f"machine {Path(machine).name}", line, python, machine=name, on={})
+        begun = f"case = tps.Case.open({self.folder.resolve().name!r}, {str(machine)!r})"
+        python, line = call("set_machine", machine) if self.history else begun, command_line("machine", "check", name)
+        self.record("machine", f"machine {Path(machine).name}", python, line, machine=name, on={})
 
     def _check_effect(self, name: str) -> None:
         if name not in self.state.effects:
@@ -204,7 +289,7 @@ class Case(Contents):
         on = {name: keys for name, keys in state.on.items() if name in known_effects(paths)}
         text = f"own effects of {Path(file).name}{', edited' if instead_of else ''}"
         python = call("add_effects", file, instead_of=instead_of)
-        self.record("effects", text, command_line("effects", "check", new), python, effects=effects, on=on)
+        self.record("effects", text, python, command_line("effects", "check", new), effects=effects, on=on)
 
     def add_data(self, *files: str | Path) -> None:
         """Add measurement files; the case keeps copies, and nothing is kept of a file that cannot be used.
@@ -219,30 +304,27 @@ class Case(Contents):
         ...     case.state.data, len(case.data.to_frame()), case.state.question("compare").split()[:2]
         (('data/nist-table1.csv',), 42, ['tps', 'compare'])
         """
-        names = [copied(self.folder, file, "data", measurements_csv(file, self.machine)) for file in files]
-        state = self.state
+        names: list[str] = []
         with kept_if_read(self.folder, names):
-            count = len(tps.Measurements([*map(self.path, (*state.data, *names))]).on(self.machine))
+            names.extend(copied(self.folder, file, "data", measurements_csv(file, self.machine)) for file in files)
+            data = (*self.state.data, *names)
+            count = len(tps.Measurements([*map(self.path, data)]).on(self.machine))
         text = f"{', '.join(Path(file).name for file in files)} added: {counted(count, 'reading')} in all"
-        command = state.question("compare", files=(*state.data_files, *names))
-        self.record("data", text, command, call("add_data", *files), data=(*state.data, *names))
+        self.record("data", text, call("add_data", *files), data=data)
 
     def set_aside(self, file: str, line: int, back: bool = False) -> None:
         """Leave out the readings of a line of a measurement file of the case; `back`: use them again."""
         state, entry = self.state, f"{file}:{line}"
-        lines = {int(other.rpartition(":")[2]) for other in state.aside if other.rpartition(":")[0] == file}
+        lines = {int(other.rpartition(":")[2]) for other in state.aside if other.rpartition(":")[0] == file} ^ {line}
         known = tps.Measurements([self.path(file)]).on(self.machine).line if file in state.data else ()
-        if line not in known or (line in lines) is not back:
+        if line not in known or (entry in state.aside) is not back:
             raise InputError(f"{entry} is no reading that is {'set aside' if back else 'in use'}")
-        lines ^= {line}
         used = {name: copy for name, copy in state.used.items() if name != file}
         if lines:
-            used[file] = free_name(self.folder, f"used/{Path(file).name}")
-            write_atomically(self.folder / used[file], without_lines(self.folder / file, lines))
+            used[file] = copied(self.folder, file, "used", without_lines(self.folder / file, lines))
         aside = (*(other for other in state.aside if other != entry), *([] if back else [entry]))
-        command = state.question("compare", files=[used.get(name, name) for name in state.data])
         text = f"{file} line {line} {'used again' if back else 'set aside'}"
-        self.record("aside", text, command, call("set_aside", file, line, back=back), aside=aside, used=used)
+        self.record("aside", text, call("set_aside", file, line, back=back), aside=aside, used=used)
 
     def switch(self, effect: str, values: Document | None) -> None:
         """Switch an effect on with these values (keys as in a machine file), or off with None.
@@ -259,20 +341,17 @@ class Case(Contents):
         ...     case.state.on
         {'weak_strut': {'strut': 4, 'factor': 0.8}}
         """
-        state, known, text = self.state, find_effect(effect, self.effect_files), f"{effect} off"
-        on = {name: keys for name, keys in state.on.items() if name != effect}
+        on, name = {name: keys for name, keys in self.state.on.items() if name != effect}, self.state.machine
+        text = f"{find_effect(effect, self.effect_files).name} off"
         if values is not None:
-            read_parameters(known, EffectEntry(effect, dict(values)), "by hand")
-            if effect in self.machine.effects:
-                raise InputError(f"{effect} is in the machine already")
             on[effect] = dict(values)
-            text = f"{effect} on: {', '.join(f'{key} {_short(value)}' for key, value in values.items())}"
-        name = state.machine
+            sizes = (f"{key} {value:{'.5g' if isinstance(value, float) else ''}}" for key, value in values.items())
+            text = f"{effect} on: {', '.join(sizes)}"
         if on:
             name = free_name(self.folder, "machines/by-hand.toml")
             self.machine_with(on).save(self.folder / name)
-        command = state.question("compare", name) if state.data else command_line("machine", "check", name)
-        self.record("switch", text, command, call("switch", effect, values), on=on)
+        command = self.state.question("compare", name) if self.state.data else command_line("machine", "check", name)
+        self.record("switch", text, call("switch", effect, values), command, on=on)
 
     def accept(self, file: str | Path) -> None:
         """Go on with the machine file that an update of this case wrote.
@@ -290,7 +369,7 @@ class Case(Contents):
         name = free_name(self.folder, f"machines/{Path(self.state.machine).stem.removesuffix('-updated')}-updated.toml")
         write_atomically(self.folder / name, read_bytes(file, "the machine file"))
         command = next((f"{step.command} -o {name}" for step in reversed(self.history) if step.kind == "update"), "")
-        self.record("accept", f"goes on with {name}", command, call("accept", file), machine=name, on={})
+        self.record("accept", f"goes on with {name}", call("accept", file), command, machine=name, on={})
 
     def add_program(self, file: str | Path | None = None, **reading: Unpack[Reading]) -> None:
         r"""Use an NC program or cutter-location file; without one, read the present one otherwise.
@@ -334,24 +413,20 @@ class Case(Contents):
             program = self._program(state)
             if state.program:
                 program.moves()
-        python = call("add_program", *([] if file is None else [file]), **reading)
-        self.record("program", text, state.program_line(), python, **vars(state))
+        self.record("program", text, call("add_program", *filter(None, [file]), **reading), **vars(state))
 
     def place_at(self, origin_mm_deg: Sequence[float]) -> None:
         """Put program zero somewhere: X, Y, Z, A, B, C in machine coordinates."""
         pose_si("origin", origin_mm_deg)
         origin = tuple(round(float(value), 6) for value in origin_mm_deg)
         text = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", origin, strict=False))
-        line = self.state.program_line(origin_mm_deg=origin)
-        self.record("place_at", f"program zero at {text}", line, call("place_at", origin), origin=origin)
+        self.record("place_at", f"program zero at {text}", call("place_at", origin), origin=origin)
 
     def require(self, stiffness_N_per_mm: float) -> None:
         """Ask a stiffness of every cut; 0: none."""
-        required = finite("required", stiffness_N_per_mm)
-        if required:
-            arguments_of(tps.analyze)["require_N_per_mm"].check(required)
-        line = self.state.program_line(require_N_per_mm=required or None)
-        self.record("require", f"{required:g} N/mm required", line, call("require", required), require=required)
+        option = arguments_of(tps.analyze)["require_N_per_mm"]
+        required = 0.0 if stiffness_N_per_mm == 0 else float(option.check(stiffness_N_per_mm) or 0)
+        self.record("require", f"{required:g} N/mm required", call("require", required), require=required)
 
     def find(self, kind: str, progress: Progress | None = None, **given: Any) -> Any:
         """A result as a step, kept in results/: of analyze, compare, diagnose, update, plan, place, draft, set_up.
@@ -374,7 +449,7 @@ class Case(Contents):
         """
         result = self.next_result(kind)
         kept, command = find(self, kind, result, progress, **given)
-        self.record(kind, repr(kept).strip("<>"), command, call("find", kind, **given), result)
+        self.record(kind, repr(kept).strip("<>"), call("find", kind, **given), command, result)
         if kind == "draft" and kept.text:
             self.add_effects(self.folder / result / f"{kept.name}.toml")
         return kept
@@ -384,31 +459,21 @@ class Case(Contents):
 
         `hidden` and `layout` as of `tps rig new`.
         """
-        folder = free_name(self.folder, "exercise")
-        rig.new_exercise(self.folder / folder, rig.blind_case(seed, layout, hidden))
-        drawn = options(seed=seed, out=folder, hidden=hidden, layout=layout if layout != "tilted" else None)
-        self.record(
-            "exercise",
-            f"blind exercise, seed {seed}",
-            command_line("rig", "new", *drawn),
-            call("start_exercise", seed, hidden=hidden, layout=layout),
-            machine=f"{folder}/{rig.MACHINE}",
-            data=(f"{folder}/{rig.MEASUREMENTS}",),
-            aside=(),
-            used={},
-            on={},
-            exercise=folder,
-        )
+        name = free_name(self.folder, "exercise")
+        rig.new_exercise(self.folder / name, rig.blind_case(seed, layout, hidden))
+        python = call("start_exercise", seed, hidden=hidden, layout=layout)
+        line = command_line("rig", "new", *options(seed=seed, out=name, hidden=hidden, layout=layout))
+        new: Document = {"data": (f"{name}/{rig.MEASUREMENTS}",), "aside": (), "used": {}, "on": {}, "exercise": name}
+        self.record("exercise", f"blind exercise, seed {seed}", python, line, machine=f"{name}/{rig.MACHINE}", **new)
 
     def measure(self, plan_file: str | Path) -> None:
         """Measure the exercise's machine at the poses of a plan; the readings are added."""
-        name = free_name(self.folder, "data/measured.csv")
         visit = 1 + sum(step.kind == "measure" for step in self.history)
         readings, count = rig.measured_again(self.folder / self.state.exercise, str(plan_file), visit)
-        write_atomically(self.folder / name, readings)
+        name = copied(self.folder, "measured.csv", "data", readings.encode())
         line = command_line("rig", "measure", self.state.exercise, *options(at=plan_file, out=name, visit=visit))
         text, data = f"{counted(count, 'reading')} measured", (*self.state.data, name)
-        self.record("measure", text, line, call("measure", plan_file), data=data)
+        self.record("measure", text, call("measure", plan_file), line, data=data)
 
     def claim(self, effects: str) -> Document:
         """Open the seal of the exercise and score a claim: names of effects with commas, "none" or "outside"."""
@@ -416,9 +481,63 @@ class Case(Contents):
         result = self.next_result("reveal")
         write_atomically(self.folder / result / "reveal.json", json_text(score))
         line = command_line("rig", "reveal", self.state.exercise, *options(claim=effects))
-        self.record("reveal", f"claimed {effects}: {score['verdict']}", line, call("claim", effects), result)
+        self.record("reveal", f"claimed {effects}: {score['verdict']}", call("claim", effects), line, result)
         return score
 
 
-def _short(value: object) -> str:
-    return f"{value:.5g}" if isinstance(value, float) else str(value)
+def find(case: Case, kind: str, result: str, progress: Progress | None = None, **given: Any) -> Found:
+    """A result of this kind, kept in a folder of the case without a step; and the command that gives it."""
+    if kind in FINDERS:
+        return FINDERS[kind](case, result, progress, **given)
+    watched: Document = {} if kind == "plan" else {"progress": progress}
+    named: Document = {"machine_file": case.path(f"{result}/machine.toml")} if kind == "update" else {}
+    data = case.data if case.state.data or kind != "plan" else None
+    kept = getattr(tps, kind)(data, case.machine, **watched, **named, **given)
+    kept.save(case.folder / result, plots=case.plots)
+    return kept, case.state.question(kind, "", *words_of(getattr(tps, kind), given))
+
+
+def _analyze(case: Case, result: str, progress: Progress | None, machine: str = "") -> Found:
+    state, on = case.state, case.machine_of(machine) if machine else case.machine_with(case.state.on)
+    stated: Document = {"origin_mm_deg": state.origin or None, "require_N_per_mm": state.require or None}
+    analysis = tps.analyze(case.program, on, partial=True, progress=progress, **stated)
+    analysis.save(case.folder / result, plots=case.plots)
+    if not machine and state.on:
+        machine = f"{result}/machine.toml"
+        on.save(case.folder / machine)
+    return analysis, state.program_line(machine=machine)
+
+
+def _place(case: Case, result: str, progress: Progress | None, **bounds: Any) -> Found:
+    kept = tps.place(case.program, case.machine, origin_mm_deg=case.state.origin or None, progress=progress, **bounds)
+    kept.save(case.folder / result, plots=case.plots)
+    return kept, case.state.program_line("place", **bounds)
+
+
+def _set_up(case: Case, result: str, progress: Progress | None) -> Found:
+    state = case.state
+    if len(state.origin) < 3:
+        raise InputError("the program sits where it always did", hint="put it somewhere with place_at first")
+    place: Document = dict(zip(PLACE, (*state.origin, 0.0, 0.0, 0.0), strict=False))
+    name, written = Path(state.program).name, {}
+    try:
+        placement = tps.place(case.program, case.machine, write=name, progress=progress, **place)
+        content, written = placement.program_bytes, {"write": f"{result}/{name}"}
+    except InputError as error:
+        placement = tps.place(case.program, case.machine, progress=progress, **place)
+        name, content = "not_written.txt", f"{error}\n".encode()
+    placement.save(case.folder / result)
+    write_atomically(case.folder / result / name, content)
+    return placement, f"{state.program_line('place', origin_mm_deg=None, **place, **written)} --out {result}"
+
+
+def _draft(case: Case, result: str, progress: Progress | None) -> Found:
+    number = 1 + sum(Path(file).stem.startswith(DRAFT) for file in case.state.effects)
+    file = f"{result}/{DRAFT}{f'_{number}' if number > 1 else ''}.toml"
+    draft = tps.draft_effect(case.data, case.machine, file, progress=progress)
+    if draft.text:
+        write_atomically(case.folder / file, draft.text)
+    return draft, case.state.question("effects draft", "", *options(output=file))
+
+
+FINDERS: dict[str, Callable[..., Found]] = {"analyze": _analyze, "place": _place, "set_up": _set_up, "draft": _draft}

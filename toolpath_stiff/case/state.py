@@ -19,7 +19,6 @@ CASE_FILE = "case.json"
 FORMAT = 2
 TABLES = {"tools": "tool table", "offsets": "work offsets", "controller": "controller file"}  # a program is read with
 READING = ("dialect", *TABLES, "block_delete", "feed_mm_per_min")  # of `Program.read`; not what runs another program
-NOT_A_CASE = (ValueError, TypeError, KeyError, AttributeError, RecursionError)  # of a file that no case has written
 
 
 @dataclass(frozen=True)
@@ -123,9 +122,8 @@ def read_steps(file: Path) -> list[Step]:
         wrong = [name for name in names if Path(name).is_absolute() or ".." in Path(name).parts]
         if wrong or not steps:
             raise ValueError(f"a file {wrong[0]!r}" if wrong else "no step")
-    except NOT_A_CASE as error:
-        expected = "what a case has written, with files in its folder"
-        raise InputError(f"this is no case: {error}", expected=expected, file=str(file)) from None
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise InputError(f"this is no case: {error}", expected="what a case has written", file=str(file)) from None
     return steps
 
 

@@ -224,7 +224,7 @@ class Session:
         case, state = self.case, self.case.state
         known = [(step.kind, step.command) for step in case.history if step.state == state]
         if (job.kind, answer.command) not in known:  # a studio that resumes works some things out again
-            case.record(job.kind, answer.text, answer.command, call("find", job.kind, **job.given), answer.result)
+            case.record(job.kind, answer.text, call("find", job.kind, **job.given), answer.command, answer.result)
         if job.kind == "update":  # the fit holds for the sizes that the switches take over
             for name, sizes in fitted_sizes(answer.document).items():
                 if name in state.on:

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 import toolpath_stiff as tps
-from toolpath_stiff.case.case import Case
-from toolpath_stiff.case.findings import find
+from toolpath_stiff.case.case import Case, find
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
 
