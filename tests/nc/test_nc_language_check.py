@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from tests.nc.test_nc_against_rs274 import TOOLS, Writer, cycle_program
-from toolpath_stiff.analysis.program_check import extents, figures, machine_findings
+from toolpath_stiff.analysis.program_check import figures, machine_findings
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import Controller
+from toolpath_stiff.nc.courses import extents
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import ToolEntry

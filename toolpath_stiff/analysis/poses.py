@@ -1,4 +1,4 @@
-"""Stiffness at single poses: along the axes, in the softest and the stiffest direction; how far one can go."""
+"""Stiffness at single poses: along the axes, in the softest and the stiffest direction."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.documents import without_nan
-from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Reach, reach
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.limits import Reach
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
@@ -173,21 +171,3 @@ def evaluate_poses(
         extrapolated=extrapolated,
         reach=stand,
     )
-
-
-RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and how many: each goes on where the one before found a limit
-
-
-def reach_along(machine: Hexapod, start: FloatArray, directions: FloatArray, turn: FloatArray) -> FloatArray:
-    """(n,) m that the tool tip can go from a place (3,) along unit vectors (n, 3) before the first limit.
-
-    `turn` (3, 3) is the orientation, which is kept. 0 where the place itself is out of reach.
-    """
-    length = np.zeros(len(directions))
-    for step, count in RAY_STEPS:
-        tried = length[:, None] + step * np.arange(count + 1)
-        tips = (start + tried[:, :, None] * directions[:, None]).reshape(-1, 3)
-        turns = np.broadcast_to(turn, (len(tips), 3, 3))
-        good = reach(machine, tips, solve_struts(machine, tips, turns), turns).reachable.reshape(tried.shape)
-        length += step * np.where(good.all(axis=1), count, np.maximum(good.argmin(axis=1) - 1, 0))
-    return length
