@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from toolpath_stiff.analysis.evaluation import compliance_along, tip_compliances
 from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
-from toolpath_stiff.documents import without_nan
+from toolpath_stiff.documents import Document, without_nan
 from toolpath_stiff.machine.limits import Reach
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
@@ -124,7 +124,7 @@ class PoseStiffness(Result):
         """One row a pose, the columns of `tps pose --csv`."""
         return frame_of(self.columns)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """Of a single pose its figures; of several, a list of them under "poses", null where out of reach."""
         about = {"machine": self.model.machine.name, **effects_stated(self.model), "warnings": self.warnings}
         cells = zip(*(column.tolist() for column in self.columns.values()), strict=True)

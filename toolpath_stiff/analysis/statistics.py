@@ -7,6 +7,7 @@ import numpy as np
 
 from toolpath_stiff.analysis.evaluation import Evaluation
 from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_rows
+from toolpath_stiff.analysis.poses import POSE_COLUMNS
 from toolpath_stiff.analysis.uncertainty import ParameterBand, parameter_band
 from toolpath_stiff.arrays import AnyArray, BoolArray, IntArray
 from toolpath_stiff.documents import Document
@@ -18,7 +19,7 @@ from toolpath_stiff.path.sampling import Samples, move_durations
 from toolpath_stiff.path.table import path_columns
 from toolpath_stiff.poses import Pose
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
 ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"  # what headline figures are about
@@ -224,15 +225,12 @@ def _rows_of(part: IntArray, count: int) -> list[IntArray]:
 
 def describe_sample(path: EvaluatedPath, row: int) -> Document:
     """Line, source text, position and stiffness of one sample."""
-    samples, source = path.samples, path.program.source
-    line = int(samples.line[row])
-    position, angles = mm_from_m(samples.position[row]).tolist(), deg_from_rad(samples.abc[row]).tolist()
+    source, columns = path.program.source, path_columns(path.samples, slice(row, row + 1))
+    line = int(columns["line"][0])
     return {
         "line": line,
         "text": source[line - 1].strip() if 0 < line <= len(source) else "",
-        "s_mm": mm_from_m(float(samples.s[row])),
-        **{f"{axis}_mm": value for axis, value in zip("xyz", position, strict=True)},
-        **{f"{axis}_deg": value for axis, value in zip("abc", angles, strict=True)},
+        **{name: float(columns[name][0]) for name in ("s_mm", *POSE_COLUMNS)},
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(float(path.at.stiffness[row])),
     }
 

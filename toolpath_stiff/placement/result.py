@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -296,13 +296,13 @@ class Placement(FolderResult):
         }
 
     @property
-    def machine_stated(self) -> dict[str, Any]:
+    def machine_stated(self) -> Document:
         """The machine and what acts on it, as every JSON document has them."""
         return {"machine": self.best.machine.name, **effects_stated(self.best.model)}
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """The JSON document of the command."""
-        document: dict[str, Any] = to_dict(
+        document: Document = to_dict(
             {
                 "warnings": self.warnings,
                 "worse": self.worse,

@@ -43,17 +43,17 @@ def other_samples(table: str) -> tuple[str, ...]:
     return tuple(name for name in ("samples.csv", "samples.parquet") if not name.endswith(table))
 
 
-def _csv(analysis: Analysis) -> Iterator[bytes]:
+def samples_csv(analysis: Analysis) -> Iterator[bytes]:
     """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
     return csv_pieces(partial(sample_columns, analysis), len(analysis.samples), COLUMNS)
 
 
-def _parquet(analysis: Analysis) -> Iterator[bytes]:
+def samples_parquet(analysis: Analysis) -> Iterator[bytes]:
     """`samples.parquet` in pieces, full precision. A value that does not exist is null."""
     return parquet_pieces(partial(sample_columns, analysis), len(analysis.samples))
 
 
-DATA = {"samples.csv": _csv, "samples.parquet": _parquet, "summary.json": Analysis.to_json}
+DATA = {"samples.csv": samples_csv, "samples.parquet": samples_parquet, "summary.json": Analysis.to_json}
 PAGE, page = "report.html", analysis_page.page
 
 
