@@ -202,7 +202,7 @@ NO_EXAMPLE = {
     "Plan": {"rows", "sentences", "notes", "visits"},
     "Analysis": {  # arrays in SI and what figures and pictures are made from
         *("machine", "moves", "path", "operations", "operation", "parameter_band", "figures", "weakest_rows"),
-        *("counted", "along_axis", "plunging", "headline", "set_aside", "out_of_reach", "charted", "central_range"),
+        *("counted", "along_axis", "plunging", "headline", "set_aside", "out_of_reach"),
     },
     "Case": {"preview", "record", "next_result"},
     "Update": {  # steps and fits in SI, and what follows from them

@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.results_folder import Rules, write_folder
@@ -57,7 +58,7 @@ class Result(ABC):
         return _door().view_of(self.shown_by)
 
     @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """The result as plain data: the JSON document that the command writes, and prints with --json.
 
         Examples

@@ -11,16 +11,17 @@ import numpy as np
 import pytest
 
 from tests.nc.test_nc_against_rs274 import TOOLS, Writer, cycle_program
-from toolpath_stiff.analysis.program_check import extents, figures, machine_findings
+from toolpath_stiff.analysis.program_check import machine_findings
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.controller import Controller
+from toolpath_stiff.nc.courses import extents
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import ToolEntry
-from toolpath_stiff.path.sampling import sample_moves
+from toolpath_stiff.path.sampling import move_figures, sample_moves
 
 PROGRAMS = sorted((Path(__file__).parents[2] / "programs").glob("*.nc"))
 
@@ -46,7 +47,7 @@ def test_figures_of_a_program_by_hand():
     moves = parse_program(
         "G0 X10 Y0 F600\nG3 X-10 I-10 (half a circle)\nG4 P2\nG1 Y-40\nG93 G1 X0 F0.5\nG0 Z30\nG95 S1000 F0.2 G1 Z0"
     ).moves
-    found = figures(moves, rapid_feed=0.1)
+    found = move_figures(moves, rapid_feed=0.1)
     half = math.pi * 10
     assert found["lengths_mm"] == pytest.approx({"cutting": half + 40 + 10 + 30, "rapid": 40, "total": half + 120})
     cutting = half / 10 + 4 + 120 + 30 / (200 / 60)

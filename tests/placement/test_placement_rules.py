@@ -135,8 +135,10 @@ def test_a_homing_rapid_out_of_reach_is_named_and_no_constraint(tmp_path, monkey
     assert main([*command, "--no-plots"]) == 0
     summary = json.loads(Path("out/placement.json").read_text())
     assert any(text.startswith("line 9:") and "rapid moves are out of reach" in text for text in summary["warnings"])
-    assert any("placement has a margin of -" in text and "in line 9" in text for text in summary["warnings"])
-    assert "line 9:" in capsys.readouterr().out
+    first = summary["warnings"][0]
+    assert first.startswith("the recommended placement is out of reach: it has a margin of -") and "in line 9" in first
+    told = " ".join(capsys.readouterr().out.split())
+    assert told.startswith(f"warning {first} program") and "line 9:" in told and "margin -" in told
 
 
 def test_a_homing_rapid_through_a_keep_out_is_named(tmp_path):

@@ -101,13 +101,9 @@ def evaluate(
     n, load = len(position), load or Load()
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
     route = core.choose_route(model, n)
-    result = Evaluation(
-        stiffness=np.empty(n),
-        substituted=np.zeros(n, dtype=bool),
-        strut_lengths=np.empty((n, 6)),
-        extrapolated=np.zeros(n, dtype=bool),
-        reach=Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(model.machine)),
-    )
+    stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(model.machine))
+    substituted, extrapolated = np.zeros((2, n), dtype=bool)
+    result = Evaluation(np.empty(n), substituted, np.empty((n, 6)), extrapolated, stand)
     for start in range(0, n, BLOCK):
         block = np.arange(start, min(start + BLOCK, n))
         for tool, some in core.rows_of_tools(lengths[block]):

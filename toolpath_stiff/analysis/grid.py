@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -68,7 +68,7 @@ class StiffnessMap(FolderResult):
     abc: tuple[float, float, float]
     inputs: tuple[str, ...] = ()
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """Extremes of each plane: `map.json`."""
         return {
             "machine": self.model.machine.name,
@@ -92,8 +92,7 @@ class StiffnessMap(FolderResult):
     def columns(self) -> dict[str, AnyArray]:
         """Column of `map.csv` -> values, plane by plane."""
         zs, ys, xs = np.meshgrid(mm_from_m(self.z), mm_from_m(self.y), mm_from_m(self.x), indexing="ij")
-        stiffness = n_per_mm_from_n_per_m(self.stiffness)
-        values = (xs, ys, zs, stiffness, self.reachable)
+        values = (xs, ys, zs, n_per_mm_from_n_per_m(self.stiffness), self.reachable)
         return {name: column.ravel() for name, column in zip(COLUMNS, values, strict=True)}
 
     def to_frame(self) -> pd.DataFrame:

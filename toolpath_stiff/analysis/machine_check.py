@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from toolpath_stiff.analysis.poses import PoseStiffness, evaluate_poses
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
 from toolpath_stiff.results import Result, frame_of
@@ -73,7 +74,7 @@ class MachineCheck(Result):
         """Effects that do not act on a program as the file stands."""
         return condition_warnings(self.model)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """The JSON document of the command."""
         return {
             "file": self.file,

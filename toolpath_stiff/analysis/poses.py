@@ -1,10 +1,10 @@
-"""Stiffness at single poses: along the axes, in the softest and the stiffest direction; how far one can go."""
+"""Stiffness at single poses: along the axes, in the softest and the stiffest direction."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -13,10 +13,8 @@ from toolpath_stiff.analysis.evaluation import compliance_along, tip_compliances
 from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
-from toolpath_stiff.documents import without_nan
-from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Reach, reach
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.documents import Document, without_nan
+from toolpath_stiff.machine.limits import Reach
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
@@ -126,7 +124,7 @@ class PoseStiffness(Result):
         """One row a pose, the columns of `tps pose --csv`."""
         return frame_of(self.columns)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """Of a single pose its figures; of several, a list of them under "poses", null where out of reach."""
         about = {"machine": self.model.machine.name, **effects_stated(self.model), "warnings": self.warnings}
         cells = zip(*(column.tolist() for column in self.columns.values()), strict=True)
@@ -173,21 +171,3 @@ def evaluate_poses(
         extrapolated=extrapolated,
         reach=stand,
     )
-
-
-RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and how many: each goes on where the one before found a limit
-
-
-def reach_along(machine: Hexapod, start: FloatArray, directions: FloatArray, turn: FloatArray) -> FloatArray:
-    """(n,) m that the tool tip can go from a place (3,) along unit vectors (n, 3) before the first limit.
-
-    `turn` (3, 3) is the orientation, which is kept. 0 where the place itself is out of reach.
-    """
-    length = np.zeros(len(directions))
-    for step, count in RAY_STEPS:
-        tried = length[:, None] + step * np.arange(count + 1)
-        tips = (start + tried[:, :, None] * directions[:, None]).reshape(-1, 3)
-        turns = np.broadcast_to(turn, (len(tips), 3, 3))
-        good = reach(machine, tips, solve_struts(machine, tips, turns), turns).reachable.reshape(tried.shape)
-        length += step * np.where(good.all(axis=1), count, np.maximum(good.argmin(axis=1) - 1, 0))
-    return length

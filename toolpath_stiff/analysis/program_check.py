@@ -4,76 +4,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import to_dict
+from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.checking import ERROR, WARNING, Finding, UsedCode, check, in_order
-from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
-from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
+from toolpath_stiff.nc.courses import Extents
+from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.path.placing import place
-from toolpath_stiff.path.sampling import move_durations, sample_moves
+from toolpath_stiff.path.sampling import move_figures, sample_moves
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
+from toolpath_stiff.units import mm_per_min_from_m_per_s
 
 if TYPE_CHECKING:
     import pandas as pd
 
 MOST_NAMED = 20  # lines named for one kind of finding
-Extents = dict[str, list[float]]
-
-
-def figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> dict[str, dict[str, Any]]:
-    """Extents of the cuts in program coordinates of G54, lengths and times of moves; rapids at `rapid_feed`, m/s."""
-    cutting = moves.motion != RAPID
-    length, duration, ends = move_lengths(moves), move_durations(moves, rapid_feed), extents(moves.take(cutting))
-    parts = (("cutting", cutting), ("rapid", ~cutting))
-    lengths = {name: mm_from_m(float(length[rows].sum())) for name, rows in parts}
-    times = {name: float(duration[rows].sum()) for name, rows in parts} | {"dwell": float(moves.dwell.sum())}
-    return {
-        "extents_mm": {axis: ends[axis] for axis in "xyz" if ends},
-        "extents_deg": {axis: ends[axis] for axis in "abc" if ends},
-        "lengths_mm": {**lengths, "total": sum(lengths.values())},
-        "times_s": {**times, "total": sum(times.values())},
-    }
-
-
-def extents(moves: Moves) -> Extents:
-    """Smallest and largest x, y, z (mm) and a, b, c (degrees) on the way, the bulges of arcs included."""
-    if not len(moves):
-        return {}
-    ends = np.stack([moves.start, moves.end])
-    low, high = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
-    bulges = _arc_extremes(moves.take(moves.arc_sweep != 0.0))
-    if len(bulges):
-        low[:3], high[:3] = np.minimum(low[:3], bulges.min(axis=0)), np.maximum(high[:3], bulges.max(axis=0))
-    scale = np.array([mm_from_m(1.0)] * 3 + [deg_from_rad(1.0)] * 3)
-    return {name: [float(lo), float(hi)] for name, lo, hi in zip("xyzabc", low * scale, high * scale, strict=True)}
-
-
-def _arc_extremes(arcs: Moves) -> FloatArray:
-    """(m, 3) m, points of arcs where a coordinate turns; climbs and growing radii as far along as the angle is."""
-    row = np.arange(len(arcs))
-    frame, sweep = arc_frame(arcs, row), np.abs(arcs.arc_sweep)
-    points = [np.empty((0, 3))]
-    for axis in range(3):
-        turning = np.arctan2(frame.e2[:, axis] * np.sign(arcs.arc_sweep), frame.e1[:, axis])
-        for opposite in (0.0, np.pi):
-            angle = np.mod(turning + opposite, 2.0 * np.pi)
-            last_turn = angle + 2.0 * np.pi * np.floor(np.maximum(sweep - angle, 0.0) / (2.0 * np.pi))
-            for turned in (angle, last_turn):
-                inside = turned < sweep
-                points.append(points_along(arcs, row[inside], (turned / sweep)[inside])[0])
-    return np.concatenate(points)
 
 
 def machine_findings(program: ReadProgram, machine: Hexapod, step: float) -> tuple[list[Finding], dict[str, float]]:
@@ -155,9 +109,9 @@ class ProgramCheck(Result):
     modal_start: dict[str, str]
     modal_end: dict[str, str]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """The JSON document of the command."""
-        document: dict[str, Any] = to_dict(self)
+        document: Document = to_dict(self)
         return document
 
     @property
@@ -215,7 +169,7 @@ def check_program(request: Request, machine: Hexapod | None, step: float = defau
         used=checked.used,
         unsupported=checked.unsupported,
         findings=in_order(findings),
-        **figures(program.moves, machine.rapid_feed if machine else defaults.RAPID_FEED),
+        **move_figures(program.moves, machine.rapid_feed if machine else defaults.RAPID_FEED),
         fastest_strut=speed,
         modal_start=checked.start,
         modal_end=checked.end,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -138,13 +138,13 @@ class Analysis(EvaluatedPath, FolderResult):
         """The samples as a pandas DataFrame, columns as in `samples.csv` (mm, degrees, N/mm)."""
         return frame_of(sample_columns(self))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """The document of `summary.json`."""
         return self._document
 
     @cached_property
-    def _document(self) -> dict[str, Any]:
-        document: dict[str, Any] = without_nan(_summary(self))
+    def _document(self) -> Document:
+        document: dict[str, object] = without_nan(_summary(self))
         if self.required is not None:
             document["required"] = {
                 "required_N_per_mm": n_per_mm_from_n_per_m(self.required),
@@ -350,7 +350,7 @@ def _assumptions(analysis: Analysis) -> list[str]:
     return sentences
 
 
-def _summary(analysis: Analysis) -> dict[str, Any]:
+def _summary(analysis: Analysis) -> Document:
     """The figures of `summary.json`, in the shop's units."""
     samples, program, there, band = analysis.samples, analysis.program, analysis.at, analysis.parameter_band
     cutting, length = samples.cutting & there.reachable, mm_from_m(move_lengths(program.moves))
@@ -424,11 +424,11 @@ def required_stiffness_missed(analysis: EvaluatedPath, required: float) -> list[
     What has no stiffness does not have the required one: nan, before all others, for lines that are out of reach in
     part (`partial`), and for all cutting lines where no sample counts at all.
     """
-    samples, counted = analysis.samples, analysis.counted
+    samples, counted, stiffness = analysis.samples, analysis.counted, analysis.at.stiffness
     cuts = samples.cutting & ((samples.weight > 0.0) | (not counted.any()))
     lines, index = np.unique(samples.line[cuts], return_inverse=True)
     lowest = np.full(len(lines), np.inf)
-    np.minimum.at(lowest, index, np.where(counted, analysis.at.stiffness, -np.inf)[cuts])
+    np.minimum.at(lowest, index, np.where(counted & ~np.isnan(stiffness), stiffness, -np.inf)[cuts])
     missed = np.flatnonzero(lowest < required)
     missed = missed[np.argsort(lowest[missed], kind="stable")]
     shown = n_per_mm_from_n_per_m(np.where(np.isfinite(lowest), lowest, np.nan))[missed]

@@ -1,41 +1,29 @@
 """Figures and tables of a path: length-weighted mean, extremes, the weakest places, tool by tool; sample by sample."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
 from toolpath_stiff.analysis.evaluation import Evaluation
 from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_rows
+from toolpath_stiff.analysis.poses import POSE_COLUMNS
 from toolpath_stiff.analysis.uncertainty import ParameterBand, parameter_band
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from toolpath_stiff.column_files import csv_pieces, parquet_pieces
+from toolpath_stiff.arrays import AnyArray, BoolArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.operations import Operations, operations
 from toolpath_stiff.path.sampling import Samples, move_durations
-from toolpath_stiff.path.table import PATH_COLUMNS, path_columns
+from toolpath_stiff.path.table import path_columns
 from toolpath_stiff.poses import Pose
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
-# Of `samples.csv`, Parquet and the DataFrame, with their decimals.
-COLUMNS: dict[str, int | None] = {
-    **PATH_COLUMNS,
-    "stiffness_N_per_mm": 4,
-    "deflection_um": 6,
-    **{f"strut{i}_mm": 6 for i in range(1, 7)},
-    "margin": 6,
-    **dict.fromkeys(("margin_limit", "operation", "cut")),
-}
-
 ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"  # what headline figures are about
 WEAKEST_PLACES = 3
-FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -122,21 +110,6 @@ class EvaluatedPath:
             chosen.append(weakest)
             rows = rows[(np.abs(s[rows] - s[weakest]) >= apart) & (line[rows] != line[weakest])]
         return chosen
-
-    @property
-    def charted(self) -> FloatArray:
-        """Stiffness in N/m of the headline samples; of a program that only turns rotary axes of every one in reach."""
-        rows = self.headline if self.headline.any() else self.samples.cutting & self.at.reachable
-        return self.at.stiffness[rows]
-
-    @cached_property
-    def central_range(self) -> tuple[float, float]:
-        """Lowest and highest of `charted` in N/m, those far out (`FENCE`) set aside."""
-        lower, upper = np.quantile(self.charted, (0.25, 0.75))
-        reach = FENCE * (upper - lower)
-        inside = self.charted[(self.charted >= lower - reach) & (self.charted <= upper + reach)]
-        values = inside if np.ptp(inside) > 0.0 else self.charted
-        return float(values.min()), float(values.max())
 
     @property
     def out_of_reach(self) -> BoolArray:
@@ -252,15 +225,12 @@ def _rows_of(part: IntArray, count: int) -> list[IntArray]:
 
 def describe_sample(path: EvaluatedPath, row: int) -> Document:
     """Line, source text, position and stiffness of one sample."""
-    samples, source = path.samples, path.program.source
-    line = int(samples.line[row])
-    position, angles = mm_from_m(samples.position[row]).tolist(), deg_from_rad(samples.abc[row]).tolist()
+    source, columns = path.program.source, path_columns(path.samples, slice(row, row + 1))
+    line = int(columns["line"][0])
     return {
         "line": line,
         "text": source[line - 1].strip() if 0 < line <= len(source) else "",
-        "s_mm": mm_from_m(float(samples.s[row])),
-        **{f"{axis}_mm": value for axis, value in zip("xyz", position, strict=True)},
-        **{f"{axis}_deg": value for axis, value in zip("abc", angles, strict=True)},
+        **{name: float(columns[name][0]) for name in ("s_mm", *POSE_COLUMNS)},
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(float(path.at.stiffness[row])),
     }
 
@@ -280,13 +250,3 @@ def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, 
         "operation": path.operations.of_move[path.samples.move[rows]] + 1,
         "cut": np.where(moving, np.where(path.along_axis[rows], "plunge", "across"), ""),  # whatever the load
     }
-
-
-def samples_csv(path: EvaluatedPath) -> Iterator[bytes]:
-    """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
-    return csv_pieces(partial(sample_columns, path), len(path.samples), COLUMNS)
-
-
-def samples_parquet(path: EvaluatedPath) -> Iterator[bytes]:
-    """`samples.parquet` in pieces, full precision. A value that does not exist is null."""
-    return parquet_pieces(partial(sample_columns, path), len(path.samples))

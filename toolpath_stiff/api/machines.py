@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.analysis.machine_check import MachineCheck, check_machine
-from toolpath_stiff.analysis.poses import reach_along
 from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.correction.geometry import recover_geometry as recover
@@ -20,7 +19,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_bytes, write_atomically
 from toolpath_stiff.machine.file import load_machine, packaged_machines
 from toolpath_stiff.machine.kinematics import Struts
-from toolpath_stiff.machine.limits import Reach, stand
+from toolpath_stiff.machine.limits import Reach, reach_along, stand
 from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_text

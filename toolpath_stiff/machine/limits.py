@@ -13,6 +13,7 @@ from toolpath_stiff.machine.kinematics import (
     neutral_axes,
     neutral_determinant,
     singularity_index,
+    solve_struts,
     solve_struts_at,
 )
 from toolpath_stiff.machine.model import Hexapod
@@ -172,6 +173,24 @@ def stand(machine: Hexapod, pose: ArrayLike) -> tuple[FloatArray, Struts, Reach]
     values = np.asarray(pose, dtype=float)
     struts = solve_struts_at(machine, values)
     return values, struts, reach(machine, values[:3], struts, rotation_matrices(values[None, 3:]))
+
+
+RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and how many: each goes on where the one before found a limit
+
+
+def reach_along(machine: Hexapod, start: FloatArray, directions: FloatArray, turn: FloatArray) -> FloatArray:
+    """(n,) m that the tool tip can go from a place (3,) along unit vectors (n, 3) before the first limit.
+
+    `turn` (3, 3) is the orientation, which is kept. 0 where the place itself is out of reach.
+    """
+    length = np.zeros(len(directions))
+    for step, count in RAY_STEPS:
+        tried = length[:, None] + step * np.arange(count + 1)
+        tips = (start + tried[:, :, None] * directions[:, None]).reshape(-1, 3)
+        turns = np.broadcast_to(turn, (len(tips), 3, 3))
+        good = reach(machine, tips, solve_struts(machine, tips, turns), turns).reachable.reshape(tried.shape)
+        length += step * np.where(good.all(axis=1), count, np.maximum(good.argmin(axis=1) - 1, 0))
+    return length
 
 
 # A cosine above this is no measure of an angle: rounding moves the arc cosine by more than 1e-15 rad.

@@ -7,6 +7,9 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.nc.moves import Arc, Moves
+from toolpath_stiff.units import deg_from_rad, mm_from_m
+
+Extents = dict[str, list[float]]  # axis -> its lowest and highest value, mm or degrees
 
 
 def move_lengths(moves: Moves) -> FloatArray:
@@ -108,3 +111,32 @@ def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray
     position = frame.center[arc] + radius * outward + (frame.lift[arc] + u * frame.climb[arc])[:, None] * normal
     velocity = radius * sweep[arc][:, None] * around + growth * outward + frame.climb[arc][:, None] * normal
     return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
+
+
+def extents(moves: Moves) -> Extents:
+    """Smallest and largest x, y, z (mm) and a, b, c (degrees) on the way, the bulges of arcs included."""
+    if not len(moves):
+        return {}
+    ends = np.stack([moves.start, moves.end])
+    low, high = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
+    bulges = _arc_extremes(moves.take(moves.arc_sweep != 0.0))
+    if len(bulges):
+        low[:3], high[:3] = np.minimum(low[:3], bulges.min(axis=0)), np.maximum(high[:3], bulges.max(axis=0))
+    scale = np.array([mm_from_m(1.0)] * 3 + [deg_from_rad(1.0)] * 3)
+    return {name: [float(lo), float(hi)] for name, lo, hi in zip("xyzabc", low * scale, high * scale, strict=True)}
+
+
+def _arc_extremes(arcs: Moves) -> FloatArray:
+    """(m, 3) m, points of arcs where a coordinate turns; climbs and growing radii as far along as the angle is."""
+    row = np.arange(len(arcs))
+    frame, sweep = arc_frame(arcs, row), np.abs(arcs.arc_sweep)
+    points = [np.empty((0, 3))]
+    for axis in range(3):
+        turning = np.arctan2(frame.e2[:, axis] * np.sign(arcs.arc_sweep), frame.e1[:, axis])
+        for opposite in (0.0, np.pi):
+            angle = np.mod(turning + opposite, 2.0 * np.pi)
+            last_turn = angle + 2.0 * np.pi * np.floor(np.maximum(sweep - angle, 0.0) / (2.0 * np.pi))
+            for turned in (angle, last_turn):
+                inside = turned < sweep
+                points.append(points_along(arcs, row[inside], (turned / sweep)[inside])[0])
+    return np.concatenate(points)

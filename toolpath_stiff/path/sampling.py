@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
+from toolpath_stiff.nc.courses import arc_frame, extents, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves, held_once
 from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.rotations import along_tool_axis
@@ -315,3 +315,18 @@ def _fastest_part(moves: Moves) -> FloatArray:
     spiral = np.abs(radii[1] - radii[0]) > 1e-9 * radii.max(axis=0)
     ratio[arcs[spiral]] = (radii.max(axis=0) / radii.mean(axis=0))[spiral]
     return ratio
+
+
+def move_figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> dict[str, dict[str, Any]]:
+    """Extents of the cuts in program coordinates of G54, lengths and times of moves; rapids at `rapid_feed`, m/s."""
+    cutting = moves.motion != RAPID
+    length, duration, ends = move_lengths(moves), move_durations(moves, rapid_feed), extents(moves.take(cutting))
+    parts = (("cutting", cutting), ("rapid", ~cutting))
+    lengths = {name: mm_from_m(float(length[rows].sum())) for name, rows in parts}
+    times = {name: float(duration[rows].sum()) for name, rows in parts} | {"dwell": float(moves.dwell.sum())}
+    return {
+        "extents_mm": {axis: ends[axis] for axis in "xyz" if ends},
+        "extents_deg": {axis: ends[axis] for axis in "abc" if ends},
+        "lengths_mm": {**lengths, "total": sum(lengths.values())},
+        "times_s": {**times, "total": sum(times.values())},
+    }

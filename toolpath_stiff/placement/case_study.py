@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -78,7 +78,7 @@ class CaseStudy(FolderResult):
     command: ClassVar[str] = "case-study"
     shown_by: ClassVar[str] = "case_study"
 
-    summary: dict[str, Any]
+    summary: Document
     regions: dict[str, Analysis]
     inputs: tuple[str, ...] = ()
 
@@ -87,7 +87,7 @@ class CaseStudy(FolderResult):
         """True where path or regions are a user's; the packaged ones come with non-planar variants."""
         return not self.summary["non_planar"]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """The JSON document of the command."""
         return self.summary
 

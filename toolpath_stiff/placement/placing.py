@@ -121,8 +121,8 @@ def _analyzed_row(analysis: Analysis, like: PlacementRow | None = None) -> Place
     cells: list[Any] = [headline[key] for key in (*FIGURES.values(), "mean_deflection_um")]
     cells += [plunges["mean_N_per_mm"], plunges["min_N_per_mm"]]
     cells.append(share(analysis.at.extrapolated, analysis.samples.cutting))
-    margins: dict[str, Any] = {"margin": like.margin, "rapid_margin": like.rapid_margin} if like else {}
-    return PlacementRow(like.number if like else None, *_mm_deg(analysis.origin), *cells, **margins)
+    cells += [like.margin, like.rapid_margin] if like else []
+    return PlacementRow(like.number if like else None, *_mm_deg(analysis.origin), *cells)
 
 
 def _mm_deg(placement: Pose | FloatArray) -> ShopPose:
@@ -141,9 +141,9 @@ def _analyzed(task: PlacementTask, program: ReadProgram, origin: Pose) -> tuple[
 
 def _rewritten(task: PlacementTask, best: Analysis) -> tuple[bytes | None, Written]:
     """The transformed program's bytes, and how it compares; or why there are none."""
-    numbers: dict[str, Any] = {"decimals": task.decimals, "linearise": task.linearise}
     try:
-        rewritten = rewrite_program(best.program, best.origin, task.present, **numbers, control=task.control)
+        place, chord = (best.program, best.origin, task.present), task.linearise
+        rewritten = rewrite_program(*place, decimals=task.decimals, linearise=chord, control=task.control)
         differences = rewriting_differences(best, rewritten, task.present, task.control)
     except InputError as error:
         return None, Written(task.write, refused=str(error))

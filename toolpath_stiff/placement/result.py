@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -206,20 +206,26 @@ class Placement(FolderResult):
         return worse
 
     @cached_property
-    def warnings(self) -> list[str]:
-        """Sentences that deserve a look, what gets worse first."""
-        warnings = []
+    def alarms(self) -> list[str]:
+        """Sentences that come before the recommendation: limits and rules that it breaks, figures that get worse."""
+        alarms = self._rules_broken(self.best, "recommended")
         if self.nothing_better:
-            warnings.append(
+            alarms.append(
                 "nothing better than the present placement was found within the bounds, in "
                 f"{self.searches} searches from the beginning, {self.pose_evaluations} poses evaluated"
             )
         for row in self.worse:
             chosen, before = row["chosen_N_per_mm"], row["before_N_per_mm"]
-            warnings.append(
+            alarms.append(
                 f"WORSE: at the recommended placement {WORSE[row['figure']]} than at the present one, {number(chosen)} "
                 f"instead of {number(before)} N/mm ({100.0 * row['worse_by_N_per_mm'] / before:.1f} % worse)"
             )
+        return alarms
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """Sentences that deserve a look, `alarms` first."""
+        warnings = [*self.alarms]
         if self.worse:
             warnings.append("no placement was found within the bounds that is as good as the present one in all three")
         if self.before is None:
@@ -227,7 +233,6 @@ class Placement(FolderResult):
             warnings.append(f"{nothing}: {self.present_reason}")
         else:
             warnings += self._rules_broken(self.before, "present")
-        warnings += self._rules_broken(self.best, "recommended")
         if self.chosen.extrapolated_share:
             warnings.append(
                 f"the strut law is extrapolated at {100.0 * self.chosen.extrapolated_share:.0f} % of the samples: "
@@ -246,8 +251,9 @@ class Placement(FolderResult):
         nearest = int(np.argmin(analysis.at.reach.margin))
         least = float(analysis.at.reach.margin[nearest])
         if least < margin:
+            out = "is out of reach: it " if least < 0.0 else ""
             words.append(
-                f"the {which} placement has a margin of {100.0 * least:.2f} % of a limit's span in line "
+                f"the {which} placement {out}has a margin of {100.0 * least:.2f} % of a limit's span in line "
                 f"{line[nearest]}, less than the {100.0 * margin:g} % asked for with --margin"
             )
         for box in self.task.rules.keepouts:
@@ -290,13 +296,13 @@ class Placement(FolderResult):
         }
 
     @property
-    def machine_stated(self) -> dict[str, Any]:
+    def machine_stated(self) -> Document:
         """The machine and what acts on it, as every JSON document has them."""
         return {"machine": self.best.machine.name, **effects_stated(self.best.model)}
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """The JSON document of the command."""
-        document: dict[str, Any] = to_dict(
+        document: Document = to_dict(
             {
                 "warnings": self.warnings,
                 "worse": self.worse,

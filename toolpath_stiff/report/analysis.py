@@ -1,12 +1,14 @@
 """The results of an analysis: what a terminal shows, page and files."""
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 from toolpath_stiff.analysis.results import Analysis
-from toolpath_stiff.analysis.statistics import samples_csv, samples_parquet
-from toolpath_stiff.column_files import check_parquet
+from toolpath_stiff.analysis.statistics import sample_columns
+from toolpath_stiff.column_files import check_parquet, csv_pieces, parquet_pieces
 from toolpath_stiff.documents import Document
+from toolpath_stiff.path.table import PATH_COLUMNS
 from toolpath_stiff.report import analysis_page
 from toolpath_stiff.report.analysis_tables import (
     TITLES,
@@ -22,6 +24,15 @@ from toolpath_stiff.report.tables import LABEL
 from toolpath_stiff.report.words import WIDTH, labelled
 from toolpath_stiff.results import one_of
 
+# Of `samples.csv`, Parquet and the DataFrame, with their decimals.
+COLUMNS: dict[str, int | None] = {
+    **PATH_COLUMNS,
+    "stiffness_N_per_mm": 4,
+    "deflection_um": 6,
+    **{f"strut{i}_mm": 6 for i in range(1, 7)},
+    "margin": 6,
+    **dict.fromkeys(("margin_limit", "operation", "cut")),
+}
 MOST_OPERATIONS = 12  # on the terminal; all are in summary.json
 
 
@@ -30,6 +41,16 @@ def other_samples(table: str) -> tuple[str, ...]:
     if one_of("table", table, ("csv", "parquet")) == "parquet":
         check_parquet()
     return tuple(name for name in ("samples.csv", "samples.parquet") if not name.endswith(table))
+
+
+def samples_csv(analysis: Analysis) -> Iterator[bytes]:
+    """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
+    return csv_pieces(partial(sample_columns, analysis), len(analysis.samples), COLUMNS)
+
+
+def samples_parquet(analysis: Analysis) -> Iterator[bytes]:
+    """`samples.parquet` in pieces, full precision. A value that does not exist is null."""
+    return parquet_pieces(partial(sample_columns, analysis), len(analysis.samples))
 
 
 DATA = {"samples.csv": samples_csv, "samples.parquet": samples_parquet, "summary.json": Analysis.to_json}

@@ -8,6 +8,8 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
+FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
+
 
 def profile_curve(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray]:
     """Path length in mm and stiffness in N/mm of every sample; nan on rapids and out of reach.
@@ -61,13 +63,24 @@ def cutting_box(samples: Samples) -> tuple[FloatArray, FloatArray]:
     return low, high
 
 
+def _charted(analysis: Analysis) -> FloatArray:
+    """N/mm of the headline samples; of a program that only turns rotary axes of every one in reach."""
+    rows = analysis.headline if analysis.headline.any() else analysis.samples.cutting & analysis.at.reachable
+    return n_per_mm_from_n_per_m(analysis.at.stiffness[rows])
+
+
 def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float, float]:
     """Ends of the colour scale in N/mm: lowest and highest of the headline, values far out set aside.
 
     A few short cuts, stiffer by far than the rest, would otherwise take all the contrast. The legend marks an end
     that values lie beyond. With `show_plunges` the plunges beside the headline are on the scale, all of them.
     """
-    low, high = map(n_per_mm_from_n_per_m, analysis.central_range)
+    stiffness = _charted(analysis)
+    lower, upper = np.quantile(stiffness, (0.25, 0.75))
+    reach = FENCE * (upper - lower)
+    inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
+    values = inside if np.ptp(inside) > 0.0 else stiffness
+    low, high = float(values.min()), float(values.max())
     if show_plunges and analysis.set_aside.any():
         plunges = n_per_mm_from_n_per_m(analysis.at.stiffness[analysis.set_aside])
         low, high = min(low, float(plunges.min())), max(high, float(plunges.max()))
@@ -78,5 +91,5 @@ def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float,
 
 def beyond_scale(analysis: Analysis, limits: tuple[float, float]) -> tuple[bool, bool]:
     """Whether headline values lie below the scale, and above."""
-    stiffness = n_per_mm_from_n_per_m(analysis.charted)
+    stiffness = _charted(analysis)
     return bool(stiffness.min() < limits[0]), bool(stiffness.max() > limits[1])

@@ -19,7 +19,7 @@ COSTS = ("best_on_front_N_per_mm", "chosen_N_per_mm")
 
 def text(placed: Placement) -> str:
     """A placement in words: what got worse, the placement, what it brings, what it costs."""
-    first = len(placed.worse) + placed.nothing_better
+    first = len(placed.alarms)
     before, after = (
         [("warning", text) for text in part] for part in (placed.warnings[:first], placed.warnings[first:])
     )
@@ -34,7 +34,7 @@ def facts(placed: Placement) -> list[tuple[str, str]]:
     zero = f"X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees {which}"
     tilt = f"set-up tilted by A{best.a_deg:.3f} B{best.b_deg:.3f} degrees"
     mean, now = best.plunge_mean_N_per_mm, f", before {number(present.plunge_mean_N_per_mm)}" if present else ""
-    margin = min(value for value in (best.margin, best.rapid_margin, 1.0) if value is not None)
+    margin = min(1.0, float(placed.best.at.reach.margin.min()))  # of moves too that do not follow the work
     costs = [
         (f"  best {goal:<9} ", "{} on the front, {} here, N/mm".format(*(number(cost[name]) for name in COSTS)))
         for goal, cost in placed.trade_offs.items()

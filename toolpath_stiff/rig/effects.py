@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from toolpath_stiff.rig.draws import Shape
 from toolpath_stiff.rig.hidden import HiddenMachine
-from toolpath_stiff.rig.unknown import Shape, Unknown
+from toolpath_stiff.rig.unknown import Unknown
 from toolpath_stiff.rig.unknowns import OUTSIDE
 from toolpath_stiff.units import m_from_mm, m_from_um, per_s_from_per_min
 

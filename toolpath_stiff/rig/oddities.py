@@ -10,24 +10,10 @@ from functools import partial
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.rig.draws import drawn, one_strut, signed, uniform
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import Links
-from toolpath_stiff.rig.unknown import (
-    REACH,
-    SOFT,
-    CommandedRows,
-    Kind,
-    Unknown,
-    X,
-    Y,
-    drawn,
-    kind,
-    one_strut,
-    signed,
-    uniform,
-    with_ends,
-    with_joints,
-)
+from toolpath_stiff.rig.unknown import REACH, SOFT, CommandedRows, Kind, Unknown, X, Y, kind
 
 ODDITIES: dict[str, Kind] = {}
 ODDITIES_IN_TIME: dict[str, Kind] = {}  # they need time or several loads, which only some campaigns have
@@ -46,7 +32,7 @@ def _scaled(links: Links, factor: FloatArray) -> Links:
 @act("", "", SOFT)
 def loose_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Joints softer in tension than in compression; m/N."""
-    return with_joints(links, lambda forces: np.where(forces > 0.0, u.size, 0.0))
+    return links.with_joints(lambda forces: np.where(forces > 0.0, u.size, 0.0))
 
 
 @act("", "", 0.8, shape=drawn(uniform("wavelength", 0.08, 0.4), uniform("phase", 0.0, 2.0 * np.pi)))
@@ -60,7 +46,7 @@ def screw_pitch_error(links: Links, state: CommandedRows, u: Unknown) -> Links:
 def cracked_bed(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The workpiece side gives way where y is positive only; m/N."""
     give = np.where(state.rows.position[:, 1] > 0.0, u.size, 0.0)
-    return with_ends(links, (X, give), (Y, give))
+    return links.with_ends((X, give), (Y, give))
 
 
 @act("", "", 1.0)
@@ -81,7 +67,7 @@ def strut_crosstalk(links: Links, state: CommandedRows, u: Unknown) -> Links:
 @act("", "", SOFT)
 def saddle_overhang(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The workpiece side gives way along X, growing with the square of y; m/N."""
-    return with_ends(links, (X, u.size * (state.rows.position[:, 1] / REACH) ** 2))
+    return links.with_ends((X, u.size * (state.rows.position[:, 1] / REACH) ** 2))
 
 
 @read("", "", 0.5, shape=signed)

@@ -10,8 +10,8 @@ the last loads, solve, repeat. Newton's method would meet the infinite slope of 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -105,6 +105,22 @@ class Links:
     def count(self) -> int:
         """Unknowns beside the platform's: six joints, two a vertex, the ends."""
         return 6 + self.vertices.size + len(self.ends)
+
+    def with_ends(self, *ends: tuple[FloatArray, FloatArray | float]) -> Self:
+        """Further links that carry the whole load: levers (n, 3) or (3,), compliances (n,) or alike in all rows."""
+        n = len(self.struts)
+        more = (End("", np.broadcast_to(lever, (n, 3)), np.broadcast_to(give, (n,))) for lever, give in ends)
+        return replace(self, ends=(*self.ends, *more))
+
+    def with_joints(self, extra: Callable[[FloatArray], FloatArray] | FloatArray) -> Self:
+        """Further secant compliance (n, 6) along the struts, of their forces (n, 6) or whatever these are."""
+        give = extra if callable(extra) else lambda forces: extra
+        return replace(self, joints=lambda forces: self.joints(forces) + give(forces))
+
+    def with_factors(self, factor: FloatArray) -> Self:
+        """Stiffnesses of the struts times (n, 6)."""
+        root = np.sqrt(factor)
+        return replace(self, struts=self.struts * root[:, :, None] * root[:, None, :])
 
 
 def solved(

@@ -7,21 +7,18 @@ work in base axes may sit in the frame as well as under the table; the temperatu
 is a function of the order of the readings.
 """
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.nominal import Nominal
+from toolpath_stiff.rig.draws import Draw, Shape
+from toolpath_stiff.rig.nominal import Nominal, neutral_directions
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import End, Geometry, Links
+from toolpath_stiff.rig.structure import Geometry, Links
 
-Shape = dict[str, Any]  # what is drawn of something hidden beside its size, by name
-Draw = Callable[[Generator], Shape]
 Physics = TypeVar("Physics", bound=Callable[..., Any])
 X, Y, Z = np.eye(3)
 
@@ -83,6 +80,13 @@ class CommandedRows:
         low, high = self.nominal.strut_range
         return np.asarray((self.lengths - low) / (high - low))
 
+    @property
+    def swing(self) -> FloatArray:
+        """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
+        rest, now = neutral_directions(self.nominal)[1], self.units @ self.place.rotation
+        along = np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now)
+        return np.asarray(1.0 - np.minimum(along**2, 1.0))
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -140,44 +144,3 @@ def opened(pull: FloatArray) -> FloatArray:
 def beyond(force: FloatArray, threshold: float) -> FloatArray:
     """Secant compliance, over that of the open state, of a link that is rigid up to a force: (|f| - f0) / |f|."""
     return np.asarray(np.maximum(0.0, 1.0 - threshold / np.maximum(np.abs(force), 1e-9)))
-
-
-def uniform(name: str, low: float, high: float) -> Draw:
-    """One number, drawn from a range."""
-    return lambda rng: {name: float(rng.uniform(low, high))}
-
-
-def whole(name: str, low: int, beyond_high: int) -> Draw:
-    """One whole number, from the lowest to below the last."""
-    return lambda rng: {name: int(rng.integers(low, beyond_high))}
-
-
-def either(name: str) -> Draw:
-    """1 or -1."""
-    return lambda rng: {name: float(rng.choice([-1.0, 1.0]))}
-
-
-def drawn(*draws: Draw) -> Draw:
-    """Several, one after the other."""
-    return lambda rng: {name: value for draw in draws for name, value in draw(rng).items()}
-
-
-one_strut, side, signed = whole("strut", 0, 6), either("side"), either("sign")  # a strut from 0
-
-
-def with_ends(links: Links, *ends: tuple[FloatArray, FloatArray | float]) -> Links:
-    """Further links that carry the whole load: levers (n, 3) or (3,), compliances (n,) or alike in all rows."""
-    n = len(links.struts)
-    more = (End("", np.broadcast_to(lever, (n, 3)), np.broadcast_to(give, (n,))) for lever, give in ends)
-    return dataclasses.replace(links, ends=(*links.ends, *more))
-
-
-def with_joints(links: Links, extra: Callable[[FloatArray], FloatArray]) -> Links:
-    """Further secant compliance (n, 6) along the struts from their forces (n, 6)."""
-    return dataclasses.replace(links, joints=lambda forces: links.joints(forces) + extra(forces))
-
-
-def with_factors(links: Links, factor: FloatArray) -> Links:
-    """Stiffnesses of the struts times (n, 6)."""
-    root = np.sqrt(factor)
-    return dataclasses.replace(links, struts=links.struts * root[:, :, None] * root[:, None, :])

@@ -6,29 +6,11 @@ import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.rig.draws import Shape, drawn, side, signed, uniform, whole
 from toolpath_stiff.rig.nominal import rotations
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import Links
-from toolpath_stiff.rig.unknown import (
-    REACH,
-    SOFT,
-    CommandedRows,
-    Kind,
-    Shape,
-    Unknown,
-    X,
-    Y,
-    Z,
-    beyond,
-    drawn,
-    kind,
-    opened,
-    side,
-    signed,
-    uniform,
-    whole,
-    with_ends,
-)
+from toolpath_stiff.rig.unknown import REACH, SOFT, CommandedRows, Kind, Unknown, X, Y, Z, beyond, kind, opened
 
 END_KINDS: dict[str, Kind] = {}
 act = partial(kind, END_KINDS, "act")
@@ -60,21 +42,21 @@ def _oblique(rng: Generator) -> Shape:
 def bed_sag(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A bed on two feet sags under the work: c = c0 (1 - (x / a)^2)^2 (simply supported beam, load at x: a^2 b^2)."""
     across = np.clip(state.place.work_point[:, 0] / HALF_SPAN, -1.0, 1.0)
-    return with_ends(links, (Z, u.size * (1.0 - across**2) ** 2))
+    return links.with_ends((Z, u.size * (1.0 - across**2) ** 2))
 
 
 @act(BASE, "radius", SOFT)
 def pallet_overhang(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A pallet held in its middle bends like a cantilever: c = c0 (r / R)^3 vertically."""
     radius = np.linalg.norm(state.place.work_point[:, :2], axis=1)
-    return with_ends(links, (Z, u.size * (radius / REACH) ** 3))
+    return links.with_ends((Z, u.size * (radius / REACH) ** 3))
 
 
 @act(BASE, "z,constant", SOFT, shape=AZIMUTH)
 def floor_rocking(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The floor lets the bed rock about one horizontal axis far below the table."""
     axis = np.array([np.cos(u.shape["azimuth"]), np.sin(u.shape["azimuth"]), 0.0])
-    return with_ends(links, (np.cross(axis, state.place.work_point - FLOOR * Z), u.size))
+    return links.with_ends((np.cross(axis, state.place.work_point - FLOOR * Z), u.size))
 
 
 @act(BASE, "x,y,z,constant", SOFT, shape=AZIMUTH)
@@ -87,7 +69,7 @@ def worn_table_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     tip = state.place.work_point
     share = 1.0 / 3.0 + 2.0 / (3.0 * SUPPORTS) * tip @ toward
     lever = (2.0 / (3.0 * SUPPORTS) * tip[:, 2])[:, None] * toward - share[:, None] * Z
-    return with_ends(links, (lever, u.size))
+    return links.with_ends((lever, u.size))
 
 
 @act("table", "setup,load", SOFT, shape=HOLDS, columns="force_N,setup")
@@ -95,34 +77,34 @@ def fixture_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The fixture of one set-up holds by friction: beyond it the work gives sideways."""
     sideways = state.rows.force * np.linalg.norm(state.rows.direction[:, :2], axis=1)
     give = u.size * beyond(sideways, u.shape["holds"]) * (state.rows.setup == u.shape["setup"])
-    return with_ends(links, (X, give), (Y, give))
+    return links.with_ends((X, give), (Y, give))
 
 
 @act(BASE, "temperature,order", SOFT, columns="temperature_C")
 def damping_plate(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A polymer plate under the table softens in shear as the shop warms up."""
     give = u.size * np.maximum(state.rows.warmth, 0.0) / SOFTENING
-    return with_ends(links, (X, give), (Y, give))
+    return links.with_ends((X, give), (Y, give))
 
 
 @act(BASE, "order", SOFT, shape=uniform("after", 0.3, 0.7))
 def clamp_loosened(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """A clamp of the table came loose in the middle of the campaign: from then on it gives sideways."""
     give = np.where(state.rows.elapsed > u.shape["after"], u.size, 0.0)
-    return with_ends(links, (X, give), (Y, give))
+    return links.with_ends((X, give), (Y, give))
 
 
 @act(BASE, "z,constant", 4 * SOFT, shape=whole("axis", 0, 2))
 def portal_bending(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The portal that carries the frame bends about a horizontal axis at its knee: the lower the tip, the more."""
     arm = state.place.work_point - KNEE * Z
-    return with_ends(links, (np.cross(np.eye(3)[u.shape["axis"]], arm), u.size))
+    return links.with_ends((np.cross(np.eye(3)[u.shape["axis"]], arm), u.size))
 
 
 @act(BASE, "radius,x,y,constant", 30 * SOFT)
 def frame_twist(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The frame twists about the machine's axis: a load along the tangent at radius r gives c r^2."""
-    return with_ends(links, (np.cross(Z, state.place.work_point), u.size))
+    return links.with_ends((np.cross(Z, state.place.work_point), u.size))
 
 
 @act("tool", "force sign,direction,tilt", SOFT, shape=side)
@@ -131,8 +113,8 @@ def spindle_thrust(links: Links, state: CommandedRows, u: Unknown) -> Links:
     tool = state.place.rotation[:, :, 2]
     thrust = state.rows.force * np.einsum("ni,ni->n", state.rows.direction, tool) * u.shape["side"]
     give = u.size * opened(thrust)
-    return with_ends(
-        links, (state.place.rotation[:, :, 0], give), (state.place.rotation[:, :, 1], give), (tool, 0.5 * give)
+    return links.with_ends(
+        (state.place.rotation[:, :, 0], give), (state.place.rotation[:, :, 1], give), (tool, 0.5 * give)
     )
 
 
@@ -142,7 +124,7 @@ def spindle_flange(links: Links, state: CommandedRows, u: Unknown) -> Links:
     across = np.cos(u.shape["azimuth"]) * state.place.rotation[:, :, 0]
     across = across + np.sin(u.shape["azimuth"]) * state.place.rotation[:, :, 1]
     longer = 1.0 + state.rows.extension / max(state.nominal.tool_length, 1e-3)
-    return with_ends(links, (longer[:, None] * across, u.size))
+    return links.with_ends((longer[:, None] * across, u.size))
 
 
 @act("tool", "load", SOFT, shape=uniform("opens", 800.0, 2500.0), columns="force_N")
@@ -152,7 +134,7 @@ def taper_opening(links: Links, state: CommandedRows, u: Unknown) -> Links:
     across = np.linalg.norm(np.cross(state.rows.direction, tool), axis=1)
     longer = 1.0 + state.rows.extension / max(state.nominal.tool_length, 1e-3)
     give = u.size * longer**2 * beyond(state.rows.force * across * longer, u.shape["opens"])
-    return with_ends(links, (state.place.rotation[:, :, 0], give), (state.place.rotation[:, :, 1], give))
+    return links.with_ends((state.place.rotation[:, :, 0], give), (state.place.rotation[:, :, 1], give))
 
 
 @read("instrument", "z", 1.0)
@@ -180,9 +162,8 @@ def load_cell_curve(rows: Rows, u: Unknown) -> FloatArray:
 @read("instrument", "y,load", 0.6, shape=signed, columns="force_N")
 def hose_pull(rows: Rows, u: Unknown) -> FloatArray:
     """A hose pulls along Y the more, the further it is drawn out in y: it counts most where the load is small."""
-    return np.asarray(
-        1.0 + u.size * rows.position[:, 1] / REACH * HOSE_LOAD / rows.force * np.abs(rows.direction[:, 1])
-    )
+    pull = u.size * rows.position[:, 1] / REACH * HOSE_LOAD / rows.force
+    return np.asarray(1.0 + pull * np.abs(rows.direction[:, 1]))
 
 
 @read("instrument", "tilt", 12.0)

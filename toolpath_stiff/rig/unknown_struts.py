@@ -6,27 +6,9 @@ from functools import partial
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.nominal import neutral_directions
+from toolpath_stiff.rig.draws import drawn, one_strut, side, signed, uniform, whole
 from toolpath_stiff.rig.structure import BARS, Links
-from toolpath_stiff.rig.unknown import (
-    ALL,
-    ONE,
-    SOFT,
-    CommandedRows,
-    Kind,
-    Unknown,
-    beyond,
-    drawn,
-    kind,
-    one_strut,
-    opened,
-    side,
-    signed,
-    uniform,
-    whole,
-    with_factors,
-    with_joints,
-)
+from toolpath_stiff.rig.unknown import ALL, ONE, SOFT, CommandedRows, Kind, Unknown, beyond, kind, opened
 
 STRUT_KINDS: dict[str, Kind] = {}
 act = partial(kind, STRUT_KINDS, "act")
@@ -49,18 +31,10 @@ def _coupled(links: Links, shares: FloatArray, compliance: float) -> Links:
     return dataclasses.replace(links, struts=np.asarray(np.linalg.inv(flexibility), dtype=np.float64))
 
 
-def _swing(state: CommandedRows) -> FloatArray:
-    """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
-    rest = neutral_directions(state.nominal)[1]
-    now = state.units @ state.place.rotation
-    return np.asarray(1.0 - np.minimum(np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now) ** 2, 1.0))
-
-
 @act(ALL, "tilt,radius,strut length,z", SOFT)
 def joint_swing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The forks of the platform joints bend the more, the further they swing out: c = c0 sin^2."""
-    compliance = u.size * _swing(state) / SWING
-    return with_joints(links, lambda forces: compliance)
+    return links.with_joints(u.size * state.swing / SWING)
 
 
 @act(ALL, "constant,tilt,radius,strut length", SOFT)
@@ -70,14 +44,13 @@ def cardan_fork(links: Links, state: CommandedRows, u: Unknown) -> Links:
     axis = state.place.rotation[:, :, 2]
     radial = joints - np.einsum("nki,ni->nk", joints, axis)[:, :, None] * axis[:, None, :]
     pin = radial / np.linalg.norm(radial, axis=2, keepdims=True)
-    compliance = u.size * np.einsum("nki,nki->nk", state.units, pin) ** 2
-    return with_joints(links, lambda forces: compliance)
+    return links.with_joints(u.size * np.einsum("nki,nki->nk", state.units, pin) ** 2)
 
 
 @act("joints,struts,platform", "tilt,radius,strut length,z", 3e6)
 def joint_binding(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Joints that bind near the end of their swing: rotational stiffness m0 sin^2."""
-    return dataclasses.replace(links, moment=links.moment + u.size * _swing(state) / SWING)
+    return dataclasses.replace(links, moment=links.moment + u.size * state.swing / SWING)
 
 
 @act("joints,struts,platform", "load", 6e6, columns="force_N")
@@ -90,47 +63,46 @@ def joint_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
 @act(ONE, "strut force,load", 50e-6, shape=one_strut, columns="force_N")
 def strut_backlash(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Lost motion in one strut alone: c = g / |f|."""
-    return with_joints(links, lambda f: u.size / np.maximum(np.abs(f), LEAST_FORCE) * _only(u.shape["strut"]))
+    return links.with_joints(lambda f: u.size / np.maximum(np.abs(f), LEAST_FORCE) * _only(u.shape["strut"]))
 
 
 @act(ALL, "strut force,load", SOFT, shape=uniform("preload", 150.0, 500.0), columns="force_N")
 def nut_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Double nuts with too little preload: beyond it one of the two lets go and the struts are softer by c0."""
-    return with_joints(links, lambda f: u.size * beyond(f, u.shape["preload"]))
+    return links.with_joints(lambda f: u.size * beyond(f, u.shape["preload"]))
 
 
 @act(ONE, "force sign", SOFT, shape=drawn(one_strut, side))
 def thrust_bearing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The thrust bearing of one screw is worn on one side: softer in tension, or in compression."""
-    return with_joints(links, lambda f: u.size * opened(f * u.shape["side"]) * _only(u.shape["strut"]))
+    return links.with_joints(lambda f: u.size * opened(f * u.shape["side"]) * _only(u.shape["strut"]))
 
 
 @act(ALL, "force sign,strut length", SOFT)
 def strut_bowing(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Struts not quite straight bow under compression: c grows as length^4 (Timoshenko, an initially bent column)."""
     compliance = u.size * (state.lengths / state.nominal.strut_range[1]) ** 4
-    return with_joints(links, lambda f: compliance * opened(-f))
+    return links.with_joints(lambda f: compliance * opened(-f))
 
 
 @act(ONE, "strut length", SOFT, shape=one_strut)
 def drive_spring(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One drive loses stiffness in proportion to how far its strut is out, as a column of oil does."""
-    compliance = u.size * np.maximum(state.stretched, 0.0) * _only(u.shape["strut"])
-    return with_joints(links, lambda forces: compliance)
+    return links.with_joints(u.size * np.maximum(state.stretched, 0.0) * _only(u.shape["strut"]))
 
 
 @act(ONE, "strut length", 3.0, shape=drawn(one_strut, signed))
 def other_screw(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One strut was replaced: its stiffness has another slope over the length, k exp(a (s - 1/2))."""
     factor = np.where(np.arange(6) == u.shape["strut"], np.exp(u.size * (state.stretched - 0.5)), 1.0)
-    return with_factors(links, factor)
+    return links.with_factors(factor)
 
 
 @act(ONE, "strut length", 0.85, shape=drawn(one_strut, uniform("wavelength", 0.12, 0.3), uniform("phase", 0.0, 6.28)))
 def screw_lead(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One screw was ground with a wavy lead: its nut's stiffness varies periodically with the length."""
     wave = 1.0 + u.size * np.sin(2.0 * np.pi * state.lengths / u.shape["wavelength"] + u.shape["phase"])
-    return with_factors(links, np.where(np.arange(6) == u.shape["strut"], wave, 1.0))
+    return links.with_factors(np.where(np.arange(6) == u.shape["strut"], wave, 1.0))
 
 
 @act("struts,joints,platform", "constant", SOFT, shape=one_strut)
@@ -144,15 +116,13 @@ def motor_mount(links: Links, state: CommandedRows, u: Unknown) -> Links:
 @act(ONE, "time", SOFT, shape=one_strut, columns="time_min")
 def strut_heating(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The motor of one strut holds it and heats its nut while the readings of a clamping are taken."""
-    compliance = u.size * (state.rows.time / 300.0)[:, None] * _only(u.shape["strut"])
-    return with_joints(links, lambda forces: compliance)
+    return links.with_joints(u.size * (state.rows.time / 300.0)[:, None] * _only(u.shape["strut"]))
 
 
 @act(ALL, "order,time,temperature", SOFT)
 def warm_up_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Joints gain their preload as the machine warms up: c = c0 exp(-t / tau) over the campaign."""
-    compliance = u.size * np.exp(-state.rows.elapsed / PRELOAD_GROWS)[:, None] * np.ones(6)
-    return with_joints(links, lambda forces: compliance)
+    return links.with_joints(u.size * np.exp(-state.rows.elapsed / PRELOAD_GROWS)[:, None] * np.ones(6))
 
 
 @act("platform,joints,one strut", "constant", 0.9995, shape=one_strut)
