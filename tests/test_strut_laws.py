@@ -159,7 +159,7 @@ def test_analyze_pose_and_place_agree_with_the_linear_law(machine, linear, tmp_p
         tps.place(slot, file, x_mm=(-60, 60), y_mm=0, z_mm=(700, 800), rotate_deg=0, step_mm=20, points=3).to_dict()
         for file in files
     ]
-    means = [one["recommended"]["mean_N_per_mm"] for one in put]
+    means = [one["chosen"]["mean_N_per_mm"] for one in put]
     assert means[0] == pytest.approx(means[1], rel=1e-3)  # a search amplifies the last digit
 
 

@@ -189,7 +189,8 @@ def _named(written: Sequence[str], columns: Columns, file: str, line: int) -> li
         name, meant = next(iter(slips.items()))
         hint = f"did you mean {meant}? Otherwise give it another name"
         if columns.sources is not None:
-            entries = [f"{parted(of)[0]}={theirs}:{parted(theirs)[1] or parted(of)[1]}" for theirs, of in slips.items()]
+            pairs = [(theirs, parted(theirs)[1], *parted(of)) for theirs, of in slips.items()]
+            entries = [f"{name}={cell}:{unit if same_quantity(unit, own) else own}" for cell, unit, name, own in pairs]
             hint += f", or say its unit: {columns_option(entries)}"
         raise InputError(f"column {name!r}", expected=meant, hint=hint, file=file, line=line)
     return heading

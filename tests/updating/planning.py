@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from tests.effects.cases import neutral_values
 from tests.stiffness.cases import nist
 from toolpath_stiff.inference.candidates import Component
+from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.planning.forecasts import Rival
 from toolpath_stiff.readings.measurements import Readings, read_measurements
@@ -71,9 +72,8 @@ def rival(name: str, observed: FloatArray) -> Rival:
         return (predictor.log_stiffness(x[:2], effects) - observed) / READING_SD
 
     found = least_squares(residual, np.concatenate([[0.0, 0.0], np.ones(len(start))]))
-    jacobian = found.jac / scale
     prior = np.diag([1.0 / 0.2**2] * 2 + [0.0] * len(start))
-    covariance = np.linalg.pinv(jacobian.T @ jacobian + prior, rcond=1e-20, hermitian=False)
+    covariance = scaled_inverse(found.jac.T @ found.jac + prior) * np.outer(scale, scale)
     values = found.x * scale
     effects = () if name == "none" else (active(name, values[2:]),)
     return Rival(name, values[:2], effects, covariance)

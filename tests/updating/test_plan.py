@@ -86,6 +86,27 @@ def test_another_visit_never_narrows_a_gap(made_up, seed):
     assert (share.gaps_with(chosen) >= before - 1e-6).all()
 
 
+def nudged(fit: Rival) -> Rival:
+    """The fit, another in its 11th digit."""
+    factors = 1.0 + 1e-11 * np.random.default_rng(3).uniform(-1.0, 1.0, len(fit.covariance))
+    return replace(fit, law=np.multiply(fit.law, factors[:2]), covariance=fit.covariance * np.outer(factors, factors))
+
+
+@pytest.mark.parametrize(
+    "pair", [("joint_moment_stiffness", "contact_nonlinearity"), ("frame_compliance", "joint_moment_stiffness")]
+)
+def test_a_fit_that_differs_in_its_11th_digit_forecasts_the_same(pair):
+    """Variances of 1e-4, 1e-18 and 1e9 stand in one covariance: law, compliance and stiffness in SI units."""
+    visits = possible_visits(nist(), menu(oblique=False), {"force_N"}, np.random.default_rng(1))
+    for one in rivals(*pair):
+        (first, second), good, _ = forecast_all(nist(), [one, nudged(one)], visits.readings)
+        assert good.any()
+        assert second.mean[good] == pytest.approx(first.mean[good], rel=1e-6)
+        spreads = [np.linalg.norm(found.factor[good], axis=1) for found in (first, second)]
+        assert spreads[0].min() > 0.0
+        assert spreads[1] == pytest.approx(spreads[0], rel=1e-6)
+
+
 @pytest.mark.parametrize("scale", [0.02, -0.1])
 def test_a_gauge_off_by_a_known_factor(scale):
     """Readings along X, two a visit, differ by ln(1 + s), all others by nothing: sqrt(2 n) |ln(1 + s)| / (sqrt 2 r)."""

@@ -149,11 +149,13 @@ def _forecast(rival: Rival, predictor: Predictor) -> Forecast:
         moved = law.copy()
         moved[k] += LAW_STEP
         columns.append((_answers(predictor, moved, rival.effects) - mean) / LAW_STEP)
-    deviations = np.sqrt(np.maximum(np.diag(covariance)[2:], 0.0))
-    for (k, component), sd in zip(rival.components, deviations, strict=True):
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    for (k, component), sd in zip(rival.components, deviations[2:], strict=True):
         columns.append(_slope(rival, k, component, float(sd), predictor, law, mean))
-    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
-    factor = np.stack(columns, axis=1) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    # Of the correlations: beside 1e7 of one unit the variances of another, 1e-18, are rounding.
+    scale = np.where(deviations > 0.0, deviations, 1.0)
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T) / np.outer(scale, scale))
+    factor = (np.stack(columns, axis=1) * deviations) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     return Forecast(rival.name, rival.weight, mean, factor)
 
 
