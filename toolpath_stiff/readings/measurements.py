@@ -183,6 +183,8 @@ def read_measurements(
     names = list(map(str, [paths] if isinstance(paths, str | Path) else paths))
     if not names:
         raise MeasurementError("no measurements", expected="a CSV file, or nist-table1")
+    if twice := [name for i, name in enumerate(names) if name in names[:i]]:
+        raise MeasurementError(f"{twice[0]!r} is given twice", hint="name it once")
     rows: list[Row] = []
     notes: list[str] = []
     errors: list[InputError] = []
