@@ -12,7 +12,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import to_dict
+from toolpath_stiff.documents import number, to_dict
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.checking import ERROR, WARNING, Finding, UsedCode, check, in_order
@@ -184,7 +184,7 @@ class ProgramCheck(Result):
 
     def _short(self) -> str:
         count = len(self.errors)
-        errors = f"{self.view.number(count)} error{'s' * (count > 1)}" if count else "no errors"
+        errors = f"{number(count)} error{'s' * (count > 1)}" if count else "no errors"
         return f"{self.program}, {errors}"
 
 
