@@ -76,6 +76,23 @@ def test_each_process_has_one_thread_for_linear_algebra():
     assert run(["threads", "threads"], 2) == [["1"] * 3] * 2
 
 
+def test_the_environment_of_the_caller_is_as_before(monkeypatch):
+    monkeypatch.setenv(THREADS[0], "4")
+    monkeypatch.delenv(THREADS[1], raising=False)
+    before = dict(os.environ)
+    run([1], 1)
+    with pytest.raises(ZeroDivisionError), ProcessPool(1) as pool:
+        pool.submit(abs, 1).result()
+        raise ZeroDivisionError
+    assert dict(os.environ) == before
+    first, second = ProcessPool(1), ProcessPool(1)  # two at a time, the first left first
+    first.shutdown()
+    assert second.submit(multiply, 1, "threads").result() == ["1"] * 3
+    second.shutdown()
+    second.shutdown()
+    assert dict(os.environ) == before
+
+
 def test_map_and_shutdown_are_those_of_any_executor():
     pool = ProcessPool(2)
     assert list(pool.map(abs, [-1, 2, -3])) == [1, 2, 3]

@@ -30,6 +30,10 @@ Answer = TypeVar("Answer")
 LEAVE_SECONDS = 5.0  # for a process that is told to stop, to remove its temporary files
 BLOCKED = [getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGTERM") if hasattr(signal, name)]
 
+_ENVIRONMENT = threading.Lock()
+_living: list[Executor] = []  # the pools whose processes take one thread over from the environment as they start
+_before: dict[str, str | None] = {}  # the environment's own settings, before the first of these pools
+
 
 class ProcessPool(Executor):
     """Calls in other processes, each with one call at a time and one thread of linear algebra.
@@ -47,9 +51,10 @@ class ProcessPool(Executor):
     def __init__(self, jobs: int) -> None:
         self._pool: Any = pebble.ProcessPool(jobs, initializer=_prepare, context=get_context("spawn"))
         self._calls: list[Future[Any]] = []
-        os.environ.update(dict.fromkeys(THREADS, "1"))  # which the processes take over as they start
+        _change_threads(self)
         with _signals_blocked():  # in the pool's threads and in the processes that they start
             if not self._pool.active:
+                _restore_threads(self)
                 raise RuntimeError("the processes cannot be started")
 
     def submit(
@@ -74,6 +79,7 @@ class ProcessPool(Executor):
         for call in cancelled:
             call.cancel()
         self._pool.join()
+        _restore_threads(self)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
@@ -90,6 +96,26 @@ def death(error: pebble.ProcessExpired) -> str:
         return f"its process ended by itself, exit code {error.exitcode}"
     name = signal.Signals(-error.exitcode).name
     return f"its process was ended by {name}" + (" (out of memory?)" if name == "SIGKILL" else "")
+
+
+def _change_threads(pool: Executor) -> None:
+    """One thread of linear algebra for every process that starts while the pool lives."""
+    with _ENVIRONMENT:
+        if not _living:
+            _before.update((name, os.environ.get(name)) for name in THREADS)
+        _living.append(pool)
+        os.environ.update(dict.fromkeys(THREADS, "1"))
+
+
+def _restore_threads(pool: Executor) -> None:
+    """The caller's own settings again, once no pool lives."""
+    with _ENVIRONMENT:
+        if pool in _living:
+            _living.remove(pool)
+            if not _living:
+                for name, setting in _before.items():
+                    os.environ.pop(name, None)
+                    os.environ.update({} if setting is None else {name: setting})
 
 
 def _prepare() -> None:

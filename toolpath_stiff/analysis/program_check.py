@@ -11,7 +11,8 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.documents import Document, to_dict
+from toolpath_stiff.documents import Document, to_dict, number
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.checking import ERROR, WARNING, Finding, UsedCode, check, in_order
@@ -138,7 +139,7 @@ class ProgramCheck(Result):
 
     def _short(self) -> str:
         count = len(self.errors)
-        errors = f"{self.view.number(count)} error{'s' * (count > 1)}" if count else "no errors"
+        errors = f"{number(count)} error{'s' * (count > 1)}" if count else "no errors"
         return f"{self.program}, {errors}"
 
 

@@ -183,6 +183,8 @@ def read_measurements(
     names = list(map(str, [paths] if isinstance(paths, str | Path) else paths))
     if not names:
         raise MeasurementError("no measurements", expected="a CSV file, or nist-table1")
+    if twice := [name for i, name in enumerate(names) if name in names[:i]]:
+        raise MeasurementError(f"{twice[0]!r} is given twice", hint="name it once")
     rows: list[Row] = []
     notes: list[str] = []
     errors: list[InputError] = []
@@ -340,7 +342,7 @@ def _points(poses: FloatArray, labels: TextArray) -> TextArray:
 
 
 def reading_columns(data: Readings) -> dict[str, AnyArray]:
-    """Column -> values of a table of the readings, in the shop's units; those that no file has are left out."""
+    """Column -> values of a table of the readings, in the shop's units; optional ones without values are left out."""
     pose = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles), data.direction], axis=1)
     with np.errstate(divide="ignore"):
         shown = data.stiffness if data.beside is None else 1.0 / data.compliance
@@ -358,7 +360,8 @@ def reading_columns(data: Readings) -> dict[str, AnyArray]:
         "temperature_C": data.temperature,
         **{name: getattr(data, name) for name in ("setup", "clamp", "repeat", "loop")},
     }
-    return {name: values for name, values in columns.items() if name == "force_N" or name not in data.missing}
+    missing = {*data.missing} - {"force_N", "point"}  # which are filled in
+    return {name: values for name, values in columns.items() if name not in missing}
 
 
 MARK = 10  # hexadecimal digits of a reading's mark: among 5,000 readings two differ in it but for one time in 90,000
