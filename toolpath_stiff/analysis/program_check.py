@@ -11,8 +11,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.documents import Document, to_dict, number
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document, number, to_dict
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.checking import ERROR, WARNING, Finding, UsedCode, check, in_order
