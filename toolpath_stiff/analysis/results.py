@@ -428,7 +428,8 @@ def required_stiffness_missed(analysis: EvaluatedPath, required: float) -> list[
     cuts = samples.cutting & ((samples.weight > 0.0) | (not counted.any()))
     lines, index = np.unique(samples.line[cuts], return_inverse=True)
     lowest = np.full(len(lines), np.inf)
-    np.minimum.at(lowest, index, np.where(counted, analysis.at.stiffness, -np.inf)[cuts])
+    stiffness = analysis.at.stiffness
+    np.minimum.at(lowest, index, np.where(counted & (stiffness > 0.0), stiffness, -np.inf)[cuts])
     missed = np.flatnonzero(lowest < required)
     missed = missed[np.argsort(lowest[missed], kind="stable")]
     shown = n_per_mm_from_n_per_m(np.where(np.isfinite(lowest), lowest, np.nan))[missed]
