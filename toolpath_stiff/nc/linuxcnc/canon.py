@@ -36,6 +36,11 @@ AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
 LEAVES = re.compile(r"O|.*M0*9[89](?!\d)")  # lines of which rs274 prints no comment: calls, returns, loops, conditions
 FINE_WORD = re.compile(r"[XYZ]\[?[-+]?\d*\.\d{4,}[1-9]")  # more decimals than rs274 prints
+# A block that moves in program coordinates, in the unit in force, and says where by numbers alone.
+PLAIN_BLOCK = re.compile(
+    r"(?:G(?:0*[0-3]|1[789]|9[014])(?![\d.])|M0*[3-9](?!\d)|[XYZABCIJKRFSPT][+-]?(?:\d++\.?\d*+|\.\d++))*+", re.ASCII
+)
+COORDINATE = re.compile(r"([XYZ])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
 PLANES = {"XY": "G17", "XZ": "G18", "YZ": "G19"}
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
 REFUSED = {  # problem, what was expected
@@ -86,6 +91,9 @@ class Follower:
     raised: float = 0.0  # mm that changes of length since the last move added to Z's number
     lost: float = 0.0  # the same, where a tool change has made rs274 forget them
     moves_of_line: int = 0
+    incremental: bool = False
+    given: dict[str, float] = field(default_factory=dict)  # the numbers of plain blocks, in the digits of the program
+    given_before: dict[str, float] = field(default_factory=dict)  # those that this line counts from
 
     def __post_init__(self) -> None:
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
@@ -124,6 +132,7 @@ class Follower:
         if text.isdigit():
             self._note_jump(int(text))
             self.line, self.moves_of_line = int(text), 0
+            self._note_numbers(self.lines[self.line - 1].words)
             codes = MOTION_CODE.findall(self._words(self.line))
             if codes:
                 self.cycle = codes[-1] in CYCLE_CODES
@@ -142,6 +151,14 @@ class Follower:
         left = left if LEAVES.match(self.lines[left - 1].words) else self.line
         after = after if LEAVES.match(self.lines[after - 1].words) else line - 1
         self.jumps.append(Jump(len(self.recorder), left, after))
+
+    def _note_numbers(self, words: str) -> None:
+        was = self.incremental
+        for mode in DISTANCE_MODE.findall(words):
+            self.incremental = mode == "1"
+        self.given_before = dict.fromkeys("XYZ", 0.0) if self.incremental else {} if was else self.given
+        here = {letter: float(number) for letter, number in COORDINATE.findall(words)}
+        self.given = self.given_before | here if PLAIN_BLOCK.fullmatch(words) else {}
 
     def _on_use_length_units(self, inner: str) -> None:
         scale = MM_PER_INCH if "INCH" in inner else 1.0
@@ -299,12 +316,7 @@ class Follower:
         here, there = frames.to_program(start), frames.to_program(end)
         apart = max(abs(here[axis] - there[axis]) for axis in (first, second)) / self.scale
         if apart < SAME_PLACE:
-            named = {AXES[first], AXES[second]}.intersection(AXIS_WORD.findall(self._words(self.line)))
-            if apart > ROUNDING or (self.fine and named):
-                problem = "an arc that may be a full circle, or shorter than the digits that rs274 prints"
-                expected = "no more than four decimals, or a full circle without its end words"
-                raise self.fail(problem, expected, line=self.line)
-            there = here
+            there = self._end_in_words(here, apart, (first, second))
         middle = list(here)
         middle[first], middle[second] = c1, c2
         beginning, ending, center = ((point[first], point[second]) for point in (here, there, middle))
@@ -315,6 +327,20 @@ class Follower:
             raise self.fail(error.found, error.expected, line=self.line) from None
         x, y, z = (c - r for c, r in zip(frames.to_control(middle), self.reference, strict=False))
         return Arc((x, y, z), frames.turn_direction(geometry.normal_of(self.plane)), sweep)
+
+    def _end_in_words(self, here: Vector, apart: float, axes: tuple[int, int]) -> Vector:
+        """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
+        named, end = AXIS_WORD.findall(self._words(self.line)), list(here)
+        for axis in (axis for axis in axes if AXES[axis] in named):
+            step = self.given.get(AXES[axis], math.nan) - self.given_before.get(AXES[axis], math.nan)
+            if not abs(step) <= SAME_PLACE:  # computed, or compensated
+                if apart > ROUNDING or self.fine:
+                    problem = "an arc that may be a full circle, or shorter than the digits that rs274 prints"
+                    expected = "no more than four decimals, or a full circle without its end words"
+                    raise self.fail(problem, expected, line=self.line)
+                return here
+            end[axis] += step * self.scale
+        return end
 
     def _find_height(self, end: Vector) -> None:
         """Until a move names Z, rs274 prints the number that Z had before the length changed."""
