@@ -32,15 +32,9 @@ MOTION_CODE = re.compile(r"G0*(0|1|2|3|5|33|38|73|74|76|8\d)(?![\d])")
 CYCLE_CODES = {"73", "74", "76", *(f"8{digit}" for digit in range(1, 10))}
 MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
 HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
-AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
 LEAVES = re.compile(r"O|.*M0*9[89](?!\d)")  # lines of which rs274 prints no comment: calls, returns, loops, conditions
 FINE_WORD = re.compile(r"[XYZ]\[?[-+]?\d*\.\d{4,}[1-9]")  # more decimals than rs274 prints
-# A block that moves in program coordinates, in the unit in force, and says where by numbers alone.
-PLAIN_BLOCK = re.compile(
-    r"(?:G(?:0*[0-3]|1[789]|9[014])(?![\d.])|M0*[3-9](?!\d)|[XYZABCIJKRFSPT][+-]?(?:\d++\.?\d*+|\.\d++))*+", re.ASCII
-)
-COORDINATE = re.compile(r"([XYZ])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
 PLANES = {"XY": "G17", "XZ": "G18", "YZ": "G19"}
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
 REFUSED = {  # problem, what was expected
@@ -92,8 +86,8 @@ class Follower:
     lost: float = 0.0  # the same, where a tool change has made rs274 forget them
     moves_of_line: int = 0
     incremental: bool = False
-    given: dict[str, float] = field(default_factory=dict)  # the numbers of plain blocks, in the digits of the program
-    given_before: dict[str, float] = field(default_factory=dict)  # those that this line counts from
+    given: dict[str, float] = field(default_factory=dict)  # X, Y, Z as plain blocks say, to the program's last digit
+    steps: dict[str, float] = field(default_factory=dict)  # of this line, from what was given before it
 
     def __post_init__(self) -> None:
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
@@ -132,7 +126,7 @@ class Follower:
         if text.isdigit():
             self._note_jump(int(text))
             self.line, self.moves_of_line = int(text), 0
-            self._note_numbers(self.lines[self.line - 1].words)
+            self._note_numbers(self.lines[self.line - 1])
             codes = MOTION_CODE.findall(self._words(self.line))
             if codes:
                 self.cycle = codes[-1] in CYCLE_CODES
@@ -152,13 +146,12 @@ class Follower:
         after = after if LEAVES.match(self.lines[after - 1].words) else line - 1
         self.jumps.append(Jump(len(self.recorder), left, after))
 
-    def _note_numbers(self, words: str) -> None:
-        was = self.incremental
-        for mode in DISTANCE_MODE.findall(words):
+    def _note_numbers(self, line: Line) -> None:
+        for mode in DISTANCE_MODE.findall(line.plain):
             self.incremental = mode == "1"
-        self.given_before = dict.fromkeys("XYZ", 0.0) if self.incremental else {} if was else self.given
-        here = {letter: float(number) for letter, number in COORDINATE.findall(words)}
-        self.given = self.given_before | here if PLAIN_BLOCK.fullmatch(words) else {}
+        here, before = line.coordinates or {}, dict.fromkeys("XYZ", 0.0) if self.incremental else self.given
+        self.steps = {axis: value - before.get(axis, math.nan) for axis, value in here.items()}
+        self.given = {} if self.incremental or line.coordinates is None else self.given | here
 
     def _on_use_length_units(self, inner: str) -> None:
         scale = MM_PER_INCH if "INCH" in inner else 1.0
@@ -330,24 +323,23 @@ class Follower:
 
     def _end_in_words(self, here: Vector, apart: float, axes: tuple[int, int]) -> Vector:
         """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
-        named, end = AXIS_WORD.findall(self._words(self.line)), list(here)
-        for axis in (axis for axis in axes if AXES[axis] in named):
-            step = self.given.get(AXES[axis], math.nan) - self.given_before.get(AXES[axis], math.nan)
-            if not abs(step) <= SAME_PLACE:  # computed, or compensated
-                if apart > ROUNDING or self.fine:
-                    problem = "an arc that may be a full circle, or shorter than the digits that rs274 prints"
-                    expected = "no more than four decimals, or a full circle without its end words"
-                    raise self.fail(problem, expected, line=self.line)
-                return here
-            end[axis] += step * self.scale
-        return end
+        named, end = self.lines[self.line - 1].named, list(here)
+        for axis in axes:
+            if (name := AXES[axis]) in named:
+                end[axis] += self.steps.get(name, math.nan) * self.scale
+        if all(abs(end[axis] - here[axis]) <= SAME_PLACE * self.scale for axis in axes):
+            return end
+        if apart > ROUNDING or self.fine:  # computed, or compensated
+            problem = "an arc that may be a full circle, or shorter than the digits that rs274 prints"
+            expected = "no more than four decimals, or a full circle without its end words"
+            raise self.fail(problem, expected, line=self.line)
+        return here
 
     def _find_height(self, end: Vector) -> None:
         """Until a move names Z, rs274 prints the number that Z had before the length changed."""
         words = self._words(self.line)
-        named = "Z" in AXIS_WORD.findall(words)
-        modes = [mode for line in self.lines[: self.line] for mode in DISTANCE_MODE.findall(line.plain)]
-        if self.cycle or (named and modes and modes[-1] == "1") or (HOME_MOVE.search(words) and not named):
+        named = "Z" in self.lines[self.line - 1].named
+        if self.cycle or (named and self.incremental) or (HOME_MOVE.search(words) and not named):
             problem = "a move from a height that rs274 has lost: the tool length changed between the last move and M6"
             raise self.fail(problem, "G90 G0 with Z before it", line=self.line)
         if named:
@@ -361,7 +353,7 @@ class Follower:
             return (False, False)
         was = self.frames.bound
         words = self._words(self.line)
-        named = {AXES.index(letter) for letter in AXIS_WORD.findall(words)}
+        named = {AXES.index(letter) for letter in self.lines[self.line - 1].named}
         named |= {0, 1} if {"@", "^"} & set(words) else set()
         machine = bool(MACHINE_MOVE.search(words))
         if HOME_MOVE.search(words):  # first to the intermediate point, then home
