@@ -205,5 +205,5 @@ def test_extreme_parameters_give_a_result_or_a_message():
 
 @pytest.mark.parametrize("pose", [(0, 0, "a"), [[1, 2, 3], [4]]])
 def test_a_pose_that_is_no_numbers_is_an_error_of_ours(pose):
-    with pytest.raises(InputError, match="expected numbers X Y Z"):
+    with pytest.raises(InputError, match="expected X Y Z or X Y Z A B C, numbers within"):
         tps.pose(pose, "nist")

@@ -79,5 +79,5 @@ def test_diagnose_reads_its_program_as_analyze_does():
 
     options = ["--interpreter", "linuxcnc", "--dialect", "haas", "--block-delete=2", "--origin", "0,0,800"]
     words = ["readings.csv", "--program", "part.ngc", *options]
-    args = actions_of("diagnose")[""].read("tps diagnose", words)
+    args = actions_of("diagnose")["diagnose"].read("tps diagnose", words)
     assert (args.interpreter, args.dialect, args.block_delete) == ("linuxcnc", "haas", frozenset({2}))

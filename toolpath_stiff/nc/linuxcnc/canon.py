@@ -32,7 +32,6 @@ MOTION_CODE = re.compile(r"G0*(0|1|2|3|5|33|38|73|74|76|8\d)(?![\d])")
 CYCLE_CODES = {"73", "74", "76", *(f"8{digit}" for digit in range(1, 10))}
 MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
 HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
-AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
 DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
 LEAVES = re.compile(r"O|.*M0*9[89](?!\d)")  # lines of which rs274 prints no comment: calls, returns, loops, conditions
 FINE_WORD = re.compile(r"[XYZ]\[?[-+]?\d*\.\d{4,}[1-9]")  # more decimals than rs274 prints
@@ -86,6 +85,9 @@ class Follower:
     raised: float = 0.0  # mm that changes of length since the last move added to Z's number
     lost: float = 0.0  # the same, where a tool change has made rs274 forget them
     moves_of_line: int = 0
+    incremental: bool = False
+    given: dict[str, float] = field(default_factory=dict)  # X, Y, Z as plain blocks say, to the program's last digit
+    steps: dict[str, float] = field(default_factory=dict)  # of this line, from what was given before it
 
     def __post_init__(self) -> None:
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
@@ -124,6 +126,7 @@ class Follower:
         if text.isdigit():
             self._note_jump(int(text))
             self.line, self.moves_of_line = int(text), 0
+            self._note_numbers(self.lines[self.line - 1])
             codes = MOTION_CODE.findall(self._words(self.line))
             if codes:
                 self.cycle = codes[-1] in CYCLE_CODES
@@ -142,6 +145,13 @@ class Follower:
         left = left if LEAVES.match(self.lines[left - 1].words) else self.line
         after = after if LEAVES.match(self.lines[after - 1].words) else line - 1
         self.jumps.append(Jump(len(self.recorder), left, after))
+
+    def _note_numbers(self, line: Line) -> None:
+        for mode in DISTANCE_MODE.findall(line.plain):
+            self.incremental = mode == "1"
+        here, before = line.coordinates or {}, dict.fromkeys("XYZ", 0.0) if self.incremental else self.given
+        self.steps = {axis: value - before.get(axis, math.nan) for axis, value in here.items()}
+        self.given = {} if self.incremental or line.coordinates is None else self.given | here
 
     def _on_use_length_units(self, inner: str) -> None:
         scale = MM_PER_INCH if "INCH" in inner else 1.0
@@ -299,12 +309,7 @@ class Follower:
         here, there = frames.to_program(start), frames.to_program(end)
         apart = max(abs(here[axis] - there[axis]) for axis in (first, second)) / self.scale
         if apart < SAME_PLACE:
-            named = {AXES[first], AXES[second]}.intersection(AXIS_WORD.findall(self._words(self.line)))
-            if apart > ROUNDING or (self.fine and named):
-                problem = "an arc that may be a full circle, or shorter than the digits that rs274 prints"
-                expected = "no more than four decimals, or a full circle without its end words"
-                raise self.fail(problem, expected, line=self.line)
-            there = here
+            there = self._end_in_words(here, apart, (first, second))
         middle = list(here)
         middle[first], middle[second] = c1, c2
         beginning, ending, center = ((point[first], point[second]) for point in (here, there, middle))
@@ -316,12 +321,25 @@ class Follower:
         x, y, z = (c - r for c, r in zip(frames.to_control(middle), self.reference, strict=False))
         return Arc((x, y, z), frames.turn_direction(geometry.normal_of(self.plane)), sweep)
 
+    def _end_in_words(self, here: Vector, apart: float, axes: tuple[int, int]) -> Vector:
+        """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
+        named, end = self.lines[self.line - 1].named, list(here)
+        for axis in axes:
+            if (name := AXES[axis]) in named:
+                end[axis] += self.steps.get(name, math.nan) * self.scale
+        if all(abs(end[axis] - here[axis]) <= SAME_PLACE * self.scale for axis in axes):
+            return end
+        if apart > ROUNDING or self.fine:  # computed, or compensated
+            problem = "an arc that may be a full circle, or shorter than the digits that rs274 prints"
+            expected = "no more than four decimals, or a full circle without its end words"
+            raise self.fail(problem, expected, line=self.line)
+        return here
+
     def _find_height(self, end: Vector) -> None:
         """Until a move names Z, rs274 prints the number that Z had before the length changed."""
         words = self._words(self.line)
-        named = "Z" in AXIS_WORD.findall(words)
-        modes = [mode for line in self.lines[: self.line] for mode in DISTANCE_MODE.findall(line.plain)]
-        if self.cycle or (named and modes and modes[-1] == "1") or (HOME_MOVE.search(words) and not named):
+        named = "Z" in self.lines[self.line - 1].named
+        if self.cycle or (named and self.incremental) or (HOME_MOVE.search(words) and not named):
             problem = "a move from a height that rs274 has lost: the tool length changed between the last move and M6"
             raise self.fail(problem, "G90 G0 with Z before it", line=self.line)
         if named:
@@ -335,7 +353,7 @@ class Follower:
             return (False, False)
         was = self.frames.bound
         words = self._words(self.line)
-        named = {AXES.index(letter) for letter in AXIS_WORD.findall(words)}
+        named = {AXES.index(letter) for letter in self.lines[self.line - 1].named}
         named |= {0, 1} if {"@", "^"} & set(words) else set()
         machine = bool(MACHINE_MOVE.search(words))
         if HOME_MOVE.search(words):  # first to the intermediate point, then home

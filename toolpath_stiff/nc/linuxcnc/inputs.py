@@ -32,6 +32,12 @@ LINE_NUMBER = re.compile(r"N[0-9]+(\.[0-9]+)?")
 BARE_NUMBER = tuple("0123456789.")
 NAMED = re.compile(r"<[^<>]*>")
 EXPRESSION = re.compile(r"\[[^\[\]]*(?:\]|$)")  # one without another in it
+AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
+# A block that moves in program coordinates, in the unit in force, and says where by numbers alone.
+PLAIN_BLOCK = re.compile(
+    r"(?:G(?:0*[0-3]|1[789]|9[014])(?![\d.])|M0*[3-9](?!\d)|[XYZABCIJKRFSPT][+-]?(?:\d++\.?\d*+|\.\d++))*+", re.ASCII
+)
+COORDINATE = re.compile(r"([XYZ])([+-]?(?:\d++\.?\d*+|\.\d++))", re.ASCII)
 ABORTS = re.compile(r"[(;]\s*a\s*b\s*o\s*r\s*t\s*,", re.IGNORECASE)
 
 
@@ -52,6 +58,17 @@ class Line:
         while "[" in words:
             words = EXPRESSION.sub(_struck_out, words)
         return words
+
+    @property
+    def named(self) -> list[str]:
+        """The axes that it names, by numbers or by expressions."""
+        return AXIS_WORD.findall(self.plain)
+
+    @cached_property
+    def coordinates(self) -> dict[str, float] | None:
+        """X, Y and Z of a plain block, to the digits of the program; None of any other."""
+        plain = PLAIN_BLOCK.fullmatch(self.words)
+        return {letter: float(number) for letter, number in COORDINATE.findall(self.words)} if plain else None
 
 
 def _struck_out(match: re.Match[str]) -> str:
