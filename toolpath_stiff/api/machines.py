@@ -458,9 +458,6 @@ def machine_from_linuxcnc(
     path = Path(file)
     text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")
     unit = units or units_of(path)
-    if unit is None:
-        mistake = "the unit of the pins is not known (no ini file beside it that says LINEAR_UNITS)"
-        raise InputError(mistake, hint="give it with --units mm or --units inch", file=str(file))
     machine, notes = machine_from_hal(text, unit, path.name)
     heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
     return TextFile(machine.name, machine_toml(machine, heading), notes)
