@@ -16,7 +16,6 @@ from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.correction.geometry import recover_geometry as recover
 from toolpath_stiff.documents import Document
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_bytes, write_atomically
 from toolpath_stiff.machine.file import load_machine, packaged_machines
 from toolpath_stiff.machine.kinematics import Struts
