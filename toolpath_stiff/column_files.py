@@ -178,12 +178,15 @@ def _number(units: AnyArray, digits: int, low: int, high: int) -> Cells:
     for place in range(width - digits - 1):  # no zeros before the first figure, but the one before the point
         if least < 10 ** (width - 1 - place):
             figures[:, place] *= size >= 10 ** (width - 1 - place)
-    point = width - digits
-    cell = np.empty((len(units), width + 2), dtype=np.uint8)
-    np.multiply(units < 0, np.uint8(ord("-")), out=cell[:, 0])
-    cell[:, 1 : point + 1] = figures[:, :point]
-    cell[:, point + 1] = ord(".") if digits else 0
-    cell[:, point + 2 :] = figures[:, point:]
+    # Only where a column has a sign or a point: every empty byte has to be taken out again.
+    sign, point = int(low < 0), width - digits
+    cell = np.empty((len(units), sign + width + bool(digits)), dtype=np.uint8)
+    cell[:, sign : sign + point] = figures[:, :point]
+    cell[:, cell.shape[1] - digits :] = figures[:, point:]
+    if sign:
+        np.multiply(units < 0, np.uint8(ord("-")), out=cell[:, 0])
+    if digits:
+        cell[:, sign + point] = ord(".")
     return cell
 
 

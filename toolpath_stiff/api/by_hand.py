@@ -102,9 +102,8 @@ class Preview:
             effect = find_effect(entry.name, self._problem.predictor.effect_files)
             values = read_parameters(effect, entry, "by hand")
             real = tuple(Component.of(p) for p in effect.parameters if not p.discrete)
-            candidates.append(
-                Candidate(effect, tuple((p.name, values[p.name]) for p in effect.parameters if p.discrete), real)
-            )
+            discrete = tuple((p.name, values[p.name]) for p in effect.parameters if p.discrete)
+            candidates.append(Candidate(effect, discrete, real))
             sizes.append(np.array([component.size(values[component.parameter.name]) for component in real]))
         if near is not None:
             return fit_effects(self._problem, candidates, sizes, (), near.law, near.scatter, law_free)

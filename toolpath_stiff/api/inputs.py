@@ -36,10 +36,8 @@ def pose_si(name: str, pose: Sequence[float]) -> Pose:
         raise InputError(f"{name} of {len(values)} numbers", expected="X, Y, Z or X, Y, Z, A, B, C in mm and degrees")
     x, y, z, a, b, c = (*values, 0.0, 0.0, 0.0)[:6]
     if max(abs(x), abs(y), abs(z)) > FARTHEST_MM or max(abs(a), abs(b), abs(c)) > FARTHEST_DEG:
-        raise InputError(
-            f"{name} {values}",
-            expected=f"positions within +-{FARTHEST_MM:g} mm and angles within +-{FARTHEST_DEG:g} degrees",
-        )
+        within = f"positions within +-{FARTHEST_MM:g} mm and angles within +-{FARTHEST_DEG:g} degrees"
+        raise InputError(f"{name} {values}", expected=within)
     return pose_in_si((x, y, z, a, b, c))
 
 

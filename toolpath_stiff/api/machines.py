@@ -15,7 +15,6 @@ from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.correction.geometry import recover_geometry as recover
 from toolpath_stiff.documents import Document
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import read_bytes, write_atomically
 from toolpath_stiff.machine.file import load_machine, packaged_machines
 from toolpath_stiff.machine.kinematics import Struts
@@ -457,9 +456,6 @@ def machine_from_linuxcnc(
     path = Path(file)
     text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")
     unit = units or units_of(path)
-    if unit is None:
-        mistake = "the unit of the pins is not known (no ini file beside it that says LINEAR_UNITS)"
-        raise InputError(mistake, hint="give it with --units mm or --units inch", file=str(file))
     machine, notes = machine_from_hal(text, unit, path.name)
     heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
     return TextFile(machine.name, machine_toml(machine, heading), notes)

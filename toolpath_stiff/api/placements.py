@@ -10,17 +10,8 @@ from typing import Annotated
 import numpy as np
 
 from toolpath_stiff.analysis.loads import parse_load
-from toolpath_stiff.api.inputs import (
-    FARTHEST_MM,
-    Decimals,
-    Force,
-    Linearised,
-    LoadDirection,
-    Origin,
-    Step,
-    origin_si,
-    pose_si,
-)
+from toolpath_stiff.api import inputs
+from toolpath_stiff.api.inputs import origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
@@ -63,13 +54,13 @@ def place(
     objective: Annotated[str, Option("--objective", choices=tuple(OBJECTIVES))] = "balanced",
     points: Annotated[int, Option("--points", at_least=2, at_most=MOST_FRONT_POINTS)] = 60,
     seed: Annotated[int, Option("--seed", at_least=0)] = 1,
-    origin_mm_deg: Origin = None,
-    load: LoadDirection = LOAD,
-    step_mm: Step = 1.0,
-    force_N: Force = FORCE,
+    origin_mm_deg: inputs.Origin = None,
+    load: inputs.LoadDirection = LOAD,
+    step_mm: inputs.Step = 1.0,
+    force_N: inputs.Force = FORCE,
     write: Annotated[str | Path | None, Option("--write", "FILE")] = None,
-    decimals: Decimals = None,
-    linearise_mm: Linearised = None,
+    decimals: inputs.Decimals = None,
+    linearise_mm: inputs.Linearised = None,
     progress: Progress | None = None,
 ) -> Placement:
     r"""Search where the work should sit.
@@ -175,7 +166,7 @@ def _bounds(
             raise InputError(f"the machine file bounds no workspace in {axis}", hint=f"give --{axis} LO:HI")
     lengths = np.array([_pair(reach if side is None else side) for side, reach in zip(sides, workspace, strict=True)])
     angles = np.array([_pair(turn) for turn in turns])
-    if not np.abs(lengths).max() <= FARTHEST_MM or not np.abs(angles).max() <= FARTHEST_TURN_DEG:
+    if not np.abs(lengths).max() <= inputs.FARTHEST_MM or not np.abs(angles).max() <= FARTHEST_TURN_DEG:
         raise InputError("bounds beyond reason", expected=f"within 100 m and {FARTHEST_TURN_DEG:g} degrees")
     low, high = np.concatenate([m_from_mm(lengths), rad_from_deg(angles)]).T
     return Bounds(low, high, tuple(m_from_mm(z) for z in heights))
@@ -220,9 +211,9 @@ def try_placement(
     program: Program | str | Path,
     machine: Machine | str | Path = "nist",
     *,
-    load: LoadDirection = LOAD,
-    step_mm: Step = 1.0,
-    force_N: Force = FORCE,
+    load: inputs.LoadDirection = LOAD,
+    step_mm: inputs.Step = 1.0,
+    force_N: inputs.Force = FORCE,
 ) -> PlacementTrial:
     r"""A program that can be put anywhere: read and sampled once, then the figures of any placement at once.
 
@@ -247,8 +238,8 @@ def rewrite(
     *,
     to_mm_deg: Sequence[float],
     from_mm_deg: Sequence[float] = (0.0, 0.0, 0.0),
-    decimals: Decimals = None,
-    linearise_mm: Linearised = None,
+    decimals: inputs.Decimals = None,
+    linearise_mm: inputs.Linearised = None,
 ) -> RewrittenProgram:
     r"""Write a program so that, run where its zero sits now, it does what it would do untouched at another placement.
 

@@ -32,16 +32,10 @@ from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 Noise = float | tuple[float, ...] | None
-NoisePercent = Annotated[
-    Noise,
-    Option(
-        "--noise",
-        "PERCENT[,PERCENT]",
-        read=numbers,
-        help="Standard deviation of one reading, re-clamping included; or of the reading alone and of a clamping. "
-        "Unless given, from repeats, else from sd_N_per_mm, else a guess.",
-    ),
-]
+NOISE = """\
+Standard deviation of one reading, re-clamping included; or of the reading alone and of a clamping. Unless given, from
+repeats, else from sd_N_per_mm, else a guess."""
+NoisePercent = Annotated[Noise, Option("--noise", "PERCENT[,PERCENT]", read=numbers, help=" ".join(NOISE.split()))]
 StrutSpread = Annotated[
     float, Option("--strut-spread", "%", at_least=0, at_most=50, help="Standard deviation of the struts' stiffness.")
 ]

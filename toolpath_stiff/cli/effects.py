@@ -53,9 +53,15 @@ def new_effect(args: Namespace, file: File) -> int:
 @command("effects draft", DATA, "Machine.load", "Measurements.read", "draft_effect", REPLACE, JSON)
 def draft_effect(
     args: Namespace,
-    output: Annotated[str, Option("-o --output", "FILE.toml", help="file to write")] = "missing.toml",
+    output: Annotated[str, Option("-o --output", "FILE.toml")] = "missing.toml",
 ) -> int:
-    """Write what a diagnosis leaves unexplained as an effect to edit."""
+    """Write what a diagnosis leaves unexplained as an effect to edit.
+
+    Parameters
+    ----------
+    output
+        File to write.
+    """
     draft = run.call(args, tps.draft_effect, file=output)
     if not draft.text:
         return run.show(args, draft)
@@ -68,5 +74,4 @@ def draft_effect(
 def check_effects(args: Namespace, file: File) -> int:
     """Try the effects of a file against the contract; exit code 1 if one fails."""
     check = tps.check_effects(file, args.machine)
-    run.show(args, check)
-    return 0 if check.passed else CHECK_FAILED
+    return run.show(args, check, code=0 if check.passed else CHECK_FAILED)

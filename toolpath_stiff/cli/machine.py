@@ -10,7 +10,7 @@ for example:
 
 import sys
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -100,26 +100,28 @@ Picture = Annotated[str | None, Option("--out", "FILE.png", help="the picture (d
 def show_machine(
     args: Namespace,
     machine: Annotated[str, Option("NAME|FILE", count="?")] = "nist",
-    pose: Annotated[
-        Sequence[float] | None,
-        Option("--pose", "X,Y,Z[,A,B,C]", read=numbers, help="pose of the picture, mm and degrees"),
-    ] = None,
+    pose: Annotated[Sequence[float] | None, Option("--pose", "X,Y,Z[,A,B,C]", read=numbers)] = None,
     out: Picture = None,
 ) -> int:
-    """Figures of a machine with their origin, and a picture of it."""
+    """Figures of a machine with their origin, and a picture of it.
+
+    Parameters
+    ----------
+    pose
+        Pose of the picture, mm and degrees.
+    """
     shown = tps.Machine.load(machine)
-    picture = {_picture_file(out, shown.name): shown.picture(pose)} if out or not args.json else {}
-    written = run.written_text(run.write_single(args, picture))
-    run.show(args, shown.text(pose), written, document=lambda: shown.to_dict()["figures"])
-    return 0 if shown.standing(pose)[2].reachable[0] else OUT_OF_REACH
+    written = _draw(args, out, shown.name, lambda: shown.picture(pose))
+    code = 0 if shown.standing(pose)[2].reachable[0] else OUT_OF_REACH
+    return run.show(args, shown.text(pose), written, document=lambda: shown.to_dict()["figures"], code=code)
 
 
-def _picture_file(out: str | None, name: str) -> Path:
-    """The file of --out, or the default. Raises `InputError`."""
+def _draw(args: Namespace, out: str | None, name: str, picture: Callable[[], bytes]) -> str:
+    """Write a picture to --out, or to reports unless JSON is printed; what was written. Raises `InputError`."""
     file = Path(out or f"reports/{name}.png")
     if file.suffix.lower() != ".png":
         raise InputError(f"--out {out}", expected="a name that ends in .png")
-    return file
+    return run.written_text(run.write_single(args, {file: picture()} if out or not args.json else {}))
 
 
 @command("machine check", "Machine.load", REPLACE, JSON, without=["machine"])
@@ -128,30 +130,31 @@ def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Pi
     if not Path(file).is_file():
         template = command_line("machine", "new", file)
         raise InputError(f"cannot read machine file {file!r}", hint=f"`{template}` writes a template")
-    target = _picture_file(out, f"{Path(file).stem}_machine")
     check = tps.Machine.load(Path(file), **run.given(args, tps.Machine.load)).check()
-    written = run.write_single(args, {target: check.picture()} if out or not args.json else {})
-    run.show(args, check, run.written_text(written))
-    return 0 if check.good else NOT_GOOD
+    written = _draw(args, out, f"{Path(file).stem}_machine", check.picture)
+    return run.show(args, check, written, code=0 if check.good else NOT_GOOD)
 
 
 @command("machine new", REPLACE)
 def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     """Write a commented template."""
-    return run.write_text(
-        args, file, tps.machine_template(file).text, "edit it, then", "machine", "check", file, fresh=True
-    )
+    text = tps.machine_template(file).text
+    return run.write_text(args, file, text, "edit it, then", "machine", "check", file, fresh=True)
 
 
 @command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
 def from_linuxcnc(
     args: Namespace,
     file: Annotated[str, Option("FILE.hal")],
-    out: Annotated[
-        str | None, Option("-o --out", "FILE", help="machine file to write (default: standard output)")
-    ] = None,
+    out: Annotated[str | None, Option("-o --out", "FILE")] = None,
 ) -> int:
-    """Read the genhexkins pins of a LinuxCNC HAL file."""
+    """Read the genhexkins pins of a LinuxCNC HAL file.
+
+    Parameters
+    ----------
+    out
+        Machine file to write (default: standard output).
+    """
     machine_file = tps.machine_from_linuxcnc(file, args.units)
     run.tell("note", machine_file.notes)
     if out:

@@ -65,8 +65,8 @@ def help_text() -> str:
 
 
 def actions_of(name: str) -> dict[str, Command]:
-    """A command by its name, or its actions by theirs ("rig new")."""
-    importlib.import_module(f"toolpath_stiff.cli.{MODULES[name]}")
+    """A command by its name, or its actions by theirs ("rig new"). Raises `InputError`."""
+    importlib.import_module(f"toolpath_stiff.cli.{MODULES[_known(name, MODULES)]}")
     return {title: command for title, command in COMMANDS.items() if title.split()[0] == name}
 
 
@@ -112,24 +112,23 @@ def _run(words: list[str]) -> int:
     if not name:
         print(f"tps {VERSION}" if "--version" in words else help_text())
         return 0 if words else 2
-    if name not in MODULES:
-        raise _unknown(name, MODULES)
-    words.remove(name)
     title, actions = name, actions_of(name)
+    words.remove(name)
     if name not in actions:
         if not words or words[0] in ("-h", "--help"):
             print(actions_help(name, actions))
             return 0 if words else 2
-        title = f"{name} {words.pop(0)}"
-        if title not in actions:
-            raise _unknown(title, actions)
+        title = _known(f"{name} {words.pop(0)}", actions)
     return actions[title](f"tps {title}", words)
 
 
-def _unknown(title: str, known: Iterable[str]) -> InputError:
-    near = nearest(title, known)
-    hint = f"did you mean `tps {near}`?" if near else f"say one of {', '.join(known)}"
-    return InputError(f"unknown command {title!r}", hint=hint)
+def _known(title: str, titles: Iterable[str]) -> str:
+    """The title, if it is one of these. Raises `InputError`."""
+    if title in titles:
+        return title
+    near = nearest(title, titles)
+    hint = f"did you mean `tps {near}`?" if near else f"say one of {', '.join(titles)}"
+    raise InputError(f"unknown command {title!r}", hint=hint)
 
 
 def actions_help(name: str, actions: Mapping[str, Command]) -> str:

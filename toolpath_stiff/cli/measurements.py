@@ -95,9 +95,7 @@ def diagnose(args: Namespace) -> int:
 @command("update", DATA, "Machine.load", "update", *FOLDER)
 def update(
     args: Namespace,
-    output: Annotated[
-        str | None, Option("-o --output", "MACHINE.toml", help="the new machine file (default: in --out)")
-    ] = None,
+    output: Annotated[str | None, Option("-o --output", "MACHINE.toml")] = None,
 ) -> int:
     """Fit effects to measurements, see how far the error falls, write the machine file.
 
@@ -110,6 +108,11 @@ def update(
     An effect that the data do not support is refused, with the reason, unless --force is given; the exit code is 0 all
     the same. Files written to --out: update.json, residuals.csv, machine.toml (unless refused or -o names another
     place), before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
+
+    Parameters
+    ----------
+    output
+        The new machine file (default: in --out).
     """
     args.replace |= args.force
     run.check_single(args, output)

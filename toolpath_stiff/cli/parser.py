@@ -21,6 +21,7 @@ from toolpath_stiff.options import PARAMETERS, SWITCHES, Argument, Option, argum
 NEGATIVE_VALUE = re.compile(r"^-(\d|\.\d|inf|nan)")
 
 
+Run = Callable[..., int]  # of a command: all values, those of its own options by name; the exit code
 PROGRAM = Argument("program", Option("PROGRAM"), "NC program or cutter-location file", required=True)
 FILES = "measurement files (CSV, or FILE.xlsx[#SHEET]), or nist-table1"
 DATA = Argument("data", Option("DATA", count="+"), FILES, required=True)
@@ -39,7 +40,7 @@ class Command:
     It takes those of public functions by name, which are imported with what they need when the command is run.
     """
 
-    run: Callable[..., int]
+    run: Run
     takes: tuple[str | Argument, ...]
     without: tuple[str, ...] = ()
 
@@ -79,9 +80,8 @@ class Command:
         given, rest = self.parser(title).parse_known_args(words)
         arguments = self.arguments
         if rest:
-            near = nearest(
-                rest[0].partition("=")[0], [name for a in arguments.values() for name in a.option.name.split()]
-            )
+            known = [name for argument in arguments.values() for name in argument.option.name.split()]
+            near = nearest(rest[0].partition("=")[0], known)
             hint = f"did you mean {near}?" if near else f"see {title} --help"
             raise InputError(f"{title} does not know {rest[0]!r}", hint=hint)
         for name in vars(given):
@@ -100,12 +100,10 @@ def nearest(word: str, known: Iterable[str]) -> str:
 COMMANDS: dict[str, Command] = {}  # "rig new": of the modules that are imported
 
 
-def command(
-    name: str, *takes: str | Argument, without: Iterable[str] = ()
-) -> Callable[[Callable[..., int]], Callable[..., int]]:
+def command(name: str, *takes: str | Argument, without: Iterable[str] = ()) -> Callable[[Run], Run]:
     """Make a command of a function of (all values, those of its own options by name)."""
 
-    def listed(run: Callable[..., int]) -> Callable[..., int]:
+    def listed(run: Run) -> Run:
         COMMANDS[name] = Command(run, takes, tuple(without))
         return run
 

@@ -93,16 +93,14 @@ def analyze(
             )
         if counts and not args.json:
             print(*counts, sep="\n")
-        run.show(args, analyses, run.written_text(analyses.written))
-        return (BELOW_REQUIRED if analyses.below_required else 0) if analyses.complete else INCOMPLETE
+        code = (BELOW_REQUIRED if analyses.below_required else 0) if analyses.complete else INCOMPLETE
+        return run.show(args, analyses, run.written_text(analyses.written), code=code)
     file = files[0].file
     folder, rules = run.destination(args, tps.Analysis, [file], other_samples(table))
     analysis = run.call(args, tps.analyze, program=tps.Program.read(file, **run.given(args, tps.Program.read)))
     written = analysis.save(folder, plots=plots, rules=rules, table=table, show_plunges=show_plunges)
-    run.show(args, analysis, run.written_text(written))
-    if analysis.below_required:
-        return BELOW_REQUIRED
-    return 0 if analysis.complete else INCOMPLETE
+    code = BELOW_REQUIRED if analysis.below_required else 0 if analysis.complete else INCOMPLETE
+    return run.show(args, analysis, run.written_text(written), code=code)
 
 
 def _executor(address: str) -> Executor:
@@ -149,10 +147,7 @@ def path(
 @command("check", PROGRAM, "check", "Program.read", JSON)
 def check(
     args: Namespace,
-    machine: Annotated[
-        str,
-        Option("--machine", "NAME|FILE", help="machine whose reach and strut speeds are checked; none: no machine"),
-    ] = "nist",
+    machine: Annotated[str, Option("--machine", "NAME|FILE")] = "nist",
 ) -> int:
     """What a program uses, what is not understood, extents, times, reach.
 
@@ -165,10 +160,14 @@ def check(
     Where the reader would refuse the program, the check says so and goes on with the next block; what it says of
     extents, lengths and times is then that of the blocks that could be read. Extents are those of the tool tip in
     program coordinates of G54, mm and degrees. Exit code 1 if there is any error.
+
+    Parameters
+    ----------
+    machine
+        Machine whose reach and strut speeds are checked; none: no machine.
     """
     findings = run.call(args, tps.check, machine=None if machine == NO_MACHINE else machine)
-    run.show(args, findings)
-    return 1 if findings.errors else 0
+    return run.show(args, findings, code=1 if findings.errors else 0)
 
 
 @command("place", PROGRAM, "place", *READ, *FOLDER)

@@ -14,19 +14,16 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import toolpath_stiff as tps
 from toolpath_stiff.errors import InputError, harmless
 from toolpath_stiff.files import Content, check_outputs, old_name, write_atomically
 from toolpath_stiff.hints import command_line, hint
 from toolpath_stiff.options import arguments_of
-from toolpath_stiff.results import FolderResult, json_text
+from toolpath_stiff.results import FolderResult, Progress, json_text
 from toolpath_stiff.results_folder import Rules, check_folder
 from toolpath_stiff.workbooks import split_name
-
-if TYPE_CHECKING:
-    from toolpath_stiff.results import Progress
 
 Made = TypeVar("Made")
 REDRAW_SECONDS = 0.5  # work shorter than this shows nothing
@@ -93,16 +90,16 @@ def tell(kind: str, texts: Iterable[object]) -> None:
         print(f"tps: {kind}: {text}", file=sys.stderr)
 
 
-def show(args: Namespace, result: Any, *after: str, document: Callable[[], Any] | None = None) -> int:
+def show(args: Namespace, result: Any, *after: str, document: Callable[[], Any] | None = None, code: int = 0) -> int:
     """Print a result (or its text, where `document` is told), and lines after it, or with --json its document.
 
-    Returns the exit code of success.
+    Returns the exit code.
     """
     if args.json:
         sys.stdout.write(json_text(document()) if document else result.to_json())
     else:
         print("\n".join([str(result), *after]).removesuffix("\n"))
-    return 0
+    return code
 
 
 def written_text(files: Iterable[Path]) -> str:

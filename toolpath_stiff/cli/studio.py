@@ -11,13 +11,11 @@ from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import Option, arguments_of
 from toolpath_stiff.studio.run import opened_case, serve
 
+# A case reads programs by itself: no other interpreter, no files from anywhere.
+NOT_IN_A_CASE = ("interpreter", "rs274", "subprograms", "unconfined")
 
-@command(
-    "studio",
-    arguments_of(Machine.load)["effects"],
-    "Program.read",
-    without=["interpreter", "rs274", "subprograms", "unconfined"],
-)
+
+@command("studio", arguments_of(Machine.load)["effects"], "Program.read", without=NOT_IN_A_CASE)
 def studio(
     args: Namespace,
     data: Annotated[Sequence[str], Option("DATA", count="*", help=f"{FILES}, to add to the case")] = (),
@@ -62,8 +60,6 @@ def studio(
         opened.add_effects(file)
     if data:
         opened.add_data(*data)
-    if program:
-        opened.add_program(program, **cast("Reading", reading))
-    elif reading:
-        opened.add_program(**cast("Reading", reading))
+    if program or reading:
+        opened.add_program(program or None, **cast("Reading", reading))
     return serve(opened, port, browser=not no_browser)

@@ -27,12 +27,18 @@ SAME_UNIT = {"mm": "mm", "metric": "mm", "inch": "inch", "in": "inch", "imperial
 ASSUMED_STIFFNESS = n_per_m_from_n_per_um(50.0)
 
 
-def units_of(hal: Path) -> str | None:
-    """`mm` or `inch` from LINEAR_UNITS of the ini files beside a HAL file; None if they do not agree or say."""
+def units_of(hal: Path) -> str:
+    """`mm` or `inch` from LINEAR_UNITS of the ini files beside a HAL file.
+
+    Raises `InputError` if they do not agree or say.
+    """
     texts = (ini.read_text(encoding="utf-8", errors="replace") for ini in sorted(hal.parent.glob("*.ini")))
     words = (word for text in texts for word in re.findall(r"(?m)^\s*LINEAR_UNITS\s*=\s*(\w+)", text))
-    units = {SAME_UNIT.get(word.lower()) for word in words}
-    return units.pop() if len(units) == 1 else None
+    units = {SAME_UNIT.get(word.lower(), "") for word in words}
+    if len(units) != 1 or "" in units:
+        mistake = "the unit of the pins is not known (no ini file beside it that says LINEAR_UNITS)"
+        raise InputError(mistake, hint="give it with --units mm or --units inch", file=str(hal))
+    return units.pop()
 
 
 def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tuple[Hexapod, list[str]]:
