@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from multiprocessing import connection, get_context, parent_process, resource_tracker
-from types import TracebackType
 from typing import Any, ParamSpec, TypeVar
 
 import pebble
@@ -30,9 +29,8 @@ Answer = TypeVar("Answer")
 LEAVE_SECONDS = 5.0  # for a process that is told to stop, to remove its temporary files
 BLOCKED = [getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGTERM") if hasattr(signal, name)]
 
-_ENVIRONMENT = threading.Lock()
-_living: list[Executor] = []  # the pools whose processes take one thread over from the environment as they start
-_before: dict[str, str | None] = {}  # the environment's own settings, before the first of these pools
+_living: set[Executor] = set()  # pools: while there are any, the environment, which processes take over, has 1 thread
+_before: dict[str, str | None] = {}  # the caller's own settings of threads, for after the last of them
 
 
 class ProcessPool(Executor):
@@ -51,10 +49,11 @@ class ProcessPool(Executor):
     def __init__(self, jobs: int) -> None:
         self._pool: Any = pebble.ProcessPool(jobs, initializer=_prepare, context=get_context("spawn"))
         self._calls: list[Future[Any]] = []
-        _change_threads(self)
+        _before.update({} if _living else {name: os.environ.get(name) for name in THREADS})
+        _living.add(self)
+        os.environ.update(dict.fromkeys(THREADS, "1"))
         with _signals_blocked():  # in the pool's threads and in the processes that they start
             if not self._pool.active:
-                _restore_threads(self)
                 raise RuntimeError("the processes cannot be started")
 
     def submit(
@@ -79,15 +78,14 @@ class ProcessPool(Executor):
         for call in cancelled:
             call.cancel()
         self._pool.join()
-        _restore_threads(self)
+        _living.discard(self)
+        while _before and not _living:
+            name, setting = _before.popitem()
+            os.environ.pop(name, None)
+            os.environ.update({} if setting is None else {name: setting})
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
-    ) -> None:
-        if kind is None:
-            self.shutdown()
-        else:
-            self.stop()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        (self.shutdown if kind is None else self.stop)()
 
 
 def death(error: pebble.ProcessExpired) -> str:
@@ -98,32 +96,11 @@ def death(error: pebble.ProcessExpired) -> str:
     return f"its process was ended by {name}" + (" (out of memory?)" if name == "SIGKILL" else "")
 
 
-def _change_threads(pool: Executor) -> None:
-    """One thread of linear algebra for every process that starts while the pool lives."""
-    with _ENVIRONMENT:
-        if not _living:
-            _before.update((name, os.environ.get(name)) for name in THREADS)
-        _living.append(pool)
-        os.environ.update(dict.fromkeys(THREADS, "1"))
-
-
-def _restore_threads(pool: Executor) -> None:
-    """The caller's own settings again, once no pool lives."""
-    with _ENVIRONMENT:
-        if pool in _living:
-            _living.remove(pool)
-            if not _living:
-                for name, setting in _before.items():
-                    os.environ.pop(name, None)
-                    os.environ.update({} if setting is None else {name: setting})
-
-
 def _prepare() -> None:
     """Of a new process: which signals end it, and that it ends with the first one."""
     # Ctrl-C reaches all processes of a terminal, and so does its end; the first one tells the others, once.
-    for name in ("SIGINT", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    for ignored in BLOCKED[:-1]:  # all but SIGTERM
+        signal.signal(ignored, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # what is half-written is removed on the way out
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, BLOCKED)
