@@ -12,12 +12,10 @@ from pathlib import PurePath
 
 from toolpath_stiff import defaults
 
-PROGRAM = "tps"
-
 
 def command_line(*words: object) -> str:
     """A command line of `tps`, quoted for the shell."""
-    return shlex.join([PROGRAM, *map(str, words)])
+    return shlex.join(["tps", *map(str, words)])
 
 
 def hint(sentence: str, line: str) -> str:

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 T = TypeVar("T", float, "NDArray[np.float64]")
 
 MM_PER_INCH = 25.4  # exact: international inch, 1959
-PI = 3.141592653589793
-RAD_PER_DEG = PI / 180.0
+RAD_PER_DEG = 3.141592653589793 / 180.0
 SECONDS_PER_MINUTE = 60.0
 SECONDS_PER_DAY = 86_400.0
 

@@ -110,10 +110,7 @@ class Measurements:
         >>> found["files"], found["readings"][0]["stiffness_N_per_mm"]
         (['nist-table1'], 56813.0)
         """
-        columns = reading_columns(self.on(machine_from(machine)))
-        cells = zip(*(values.tolist() for values in columns.values()), strict=True)
-        rows = [dict(zip(columns, row, strict=True)) for row in cells]
-        return {"files": list(self.files), "readings": without_nan(rows)}
+        return {"files": list(self.files), "readings": without_nan(self.to_frame(machine).to_dict("records"))}
 
     def __repr__(self) -> str:
         return f"<Measurements {', '.join(self.files)}>"
