@@ -1,7 +1,6 @@
 """The house in figures that folding cannot please: `house.py ROOT [--runs] [--places]`; 1 where one is too high.
 
-Counted by syntax tree and tokens: no line is longer, shorter or hidden for it. `--reached` holds the figures against
-those that stand in house_reached.toml, which no commit may exceed; `--keep` writes them there.
+Counted by syntax tree and tokens: no line is longer, shorter or hidden for it.
 """
 
 from __future__ import annotations
@@ -307,16 +306,11 @@ def judge(budget: dict[str, dict[str, float]], figures: dict[str, dict[str, floa
 def main() -> int:
     """Print figures beside budgets; 1 where one is above, with the places of broken rules."""
     root = Path(sys.argv[1]).resolve()
-    reached = root / ".ci" / "house_reached.toml"
-    file = reached if "--reached" in sys.argv else root / ".ci" / "house.toml"
-    budget = tomllib.loads(file.read_text("utf-8"))
+    budget = tomllib.loads((root / ".ci" / "house.toml").read_text("utf-8"))
     modules = modules_of(root)
     figures = {**figures_of(modules), "beside": beside(root, modules)}
     if "--runs" in sys.argv:
         figures["runs"] = runs(root)
-    if "--keep" in sys.argv:
-        sections = ("\n".join([f"[{s}]", *(f"{n} = {c}" for n, c in counts.items())]) for s, counts in figures.items())
-        reached.write_text("# Made by `python .ci/house.py . --keep`.\n\n" + "\n\n".join(sections) + "\n", "utf-8")
     rows = judge(budget, figures)
     for name, count, most in rows:
         print(f"{name:<36}{count:>10,}{most:>10,}{'   above' if count > most else ''}")
