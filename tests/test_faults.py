@@ -142,16 +142,17 @@ def test_a_single_file_is_the_old_or_the_new(tmp_path):
 
 
 def test_another_run_waits_for_its_turn(tmp_path):
-    second = threading.Thread(target=lambda: write_folder(tmp_path, {"a": "second"}, command="test"))
+    after = {"a": lambda: f"{(tmp_path / 'a').read_text()} and second"}
+    second = threading.Thread(target=lambda: write_folder(tmp_path, after, command="test"))
 
     def content():
         second.start()
         time.sleep(0.1)
         return "first"
 
-    assert write_folder(tmp_path, {"a": content}, command="test")[0].read_text() == "first"
+    write_folder(tmp_path, {"a": content}, command="test")
     second.join()
-    assert (tmp_path / "a").read_text() == "second"
+    assert (tmp_path / "a").read_text() == "first and second"
 
 
 def test_the_current_folder_stays_itself(tmp_path, monkeypatch):

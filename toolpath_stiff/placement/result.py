@@ -152,8 +152,8 @@ class Placement(FolderResult):
     >>> found = tps.place(slot, "nist", x_mm=0, y_mm=0, z_mm=800, rotate_deg=0, step_mm=10, points=2, write="new.nc")
     >>> found
     <Placement: slot.nc, X0 Y0 Z800 A0 B0 C0 of 1 placements>
-    >>> found.origin_mm_deg, found.worse, found.warnings
-    ((0.0, 0.0, 800.0, 0.0, 0.0, 0.0), [], [])
+    >>> found.origin_mm_deg, found.worse, found.alarms, found.warnings
+    ((0.0, 0.0, 800.0, 0.0, 0.0, 0.0), [], [], [])
     >>> found.refusal, found.program_bytes.decode().splitlines()[1]
     ('', 'G0 X0 Y0 Z5')
     >>> len(found.to_frame()), list(found.files(plots=False)), found.to_dict()["objective"]
