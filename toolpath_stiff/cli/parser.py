@@ -19,8 +19,6 @@ from toolpath_stiff.options import PARAMETERS, SWITCHES, Argument, Option, argum
 
 # argparse takes "-10,0,800" or "-300:300" for an option; this matches every value that begins like a negative number.
 NEGATIVE_VALUE = re.compile(r"^-(\d|\.\d|inf|nan)")
-
-
 Run = Callable[..., int]  # of a command: all values, those of its own options by name; the exit code
 PROGRAM = Argument("program", Option("PROGRAM"), "NC program or cutter-location file", required=True)
 FILES = "measurement files (CSV, or FILE.xlsx[#SHEET]), or nist-table1"

@@ -24,14 +24,8 @@ from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import mm_from_m
 
 SAME = 1e-3  # m, poses and joints closer than this are one
-
-
 UPRIGHT = 1e-3  # rad
-
-
 SURE = 0.05  # probability, all checks counted, below which a principle does not hold
-
-
 ON_AXIS, IMAGES = "threefold symmetry on the axis", "symmetric images"
 
 

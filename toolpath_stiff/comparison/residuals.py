@@ -17,34 +17,18 @@ from toolpath_stiff.readings.measurements import Readings, model_stiffness
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 AXIS_ALIGNED = 0.999  # |cosine| from which a direction counts as X, Y or Z
-
-
 SAME_PLANE = 0.005  # m, heights closer than this are one plane
-
-
 MOST_PLANES = 5  # beyond, heights are put into three bands of equally many readings
-
-
 # Number of planes -> their names, the lowest first; of more by their heights.
 PLANES = {
     1: ("only plane",),
     2: ("lower plane", "upper plane"),
     3: ("lower plane", "middle plane", "upper plane"),
 }
-
-
 ON_AXIS, NEAR_AXIS = 0.1, 0.6  # of the largest distance from the axis: limits of the zones
-
-
 FEWEST = 2  # readings in a level; a single one is a reading, not a pattern
-
-
 CURVED = ("order", "time_min", "height", "mean_strut_length")  # variables whose curvature is looked for too
-
-
 ALL = "all"
-
-
 MOST_LEVELS = 100  # of a label: beyond, its levels are not tested one by one
 
 

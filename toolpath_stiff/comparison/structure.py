@@ -32,32 +32,14 @@ if TYPE_CHECKING:
 
 # tau: relative sd of the excess; 0, then 0.3 % to 100 % in steps of 30 %.
 EXCESSES = np.concatenate([[0.0], np.geomspace(0.003, 1.0, 23)])
-
-
 SIGNIFICANT = 0.05  # family-wise
-
-
 FAR_OFF = 4.0  # standard deviations, of a reading that is named
-
-
 MOST_PATTERNS = 8  # found one after the other
-
-
 ALIKE = 0.9  # correlation from which two patterns cannot be told apart in these data
-
-
 WILD = 3.0  # standard deviations at which a reading is drawn in
-
-
 FEWEST_REPEATED = 5  # readings beyond one a place from which the noise itself is checked
-
-
 WIDE = 60  # readings of a clamping or a place from which it counts as something that all readings share
-
-
 TIED = 1e-9  # share by which statistics differ that are one and the same: of patterns that cannot be told apart
-
-
 DEPENDENT = 1e-6  # of a column's square that is left after the patterns already found: less is nothing
 
 

@@ -8,8 +8,6 @@ from toolpath_stiff.comparison.structure import FoundPattern, Pattern
 from toolpath_stiff.stiffness.sizes import about
 
 NOUGHT = 0.3  # of a course's change: a residual below is nothing beside it
-
-
 SHARE = "share_of_strut_"  # of the compliance; the strut's number follows
 
 

@@ -13,8 +13,6 @@ from toolpath_stiff.portrait.words import alike_entry, portrait_entry
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 FIGURES = ("probability", "log_evidence", "words")
-
-
 ERRORS = (
     "mean_abs_error_percent", "finding", "held_out_error_percent", "held_out_rms_percent", "held_out_gain_in_se",
 )  # fmt: skip

@@ -26,26 +26,12 @@ from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 
 SMALLEST, LARGEST = 2e-3, 0.7  # rms change of ln stiffness between which sizes are tabulated
-
-
 POINTS = 9  # sizes a sign
-
-
 CROWDED = 2.5  # power by which they crowd towards large ones: delta / size is constant first and bends at the end
-
-
 MOST_COMPONENTS = 4  # effects with more real parameters are tried in full and one by one only
-
-
 MOST_TRIALS = 12  # of a size that makes a small change
-
-
 INVISIBLE = 1e-7  # rms change of ln stiffness below which a choice does nothing to these data
-
-
 Knots = tuple[FloatArray, FloatArray]  # ln size (g,), delta / size (g, n)
-
-
 Delta = Callable[[float], FloatArray | None]  # size -> (n,) m/N added; None where the model has no answer
 
 

@@ -12,8 +12,6 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.hypotheses import Family
 
 CONFOUNDED = 0.95  # canonical correlation above which two effects cannot be told apart by these data
-
-
 SEPARATE = 1e-10  # share of an effect's information below which a combination of its components is not seen
 
 

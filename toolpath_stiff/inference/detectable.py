@@ -11,8 +11,6 @@ from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.stiffness.contract import Parameter
 
 POWER_80 = 0.8416  # normal quantile of 80 % power
-
-
 TIED = 1e-9  # share by which changes differ that are one and the same: of a factor and of its inverse
 
 

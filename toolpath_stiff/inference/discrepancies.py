@@ -13,8 +13,6 @@ from toolpath_stiff.inference.prediction import Predictor
 # Ranges over which a smooth discrepancy stays alike; assumed: about half a workspace, half a tilting range, a few
 # turns of a screw, a third of a campaign.
 RANGE_POSITION, RANGE_ANGLE, RANGE_LENGTH, RANGE_ORDER = 0.25, np.radians(15.0), 0.05, 0.3
-
-
 # Features of a form, and of the one that has one for each point and direction: what varies faster is left out.
 MOST_FEATURES, MOST_POINTS = 300, 2000
 

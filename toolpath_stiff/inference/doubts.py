@@ -12,19 +12,11 @@ from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.size_priors import EXPECTED
 
 FACTOR = float(np.exp(4.0 * LAW_PRIOR))  # of the median reading to the model: four standard deviations of the strut law
-
-
 # Correlation of ln measured with ln modelled below which the readings do not follow the model. Hidden effects that
 # change the stiffness by 30 % leave 0.8 and more, readings of other machines or in another order 0.3 and less.
 FOLLOWS = 0.5
-
-
 NOTHING = 1e-6  # of the model's own variation: less is rounding
-
-
 TELLS = EXPECTED[1]  # sd of ln modelled over the readings from which it is asked: as large as the largest effect
-
-
 FEWEST_FOLLOWING = 6  # readings that differ in what mechanics sees
 
 
@@ -53,17 +45,9 @@ def question(predictor: Predictor) -> str:
 
 
 TOO_QUIET = 0.005  # share of simulated campaigns that scatter as little or less
-
-
 TOO_LOUD = 0.025  # share of those that scatter as much or more, where nothing explains it
-
-
 ROUNDS = 3  # of the search for the noise that the readings show
-
-
 LARGEST_FACTOR = 10.0
-
-
 ENOUGH = 0.05  # probability of the base model's gate, as in the verdict
 
 

@@ -29,8 +29,6 @@ from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.sizes import joined
 
 CONFIRMS = 3.0  # log probability that new readings must gain: odds of 20 to 1, strong evidence (Kass and Raftery 1995)
-
-
 FEWEST_POINTS = 2  # of new readings: one pose alone cannot confirm a form
 
 

@@ -36,14 +36,8 @@ def law_prior(unknowns: int) -> FloatArray:
 
 
 MOST_ROUNDS = 3  # searches for wild readings
-
-
 BASE_ROUNDS = 3  # the same of the model without any further effect
-
-
 TABLE_STEPS, TABLE_TOLERANCE = 12, 1e-4  # of a fit on tables; standard deviations
-
-
 BEYOND = 0.05  # share of a bound by which a search may overshoot it
 
 

@@ -17,14 +17,8 @@ from toolpath_stiff.inference.least_squares import NormalEquations, bounded_step
 from toolpath_stiff.inference.noise import Scatter
 
 STEPS = 8
-
-
 TOLERANCE = 1e-3  # of a standard deviation
-
-
 LAW_STEP = 1e-4  # of the law's logarithms, for differences
-
-
 HALVINGS = 10  # of a step that makes the fit worse
 
 
@@ -167,11 +161,7 @@ def fit_effects(
 # Shares of the largest usual size to start from: at zero itself some effects have no slope to follow, and from far
 # away others (a platform's bars) have only a slope outwards.
 STARTS = (0.03, 0.5)
-
-
 ROUNDS = 5  # searches for wild readings
-
-
 BEHIND = 30.0  # of log posterior: further behind, no reading taken for wild makes up for it
 
 

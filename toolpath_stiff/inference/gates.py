@@ -24,25 +24,13 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.noise import Noise, Scatter
 
 DRAWS = 400
-
-
 RIDGE = 1e-12  # on the diagonal where readings are set aside: two that a fit explains entirely are not told apart
-
-
 # Squared deleted residual beyond which a reading is set aside, and share of readings that may be: what pays the price
 # of `scatter` where one reading in fifty is wild.
 WILD_SQUARED, MOST_WILD = 11.3, 0.05
-
-
 CHANCE = 0.05  # share of campaigns in which the best of all candidates gains as much by chance
-
-
 HOPELESS = 1.3  # times the largest simulated sum of squares
-
-
 FAR = 1e-290  # tail probability below which the continued fraction takes over from SciPy's, which ends there
-
-
 TERMS = 100  # of that fraction
 
 

@@ -14,8 +14,6 @@ from toolpath_stiff.inference.size_priors import likely_interval
 from toolpath_stiff.stiffness.contract import Effect
 
 NOTHING = -1e9  # log evidence of what cannot be
-
-
 GRID, ZOOMS = 24, 3  # sizes a sign of the scan of a single parameter; refinements about its peak
 
 
@@ -185,8 +183,6 @@ def probabilities(log_evidence: Mapping[str, float], prior: Mapping[str, float])
 
 
 SHARE = 0.95
-
-
 HALVINGS = 60  # of the bracket about a quantile
 
 
@@ -229,8 +225,6 @@ def _quantile(parts: tuple[FloatArray, ...], absent: float, ends: FloatArray, sh
 
 
 AMPLITUDES = np.geomspace(0.003, 0.3, 9)  # rms of a discrepancy of ln k; as wide as the effects' own prior
-
-
 FORMS = 5  # forms of discrepancy that are weighed, those that stick out most
 
 

@@ -44,44 +44,20 @@ from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
 from toolpath_stiff.stiffness.contract import Effect
 
 NONE = "none"
-
-
 OUTSIDE = "outside the catalogue"
-
-
 # What is expected before anything is measured; assumed. Whoever measures has a reason, but most machines are sound.
 PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_TRIPLES, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.03, 0.10
-
-
 FALSE_ALARM = 0.05  # of the base model's gate
-
-
 ADEQUATE = 0.005  # below this probability an explanation does not explain the data
-
-
 NAMED = 0.90  # probability from which a single name is the answer
-
-
 HELD = 0.95  # probability that the plausible set adds up to where it is not a single name
-
-
 STANDS = 0.05  # probability from which something outside the catalogue, or another pair, is not ruled out
-
-
 TESTED = 4  # candidates, besides all those that matter, that go through the absolute gate
-
-
 FAR = 8.0  # log evidence behind the best adequate candidate at which the others cannot matter
-
-
 SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alone
-
-
 # Odds below which a second effect is not considered where one suffices: "positive" evidence begins at 3 (Kass and
 # Raftery 1995, Bayes factors).
 POSITIVE = 3.0
-
-
 Evidence = dict[tuple[str, ...], float]  # of effects, pairs and triples by their names
 
 

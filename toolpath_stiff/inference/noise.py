@@ -30,26 +30,16 @@ from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, c
 from toolpath_stiff.readings.measurements import Readings
 
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
-
-
 # Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
 GUESSES = {"low": 0.02, "high": 0.10}
-
-
 LARGEST = 0.5  # relative sd that a user may state
-
-
 # Relative sd of a reading below which nobody measures: the paper's best readings, not clamped anew, scatter by 44 N/mm,
 # 0.1 %. With less, the last digit of the readings would decide.
 LEAST = 1e-3
-
-
 # Degrees of freedom that a standard deviation is worth: one that is right within 10 % (1 / sqrt(2 x 50)) where a person
 # states it, within a third where it is guessed; assumed.
 STATED_FREEDOM, GUESSED_FREEDOM = 50.0, 4.0
-
-
 CONTRADICTED = 3.3  # standard deviations of the logarithm of their ratio from which repeats overrule a stated noise
 
 
@@ -244,11 +234,7 @@ def covariance(noise: Noise, predictor: Predictor) -> Covariance:
 
 
 MOST_WILD = 0.05  # share of readings that may be taken for wild; more where more of them are
-
-
 OFTEN_WILD = 2.0  # times the expected share
-
-
 NEVER = 1e12  # price of a wild reading where there are none
 
 

@@ -27,8 +27,7 @@ from toolpath_stiff.stiffness.model import StiffnessModel, build_model, idle_on_
 from toolpath_stiff.stiffness.trial import failures, own_effects
 
 NO_CHANGE = (0.0, 0.0)  # of the strut law
-
-
+ANSWERS_KEPT = 64
 JOINT_STEP = 0.5e-3  # m, for differences: the size of the joint errors that the columns are used for
 
 
@@ -92,6 +91,7 @@ class Predictor:
         self._timeless = _prepare(self.base, data, timed=False)
         self._timed = _prepare(self.base, data, timed=True)
         self.tables: dict[tuple[Any, ...], Any] = {}
+        self._answers: dict[tuple[Any, ...], FloatArray] = {}
 
     @property
     def distinct(self) -> NDArray[np.int64]:
@@ -107,8 +107,18 @@ class Predictor:
     def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
         """(n,) ln(N/m) that the readings should show; nan where the model has no answer.
 
-        `effects` come on top of those of the machine file; instruments among them change the readings only.
+        `effects` come on top of those of the machine file; instruments among them change the readings only. The last
+        answers are kept: a fit begins where the one before it ended, and asks for the same again.
         """
+        chosen = tuple((active.effect.name, *active.values.items()) for active in effects)
+        key = (*np.asarray(law, dtype=float).tolist(), chosen)
+        if key not in self._answers:
+            while len(self._answers) >= ANSWERS_KEPT:
+                self._answers.pop(next(iter(self._answers)))
+            self._answers[key] = self._solved(law, effects)
+        return self._answers[key].copy()
+
+    def _solved(self, law: ArrayLike, effects: Sequence[ActiveEffect]) -> FloatArray:
         machine = self.machine.with_changes(strut_law=scaled_law(self.machine.strut_law, law))
         model = build_model(machine, self.effect_files, effects)
         prepared = self._timed if any("time_min" in a.effect.needs for a in model.effects) else self._timeless

@@ -17,36 +17,18 @@ from toolpath_stiff.readings.measurements import Readings
 # Share of wild readings where repeats do not tell, and how much wider they scatter; assumed. Where repeats tell, their
 # share is expected about the assumed one (sd of its logarithm), within the ends.
 OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0
-
-
 OUTLIER_SPREAD, OUTLIER_ENDS = 1.5, (0.005, 0.20)
-
-
 # The grid on which scatter and share are weighed: factors on the first estimate of the scatter, shares.
 FACTORS, SHARES = np.geomspace(0.3, 3.3, 61), np.geomspace(*OUTLIER_ENDS, 16)
-
-
 # Degrees of freedom that a difference is worth for the scatter when it may be wild: what 300 simulations each of 6 to
 # 71 differences, 2 % of the readings wild, give (0.74 to 0.62).
 WORTH = 0.63
-
-
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
-
-
 MOST_TRIMS = 8
-
-
 LARGEST_RATIO, ZOOMS = 5.0, 6  # of clamping to repeat noise; ever finer grids on which it is looked for
-
-
 # Standard deviations as which a larger deviation counts: how far off the wildest is tells nothing of the others.
 FARTHEST = 1.5 * OUTLIER_WIDTH
-
-
 ALIKE = ("position", "angles", "direction", "force", "tool_extension", "setup", "loop")  # columns of repeats
-
-
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 

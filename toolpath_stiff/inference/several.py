@@ -24,30 +24,14 @@ from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
 
 SCORED = 8  # sets of effects whose tables are scored
-
-
 SEEDS = 6  # pairs from which triples are grown
-
-
 SWEEPS = 60  # of the coordinate descent
-
-
 ROUNDS = 2  # searches, each without the readings that the best set of the one before takes for wild
-
-
 NEGLIGIBLE = 1e-3  # whitened length of a component below which it counts as absent
-
-
 # Laplace's term for a size under a prior that is flat in its logarithm from 0.5 to 30 %: ln(ln(60) / sqrt(2 pi)).
 PER_SIZE = float(np.log(np.log(60.0) / np.sqrt(2.0 * np.pi)))
-
-
 LARGE = (0.05, 0.15)  # rms change of ln stiffness at which an effect is large
-
-
 STRAIGHT = 0.999  # correlation of what an effect adds at two sizes above which it grows in proportion
-
-
 BLOCK = 4000  # sets that are searched side by side
 
 

@@ -13,25 +13,13 @@ from toolpath_stiff.inference.covariances import Precision
 # Rms change of ln stiffness between which an effect's size is expected, flat in its logarithm; assumed: effects are
 # "a few to thirty per cent", smaller ones do no harm, larger ones are seen with the naked eye.
 EXPECTED = (0.005, 0.30)
-
-
 TAIL = 1.0  # sd of ln size beyond them
-
-
 USUAL = np.log(10.0)  # distance in ln size from the typical range at which the prior has halved
-
-
 # Mean and sd of ln(change by a component / change by the strongest): what gives way along X gives way along Y, too, by
 # an amount of the same order; assumed.
 COMPARABLE = (-0.7, 0.9)
-
-
 VISIBLE = 3.0  # whitened length of a signature from which on it can be seen
-
-
 FADES = 0.7  # sd by which visibility fades below
-
-
 LIKELY = 3.84  # 95 % quantile of chi-square with one degree of freedom
 
 

@@ -21,43 +21,19 @@ from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg
 
 AS_WELL = 3.0  # log odds behind the best way of slipping within which another is said as well
-
-
 SLIPPED = 0.5  # chance that a campaign holds a slip; assumed
-
-
 CLEAR = float(np.log(1000.0))  # log odds from which its rows are left out of the judgement
-
-
 FAR_OFF = 16.0  # squared deviation of a row from which on it is looked at
-
-
 MOST_ROWS, MOST_CLAMPS, MOST_SLIPS = 12, 6, 3
-
-
 NEAR = 3.0  # standard deviations within which the mended rows must lie, root mean square
-
-
 # A digit typed wrongly; mm and degrees, assumed. Each further one costs all others a little: more is tried by chance.
 STEPS_MM, STEPS_DEG = (10.0,), (1.0, 5.0)
-
-
 # What a stiffness may have been written in -> written over true; an inch is 25.4 mm, a pound-force 4.448... N.
 UNITS = {"lbf/in": 25.4 / 4.4482216152605, "N/um": 1e-3}
-
-
 TINY = 1e-9
-
-
 SET_ASIDE = 1e2  # variance of ln k of a row that is left out
-
-
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-
-
 MENDED = ("position", "angles", "direction", "stiffness")  # columns of the readings that a slip may change
-
-
 # Columns, field of the readings, usual slips, SI value of their unit.
 POSE_STEPS = (
     (("x_mm", "y_mm", "z_mm"), "position", STEPS_MM, float(m_from_mm(1.0))),

@@ -16,8 +16,6 @@ from toolpath_stiff.stiffness.contract import Effect, Parameter
 # Rms change of ln stiffness from which an effect matters; assumed: at 5 % of its stiffness the tip's deflection is off
 # by less than the 10 % to which a cutting force is known.
 MATTERS = 0.05
-
-
 SIZES = 16  # a sign, between those that are tabulated
 
 

@@ -14,8 +14,6 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_
 
 # `tps machine new` puts it in every section; what still has it was not replaced.
 TEMPLATE_REMARK = "value of the template, not of this machine"
-
-
 HEADINGS = {
     "frame_joints": "Base frame: Z up. Row i is strut i + 1: x, y, z in mm\n"
     "# (or cylindrical_mm_deg: rows of radius in mm, angle in degrees, height in mm).",

@@ -52,8 +52,6 @@ _SIGNS = (
     (_SUB, r"SUB\s+\w+\s*\["),
     (_SIEMENS, r"(?:[A-Z]++[\d.+-]*+\s++)*(?:T\s*=\s*\"|[XYZABCIJKFS]\d?\s*=|CR\s*=|(?:A3|B3|C3|AP|RP)\s*=)"),
 )
-
-
 _PATTERNS = [(what, re.compile(rf"\s*(?:N\d+\s+|\d+\s+)?(?:{sign})", re.IGNORECASE)) for what, sign in _SIGNS]
 
 LATHE_LINES = 2000  # lines: a lathe's program shows what it is at its beginning

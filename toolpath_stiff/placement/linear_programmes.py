@@ -7,11 +7,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray, IntArray, product
 
 PERTURBATION, TOLERANCE = 1e-10, 1e-10  # of costs and of rows, both of the order of one
-
-
 MOST_PIVOTS = 500  # some fifteen are usual
-
-
 Programme = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]  # cost, matrix, right, low, high
 
 

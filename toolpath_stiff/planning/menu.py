@@ -17,8 +17,6 @@ from toolpath_stiff.units import RAD_PER_DEG
 MINUTE = 60.0
 LOADS = (1e-3, 1e6)  # N, that a plan may ask for
 TABLE, RISER = "table", "riser"  # set-ups where the data know none, or only one
-
-
 # Minutes of work; assumed, and the user's to change: one more direction or load at a visit; moving to another pose,
 # clamping gauge and indicator, zeroing; another tool; a riser on or off; a second indicator across a link.
 COSTS = {"reading": 1.0, "pose": 15.0, "tool": 10.0, "setup": 45.0, "indicator": 10.0}

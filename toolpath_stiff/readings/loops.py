@@ -26,14 +26,8 @@ from toolpath_stiff.stiffness.measuring_loop import TIP, WORDS, MeasuringLoop, m
 
 # Scatter of one reading where no `sd_um` says: a lever indicator or probe with its stand, and the load; assumed.
 INDICATOR_SD, LOAD_SHARE = 0.3e-6, 0.02  # m; of the reading
-
-
 OFFSET_SHARE = 0.5  # of the tip's compliance
-
-
 WIDEST = 0.05  # of offset and reading: relative sd up to which the logarithm is straight enough
-
-
 BACKWARDS = 3.0  # times a reading of the wrong sign, so that its logarithm exists
 
 

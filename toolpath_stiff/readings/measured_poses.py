@@ -13,8 +13,6 @@ from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
 SINGULAR = 1e-6  # singularity index: the tip would be a million times softer than at the neutral pose
-
-
 # Of the machine file under `limits`; the last word of each stands in its limits' names.
 SECTIONS = ("strut_length", "joint_angle", "workspace", "singularity")
 

@@ -32,8 +32,6 @@ from toolpath_stiff.tables import Columns, Table, parse_table
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m
 
 NIST_TABLE_1 = "nist-table1"
-
-
 RISER_ABOVE_MM = 1000.0  # of the paper's two planes, 353 and 1268 mm, Figure 6 shows the upper one on a riser
 
 

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 DATA = Markup("<data>")  # where the data of a page go; what is not `Markup` has no such letters in a page
 LONG_LIST = 20_000  # entries
 FINER = 1.5  # pixels of a picture to one of the page
-
-
 # Of a section: a table, a list of sentences, a remark, or HTML.
 Part = ShownTable | Sequence[object] | str | Markup
 Section = tuple[str, *tuple[Part, ...]] | str  # its title and its parts; or a picture's file name

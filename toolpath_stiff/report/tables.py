@@ -12,8 +12,6 @@ from toolpath_stiff.report.words import WIDTH, plain, shortened
 
 LABEL = 14  # columns of the left-hand words
 LEAST_NAME = 24  # columns for the first column, however wide the others are
-
-
 Item = TypeVar("Item")
 
 

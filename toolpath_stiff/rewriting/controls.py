@@ -24,8 +24,6 @@ from toolpath_stiff.units import MM_PER_INCH
 
 SAME = 1e-9  # mm, inch or degrees: a word whose number changes by less keeps its text
 FEED_DECIMALS = 6
-
-
 # Added words go behind the last word present of those that come before them here.
 ORDER = ("G", "X", "Y", "Z", "A", "B", "C", "I", "J", "K", "R", "Q", "P", "L", "F")
 NUMBERS = frozenset("XYZABCIJKR")

@@ -21,8 +21,6 @@ NM_PER_N = 1e-9  # m/N in nm/N
 
 # Largest compliances that are tried, nm/N: far beyond 30 % of a tip that gives 8 to 31 nm/N.
 SOFT = 60.0
-
-
 Draw = Callable[[Generator, int, list[str]], Shape]  # of how many vertices the frame has, which set-ups there are
 
 

@@ -34,8 +34,6 @@ from toolpath_stiff.rig.unknowns import OUTSIDE
 MAGIC = b"tps-rig-sealed-2\n"
 DIGEST = hashlib.sha256().digest_size
 BLOCK = 8192  # bytes; several times what one case needs
-
-
 # Column -> lowest and highest value that makes sense, and the value of an empty cell (None: a number is needed).
 NUMBERS: dict[str, tuple[float, float, float | None]] = {
     **dict.fromkeys(POSE[:3], (-1e5, 1e5, None)),
@@ -54,8 +52,6 @@ TEXTS = {  # column -> what matches, in words as well
     **dict.fromkeys(("repeat", "point", "setup"), ("(?s).*", "any text")),
 }
 RESULTS = ("stiffness_N_per_mm", "sd_N_per_mm", "displacement_um")
-
-
 # Claims, verdicts of a diagnosis among them: that nothing is hidden, and that something is which the catalogue lacks.
 # Of a `described` effect the form was drawn from the readings: it is none of the catalogue.
 SOUND, OTHER = ("none", "adequate"), ("outside", "unexplained", "described")

@@ -23,12 +23,8 @@ LOOP_PATTERN = (
     r"|tip|spindle|platform|table|strut [1-6]( alone)?|joint [1-6]( (platform|frame))?|frame [1-3]( (radial|vertical))?"
 )
 LOOP_WORDS = "tip, spindle, platform, table, strut 1 (alone), joint 1 (platform, frame), frame 1 (radial, vertical)"
-
-
 # An indicator on its stand, one sd of a reading in m, and the load with the indicator's slant, relative; assumed.
 INDICATOR, SLANT = 0.2e-6, 0.01
-
-
 PRINTED = 0.1  # um, resolution of the indicator; assumed
 
 

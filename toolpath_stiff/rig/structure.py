@@ -18,14 +18,8 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray, IntArray
 
 BARS = 19  # of the platform truss (the paper's Figure 2b)
-
-
 HUB, TIP = 6, 7  # nodes of the platform truss after its six joints
-
-
 SECANT_STEPS = 60
-
-
 SECANT_TOLERANCE = 1e-11  # relative change of the tip's compliance between two steps
 
 

@@ -28,8 +28,6 @@ VARIABLES = (
     *("constant", "x", "y", "z", "radius", "tilt", "strut length", "strut force", "force sign"),
     *("load", "time", "order", "setup", "temperature", "direction"),
 )
-
-
 # What can be told at the tip: joints and struts are in series, so an effect of all joints may be called either; so is
 # that of one strut, its joints and its drive. A strut's length follows height, radius and tilt of the pose, so what
 # varies with a swing may be called by any pose variable that swings the joints; what gives along a pin is constant

@@ -7,8 +7,6 @@ holds the whole load path; an indicator across one joint holds that joint alone.
 from dataclasses import dataclass
 
 LINKS_ON_THE_PATH = ("tool", "platform", "joints", "struts", "frame", "table")
-
-
 # Kind -> links of the load path between the indicator's two points.
 INSIDE = {
     "tip": LINKS_ON_THE_PATH,
@@ -20,12 +18,8 @@ INSIDE = {
     "strut": ("struts",),
     "alone": ("struts",),
 }
-
-
 # Kinds that read along the load, so that a reading is a stiffness; the others read along a strut or across a vertex.
 ALONG_THE_LOAD = ("tip", "spindle", "platform", "table")
-
-
 WORDS = (
     "tip, spindle, platform, table, strut 1 (to 6), strut 1 alone, joint 1, joint 1 platform, joint 1 frame, frame 1 "
     "(to 3), frame 1 radial, frame 1 vertical"

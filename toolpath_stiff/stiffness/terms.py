@@ -72,8 +72,6 @@ EQUATIONS: dict[Action, str] = {  # {} is the size, s its share, h a load
 PINS = ("frame pin", "platform pin")
 IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the compliance of each strut by itself
 PAIR = ("first", "second")  # constants of a coupling
-
-
 # (action, link) -> directions along which it may act there.
 HEAD, BASE, STRUTS = ("tool", "platform"), ("frame", "table"), ("along the struts",)
 ALONG: dict[tuple[str, str], tuple[str, ...]] = {

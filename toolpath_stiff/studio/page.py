@@ -11,8 +11,6 @@ from toolpath_stiff.studio.picture import document
 from toolpath_stiff.studio.session import Session
 
 SHARED = ("stage.js", "viewer.js", "profile.js")  # of the static pages
-
-
 OWN = ("machine.js", "panels.js", "studio.js")
 
 

@@ -24,14 +24,8 @@ from toolpath_stiff.studio.picture import document
 from toolpath_stiff.studio.session import Session
 
 LARGEST_FILE = 64 * 1024 * 1024  # bytes of a dropped file
-
-
 LARGEST_QUESTION = 1024 * 1024
-
-
 BEAT = 15.0  # s between two signs of life of an event stream
-
-
 PLAIN = {
     **dict.fromkeys((".toml", ".py", ".nc", ".ngc", ".txt"), "text/plain"),
     ".json": "application/json",
@@ -41,11 +35,7 @@ PLAIN = {
     ".pdf": "application/pdf",
     ".svg": "image/svg+xml",
 }
-
-
 SANDBOX = "sandbox allow-scripts"  # a page among the results has an origin of its own and cannot ask the studio
-
-
 REFUSED = "This is a studio of toolpath_stiff. Open the address that `tps studio` has printed, with its token."
 
 

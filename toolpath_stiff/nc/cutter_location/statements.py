@@ -9,43 +9,21 @@ from dataclasses import dataclass
 from toolpath_stiff.nc.place import Place
 
 _NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[EeDd][+-]?\d++)?"
-
-
 NUMBERS = re.compile(_NUMBER)
-
-
 _LABEL = re.compile(r"\s*(?:N?\d+\s+(?=[A-Za-z])|[A-Za-z0-9]+\))")
-
-
 # These carry free text, which no `$` continues.
 _TEXT_WORD = re.compile(r"\s*(PARTNO|PPRINT|REMARK|INSERT|LETTER|TITLES|MFGNO)", re.IGNORECASE)
-
-
 _WORD = re.compile(r"\s*([A-Za-z][\w.-]*(?: +[A-Za-z][\w.-]*)*(?:\s*,\s*\w+)*)\s*(/|$)")
-
-
 _FRAME = re.compile(r"\s*\$\$(?:(\*)CATIA0\b|->\s*CSYS\s*/)", re.IGNORECASE)
-
-
 FRAME_NUMBERS = 12
-
-
 _ONLY_NUMBERS = re.compile(r"[\s\d.,+\-EeDd$]*")
-
-
 _NEW_STATEMENT = re.compile(
     r"\s*(?:(?:GOTO|FROM|FEDRAT|GODLTA|CYCLE|LOADTL|SPINDL|CUTTER|UNITS?|TLAXIS|INDIRV)\s*/|TLON\s*,|(?:RAPID|FINI)\s*$)",
     re.IGNORECASE,
 )
-
-
 # Without an exponent of D, which `float` does not read.
 _FIRST = rf"\s*({_NUMBER.replace('Dd', '')})"
-
-
 _NEXT = rf"\s*,{_FIRST}"
-
-
 _POINT = re.compile(rf"\s*GOTO\s*/{_FIRST}{_NEXT * 2}(?:{_NEXT * 3})?\s*$", re.IGNORECASE)
 
 

@@ -95,8 +95,6 @@ _OUTPUT = "about the output of the post processor"
 _BLOCK = "a block for the control as it stands: what it does is not known"
 _TURNS, _COMPENSATES = "turns the work or the head of one machine", "is cutter compensation"
 _REPEATS, _DRIVE = "repeats or calls a part of the file", "is driven along surfaces: APT's processor writes the points"
-
-
 TABLE = (
     MajorWord("GOTO", motion.goto, "the tool moves to a point", ALL, ISO, _POINT),
     MajorWord("", motion.more_points, "further points of the GOTO before it", CREO, PTC, "x,y,z[,i,j,k]"),

@@ -16,8 +16,6 @@ ARGUMENTS = {
 SECOND_KIND = {"A": 1, "B": 2, "C": 3}  # then I, J, K up to ten times, from #4
 LAST_LOCAL = 33
 WHOLE_ARGUMENTS = frozenset("DHMST")  # numbers of tools, offsets and speeds: no decimal point belongs to them
-
-
 MACRO_CALLS = ("G65", "G66", "G67")
 LARGEST_NUMBER = 99_999_999  # of a program, or of repeats
 Fault = Callable[[Word, str, str], InputError]  # makes the error of a word: what is wrong with it, what was expected
