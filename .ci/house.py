@@ -224,6 +224,13 @@ def class_names_twice(modules: list[Module]) -> list[str]:
     return sorted(name for name, count in names.items() if count > 1)
 
 
+def public_names(root: Path) -> int:
+    """Names that the package gives: the imports of its list of them."""
+    listed = root / PACKAGE / "__init__.pyi"
+    tree = ast.parse(listed.read_text("utf-8") if listed.is_file() else "")
+    return sum(len(node.names) for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom))
+
+
 def figures_of(modules: list[Module]) -> dict[str, dict[str, float]]:
     """Section of the budget file -> figure -> count."""
     rooms = Counter[str]()
@@ -309,6 +316,7 @@ def main() -> int:
     budget = tomllib.loads((root / ".ci" / "house.toml").read_text("utf-8"))
     modules = modules_of(root)
     figures = {**figures_of(modules), "beside": beside(root, modules)}
+    figures["whole"]["public_names"] = public_names(root)
     if "--runs" in sys.argv:
         figures["runs"] = runs(root)
     rows = judge(budget, figures)

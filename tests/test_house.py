@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+import toolpath_stiff as tps
+
 FILE = Path(__file__).parents[1] / ".ci" / "house.py"
 SPEC = importlib.util.spec_from_file_location("house", FILE)
 house = importlib.util.module_from_spec(SPEC)
@@ -66,3 +68,11 @@ def test_a_figure_above_its_budget_or_in_no_budget_falls_short(tmp_path, monkeyp
     monkeypatch.setattr("sys.argv", ["house.py", str(tmp_path)])
     assert house.main() == 1
     assert "falls short: rooms.attic" in capsys.readouterr().out
+
+
+def test_public_names_are_those_of_the_list(tmp_path):
+    (tmp_path / "toolpath_stiff").mkdir()
+    assert house.public_names(tmp_path) == 0
+    (tmp_path / "toolpath_stiff" / "__init__.pyi").write_text("from a import b as b\nfrom a import c as c, d as d\n")
+    assert house.public_names(tmp_path) == 3
+    assert house.public_names(FILE.parents[1]) == len(set(tps.__all__) - {"__version__"})

@@ -287,8 +287,11 @@ def _outcomes(tasks: Sequence[Task], executor: Executor | None, jobs: int) -> It
     else:
         futures = {executor.submit(analyze_task, task): place for place, task in enumerate(tasks)}
         try:
-            for future in as_completed(futures):
-                yield futures[future], _answer(tasks[futures[future]], future)
+            for future in as_completed(list(futures)):
+                place = futures.pop(future)
+                outcome = _answer(tasks[place], future)
+                del future  # what is held a cluster computes again when the worker that has it dies
+                yield place, outcome
         finally:
             for future in futures:
                 future.cancel()
