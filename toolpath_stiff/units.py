@@ -86,6 +86,16 @@ def per_s_from_per_min(rate: T) -> T:
     return rate / 60.0
 
 
+def rad_per_s_from_per_min(speed: T) -> T:
+    """rad/s from revolutions per minute."""
+    return speed * (360.0 * RAD_PER_DEG / SECONDS_PER_MINUTE)
+
+
+def per_min_from_rad_per_s(speed: T) -> T:
+    """Revolutions per minute from rad/s."""
+    return speed / (360.0 * RAD_PER_DEG / SECONDS_PER_MINUTE)
+
+
 def m_per_s_from_mm_per_min(feed: T) -> T:
     """m/s from mm/min."""
     return feed / 60e3
