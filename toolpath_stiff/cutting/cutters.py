@@ -76,20 +76,18 @@ def merged_tool(table: ToolEntry, further: ToolEntry) -> ToolEntry:
 
 def cutter_of(tool: ToolEntry) -> Cutter:
     """The cutter of a tool. Raises `InputError` where it is not known well enough; names what is missing."""
+    name = f"tool {tool.number}"
     given: dict[str, float] = {"diameter_mm": tool.diameter, "stick_out_mm": tool.stick_out, **tool.cutter}
     given = {key: value for key, value in given.items() if not math.isnan(value)}
     missing = [key for key in NEEDED if key not in given]
     if missing:
         raise InputError(
-            f"tool {tool.number}: {', '.join(missing)} not known",
+            f"{name}: {', '.join(missing)} not known",
             hint=f"write it in cut.toml, [[tool]] with number = {tool.number}, or in the tool table (--tools)",
         )
     diameter, corner = given["diameter_mm"], given.get("corner_radius_mm", 0.0)
     if corner > diameter / 2.0:
-        raise InputError(
-            f"tool {tool.number}: corner_radius_mm = {corner:g}", expected=f"at most {diameter / 2.0:g}, a ball"
-        )
-    name = f"tool {tool.number}"
+        raise InputError(f"{name}: corner_radius_mm = {corner:g}", expected=f"at most {diameter / 2.0:g}, a ball")
     origin = [] if "corner_radius_mm" in given else [f"{name}: no corner_radius_mm is given, its end is flat"]
     lateral, axial, beam = _beam(given, tool.material)
     origin += [f"{name}: {beam}"] if beam else []

@@ -164,14 +164,15 @@ def tools_of(toml: TomlReader, key: str = "tools") -> dict[int, ToolEntry] | Non
 
 def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
     columns = ("tool", *TOOL_KEYS[1:])
-    table = parse_table(text, file, Columns(columns[:4], columns[4:]))
+    numbers_of = (*columns[:4], *CUTTER_KEYS)
+    table = parse_table(text, file, Columns(numbers_of, columns[4:6]))
     unknown = [f"{name!r} is not known" for name in table.heading if name not in columns]
     for problem in unknown + [f"{name!r} is missing" for name in columns[:2] if name not in table.heading]:
         raise Place(file, table.heading_line).fail(f"column {problem}", f"columns {', '.join(columns)}")
     for line, cells in table.rows:
         try:
             row = {key: cell for key, cell in table.record(cells).items() if cell}
-            numbers = {key: _number(row[key], key) for key in (*columns[:4], *CUTTER_KEYS) if key in row}
+            numbers = {key: _number(row[key], key) for key in numbers_of if key in row}
             tool = _tool({**row, **numbers, "number": numbers.get("tool")})
         except InputError as error:
             raise error.in_line(file, line) from None
