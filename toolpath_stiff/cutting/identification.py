@@ -26,19 +26,17 @@ def slot_patches(depth: FloatArray) -> Patches:
     return Patches(np.arange(len(depth)), zero, depth, zero, zero + np.pi)
 
 
-def slot_responses(
-    cutter: Cutter, feed: FloatArray, depth: FloatArray, run_out: float = 0.0, angle: FloatArray | None = None
-) -> FloatArray:
+def slot_responses(cutter: Cutter, feed: FloatArray, depth: FloatArray, angle: FloatArray | None = None) -> FloatArray:
     """(n, 3, 6) mean forces per coefficient in slots of depths (n,) m at feeds (n,) m per tooth.
 
-    With run-out, m, at angles (n,) rad, as each record begins elsewhere in the turn.
+    Run-out points to angles (n,) rad, as each record begins elsewhere in the turn; unless given, as the cutter says.
     """
     across = np.stack([feed, np.zeros(len(feed))], axis=1)[:, None]
-    angles = np.zeros(len(feed)) if angle is None else angle
+    angles = np.full(len(feed), cutter.run_out_angle) if angle is None else angle
     return np.concatenate(
         [
-            mean_responses(slot_patches(row[None]), replace(cutter, run_out=run_out, run_out_angle=at), fed, ONE, TAPER)
-            for row, fed, at in zip(depth, across, angles.tolist(), strict=True)
+            mean_responses(slot_patches(row[None]), replace(cutter, run_out_angle=to), fed, ONE, TAPER)
+            for row, fed, to in zip(depth, across, angles.tolist(), strict=True)
         ]
     )
 

@@ -1,8 +1,9 @@
 """Records of a dynamometer in slots: mean force over whole turns, without drift, and what comes back turn by turn.
 
-A turn cuts where the force swings by half as much as in the strongest turns, and is air where it swings by a fifth at
-most; over a radius of feed after entry and before exit the slot is not yet full. The zero is a straight line through
-the air before and after. The speed of the spindle is taken from the record itself, where its teeth are heard.
+A turn cuts where the force swings by half as much as in the strongest turns, and is air where it swings hardly more
+than in the quietest; over a radius of feed after entry and before exit the slot is not full. The zero is a straight
+line through the air before and after. The speed of the spindle is taken from the record itself, where its teeth are
+heard.
 """
 
 from collections.abc import Iterator
@@ -10,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.errors import MeasurementError
@@ -23,7 +24,8 @@ FEEDS = ("feed_per_tooth_mm", "feed_mm_per_min")
 ComplexArray = NDArray[np.complex128]
 COLUMNS = Columns(numbers=("time_s", *FORCES, *FEEDS, "spindle_rpm", "depth_mm"), texts=("record",))
 LAYOUT = "time_s, fx_N, fy_N, fz_N, feed_per_tooth_mm or feed_mm_per_min, spindle_rpm, depth_mm; record, if several"
-CUTS, AIR = 0.5, 0.2  # of the swing of the strongest turns
+CUTS, AIR = 0.5, 1.5  # swing of turns that cut, of the strongest ones'; of turns in air, of the quietest ones'
+STRONG = 90.0  # per cent of the turns that are weaker than the strongest, and stronger than the quietest
 LEAST_TURNS = 5  # of the full slot
 SPEED_RANGE = 0.03  # by which the spindle may turn faster or slower than is said
 FINER = 8  # times finer than the spectrum of the record its speed is looked for
@@ -113,42 +115,47 @@ def mean_force(
     if abs(heard / rate - 1.0) > 0.01:
         turning, said = (f"{s_from_min(1.0) * value:.0f}" for value in (heard, rate))
         remarks.append(f"{name}: the teeth pass at {turning} turns a minute, not at {said}")
-    starts = np.searchsorted(time, np.arange(1, int(time[-1] * heard) + 1) / heard)[:-1]
-    starts = np.append(0, starts) if len(starts) else np.zeros(1, dtype=int)
-    turn = np.minimum(np.floor(time * heard).astype(int), len(starts))  # the last one is not whole
-    swing = np.array([np.ptp(known[turn == k], axis=0).max() for k in range(len(starts))])
-    strongest = float(np.percentile(swing, 90.0))
-    cutting, air = _longest(swing >= CUTS * strongest), swing <= AIR * strongest
-    beside = np.concatenate([[True], air, [True]])
-    air = air & beside[:-2] & beside[2:]  # not the turn of the first touch
-    if not air.any():
-        remarks.append(f"{name}: no air before or after the cut, the zero is as recorded")
-    else:  # until the slot is full
-        filling = int(np.ceil(cutter.radius / (feed * cutter.flutes)))
-        cutting = cutting[filling : len(cutting) - filling]
+    turn = np.floor(time * heard).astype(int)
+    cutting, air = _cut_and_air(turn, known, int(np.ceil(cutter.radius / (feed * cutter.flutes))))
     if len(cutting) < LEAST_TURNS:
         raise MeasurementError(
             f"{name}: {len(cutting)} whole turns of the full slot",
             expected=f"{LEAST_TURNS} or more",
             hint="are spindle_rpm, feed and the cutter's diameter right?",
         )
-    zero = np.zeros_like(known)
-    if air.any():
-        before, after = air & (np.arange(len(air)) < cutting[0]), air & (np.arange(len(air)) > cutting[-1])
-        silent = air[np.minimum(turn, len(air) - 1)] & (turn < len(air))
-        line = np.polynomial.polynomial.polyfit(time[silent], known[silent], 1 if before.any() and after.any() else 0)
-        zero = np.polynomial.polynomial.polyval(time, line).T.reshape(known.shape)
+    silent, zero = np.isin(turn, air), np.zeros(3)
+    if len(air):
+        order = 1 if air[0] < cutting[0] and air[-1] > cutting[-1] else 0
+        line = np.polynomial.polynomial.polyfit(time[silent], known[silent], order)
+        zero = np.polynomial.polynomial.polyval(time, line).T
+    else:
+        remarks.append(f"{name}: no air before or after the cut, the zero is as recorded")
     full = (turn >= cutting[0]) & (turn <= cutting[-1])
-    cleared = known - zero
-    mean = cleared[full].mean(axis=0)
-    waves = harmonics(time[full] * heard, cleared[full, side], cutter.flutes)
-    return np.where(np.isnan(force[0]), np.nan, mean), waves, remarks
+    cleared = (known - zero)[full]
+    waves = harmonics(time[full] * heard, cleared[:, side], cutter.flutes)
+    return np.where(np.isnan(force[0]), np.nan, cleared.mean(axis=0)), waves, remarks
 
 
-def _longest(chosen: BoolArray) -> IntArray:
-    """Places of the longest run of chosen turns."""
-    runs = np.split(np.flatnonzero(chosen), np.flatnonzero(np.diff(np.flatnonzero(chosen)) > 1) + 1)
-    return max(runs, key=len)
+def _cut_and_air(turn: IntArray, force: FloatArray, filling: int) -> tuple[IntArray, IntArray]:
+    """Whole turns of the full slot, and turns in air; a slot is full `filling` turns after entry.
+
+    `turn` (m,) of the forces (m, 3).
+    """
+    first = np.searchsorted(turn, np.arange(turn[-1]))  # the last turn is not whole
+    ending = np.searchsorted(turn, turn[-1])
+    if len(first) < LEAST_TURNS:
+        return first[:0], first[:0]
+    high, low = (extreme.reduceat(force[:ending], first) for extreme in (np.maximum, np.minimum))
+    swing = (high - low).max(axis=1)
+    strongest, quiet = np.percentile(swing, [STRONG, 100.0 - STRONG])
+    runs = np.flatnonzero(swing >= CUTS * strongest)
+    cutting = max(np.split(runs, np.flatnonzero(np.diff(runs) > 1) + 1), key=len)
+    if AIR * quiet > CUTS * strongest:
+        return cutting, first[:0]
+    # Where the swing hardly differs from the air's, the first touch may already push.
+    reach = min(filling // 10 + 1, (len(swing) - 1) // 2)
+    touched = np.convolve(swing > AIR * quiet, np.ones(2 * reach + 1), "same") > 0.5
+    return cutting[filling : len(cutting) - filling], np.flatnonzero(~touched)
 
 
 def _heard_rate(time: FloatArray, force: FloatArray, rate: float, flutes: int) -> float:

@@ -40,7 +40,7 @@ class CoefficientFit(FolderResult):
     told
         (6,) those that the records tell.
     cutter
-        That cut the slots.
+        That cut the slots, with the run-out that they tell.
     records
         (n,) names.
     feed, depth
@@ -185,7 +185,8 @@ def fit_coefficients(
     force = np.array(forces)
     run_out, angle = np.zeros(len(feed)), np.zeros(len(feed))
     for _ in range(ROUNDS):  # with run-out some teeth cut less, which bends the lines a little
-        response = slot_responses(cutter, feed, depth, float(np.median(run_out)), angle)
+        cutter = replace(cutter, run_out=float(np.median(run_out)), run_out_angle=float(angle[0]))
+        response = slot_responses(cutter, feed, depth, angle)
         values, covariance, told = least_squares(response, force)
         if cutter.flutes > 1 and values[0] > 0.0:
             known = Coefficients(values[:3], values[3:], covariance)
