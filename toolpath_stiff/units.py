@@ -56,16 +56,6 @@ def pa_from_gpa(gpa: T) -> T:
     return gpa * 1e9
 
 
-def n_per_m2_from_n_per_mm2(pressure: T) -> T:
-    """N/m2 from N/mm2."""
-    return pressure * 1e6
-
-
-def n_per_mm2_from_n_per_m2(pressure: T) -> T:
-    """N/mm2 from N/m2."""
-    return pressure / 1e6
-
-
 def rad_from_deg(deg: T) -> T:
     """Radians from degrees."""
     return deg * RAD_PER_DEG
