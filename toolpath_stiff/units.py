@@ -26,6 +26,11 @@ def m_from_mm(mm: T) -> T:
     return mm / 1e3
 
 
+def mm3_from_m3(m3: T) -> T:
+    """Cubic millimetres from cubic metres."""
+    return m3 * 1e9
+
+
 def mm_from_m(m: T) -> T:
     """Millimetres from metres."""
     return m * 1e3
