@@ -1,7 +1,8 @@
 """Thickness of the chip before each flute, with run-out, and its integrals over the angle of the edge.
 
-Flute j stands R + rho cos(lambda + 2 pi j / N) from the axis (Kline, DeVor, International Journal of Machine Tool Design
-and Research 23 (1983) 123). It cuts what the m flutes before it left, so that the chip is
+Flutes are numbered in the order in which they pass: flute j stands 2 pi j / N behind flute 0, and, with a run-out rho,
+R + rho cos(lambda + 2 pi j / N) from the axis (Kline, DeVor, International Journal of Machine Tool Design and Research 23
+(1983) 123). It cuts what the m flutes before it left, so that the chip is
 
     h_j = max(0, min over m of m u + R_j - R_(j-m)),    u = f sin(phi),
 
@@ -20,6 +21,12 @@ def flute_gaps(cutter: Cutter) -> FloatArray:
     radius = flute_radii(cutter)
     before = (np.arange(flutes)[:, None] - np.arange(1, flutes + 1)) % flutes
     return np.asarray(radius[:, None] - radius[before])
+
+
+def flute_laws(cutter: Cutter) -> list[tuple[FloatArray, int]]:
+    """Gaps of each kind of flute and how many flutes have them: all the same without run-out."""
+    gaps = flute_gaps(cutter)
+    return [(row, 1) for row in gaps] if cutter.run_out else [(gaps[0], cutter.flutes)]
 
 
 def flute_radii(cutter: Cutter) -> FloatArray:

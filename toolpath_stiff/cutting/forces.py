@@ -17,8 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.cutting.chips import chip_integrals, chip_pieces, flute_gaps
+from toolpath_stiff.arrays import FloatArray, IntArray, product
+from toolpath_stiff.cutting.chips import chip_integrals, chip_pieces, flute_laws
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.patches import Patches
@@ -46,7 +46,7 @@ def mean_force(
     turning
         (n,) 1 where the spindle turns clockwise (M3), -1 (M4).
     """
-    return _sideways(mean_responses(patches, cutter, feed, turning, coefficients.taper) @ coefficients.values, turning)
+    return _force(mean_responses(patches, cutter, feed, turning, coefficients.taper), coefficients, turning)
 
 
 def peak_force(
@@ -77,11 +77,12 @@ def force_at(
     With a spindle that turns counter-clockwise the angles count counter-clockwise from the right of the feed.
     """
     response = responses(patches, cutter, feed, turning, angle, coefficients.taper)
-    return _sideways(response @ coefficients.values, turning[:, None])
+    return _force(response, coefficients, turning[:, None])
 
 
-def _sideways(force: FloatArray, turning: FloatArray) -> FloatArray:
-    """Forces of stations that were computed mirrored, back in their frame."""
+def _force(response: FloatArray, coefficients: Coefficients, turning: FloatArray) -> FloatArray:
+    """Forces (..., 3) from those per coefficient (..., 3, 6); stations that were computed mirrored in their frame."""
+    force = product(response, coefficients.values[:, None])[..., 0]
     force[..., 1] *= turning
     return force
 
@@ -106,9 +107,7 @@ def responses(
     return total
 
 
-def mean_responses(
-    patches: Patches, cutter: Cutter, feed: FloatArray, turning: FloatArray, taper: float
-) -> FloatArray:
+def mean_responses(patches: Patches, cutter: Cutter, feed: FloatArray, turning: FloatArray, taper: float) -> FloatArray:
     """(n, 3, 6) mean forces over a turn per coefficient; mirrored as `responses`."""
     patches, _, hand = _seen_clockwise(patches, cutter, feed, turning)
     total = np.zeros((len(feed), 1, 3, 6))
@@ -116,8 +115,8 @@ def mean_responses(
     rows = straight.station
     arcs = np.stack([straight.entry, straight.exit], axis=1)
     moments = np.zeros((6, len(rows), 1))
-    for pieces, count in _laws(cutter, taper):
-        integrals = chip_integrals(arcs, feed[rows, 0], pieces)
+    for gaps, count in flute_laws(cutter):
+        integrals = chip_integrals(arcs, feed[rows, 0], chip_pieces(gaps, taper))
         moments += count * (integrals[..., 1:] - integrals[..., :1])
     moments *= ((straight.high - straight.low) / TURN)[:, None]
     _add_moments(total, _per_station(moments, rows, len(feed)))
@@ -176,28 +175,20 @@ def _below(patches: Patches, height: float) -> Patches:
     return replace(patches, high=np.minimum(patches.high, height)).take(patches.low < height)
 
 
-def _laws(cutter: Cutter, taper: float) -> list[tuple[FloatArray, int]]:
-    """Pieces of the chip of each flute and how many flutes have them: all the same without run-out."""
-    gaps = flute_gaps(cutter)
-    if not cutter.run_out:
-        return [(chip_pieces(gaps[0], taper), cutter.flutes)]
-    return [(chip_pieces(row, taper), 1) for row in gaps]
-
-
 def _cylinder(
     patches: Patches, cutter: Cutter, feed: FloatArray, lag: FloatArray, angle: FloatArray, taper: float
 ) -> FloatArray:
     """(6, p, a) integrals of the chip over the height of each patch, of all flutes."""
     entry, leave = np.minimum(patches.entry, np.pi)[:, None], np.minimum(patches.exit, np.pi)[:, None]
     total = np.zeros((6, *angle.shape))
-    laws = _laws(cutter, taper)
     flute = 0
-    for pieces, count in laws:
+    for gaps, count in flute_laws(cutter):
+        pieces = chip_pieces(gaps, taper)
         arc = chip_integrals(np.concatenate([entry, leave], axis=1), feed, pieces)
         arc = arc[..., 1:] - arc[..., :1]
         for _ in range(count):
             for sign, height in ((1.0, patches.low), (-1.0, patches.high)):
-                phi = angle + (TURN * flute / cutter.flutes - lag * height)[:, None]
+                phi = angle - (TURN * flute / cutter.flutes + lag * height)[:, None]
                 turns = np.floor(phi / TURN)
                 phi -= TURN * turns
                 total += sign * (chip_integrals(np.clip(phi, entry, leave), feed, pieces) + turns * arc)
@@ -205,7 +196,7 @@ def _cylinder(
     return total / lag[:, None]
 
 
-def _per_station(values: FloatArray, station: FloatArray, count: int, axis: int = 1) -> FloatArray:
+def _per_station(values: FloatArray, station: IntArray, count: int, axis: int = 1) -> FloatArray:
     """Sums over the rows of each station, rows along an axis."""
     values = np.moveaxis(values, axis, 0)
     total = np.zeros((count, *values.shape[1:]))
