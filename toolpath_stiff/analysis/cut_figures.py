@@ -56,7 +56,7 @@ def _tool(cut: Cut, number: int) -> Document:
 def _figures(cut: Cut, rows: IntArray) -> Document:
     """Errors of walls and floors at some samples, the largest force, the volume removed."""
     weight, mean = cut.samples.weight[rows], cut.errors[rows]
-    low, high = (ends[rows] for ends in cut.extremes)
+    low, high = cut.lowest[rows], cut.highest[rows]
     force = np.linalg.norm(cut.peak_force[rows], axis=1)
     return {
         "removed_mm3": mm3_from_m3(float(cut.removed[rows].sum())),
@@ -86,7 +86,7 @@ def _errors(mean: FloatArray, low: FloatArray, high: FloatArray, weight: FloatAr
 
 def _worst(path: EvaluatedPath, cut: Cut, sign: float) -> list[Document]:
     """The surfaces that stand out farthest (sign 1) or are cut deepest (-1), each of another line."""
-    low, high = cut.extremes
+    low, high = cut.lowest, cut.highest
     size = np.where(np.isfinite(cut.errors), high if sign > 0.0 else -low, -np.inf)
     size[cut.samples.weight <= 0.0] = -np.inf
     rows, worst = largest_of(cut.samples.line, size)
@@ -105,7 +105,7 @@ def largest_of(group: IntArray, values: FloatArray) -> tuple[IntArray, FloatArra
 
 def surface_at(path: EvaluatedPath, cut: Cut, row: int, surface: int) -> Document:
     """One surface of one sample: where it is, what its error is."""
-    low, high = cut.extremes
+    low, high = cut.lowest, cut.highest
     line, position = int(cut.samples.line[row]), mm_from_m(path.samples.position[row]).tolist()
     source = path.program.source
     return {
@@ -123,7 +123,7 @@ def surface_at(path: EvaluatedPath, cut: Cut, row: int, surface: int) -> Documen
 
 def lines_beyond(cut: Cut, tolerance: float) -> list[tuple[int, float]]:
     """(line, error of the largest size in um) of lines whose surface leaves +-tolerance (m) anywhere, worst first."""
-    low, high = cut.extremes
+    low, high = cut.lowest, cut.highest
     error = np.where(-low > high, low, high)
     made = np.isfinite(error) & (cut.samples.weight > 0.0)[:, None]
     places, worst = largest_of(cut.samples.line, np.where(made, np.abs(error), -np.inf))
@@ -135,7 +135,7 @@ def lines_beyond(cut: Cut, tolerance: float) -> list[tuple[int, float]]:
 
 def cut_columns(path: EvaluatedPath, cut: Cut, rows: slice = slice(None)) -> dict[str, AnyArray]:
     """Column of `cut.csv` -> values in the shop's units, for some rows."""
-    samples, low, high = path.samples, *cut.extremes
+    samples, low, high = path.samples, cut.lowest, cut.highest
     columns: dict[str, AnyArray] = {"line": samples.line[rows], "tool": samples.tool[rows], "s_mm": mm_from_m(samples.s[rows])}
     columns |= {f"{axis}_mm": mm_from_m(samples.position[rows, i]) for i, axis in enumerate("xyz")}
     columns |= {"feed_per_tooth_um": um_from_m(cut.feed_per_tooth[rows])}
@@ -165,7 +165,7 @@ def line_columns(cut: Cut) -> dict[str, AnyArray]:
         "removed_mm3": mm3_from_m3(np.add.reduceat(cut.removed[cuts], first)),
         "largest_force_N": np.maximum.reduceat(force, first),
     }
-    low, high = cut.extremes
+    low, high = cut.lowest, cut.highest
     for i, name in enumerate(SURFACES):
         error = cut.errors[cuts, i]
         weight = np.where(np.isfinite(error), cut.samples.weight[cuts], 0.0)
