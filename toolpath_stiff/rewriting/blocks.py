@@ -189,21 +189,15 @@ def _lead(controls: Controls) -> str:
 
 def _shifted(controls: Controls, plane: str, course: Course) -> list[str]:
     """Straight moves and arcs in place of a move, the first in the block's line."""
-    first, *others = course
-    if others:
-        lead = _lead(controls)
-    lines, edit, axes = [], controls.edit, controls.axes
-    for start, end, arc in (first, *others):
+    lead = _lead(controls) if len(course) > 1 else ""
+    edit, axes = controls.edit, controls.axes
+    lines: list[str] = []
+    for start, end, arc in course:
         if lines:
             controls.edit, controls.current, axes = edit.next_line(lead), None, []
-        if arc is None:
-            controls.motion_word("G1")
-            controls.edit.remove("IJKR")
-        else:
-            controls.motion_word(ARCS[arc.sweep * arc.normal[2] > 0.0])
-            if math.dist(start[:2], end[:2]) < SAME:  # a circle ends where it begins, whatever is rounded
-                controls.edit.remove("XY")
+        controls.motion_word("G1" if arc is None else ARCS[arc.sweep * arc.normal[2] > 0.0])
         closed = arc is not None and math.dist(start[:2], end[:2]) < SAME
+        controls.edit.remove("IJKR" if arc is None else "XY" if closed else "")  # as `_arc` has closed circles
         controls.go(controls.of_setup(end), axes, only=range(2, 6) if closed else range(6))
         if arc is not None:
             _write_center(controls, plane, arc)

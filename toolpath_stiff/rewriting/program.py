@@ -170,12 +170,12 @@ def shift_program(
     >>> from toolpath_stiff.nc.reader import parse_program
     >>> from toolpath_stiff.rewriting.side_shift import SideShift
     >>> program = parse_program("G21 G90 F600
-G0 X0 Y0 Z0
-G1 X10
-G1 Y20 (wall)
-G1 X0
-M30
-", "slot.nc")
+    G0 X0 Y0 Z0
+    G1 X10
+    G1 Y20 (wall)
+    G1 X0
+    M30
+    ", "slot.nc")
     >>> shift = SideShift(program.moves, {2: (np.array([0.0, 1.0]), np.array([-0.02, -0.02]))})  # mm, left is +
     >>> shifted, rows = shift_program(program, (0.0,) * 6, shift.courses)
     >>> print(shifted, end="")

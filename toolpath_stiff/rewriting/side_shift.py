@@ -1,14 +1,15 @@
 """Moves shifted sideways, as a compensation asks for: where they meet, arcs that stay arcs, ramps. mm, degrees.
 
 A shift is to the left of the feed, in the plane across the set-up's z axis; heights stay as they are. The plan view is
-in complex numbers x + i y. Neighbours that are both shifted meet where their shifted courses intersect; a move without a
-shift of its own (a lead-in, a link) carries the shift of its neighbour down to nothing; rapids, plunges, moves of the
+in complex numbers x + i y. Neighbours that are both shifted meet where their shifted courses intersect; a move without
+a shift of its own (a lead-in, a link) carries the shift of its neighbour down to nothing; rapids, plunges, moves of the
 rotary axes and arcs that stand on edge are never shifted, so that the shift ramps within its own move beside them.
 """
 
 import cmath
+import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -29,17 +30,19 @@ RAMP = 1.0  # mm, over which a shift comes and goes
 LARGEST_MITRE = 3.0  # of the shift: neighbours that would meet further out ramp instead
 STEEPEST = 5.0  # lengths of a shift over which it may come and go at least
 SHALLOW = 0.1  # of singular values: neighbours within some 11 degrees of one line meet at the mean of their shifts
+LARGEST_PIECE = math.pi / 8.0  # of an arc whose shift varies: circles through three points are within 0.3 um of that
 STRAIGHT = 1e5  # mm: an arc of more is straight
 
 
 def movable_rows(moves: Moves) -> BoolArray:
-    """(n,) moves that may be shifted: feeds and flat arcs of the linear axes, no plunges, nothing in machine numbers."""
+    """(n,) moves that may be shifted: feeds and flat arcs of linear axes, no plunges, nothing in machine numbers."""
     plan = np.linalg.norm(moves.end[:, :2] - moves.start[:, :2], axis=1)
     plan = np.where(moves.arc_sweep != 0.0, move_lengths(moves), plan)
     steep = np.abs(moves.end[:, 2] - moves.start[:, 2]) * math.tan(defaults.PLUNGE_ANGLE) >= plan
     flat = (moves.arc_sweep == 0.0) | (np.abs(moves.arc_normal[:, 2]) > 1.0 - 1e-9)
     still = np.logical_and.reduce([moves.start[:, axis] == moves.end[:, axis] for axis in (3, 4, 5)])
-    return np.isin(moves.motion, (FEED, ARC)) & flat & still & ~steep & ~moves.from_machine.any(axis=1)
+    feeds = np.isin(moves.motion, (FEED, ARC)) & ~moves.from_machine.any(axis=1)
+    return np.asarray(feeds & flat & still & ~steep)
 
 
 class SideShift:
@@ -75,8 +78,9 @@ class SideShift:
         self._length = mm_from_m(move_lengths(moves))
         self._movable = movable_rows(moves)
         same = np.logical_and.reduce([moves.start[1:, axis] == moves.end[:-1, axis] for axis in range(6)])
+        same &= (moves.tool[1:] == moves.tool[:-1]) & self._movable[1:] & self._movable[:-1]
         # (n + 1,) whether a move meets the one before it so that both may be shifted there
-        self._joined = np.concatenate([[False], same & self._movable[1:] & self._movable[:-1], [False]])
+        self._joined = np.concatenate([[False], same, [False]])
         self.refused = {row: "a plunge or another move that is not shifted" for row in shifts if not self._movable[row]}
         while True:
             self.error = 0.0
@@ -107,7 +111,7 @@ class SideShift:
         if self._sweep[row] == 0.0:
             return float((moved * self._left(row, point).conjugate()).real)
         center = self._center[row]
-        return math.copysign(1.0, self._sweep[row]) * (abs(point - center) - abs(point + moved - center))
+        return math.copysign(1.0, self._sweep[row]) * float(abs(point - center) - abs(point + moved - center))
 
     def _joints(self) -> dict[int, complex]:
         """Row -> by how much its start moves, where it meets the end of the row before."""
@@ -152,7 +156,7 @@ class SideShift:
 
     def _course(self, row: int) -> Course:
         first, last = self._joint.get(row, 0j), self._joint.get(row + 1, 0j)
-        start, end = complex(self._start[row]) + first, complex(self._end[row]) + last
+        start, end = complex(self._start[row] + first), complex(self._end[row] + last)
         knots = self._shifts.get(row)
         if knots is None:
             center = complex(self._center[row])
@@ -162,18 +166,25 @@ class SideShift:
                 center += first
             return [self._stretch(row, (0.0, 1.0), start, end, center, float(self._sweep[row]))]
         shares, shift = self._with_ramps(row, *knots, (first, last))
-        keep = self._pieces(shares * self._length[row], shift)
-        shares, shift = shares[keep], shift[keep]
+        steady = float(np.ptp(shift)) <= TOLERANCE
+        parts = 1 if steady else max(1, math.ceil(abs(self._sweep[row]) / LARGEST_PIECE))
+        borders = np.linspace(0.0, 1.0, parts + 1)
+        at_all = np.union1d(shares, borders)
+        shift = np.interp(at_all, shares, shift)
+        keep = self._pieces(at_all * self._length[row], shift, np.searchsorted(at_all, borders).tolist())
+        shares, shift = at_all[keep], shift[keep]
         points = [start, *(self._point(row, u, e) for u, e in zip(shares[1:-1], shift[1:-1], strict=True)), end]
         course = []
-        for part, (a, b) in enumerate(zip(points[:-1], points[1:], strict=True)):
+        for part, (a, b) in enumerate(itertools.pairwise(points)):
             span = float(shares[part]), float(shares[part + 1])
             if self._sweep[row] == 0.0:
                 center, sweep = 0j, 0.0
-            elif len(keep) == 2 and abs(shift[1] - shift[0]) <= TOLERANCE:
+            elif steady:
                 center = complex(self._center[row])
                 old = complex(self._start[row]) - center, complex(self._end[row]) - center
-                sweep = float(self._sweep[row]) + cmath.phase((b - center) / old[1]) - cmath.phase((a - center) / old[0])
+                sweep = (
+                    float(self._sweep[row]) + cmath.phase((b - center) / old[1]) - cmath.phase((a - center) / old[0])
+                )
             else:
                 middle = self._point(row, sum(span) / 2.0, float(shift[part] + shift[part + 1]) / 2.0)
                 center, sweep = _arc_through(a, middle, b)
@@ -194,9 +205,8 @@ class SideShift:
             shift = shift + off * np.maximum(0.0, 1.0 - along / ramp)
         return all_shares, shift
 
-    def _pieces(self, along: FloatArray, shift: FloatArray) -> list[int]:
-        """Rows of knots between which straight lines stay within `TOLERANCE`, no two closer than `SHORTEST`."""
-        keep = [0, len(along) - 1]
+    def _pieces(self, along: FloatArray, shift: FloatArray, keep: list[int]) -> list[int]:
+        """Rows of knots between which straight lines stay within `TOLERANCE`; those added are `SHORTEST` apart."""
         while True:
             off = np.abs(np.interp(along, along[keep], shift[keep]) - shift)
             near = np.abs(along[:, None] - along[keep]).min(axis=1) < SHORTEST
@@ -213,7 +223,7 @@ class SideShift:
             center = complex(self._center[row])
             growth = abs(self._end[row] - center) / abs(start - center) - 1.0
             point = center + (start - center) * (1.0 + share * growth) * cmath.rect(1.0, share * sweep)
-        return point + shift * self._left(row, point)
+        return complex(point + float(shift) * self._left(row, point))
 
     def _stretch(
         self, row: int, span: tuple[float, float], start: complex, end: complex, center: complex, sweep: float
@@ -227,7 +237,9 @@ class SideShift:
     def _turned(self, row: int, course: Course) -> bool:
         """Whether a shift has turned a move, or a part of it, around."""
         if self._sweep[row]:
-            return any(arc is not None and arc.sweep * self._normal[row] * self._sweep[row] <= 0.0 for *_, arc in course)
+            return any(
+                arc is not None and arc.sweep * self._normal[row] * self._sweep[row] <= 0.0 for *_, arc in course
+            )
         along = (self._end[row] - self._start[row]).conjugate()
         return any(((b[0] - a[0] + 1j * (b[1] - a[1])) * along).real <= 0.0 for a, b, _ in course)
 
@@ -242,5 +254,3 @@ def _arc_through(start: complex, middle: complex, end: complex) -> tuple[complex
     center = start + to_center
     sweep = cmath.phase((middle - center) / (start - center)) + cmath.phase((end - center) / (middle - center))
     return center, sweep
-
-
