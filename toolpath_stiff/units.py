@@ -41,6 +41,21 @@ def m_from_um(um: T) -> T:
     return um / 1e6
 
 
+def m_from_nm(nm: T) -> T:
+    """Metres from nanometres, as of nm/N."""
+    return nm / 1e9
+
+
+def nm_from_m(m: T) -> T:
+    """Nanometres from metres, as of nm/N."""
+    return m * 1e9
+
+
+def pa_from_gpa(gpa: T) -> T:
+    """Pascal from gigapascal."""
+    return gpa * 1e9
+
+
 def rad_from_deg(deg: T) -> T:
     """Radians from degrees."""
     return deg * RAD_PER_DEG
@@ -84,6 +99,16 @@ def min_from_s(seconds: T) -> T:
 def per_s_from_per_min(rate: T) -> T:
     """A rate a second from one a minute."""
     return rate / 60.0
+
+
+def rad_per_s_from_per_min(speed: T) -> T:
+    """rad/s from revolutions per minute."""
+    return speed * (360.0 * RAD_PER_DEG / SECONDS_PER_MINUTE)
+
+
+def per_min_from_rad_per_s(speed: T) -> T:
+    """Revolutions per minute from rad/s."""
+    return speed / (360.0 * RAD_PER_DEG / SECONDS_PER_MINUTE)
 
 
 def m_per_s_from_mm_per_min(feed: T) -> T:
