@@ -1,9 +1,10 @@
 """Error of the surface that a cutter leaves: how far it stands aside at the moment when an edge makes the surface.
 
 A wall is made at height z when an edge passes it there (0 or 180 degrees), by the force of all slices that cut at that
-moment: not by the mean force (Kline, DeVor, Shareef, Journal of Engineering for Industry 104 (1982) 272; Budak, Altintas,
-International Journal of Machine Tools and Manufacture 34 (1994) 1141). A floor is passed twice, ahead and behind, and the
-lower pass counts; a ball or a corner radius makes a point of the surface where its normal is that of the surface.
+moment: not by the mean force (Kline, DeVor, Shareef, Journal of Engineering for Industry 104 (1982) 272; Budak,
+Altintas, International Journal of Machine Tools and Manufacture 34 (1994) 1141). A floor is passed twice, ahead and
+behind, and the lower pass counts; a ball or a corner radius makes a point of the surface where its normal is that of
+the surface.
 
 Errors count along the normal of the surface, out of the part: + material left, - cut too deep. With run-out the radius
 counts to the flute that stands out farthest, as where a tool is measured turning. The deflection is quasi-static and
@@ -46,7 +47,7 @@ def wall_error(
     compliance: FloatArray,
     walls: FloatArray,
 ) -> Surface:
-    """(n, 2, HEIGHTS) m, error of the walls to the left and right of n stations, from the lower to the upper end of each.
+    """(n, 2, HEIGHTS) m, error of the walls to the left and right of n stations, from lower to upper end.
 
     Parameters
     ----------
@@ -66,7 +67,7 @@ def wall_error(
     error, deviation = np.full((len(feed), 2, HEIGHTS), np.nan), np.full((len(feed), 2), np.nan)
     nodes, weights = shares()
     for side, (angle, outward) in enumerate(((0.0, -1.0), (np.pi, 1.0))):
-        cut = np.isfinite(walls[:, side]).all(axis=1)
+        cut = np.asarray(np.isfinite(walls[:, side]).all(axis=1))
         low, high = walls[cut, side, :, None].swapaxes(0, 1)
         heights = low + (high - low) * nodes
         normal = np.broadcast_to([0.0, outward, 0.0], (*heights.shape, 3))
@@ -102,7 +103,7 @@ def floor_error(
         Errors, nan where no surface stays; (n,) m, standard deviation of their mean that comes from the coefficients.
     """
     error, deviation = np.full((len(feed), STRIPS), np.nan), np.full(len(feed), np.nan)
-    cut = np.isfinite(strip).all(axis=1)
+    cut = np.asarray(np.isfinite(strip).all(axis=1))
     right, left = strip[cut, :, None].swapaxes(0, 1)
     aside = right + (left - right) * (np.arange(STRIPS) + 0.5) / STRIPS
     flat = cutter.radius - cutter.corner_radius
