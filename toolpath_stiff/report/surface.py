@@ -1,10 +1,12 @@
 """The finished part as quadrangles with the error on each: for pictures, the page and a file to take away."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray, product
 from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.cutting.final_surface import finished_surface
+from toolpath_stiff.rotations import rotation_matrices
 
 Quads = tuple[FloatArray, FloatArray, IntArray]
 STEEP = 2.0  # rise over the width of a cell beyond which it is a wall, which has quadrangles of its own
@@ -21,6 +23,18 @@ def surface_of(cut: Cut, most: int) -> Quads:
     parts = [_walls(cut, 0, most), _walls(cut, 1, most), _floors(cut, most)]
     quads, error, sample = (np.concatenate(column) for column in zip(*parts, strict=True))
     return quads, error, sample
+
+
+def in_machine(points: FloatArray, origin: ArrayLike) -> FloatArray:
+    """(k, 3) m in machine coordinates, of points of the set-up frame whose zero sits at `origin` (m, rad)."""
+    zero = np.asarray(origin, dtype=float)
+    return product(points, rotation_matrices(zero[3:]).T) + zero[:3]
+
+
+def error_limit(error: FloatArray) -> float:
+    """End of a scale of colours, m: what 99 % of the quadrangles with an error keep within, a nanometre at least."""
+    known = np.abs(error[np.isfinite(error)])
+    return max(float(np.quantile(known, 0.99)), 1e-9) if len(known) else 1e-9
 
 
 def _walls(cut: Cut, side: int, most: int) -> Quads:
