@@ -26,6 +26,11 @@ def m_from_mm(mm: T) -> T:
     return mm / 1e3
 
 
+def mm3_from_m3(m3: T) -> T:
+    """Cubic millimetres from cubic metres."""
+    return m3 * 1e9
+
+
 def mm_from_m(m: T) -> T:
     """Millimetres from metres."""
     return m * 1e3
@@ -124,3 +129,13 @@ def rad_per_s_from_deg_per_min(feed: T) -> T:
 def mm_per_min_from_m_per_s(feed: T) -> T:
     """mm/min from m/s."""
     return feed * 60e3
+
+
+def pa_from_n_per_mm2(pressure: T) -> T:
+    """N/m2 from N/mm2."""
+    return pressure * 1e6
+
+
+def n_per_mm2_from_pa(pressure: T) -> T:
+    """N/mm2 from N/m2."""
+    return pressure / 1e6
