@@ -1,7 +1,7 @@
 """A program without the micrometres that its cutting forces make."""
 
-from pathlib import Path
 from dataclasses import replace
+from pathlib import Path
 
 from toolpath_stiff.api import inputs
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, cut_setup
@@ -10,10 +10,10 @@ from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.cutting.compensation import Compensation, compensate_program
 from toolpath_stiff.cutting.cut import Cut, evaluate_cut
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.lines import split_lines
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.nc.reader import read
-from toolpath_stiff.nc.lines import split_lines
 from toolpath_stiff.options import checked
 from toolpath_stiff.results import Progress, teller
 from toolpath_stiff.units import m_from_mm
@@ -32,7 +32,7 @@ def compensate(
     decimals: inputs.Decimals = None,
     progress: Progress | None = None,
 ) -> Compensation:
-    """A program whose path is shifted against the deflection of its final walls.
+    r"""A program whose path is shifted against the deflection of its final walls.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def compensate(
     ------
     InputError
         Nothing is known of the cut, no pass makes a final wall, or a block cannot be written otherwise: where and why.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> text = "G21 G90\\nT1 M6\\nS8000 M3\\nG0 X-20 Y0 Z5\\nG1 Z-4 F300\\nG1 X80 F900\\nG0 Z5\\nM2\\n"
     """
-    on, part, origin, setup = machine_from(machine), program_from(program), origin_si(origin_mm_deg), cut_setup(cut, material, stock_mm)
+    on, part, origin, setup = (
+        machine_from(machine),
+        program_from(program),
+        origin_si(origin_mm_deg),
+        cut_setup(cut, material, stock_mm),
+    )
     if setup is None:
         raise InputError("no cut to compensate", hint="say --cut FILE, or --material and --stock")
     model = on.running(part)
@@ -75,6 +75,4 @@ def compensate(
     def reread(text: str) -> ReadProgram:
         return read(replace(part.placed(origin, default), lines=split_lines(text, part.name), path=""))
 
-    return compensate_program(
-        first, place, evaluate, reread, decimals=decimals, control=part.request.controller
-    )
+    return compensate_program(first, place, evaluate, reread, decimals=decimals, control=part.request.controller)

@@ -24,7 +24,7 @@ Shifts = Mapping[int, tuple[FloatArray, FloatArray]]
 Stretch = tuple[list[float], list[float], Arc | None]  # start and end (6) in the set-up frame, a part of a shifted move
 Course = list[Stretch]
 
-TOLERANCE = 1e-3  # mm, of a shift that varies along a move: straight pieces and arcs of constant radius stay within it
+TOLERANCE = 5e-4  # mm, of a shift that varies along a move: straight pieces and arcs of constant radius stay within it
 SHORTEST = 0.2  # mm, the shortest piece into which a move is cut
 RAMP = 1.0  # mm, over which a shift comes and goes
 LARGEST_MITRE = 3.0  # of the shift: neighbours that would meet further out ramp instead
