@@ -1,8 +1,8 @@
 """Thickness of the chip before each flute, with run-out, and its integrals over the angle of the edge.
 
 Flutes are numbered in the order in which they pass: flute j stands 2 pi j / N behind flute 0, and, with a run-out rho,
-R + rho cos(lambda + 2 pi j / N) from the axis (Kline, DeVor, International Journal of Machine Tool Design and Research 23
-(1983) 123). It cuts what the m flutes before it left, so that the chip is
+R + rho cos(lambda + 2 pi j / N) from the axis (Kline, DeVor, International Journal of Machine Tool Design and Research
+23 (1983) 123). It cuts what the m flutes before it left, so that the chip is
 
     h_j = max(0, min over m of m u + R_j - R_(j-m)),    u = f sin(phi),
 

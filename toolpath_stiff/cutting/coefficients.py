@@ -24,14 +24,9 @@ from toolpath_stiff.units import (
 
 SYMBOLS = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
 SHOWN = np.array([n_per_mm2_from_pa(1.0)] * 3 + [n_per_mm_from_n_per_m(1.0)] * 3)  # N/mm2 and N/mm per SI
-SPREAD = 0.3  # relative standard deviation where none is stated: one aluminium measured by many spreads by a factor 2
-UNKNOWN = (
-    0.3,
-    1.0,
-)  # standard deviation of what is not published, as shares of Ktc and Kte: of the size of radial ones
-TAPER = (
-    1e-6  # m of chip over which the force at the edge sets in; assumed, so that no force jumps where the chip begins
-)
+SPREAD = 0.3  # relative standard deviation where none is stated: of one aluminium, published ones spread by a factor 2
+UNKNOWN = (0.3, 1.0)  # standard deviation of what is not known, shares of Ktc and Kte: the size of radial ones
+TAPER = 1e-6  # m of chip over which the force at the edge sets in: assumed, so that no force jumps
 STRONGEST = 1e5  # N/mm2, N/mm: twenty times a nickel alloy
 KEYS = ("material", "origin", "cutting_N_per_mm2", "edge_N_per_mm", "covariance", "spread_percent", "thinnest_chip_um",
         "thickest_chip_um")  # fmt: skip
@@ -96,13 +91,11 @@ class Coefficients:
 def materials() -> dict[str, Coefficients]:
     """Name -> coefficients of the materials that ship with the package."""
     reader = TomlReader.read(Path(__file__).parent.parent / "data" / "materials.toml", "materials")
-    return {
-        name: coefficients_from(
-            {"material": table["title"], **{key: value for key, value in table.items() if key != "title"}},
-            lambda key, mistake, expected, name=name: reader.error(mistake, expected, where=f"{name}.{key}"),
-        )
-        for name, table in reader.data.items()
-    }
+
+    def fault(key: str, mistake: str, expected: str) -> InputError:
+        return reader.error(mistake, expected)
+
+    return {name: coefficients_from(table, fault) for name, table in reader.data.items()}
 
 
 def material(name: str) -> Coefficients:
@@ -209,7 +202,5 @@ def _covariance(table: Document, values: FloatArray, fault: Fault) -> FloatArray
         covariance = np.zeros(0)
     sound = covariance.shape == (6, 6) and np.isfinite(covariance).all() and np.allclose(covariance, covariance.T)
     if not sound or np.linalg.eigvalsh(covariance)[0] < -1e-6 * np.trace(covariance):
-        raise fault(
-            "covariance", f"covariance = {shortened(rows)}", "6 rows of 6 numbers, symmetric, no negative variance"
-        )
+        raise fault("covariance", f"covariance = {shortened(rows)}", "6 rows of 6 numbers, a covariance")
     return covariance

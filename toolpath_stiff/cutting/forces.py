@@ -1,11 +1,11 @@
 """Forces on a cutter from where it touches the stock: at an angle of the spindle, their mean and peak over a turn.
 
-All is linear in the six coefficients (tangential, radial, axial; of the chip and of the edge): `responses` are forces per
-coefficient. Along the cylinder of a cutter the integral over the height is one over the angle, as a flute lags by
+All is linear in the six coefficients (tangential, radial, axial; of the chip and of the edge): `responses` are forces
+per coefficient. Along the cylinder of a cutter the integral over the height is one over the angle, as a flute lags by
 tan(helix) / R, and has a closed antiderivative (`chips`); round a corner radius or a ball it is taken by Gauss's rule
 (`torus`). Altintas, Manufacturing Automation, 2nd ed., chapter 2; Budak, Altintas, Armarego, Journal of Manufacturing
-Science and Engineering 118 (1996) 216; Engin, Altintas, International Journal of Machine Tools and Manufacture 41 (2001)
-2195.
+Science and Engineering 118 (1996) 216; Engin, Altintas, International Journal of Machine Tools and Manufacture 41
+(2001) 2195.
 
 Frame: x along the horizontal feed, y to its left, z along the tool, up. Angles count clockwise seen from above from the
 left of the feed. Forces act on the tool. A spindle that turns the other way (M4) is the mirror image across the feed;
@@ -90,7 +90,7 @@ def _force(response: FloatArray, coefficients: Coefficients, turning: FloatArray
 def responses(
     patches: Patches, cutter: Cutter, feed: FloatArray, turning: FloatArray, angle: FloatArray, taper: float
 ) -> FloatArray:
-    """(n, a, 3, 6) forces per coefficient at angles (n, a) of flute 0; mirrored where the spindle turns the other way."""
+    """(n, a, 3, 6) forces per coefficient at angles (n, a) of flute 0; mirrored where the spindle turns so."""
     patches, lag, hand = _seen_clockwise(patches, cutter, feed, turning)
     total = np.zeros((*angle.shape, 3, 6))
     straight = _above(patches, cutter.corner_radius)
@@ -139,13 +139,13 @@ def blocks(patches: Patches, count: int, size: int = BLOCK) -> Iterator[tuple[sl
 
 def lag_per_height(cutter: Cutter) -> float:
     """Angle by which a flute lags per height above the tip, rad/m; less than 0 of a left-hand helix."""
-    return cutter.hand * max(np.tan(cutter.helix) / (0.5 * cutter.diameter), LEAST_LAG)
+    return cutter.hand * max(float(np.tan(cutter.helix)) / cutter.radius, LEAST_LAG)
 
 
 def _seen_clockwise(
     patches: Patches, cutter: Cutter, feed: FloatArray, turning: FloatArray
 ) -> tuple[Patches, FloatArray, FloatArray]:
-    """Patches of stations that move, mirrored where the spindle turns the other way; lag (n,) and hand (n,) as seen then."""
+    """Patches of stations that move, mirrored where the spindle turns the other way; lag (n,), hand (n,) as seen so."""
     moving = feed[patches.station, 0] > 0.0
     if not moving.all():
         patches = patches.take(moving)

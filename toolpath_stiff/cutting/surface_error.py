@@ -1,9 +1,10 @@
 """Error of the surface that a cutter leaves: how far it stands aside at the moment when an edge makes the surface.
 
 A wall is made at height z when an edge passes it there (0 or 180 degrees), by the force of all slices that cut at that
-moment: not by the mean force (Kline, DeVor, Shareef, Journal of Engineering for Industry 104 (1982) 272; Budak, Altintas,
-International Journal of Machine Tools and Manufacture 34 (1994) 1141). A floor is passed twice, ahead and behind, and the
-lower pass counts; a ball or a corner radius makes a point of the surface where its normal is that of the surface.
+moment: not by the mean force (Kline, DeVor, Shareef, Journal of Engineering for Industry 104 (1982) 272; Budak,
+Altintas, International Journal of Machine Tools and Manufacture 34 (1994) 1141). A floor is passed twice, ahead and
+behind, and the lower pass counts; a ball or a corner radius makes a point of the surface where its normal is that of
+the surface.
 
 Errors count along the normal of the surface, out of the part: + material left, - cut too deep. With run-out the radius
 counts to the flute that stands out farthest, as where a tool is measured turning. The deflection is quasi-static and
@@ -23,7 +24,7 @@ from toolpath_stiff.cutting.patches import Patches
 
 HEIGHTS = 9  # of a wall at which its error is computed, both ends among them
 STRIPS = 5  # of a floor
-Surface = tuple[FloatArray, FloatArray]  # error (n, ...) m, and the standard deviation (n, ...) m of its mean
+Passes = tuple[FloatArray, ...]  # errors (n, h) m, their slopes (n, h, 6) over the coefficients, forces (n, h, 3) N
 
 
 def shares() -> tuple[FloatArray, FloatArray]:
@@ -45,8 +46,8 @@ def wall_error(
     turning: FloatArray,
     compliance: FloatArray,
     walls: FloatArray,
-) -> Surface:
-    """(n, 2, HEIGHTS) m, error of the walls to the left and right of n stations, from the lower to the upper end of each.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(n, 2, HEIGHTS) m, error of the walls to the left and right of n stations, from lower to upper end.
 
     Parameters
     ----------
@@ -61,20 +62,23 @@ def wall_error(
     -------
     tuple of FloatArray
         Errors, nan where there is no wall; (n, 2) m, standard deviation of their mean over the height that comes from
-        the coefficients.
+        the coefficients; (n, 2, 3) N, force on the tool while the wall is made, mean over its height.
     """
     error, deviation = np.full((len(feed), 2, HEIGHTS), np.nan), np.full((len(feed), 2), np.nan)
+    force = np.full((len(feed), 2, 3), np.nan)
     nodes, weights = shares()
     for side, (angle, outward) in enumerate(((0.0, -1.0), (np.pi, 1.0))):
-        cut = np.isfinite(walls[:, side]).all(axis=1)
+        cut = np.asarray(np.isfinite(walls[:, side]).all(axis=1))
         low, high = walls[cut, side, :, None].swapaxes(0, 1)
         heights = low + (high - low) * nodes
         normal = np.broadcast_to([0.0, outward, 0.0], (*heights.shape, 3))
         pull = _pull(normal, compliance[cut], turning[cut])
         tip = _tip_angle(cutter, np.full_like(heights, angle), heights, turning[cut])
-        error[cut, side], slope = _errors(_of(patches, cut), cutter, coefficients, feed[cut], turning[cut], tip, pull)
+        chosen = (_of(patches, cut), cutter, coefficients, feed[cut], turning[cut])
+        error[cut, side], slope, acting = _errors(*chosen, tip, pull)
         deviation[cut, side] = _deviation((slope * weights[:, None]).sum(axis=1), coefficients)
-    return error, deviation
+        force[cut, side] = (acting * weights[:, None]).sum(axis=1)
+    return error, deviation, force
 
 
 def floor_error(
@@ -85,7 +89,7 @@ def floor_error(
     turning: FloatArray,
     compliance: FloatArray,
     strip: FloatArray,
-) -> Surface:
+) -> tuple[FloatArray, FloatArray]:
     """(n, STRIPS) m, error of the surface below n stations, from the right to the left end of each strip.
 
     Parameters
@@ -102,7 +106,7 @@ def floor_error(
         Errors, nan where no surface stays; (n,) m, standard deviation of their mean that comes from the coefficients.
     """
     error, deviation = np.full((len(feed), STRIPS), np.nan), np.full(len(feed), np.nan)
-    cut = np.isfinite(strip).all(axis=1)
+    cut = np.asarray(np.isfinite(strip).all(axis=1))
     right, left = strip[cut, :, None].swapaxes(0, 1)
     aside = right + (left - right) * (np.arange(STRIPS) + 0.5) / STRIPS
     flat = cutter.radius - cutter.corner_radius
@@ -118,7 +122,7 @@ def floor_error(
     passes = [
         _errors(*chosen, _tip_angle(cutter, angle, height, turning[cut]), pull) for angle in (ahead, TURN - ahead)
     ]
-    error[cut], slopes = _lowest(passes)
+    error[cut], slopes, _ = _lowest(passes)
     deviation[cut] = _deviation(slopes.mean(axis=1), coefficients)
     return error, deviation
 
@@ -152,29 +156,34 @@ def _errors(
     turning: FloatArray,
     tip: FloatArray,
     pull: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """(n, h) m of the lowest of the flutes' passes, and (n, h, 6) its slope over the coefficients."""
+) -> Passes:
+    """The lowest of the flutes' passes."""
     radii = flute_radii(cutter) if cutter.run_out else np.zeros(1)
-    error, slope = np.zeros(tip.shape), np.zeros((*tip.shape, 6))
+    lowest = np.zeros(tip.shape), np.zeros((*tip.shape, 6)), np.zeros((*tip.shape, 3))
     for block, part in blocks(patches, len(tip)):
         passes = []
         for flute, short in enumerate(radii.max() - radii):
             angle = tip[block] + TURN * flute / cutter.flutes
             response = responses(part, cutter, feed[block], turning[block], angle, coefficients.taper)
-            per_coefficient = product(pull[block][..., None, :], response)[..., 0, :]
-            moved = product(per_coefficient[..., None, :], coefficients.values[:, None])[..., 0, 0]
-            passes.append((moved + short, per_coefficient))
-        error[block], slope[block] = _lowest(passes)
-    return error, slope
+            slope = product(pull[block][..., None, :], response)[..., 0, :]
+            force = product(response, coefficients.values[:, None])[..., 0]
+            passes.append(((pull[block] * force).sum(axis=-1) + short, slope, force))
+        for whole, values in zip(lowest, _lowest(passes), strict=True):
+            whole[block] = values
+    lowest[2][..., 1] *= turning[:, None]
+    return lowest
 
 
-def _lowest(passes: list[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
-    """The lowest of several errors (n, h), and its slope (n, h, 6)."""
-    error, slope = passes[0]
-    for other, other_slope in passes[1:]:
-        lower = other < error
-        error, slope = np.where(lower, other, error), np.where(lower[..., None], other_slope, slope)
-    return error, slope
+def _lowest(passes: list[Passes]) -> Passes:
+    """Of several passes the one with the lowest error at each place."""
+    lowest = passes[0]
+    for other in passes[1:]:
+        lower = other[0] < lowest[0]
+        lowest = tuple(
+            np.where(lower if values.ndim == 2 else lower[..., None], values, old)
+            for values, old in zip(other, lowest, strict=True)
+        )
+    return lowest
 
 
 def _deviation(slope: FloatArray, coefficients: Coefficients) -> FloatArray:
