@@ -53,7 +53,7 @@ class Cut:
     wall_heights
         (n, 2, 2) m above the tip: of the left and right wall that stays, lowest and highest point.
     errors, lowest, highest
-        (n, 3) m, error of left wall, right wall, and the floor or a ball's contact: mean over height or width, extremes.
+        (n, 3) m, error of left wall, right wall, and the floor or a ball's contact: mean over it, extremes.
     deviation
         (n, 3) m, standard deviation of `errors`, from the coefficients and the machine.
     assumptions, warnings
@@ -78,8 +78,8 @@ class Cut:
     lowest: FloatArray
     highest: FloatArray
     deviation: FloatArray
-    assumptions: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    assumptions: tuple[str, ...]
+    warnings: tuple[str, ...]
 
     @property
     def wall_mean(self) -> FloatArray:
@@ -129,12 +129,12 @@ def evaluate_cut(
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
     spindle, stock = spindle_of(setup, program, samples), stock_of(setup, program.moves, cutters)
     cut = _nothing_cut(samples, cutters, stock, setup.coefficients, spindle)
-    parts, removed = [], np.zeros(len(samples))
-    for rows, some, volume in engage(stock, program.moves, samples, cutters, progress):
-        removed[rows] = volume
+    given, parts, removed = (stock, program.moves, samples, cutters), [], np.zeros(len(samples))
+    for block, some, volume in engage(*given, progress):
+        removed[block] = volume
         parts.append(some)
     patches = Patches.joined(parts)
-    walls, strips = final_walls(stock, program.moves, samples, cutters), final_strip(stock, program.moves, samples, cutters)
+    walls, strips = final_walls(*given), final_strip(*given)
     cut = replace(cut, removed=removed, wall_heights=walls)
     _note_engagement(cut, patches)
     for number, cutter in cutters.items():
@@ -156,11 +156,19 @@ def _nothing_cut(
         teeth[samples.tool == number] = cutter.flutes
     turning = samples.cutting & (np.abs(spindle) > 0.0)
     per_second = np.where(turning, teeth * np.abs(spindle) / (2.0 * np.pi), 1.0)
-    zeros, nan = np.zeros((6, n)), np.full((4, n, 3), np.nan)
     return Cut(
-        samples, cutters, stock, coefficients, np.where(turning, samples.feed / per_second, np.nan), *zeros[:5],
-        *np.zeros((3, n, 3)), np.full((n, 2, 2), np.nan), *nan,
-    )  # fmt: skip
+        samples=samples,
+        cutters=cutters,
+        stock=stock,
+        coefficients=coefficients,
+        feed_per_tooth=np.where(turning, samples.feed / per_second, np.nan),
+        **{name: np.zeros(n) for name in ("ap", "ae", "entry", "exit", "removed")},
+        **{name: np.zeros((n, 3)) for name in ("mean_force", "peak_force", "deflection")},
+        wall_heights=np.full((n, 2, 2), np.nan),
+        **{name: np.full((n, 3), np.nan) for name in ("errors", "lowest", "highest", "deviation")},
+        assumptions=(),
+        warnings=(),
+    )
 
 
 def _note_engagement(cut: Cut, patches: Patches) -> None:
@@ -226,10 +234,13 @@ def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: 
 
 def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str, ...]:
     """All that was assumed, a sentence each."""
-    sentences = [f"stock: {cut.stock.origin}", f"coefficients of {cut.coefficients.material}: {cut.coefficients.origin}"]
+    sentences = [
+        f"stock: {cut.stock.origin}",
+        f"coefficients of {cut.coefficients.material}: {cut.coefficients.origin}",
+    ]
     sentences += [sentence for cutter in cut.cutters.values() for sentence in cutter.origin]
     sentences += [
-        "the errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; the chip "
+        "errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; the chip "
         "is not thinner for them",
         "a spring pass cuts the stock as programmed, not what the pass before left by its error",
     ]
@@ -247,12 +258,14 @@ def _warnings(cut: Cut) -> tuple[str, ...]:
     if cut.machine_only:
         numbers = [f"T{number}" for number, cutter in cut.cutters.items() if np.isnan(cutter.lateral_compliance)]
         warnings.append(
-            f"machine only: the compliance of {', '.join(numbers)} is not known, and a slim tool gives way more than the "
-            "machine (stick_out_mm in [[tool]] of cut.toml)"
+            f"machine only: the compliance of {', '.join(numbers)} is not known, and a slim tool gives way more than "
+            "the machine (stick_out_mm in [[tool]] of cut.toml)"
         )
     engaged = cut.ap > 0.0
     plunges = samples.cutting & ~engaged & (cut.removed > 0.0)
-    warnings += _lines_warning(samples, plunges, "plunges: cutting with the end is not modelled, no force is known there")
+    warnings += _lines_warning(
+        samples, plunges, "plunges: cutting with the end is not modelled, no force is known there"
+    )
     chip = np.where(engaged, cut.feed_per_tooth, np.nan)
     thin, thick = cut.coefficients.thinnest, cut.coefficients.thickest
     for beyond, words in ((chip < thin, "thinner"), (chip > thick, "thicker")):
