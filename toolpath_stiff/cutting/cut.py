@@ -17,6 +17,7 @@ from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock
 from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import floor_error, shares, wall_error
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
+from toolpath_stiff.cutting.workpiece import Workpiece, workpiece_of
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.poses import Pose
@@ -39,8 +40,8 @@ class Cut:
     ----------
     samples
         In the set-up frame, row for row those of the analysis.
-    cutters, stock, coefficients
-        By tool number; in the set-up frame; of the cutting force.
+    cutters, work, coefficients
+        By tool number; the stock and what is taken from it, set-up frame; of the cutting force.
     feed_per_tooth
         (n,) m.
     ap, ae, entry, exit, removed
@@ -62,7 +63,7 @@ class Cut:
 
     samples: Samples
     cutters: Mapping[int, Cutter]
-    stock: Stock
+    work: Workpiece
     coefficients: Coefficients
     feed_per_tooth: FloatArray
     ap: FloatArray
@@ -80,6 +81,11 @@ class Cut:
     deviation: FloatArray
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
+
+    @property
+    def stock(self) -> Stock:
+        """The stock before the first cut."""
+        return self.work.stock
 
     @property
     def wall_mean(self) -> FloatArray:
@@ -127,9 +133,10 @@ def evaluate_cut(
         Something is missing (which, and where to write it), or a tool is tilted.
     """
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
-    spindle, stock = spindle_of(setup, program, samples), stock_of(setup, program.moves, cutters)
-    cut = _nothing_cut(samples, cutters, stock, setup.coefficients, spindle)
-    given, parts, removed = (stock, program.moves, samples, cutters), [], np.zeros(len(samples))
+    spindle = spindle_of(setup, program, samples)
+    work = workpiece_of(stock_of(setup, program.moves, cutters), program.moves, cutters)
+    cut = _nothing_cut(samples, cutters, work, setup.coefficients, spindle)
+    given, parts, removed = (work, program.moves, samples, cutters), [], np.zeros(len(samples))
     for block, some, volume in engage(*given, progress):
         removed[block] = volume
         parts.append(some)
@@ -147,7 +154,7 @@ def evaluate_cut(
 
 
 def _nothing_cut(
-    samples: Samples, cutters: Mapping[int, Cutter], stock: Stock, coefficients: Coefficients, spindle: FloatArray
+    samples: Samples, cutters: Mapping[int, Cutter], work: Workpiece, coefficients: Coefficients, spindle: FloatArray
 ) -> Cut:
     """A cut to be filled in."""
     n = len(samples)
@@ -159,7 +166,7 @@ def _nothing_cut(
     return Cut(
         samples=samples,
         cutters=cutters,
-        stock=stock,
+        work=work,
         coefficients=coefficients,
         feed_per_tooth=np.where(turning, samples.feed / per_second, np.nan),
         **{name: np.zeros(n) for name in ("ap", "ae", "entry", "exit", "removed")},

@@ -7,10 +7,10 @@ import numpy as np
 
 from toolpath_stiff.analysis.cut_figures import cut_columns, line_columns
 from toolpath_stiff.analysis.results import Analysis
-from toolpath_stiff.arrays import AnyArray
+from toolpath_stiff.arrays import AnyArray, IntArray
 from toolpath_stiff.column_files import csv_pieces
 from toolpath_stiff.documents import Document, number
-from toolpath_stiff.report.pages import markup
+from toolpath_stiff.report.pages import Part, markup
 from toolpath_stiff.report.surface import surface_of
 from toolpath_stiff.report.tables import LABEL, ShownTable
 from toolpath_stiff.report.words import counted, labelled, shortened
@@ -18,6 +18,7 @@ from toolpath_stiff.units import mm_from_m, um_from_m
 
 DECIMALS = {"mm": 6, "um": 4, "N": 4, "deg": 4, "mm3": 6}
 MOST_ROWS = 200
+MOST_QUADS = 60_000  # of walls and of floors in the file
 VTK_BLOCK = 20_000  # lines of a file at a time
 
 
@@ -46,7 +47,7 @@ def surface_vtk(analysis: Analysis) -> Iterator[str]:
     VTK's legacy format (The VTK User's Guide, 11th ed., "Simple Legacy Formats").
     """
     assert analysis.cut is not None
-    quads, error, sample = surface_of(analysis.cut)
+    quads, error, sample = surface_of(analysis.cut, MOST_QUADS)
     n = len(quads)
     yield "# vtk DataFile Version 3.0\n"
     yield f"{shortened(analysis.program.name, 60)}: error of the surface, um\nASCII\nDATASET POLYDATA\n"
@@ -169,3 +170,26 @@ def part_table(heading: str, names: Sequence[str], parts: Sequence[Document]) ->
         for name, part in zip(names, parts, strict=True)
     ]
     return ShownTable((heading, *PART), rows)
+
+
+def cut_tables(analysis: Analysis, rows: IntArray) -> list[tuple[str, Sequence[Part], bool]]:
+    """Title, content and whether it is wide, of the page's tables; `rows` are the samples that the page holds."""
+    if analysis.cut is None:
+        return []
+    summary = analysis.to_dict()
+    document = summary["cut"]
+    names = [f"{row['operation']} {row['name']}" for row in summary["per_operation"]]
+    operations = part_table("operation", names[:MOST_ROWS], document["per_operation"][:MOST_ROWS])
+    tools = part_table("tool", [f"T{part['tool']}" for part in document["per_tool"]], document["per_tool"])
+    worst = [
+        places(document[key], [int(np.searchsorted(rows, entry["sample"])) for entry in document[key]])
+        for key in ("worst_material_left", "worst_cut_too_deep")
+    ]
+    return [
+        ("Cut by operation and tool", [operations, tools], True),
+        ("Cut", [ShownTable((), facts(document))], False),
+        ("Surface error: material left", [worst[0]] if worst[0].rows else [], False),
+        ("Surface error: cut too deep", [worst[1]] if worst[1].rows else [], False),
+        ("Tolerance", [*tolerance(analysis)] if "tolerance" in document else [], False),
+        ("Cut: assumptions", [document["assumptions"]], False),
+    ]
