@@ -161,7 +161,7 @@ def _errors(
     radii = flute_radii(cutter) if cutter.run_out else np.zeros(1)
     lowest = np.zeros(tip.shape), np.zeros((*tip.shape, 6)), np.zeros((*tip.shape, 3))
     for block, part in blocks(patches, len(tip)):
-        passes = []
+        passes: list[Passes] = []
         for flute, short in enumerate(radii.max() - radii):
             angle = tip[block] + TURN * flute / cutter.flutes
             response = responses(part, cutter, feed[block], turning[block], angle, coefficients.taper)
