@@ -91,7 +91,11 @@ def _worst(path: EvaluatedPath, cut: Cut, sign: float) -> list[Document]:
     size[cut.samples.weight <= 0.0] = -np.inf
     rows, worst = largest_of(cut.samples.line, size)
     chosen = np.argsort(-worst, kind="stable")[:PLACES]
-    return [surface_at(path, cut, *divmod(int(row), 3)) for row, by in zip(rows[chosen], worst[chosen], strict=True) if by > 0.0]
+    return [
+        surface_at(path, cut, *divmod(int(row), 3))
+        for row, by in zip(rows[chosen], worst[chosen], strict=True)
+        if by > 0.0
+    ]
 
 
 def largest_of(group: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -136,7 +140,11 @@ def lines_beyond(cut: Cut, tolerance: float) -> list[tuple[int, float]]:
 def cut_columns(path: EvaluatedPath, cut: Cut, rows: slice = slice(None)) -> dict[str, AnyArray]:
     """Column of `cut.csv` -> values in the shop's units, for some rows."""
     samples, low, high = path.samples, cut.lowest, cut.highest
-    columns: dict[str, AnyArray] = {"line": samples.line[rows], "tool": samples.tool[rows], "s_mm": mm_from_m(samples.s[rows])}
+    columns: dict[str, AnyArray] = {
+        "line": samples.line[rows],
+        "tool": samples.tool[rows],
+        "s_mm": mm_from_m(samples.s[rows]),
+    }
     columns |= {f"{axis}_mm": mm_from_m(samples.position[rows, i]) for i, axis in enumerate("xyz")}
     columns |= {"feed_per_tooth_um": um_from_m(cut.feed_per_tooth[rows])}
     columns |= {f"{name}_mm": mm_from_m(getattr(cut, name)[rows]) for name in ("ap", "ae")}

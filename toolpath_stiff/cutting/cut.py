@@ -134,7 +134,10 @@ def evaluate_cut(
         removed[rows] = volume
         parts.append(some)
     patches = Patches.joined(parts)
-    walls, strips = final_walls(stock, program.moves, samples, cutters), final_strip(stock, program.moves, samples, cutters)
+    walls, strips = (
+        final_walls(stock, program.moves, samples, cutters),
+        final_strip(stock, program.moves, samples, cutters),
+    )
     cut = replace(cut, removed=removed, wall_heights=walls)
     _note_engagement(cut, patches)
     for number, cutter in cutters.items():
@@ -226,7 +229,10 @@ def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: 
 
 def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str, ...]:
     """All that was assumed, a sentence each."""
-    sentences = [f"stock: {cut.stock.origin}", f"coefficients of {cut.coefficients.material}: {cut.coefficients.origin}"]
+    sentences = [
+        f"stock: {cut.stock.origin}",
+        f"coefficients of {cut.coefficients.material}: {cut.coefficients.origin}",
+    ]
     sentences += [sentence for cutter in cut.cutters.values() for sentence in cutter.origin]
     sentences += [
         "the errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; the chip "
@@ -252,7 +258,9 @@ def _warnings(cut: Cut) -> tuple[str, ...]:
         )
     engaged = cut.ap > 0.0
     plunges = samples.cutting & ~engaged & (cut.removed > 0.0)
-    warnings += _lines_warning(samples, plunges, "plunges: cutting with the end is not modelled, no force is known there")
+    warnings += _lines_warning(
+        samples, plunges, "plunges: cutting with the end is not modelled, no force is known there"
+    )
     chip = np.where(engaged, cut.feed_per_tooth, np.nan)
     thin, thick = cut.coefficients.thinnest, cut.coefficients.thickest
     for beyond, words in ((chip < thin, "thinner"), (chip > thick, "thicker")):

@@ -109,7 +109,9 @@ def _stock_in(
     toml.only("stock", table, ("box_mm", "corner_mm", "extents", "stl"))
     kinds = [key for key in ("box_mm", "extents", "stl") if key in table]
     if len(kinds) != 1:
-        raise toml.error(f"[stock] with {' and '.join(kinds) or 'nothing'}", "one of box_mm, extents, stl", where="stock")
+        raise toml.error(
+            f"[stock] with {' and '.join(kinds) or 'nothing'}", "one of box_mm, extents, stl", where="stock"
+        )
     if "corner_mm" in table and kinds != ["box_mm"]:
         raise toml.error("stock.corner_mm without box_mm", "the box that it is of", where="stock.corner_mm")
     size = corner = None
@@ -184,7 +186,9 @@ def stock_of(setup: CutSetup, moves: Moves, cutters: Mapping[int, Cutter]) -> St
         places = []
         for axis, size in zip("xy", setup.size, strict=False):
             middle = m_from_mm(0.5 * (cuts[axis][0] + cuts[axis][1]))
-            places.append(min((-0.5 * size, 0.0, -size), key=lambda low, size=size, m=middle: abs(low + 0.5 * size - m)))
+            places.append(
+                min((-0.5 * size, 0.0, -size), key=lambda low, size=size, m=middle: abs(low + 0.5 * size - m))
+            )
         above = cuts["z"][1] > 0.0 and cuts["z"][0] >= 0.0
         low = (*places, 0.0 if above else -setup.size[2])
         corner = ", ".join(f"{mm_from_m(value) + 0.0:g}" for value in low)

@@ -116,7 +116,7 @@ def vote_words(rival: str, differences: FloatArray) -> str:
 
 
 def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
-    """Explanations that an explanation must outvote beside the model alone: those of other parts, those with less of itself.
+    """Explanations that one must outvote beside the model alone: those of other parts, those with less of itself.
 
     `fits`: all explanations by name; of those with more effects the search has its own price.
     """
