@@ -7,6 +7,7 @@ from toolpath_stiff.analysis.program_check import ProgramCheck as ProgramCheck
 from toolpath_stiff.analysis.results import Analysis as Analysis
 from toolpath_stiff.api.by_hand import Preview as Preview
 from toolpath_stiff.api.by_hand import preview as preview
+from toolpath_stiff.api.cutting import cut_template as cut_template
 from toolpath_stiff.api.effects import check_effects as check_effects
 from toolpath_stiff.api.effects import effect_template as effect_template
 from toolpath_stiff.api.effects import effects as effects
