@@ -26,6 +26,11 @@ def m_from_mm(mm: T) -> T:
     return mm / 1e3
 
 
+def mm3_from_m3(m3: T) -> T:
+    """Cubic millimetres from cubic metres."""
+    return m3 * 1e9
+
+
 def mm_from_m(m: T) -> T:
     """Millimetres from metres."""
     return m * 1e3
@@ -54,16 +59,6 @@ def nm_from_m(m: T) -> T:
 def pa_from_gpa(gpa: T) -> T:
     """Pascal from gigapascal."""
     return gpa * 1e9
-
-
-def n_per_m2_from_n_per_mm2(pressure: T) -> T:
-    """N/m2 from N/mm2."""
-    return pressure * 1e6
-
-
-def n_per_mm2_from_n_per_m2(pressure: T) -> T:
-    """N/mm2 from N/m2."""
-    return pressure / 1e6
 
 
 def rad_from_deg(deg: T) -> T:

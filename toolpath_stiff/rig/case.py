@@ -18,6 +18,11 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE, with_effect
+from toolpath_stiff.rig.fem import FemMachine
+from toolpath_stiff.rig.fem_case import draw_machine, fault_names, path_truth, scattered
+from toolpath_stiff.rig.fem_faults import FAULTS
+from toolpath_stiff.rig.fem_solution import readings as readings_of_elements
+from toolpath_stiff.rig.fem_solution import true_stiffness as stiffness_of_elements
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, disturb_machine, disturb_readings, readings
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
@@ -27,9 +32,11 @@ from toolpath_stiff.rig.sizes import Scale
 from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
+BUILT = ("springs", "fem")  # ways to build a machine, the first by default
 # How often a blind draw hides what, where nothing is said (assumed).
 BLIND = {"none": 0.2, "one": 0.45, "two": 0.15, "outside": 0.2}
 
+KINDS = ("none", "one", "two", "three")  # by how many effects of the catalogue are hidden
 # One stream of random numbers for each purpose, so that a change in one leaves the others as they were.
 _STREAMS = ("kind", "campaign", "machine", "noise")
 
@@ -79,7 +86,8 @@ class DrawnCase:
     truth
         What was hidden: `hidden` (names; empty if nothing), `kind`, `effects` with parameters in shop units,
         their `size` (rms change of ln stiffness) and `detectability` (see `sizes.DETECTABLE`); of an unknown also
-        `links` and `variables`, what a description may name.
+        `links` and `variables`, what a description may name. Of a machine of finite elements `links` and `names`, what
+        the catalogue calls it, and `path`: poses and directions with the true stiffness there.
     nominal, machine, nuisances
         To measure the same machine again.
     seed, layout
@@ -89,21 +97,25 @@ class DrawnCase:
     rows: Table
     truth: Document
     nominal: Nominal
-    machine: HiddenMachine
+    machine: HiddenMachine | FemMachine
     nuisances: Nuisances
     seed: int = 0
     layout: str = ""
 
     def measure(self, table: Table, rows: Rows, rng: Generator, stated_sd: bool = False) -> Table:
         """A table with the column `stiffness_N_per_mm`, and `sd_N_per_mm` if it is to be stated; `rows` in SI."""
-        shown, nuisances = readings(self.nominal, self.machine, rows), self.nuisances
+        machine, nuisances = self.machine, self.nuisances
+        if isinstance(machine, FemMachine):
+            shown, apart = readings_of_elements(self.nominal, machine, rows), machine.clamping * rows.direction**2
+        else:
+            shown, apart = readings(self.nominal, machine, rows), None
         bad = np.flatnonzero(~(np.isfinite(shown) & (shown > 0.0)))
         if len(bad):
             raise InputError(
                 f"row {bad[0] + 1}: the indicator would run backwards on the hidden machine",
                 hint="use a larger load or zero the indicator later (time_min)",
             )
-        stiffness = n_per_mm_from_n_per_m(disturb_readings(shown, clamp_of(table), nuisances, rng))
+        stiffness = n_per_mm_from_n_per_m(disturb_readings(shown, clamp_of(table), nuisances, rng, apart))
         measured: Table = {}
         for name, values in table.items():
             measured[name] = values
@@ -138,6 +150,7 @@ def draw_case(
     machine: str | Nominal = defaults.MACHINE,
     plan: Table | None = None,
     size: float | Sequence[float] | None = None,
+    built: str = BUILT[0],
 ) -> DrawnCase:
     """A blind campaign on a machine that hides something; the same arguments give the same rows.
 
@@ -159,6 +172,8 @@ def draw_case(
     size
         Rms change of ln stiffness that each effect makes, instead of a draw; less where its bound is reached. Several:
         one for each effect, in the order of `truth["hidden"]`.
+    built
+        Of `springs`, or of finite elements (`fem`), whose faults have names of their own (`fem_faults.FAULTS`).
 
     Raises
     ------
@@ -173,8 +188,10 @@ def draw_case(
     nominal = load_nominal(machine) if isinstance(machine, str) else machine
     streams = {name: np.random.default_rng([seed, i]) for i, name in enumerate(_STREAMS)}
     table = campaign(layout, nominal, plan, streams["campaign"])
-    names = _names(hidden, layout, table, streams["kind"])
     rows = rows_of(table)
+    if built == "fem":
+        return _elements(seed, layout, hidden, size, nuisances, nominal, table, rows, streams)
+    names = _names(hidden, layout, table, streams["kind"])
     true, effects = HiddenMachine(), []
     if names:
         scale = Scale(nominal, rows, clamp_of(table), nuisances)
@@ -189,11 +206,41 @@ def draw_case(
     true = disturb_machine(true, nuisances, streams["machine"])
     truth = {
         "hidden": list(names),
-        "kind": "outside" if {*names} & {*OUTSIDE} else ("none", "one", "two", "three")[min(len(names), 3)],
+        "kind": "outside" if {*names} & {*OUTSIDE} else KINDS[min(len(names), 3)],
         "effects": effects,
     }
     case = DrawnCase(table, truth, nominal, true, nuisances, seed, layout)
     return replace(case, rows=case.measure(table, rows, streams["noise"], stated_sd=layout == "paper"))
+
+
+def _elements(
+    seed: int,
+    layout: str,
+    hidden: str | Sequence[str] | None,
+    size: float | Sequence[float] | None,
+    nuisances: Nuisances,
+    nominal: Nominal,
+    table: Table,
+    rows: Rows,
+    streams: dict[str, Generator],
+) -> DrawnCase:
+    """The same of a machine of finite elements."""
+    wanted = hidden if isinstance(hidden, str) else tuple(hidden) if hidden is not None else _blind(streams["kind"])
+    names = fault_names(wanted, table, streams["kind"])
+    true, effects = draw_machine(seed, names, _sizes(size, len(names)), nominal, rows, clamp_of(table), nuisances)
+    true = scattered(true, nuisances, streams["machine"])
+    kind = KINDS[min(len(names), 3)] if all(FAULTS[name].names for name in names) else "outside"
+    path = path_truth(
+        nominal, lambda at: stiffness_of_elements(nominal, true, at), rows, np.random.default_rng([seed, len(_STREAMS)])
+    )
+    truth = {"hidden": list(names), "kind": kind, "effects": effects, "path": path}
+    case = DrawnCase(table, truth, nominal, true, nuisances, seed, layout)
+    return replace(case, rows=case.measure(table, rows, streams["noise"], stated_sd=layout == "paper"))
+
+
+def _blind(rng: Generator) -> str:
+    """What is hidden where nothing is said."""
+    return str(rng.choice(list(BLIND), p=list(BLIND.values())))
 
 
 def _sizes(size: float | Sequence[float] | None, count: int) -> Sequence[float | None]:
@@ -207,7 +254,7 @@ def _sizes(size: float | Sequence[float] | None, count: int) -> Sequence[float |
 def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: Generator) -> tuple[str, ...]:
     """Names of what is hidden."""
     if hidden is None:
-        hidden = str(rng.choice(list(BLIND), p=list(BLIND.values())))
+        hidden = _blind(rng)
     known = effects_of_layout(layout)
     if hidden in ("two", "three"):
         return tuple(known[i] for i in rng.choice(len(known), size=2 if hidden == "two" else 3, replace=False))

@@ -251,12 +251,23 @@ def disturb_machine(hidden: HiddenMachine, nuisances: Nuisances, rng: Generator)
     )
 
 
-def disturb_readings(stiffness: FloatArray, clamps: IntArray, nuisances: Nuisances, rng: Generator) -> FloatArray:
-    """(n,) N/m as printed, from what undisturbed instruments would show; `clamps` (n,) numbers the clamps from 0."""
+def disturb_readings(
+    stiffness: FloatArray,
+    clamps: IntArray,
+    nuisances: Nuisances,
+    rng: Generator,
+    apart: FloatArray | None = None,
+) -> FloatArray:
+    """(n,) N/m as printed, from what undisturbed instruments would show; `clamps` (n,) numbers the clamps from 0.
+
+    `apart` (n, 3): shares in which three clampings, each scattering for itself, count in a row; None: one does.
+    """
     n = len(stiffness)
     wide = np.where(rng.random(n) < nuisances.outliers, nuisances.outlier_width, 1.0)
     repeat = nuisances.repeat * wide * rng.standard_normal(n)
-    clamping = nuisances.clamping * rng.standard_normal(int(clamps.max()) + 1)[clamps]
+    shares = np.ones((n, 1)) if apart is None else apart
+    clamped = rng.standard_normal((int(clamps.max()) + 1, shares.shape[1]))[clamps]
+    clamping = nuisances.clamping * np.einsum("ni,ni->n", clamped, shares)
     # On the logarithm, so that no reading can come out negative.
     shown = stiffness * np.exp(repeat + clamping)
     if not nuisances.rounded:
