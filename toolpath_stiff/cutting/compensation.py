@@ -321,8 +321,8 @@ def _intended(shifts: Shifts, walls: Walls) -> FloatArray:
 
 
 def _worse(was: Mapping[str, FloatArray], now: Mapping[str, FloatArray]) -> BoolArray:
-    """(rows, 2) walls whose error grew, in its mean size or its rms; one that is new counts against nothing."""
-    grown = [now[name] - np.where(was["length"] > 0.0, was[name], 0.0) for name in ("size", "rms")]
+    """(rows, 2) walls whose error grew, in its mean size or its rms; one that is new, against the worst there was."""
+    grown = [now[name] - np.where(was["length"] > 0.0, was[name], np.nanmax(was[name])) for name in ("size", "rms")]
     return np.asarray(np.fmax(*grown) > SAME)
 
 
