@@ -143,6 +143,9 @@ def evaluate_cut(
     patches = Patches.joined(parts)
     walls, strips = final_walls(*given), final_strip(*given)
     cut = replace(cut, removed=removed, wall_heights=walls)
+    made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
+    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
+        values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
     _note_engagement(cut, patches)
     for number, cutter in cutters.items():
         engaged = np.zeros(len(samples), dtype=bool)
@@ -249,7 +252,8 @@ def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str,
     sentences += [
         "errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; the chip "
         "is not thinner for them",
-        "a spring pass cuts the stock as programmed, not what the pass before left by its error",
+        "a spring pass meets the part as programmed, not what the pass before left by its error: where it takes nothing "
+        "off, its error counts as 0",
     ]
     if model.load_dependent:
         sentences.append("effects that depend on the load act as under the mean force of a turn")

@@ -21,8 +21,8 @@ from toolpath_stiff.documents import Document, number
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report import analysis_tables as words
 from toolpath_stiff.report.colours import error_colours, page_colours
-from toolpath_stiff.report.cut import cut_tables
 from toolpath_stiff.report.curves import beyond_scale, cutting_box, extremes_by_column, profile_curve, scale_limits
+from toolpath_stiff.report.cut import cut_tables
 from toolpath_stiff.report.pages import Part, markup, part, render
 from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
 from toolpath_stiff.report.tables import ShownTable
@@ -62,7 +62,7 @@ def _thinned_note(shown: int, samples: int) -> str:
 
 
 def _tables(analysis: Analysis, weakest: Sequence[int], rows: IntArray) -> list[tuple[str, Markup, bool]]:
-    """Title, content and whether it is wide, of each table; `weakest`: the page's rows of the weakest places, of `rows`."""
+    """Title, content and whether it is wide, of each table; `weakest` of the page's `rows`: the weakest places."""
     summary, other = analysis.to_dict(), analysis.on_other
     operations, unsupported = summary["per_operation"], summary["unsupported"]
     more = words.and_more(operations, words.MOST_ROWS, "operations")
@@ -168,7 +168,7 @@ def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
         "frame": frame.tolist(),
         "error": fractions,
         "error_range": ends,
-        "limit": um_from_m(error_limit(error)),
+        "limit": um_from_m(error_limit(cut)),
         "sample": _base64(np.where(sample < 0, -1, nearest).astype("<i4")),
         "colours": error_colours(),
     }

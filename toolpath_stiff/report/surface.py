@@ -28,13 +28,13 @@ def surface_of(cut: Cut, most: int) -> Quads:
 def in_machine(points: FloatArray, origin: ArrayLike) -> FloatArray:
     """(k, 3) m in machine coordinates, of points of the set-up frame whose zero sits at `origin` (m, rad)."""
     zero = np.asarray(origin, dtype=float)
-    return product(points, rotation_matrices(zero[3:]).T) + zero[:3]
+    return np.asarray(product(points, rotation_matrices(zero[3:]).T) + zero[:3])
 
 
-def error_limit(error: FloatArray) -> float:
-    """End of a scale of colours, m: what 99 % of the quadrangles with an error keep within, a nanometre at least."""
-    known = np.abs(error[np.isfinite(error)])
-    return max(float(np.quantile(known, 0.99)), 1e-9) if len(known) else 1e-9
+def error_limit(cut: Cut) -> float:
+    """End of a scale of colours, m: what 99 % of the walls keep within, or of the floors if that is more."""
+    known = [np.abs(error[np.isfinite(error)]) for error in (cut.wall_mean, cut.errors[:, 2])]
+    return max([1e-9, *(float(np.quantile(size, 0.99)) for size in known if len(size))])
 
 
 def _walls(cut: Cut, side: int, most: int) -> Quads:
@@ -42,16 +42,16 @@ def _walls(cut: Cut, side: int, most: int) -> Quads:
     samples = cut.samples
     made = np.isfinite(cut.errors[:, side]) & (samples.weight > 0.0)
     rows = np.flatnonzero(made[:-1] & made[1:] & (samples.move[:-1] == samples.move[1:]))
+    if not len(rows):
+        return np.empty((0, 4, 3)), np.empty(0), rows
     many = -(-len(rows) // most)
     starts = (np.diff(rows, prepend=-2) != 1) | (np.diff(samples.move[rows], prepend=-1) != 0)
-    if many > 1:
-        starts |= np.arange(len(rows)) % many == 0
+    starts |= np.arange(len(rows)) % many == 0
     first = np.flatnonzero(starts)
     last = np.append(first[1:], len(rows)) - 1
     error = 0.5 * (cut.errors[rows, side] + cut.errors[rows + 1, side])
-    if len(rows):
-        low, high = np.minimum.reduceat(error, first), np.maximum.reduceat(error, first)
-        error = np.where(-low > high, low, high)
+    low, high = np.minimum.reduceat(error, first), np.maximum.reduceat(error, first)
+    error = np.where(-low > high, low, high)
     ends = [_foot_and_top(cut, side, row) for row in (rows[first], rows[last] + 1)]
     (low_point, high_point), (next_low, next_high) = ends
     return np.stack([low_point, next_low, next_high, high_point], axis=1), error, rows[first]
@@ -78,9 +78,8 @@ def _floors(cut: Cut, most: int) -> Quads:
     corners = [(slice(None, -1), slice(None, -1)), (slice(1, None), slice(None, -1)), (slice(1, None), slice(1, None))]
     corners.append((slice(None, -1), slice(1, None)))
     height = np.stack([top[corner] for corner in corners], axis=-1)
-    flat = np.isfinite(height).all(axis=-1)
-    flat[flat] = np.ptp(height[flat], axis=-1) <= STEEP * (x[1] - x[0])
-    i, j = np.nonzero(flat)
+    known = np.asarray(np.isfinite(height).all(axis=-1))
+    i, j = np.nonzero(known & (np.ptp(np.where(known[..., None], height, 0.0), axis=-1) <= STEEP * (x[1] - x[0])))
     places = ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))
     quads = np.stack([np.stack([x[a], y[b], top[a, b]], axis=1) for a, b in places], axis=1)
     sample = owner[i, j]
