@@ -7,6 +7,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
@@ -32,11 +33,12 @@ def run_benchmark(
     """
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
     parser.add_argument("--records", type=Path, default=records, help="JSON lines, one a case")
+    parser.add_argument("--resume", action="store_true", help="keep the cases that --records holds")
     parser.add_argument("--table-only", action="store_true", help="print the tables from --records again")
     parser.add_argument("--out", type=Path, default=out, help="markdown file to write")
     args = parser.parse_args(arguments)
     if not args.table_only:
-        run_cases(make_jobs(args), run, args.jobs, args.records)
+        run_cases(make_jobs(args), run, args.jobs, args.records, resume=args.resume)
     made = [json.loads(line) for line in args.records.read_text(encoding="utf-8").splitlines()]
     text, cleared = report(made, f"{parser.prog} {shlex.join(sys.argv[1:] if arguments is None else arguments)}")
     print(text)
@@ -54,10 +56,15 @@ def record_of(heading: Record, work: Callable[[Path], Record]) -> Record:
         return heading | {"error": traceback.format_exc()}
 
 
-def run_cases(jobs: Sequence[Any], run: Callable[[Any], Record], workers: int, into: Path) -> None:
-    """Each record is written as it comes, a line of JSON."""
+def run_cases(
+    jobs: Sequence[Any], run: Callable[[Any], Record], workers: int, into: Path, *, resume: bool = False
+) -> None:
+    """Each record is written as it comes, a line of JSON; `resume` leaves out jobs whose fields a record holds."""
     into.parent.mkdir(parents=True, exist_ok=True)
-    with into.open("w", encoding="utf-8") as stream, Pool(workers) as pool:
+    if resume and into.exists():
+        kept = [json.loads(line) for line in into.read_text(encoding="utf-8").splitlines()]
+        jobs = [job for job in jobs if not any(asdict(job).items() <= record.items() for record in kept)]
+    with into.open("a" if resume else "w", encoding="utf-8") as stream, Pool(workers) as pool:
         for count, record in enumerate(pool.imap_unordered(run, jobs, chunksize=1), 1):
             stream.write(json.dumps(record) + "\n")
             stream.flush()

@@ -22,6 +22,7 @@ from toolpath_stiff.rig.fem import FemMachine
 from toolpath_stiff.rig.fem_case import draw_machine, fault_names, path_truth, scattered
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.fem_solution import readings as readings_of_elements
+from toolpath_stiff.rig.fem_solution import true_stiffness as stiffness_of_elements
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, disturb_machine, disturb_readings, readings
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
@@ -229,7 +230,9 @@ def _elements(
     true, effects = draw_machine(seed, names, _sizes(size, len(names)), nominal, rows, clamp_of(table), nuisances)
     true = scattered(true, nuisances, streams["machine"])
     kind = KINDS[min(len(names), 3)] if all(FAULTS[name].names for name in names) else "outside"
-    path = path_truth(nominal, true, rows, np.random.default_rng([seed, len(_STREAMS)]))
+    path = path_truth(
+        nominal, lambda at: stiffness_of_elements(nominal, true, at), rows, np.random.default_rng([seed, len(_STREAMS)])
+    )
     truth = {"hidden": list(names), "kind": kind, "effects": effects, "path": path}
     case = DrawnCase(table, truth, nominal, true, nuisances, seed, layout)
     return replace(case, rows=case.measure(table, rows, streams["noise"], stated_sd=layout == "paper"))

@@ -1,6 +1,7 @@
 """Draws of machines of finite elements: the fault and its size, what every machine scatters, the truth along a path."""
 
 import zlib
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +15,7 @@ from toolpath_stiff.rig.campaigns import POSE, Table
 from toolpath_stiff.rig.draws import Shape
 from toolpath_stiff.rig.fem import FemMachine
 from toolpath_stiff.rig.fem_faults import FAULTS
-from toolpath_stiff.rig.fem_solution import pulled, readings, sound, true_stiffness
+from toolpath_stiff.rig.fem_solution import pulled, readings, sound
 from toolpath_stiff.rig.hidden import Nuisances
 from toolpath_stiff.rig.nominal import Nominal, reachable
 from toolpath_stiff.rig.rows import Rows
@@ -22,7 +23,8 @@ from toolpath_stiff.rig.sizes import LARGEST_SINGLE, Scale
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 SIZES = (0.04, 0.20)  # rms change of ln stiffness that a fault is drawn with, log-uniform, as far as its limit allows
-INSIDE, OUTSIDE = 24, 12  # poses of the path between those measured, and beyond them
+INSIDE, BEYOND = 24, 12  # poses of the path amid those measured, and beyond them
+MOST_DRAWS = 4000  # of poses, until so many can be reached
 # Standard deviations of ln stiffness from machine to machine (assumed), and of the clamping scatter by direction.
 SPREAD = {"beams": 0.1, "feet": 0.15, "rim": 0.1, "spokes": 0.1, "mounts": 0.15, "plate": 0.15}
 CLAMPING_SPREAD = 0.4
@@ -94,7 +96,7 @@ def draw_machine(
     return machine, effects
 
 
-def _strength(change: Any, wanted: float) -> float:
+def _strength(change: Callable[[float], FloatArray], wanted: float) -> float:
     """Strength in (0, 1] of a fault whose rms change is `wanted` within 2 %, or 1; bisection of its logarithm."""
     low, high = 1e-4, 1.0
     if np.sqrt(np.mean(change(high) ** 2)) <= wanted:
@@ -102,10 +104,10 @@ def _strength(change: Any, wanted: float) -> float:
     for _ in range(30):
         middle = float(np.sqrt(low * high))
         rms = float(np.sqrt(np.mean(change(middle) ** 2)))
+        low, high = (middle, high) if rms <= wanted else (low, middle)
         if abs(rms - wanted) <= 0.02 * wanted:
-            break
-        low, high = (middle, high) if rms < wanted else (low, middle)
-    return middle
+            return middle
+    return low  # beyond it a single reading changes by more than `LARGEST_SINGLE`
 
 
 def scattered(machine: FemMachine, nuisances: Nuisances, rng: Generator) -> FemMachine:
@@ -123,30 +125,27 @@ def scattered(machine: FemMachine, nuisances: Nuisances, rng: Generator) -> FemM
     return replace(machine, **changed, clamping=np.exp(CLAMPING_SPREAD * rng.standard_normal(3)))
 
 
-def path_truth(nominal: Nominal, machine: FemMachine, rows: Rows, rng: Generator) -> Document:
-    """True stiffness along drawn directions at poses between those measured, and beyond: columns in shop units."""
+def path_truth(nominal: Nominal, stiffness: Callable[[Rows], FloatArray], rows: Rows, rng: Generator) -> Document:
+    """True stiffness along X, Y, Z at poses amid those of the rows, and beyond: columns in shop units.
+
+    `stiffness` gives it of rows; `measured_near` is false of a pose beyond.
+    """
     measured = np.unique(np.column_stack([rows.position, rows.angles]), axis=0)
     middle, poses = measured.mean(axis=0), list[FloatArray]()
-    for count, low, high in ((INSIDE, 0.0, 0.9), (OUTSIDE, 1.2, 1.8)):
-        for _ in range(2000):
-            if len(poses) == (INSIDE if count == INSIDE else INSIDE + OUTSIDE):
-                break
-            some = measured[rng.integers(len(measured), size=2)]
-            from_middle = some[0] - middle if high > 1.0 else some.mean(axis=0) - middle
-            pose = middle + rng.uniform(low, high) * from_middle
-            if reachable(nominal, pose[None, :3], pose[None, 3:], np.zeros(1))[0]:
-                poses.append(pose)
-    drawn = np.array(poses).reshape(-1, 6)
-    direction = rng.standard_normal((len(drawn), 3))
-    direction = np.round(direction / np.linalg.norm(direction, axis=1, keepdims=True), 6)
-    drawn = np.round(drawn, 6)
-    path = pulled(drawn[:, :3], drawn[:, 3:]).take(3 * np.arange(len(drawn)))
-    unit = direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    stiffness = true_stiffness(nominal, machine, replace(path, direction=unit))
-    columns = np.column_stack([mm_from_m(drawn[:, :3]), deg_from_rad(drawn[:, 3:])]).round(5)
-    named = zip((*POSE, "dx", "dy", "dz"), np.column_stack([columns, direction]).T, strict=True)
+    for _ in range(MOST_DRAWS):
+        if len(poses) == INSIDE + BEYOND:
+            break
+        some = measured[rng.integers(len(measured), size=2)] - middle
+        near = len(poses) < INSIDE
+        pose = middle + (rng.uniform(0.3, 0.9) * some.mean(axis=0) if near else rng.uniform(1.2, 1.8) * some[0])
+        pose = pose.round(6)
+        if reachable(nominal, pose[None, :3], pose[None, 3:], np.zeros(1))[0]:
+            poses.append(pose)
+    drawn = np.array(poses).reshape(-1, len(POSE))
+    true = n_per_mm_from_n_per_m(stiffness(pulled(drawn[:, :3], drawn[:, 3:]))).reshape(-1, 3).round(1)
+    columns = np.column_stack([mm_from_m(drawn[:, :3]), deg_from_rad(drawn[:, 3:]).round(6), true])
+    names = (*POSE, *(f"{axis}_N_per_mm" for axis in "xyz"))
     return {
-        **{name: values.tolist() for name, values in named},
-        "stiffness_N_per_mm": np.round(n_per_mm_from_n_per_m(stiffness), 1).tolist(),
+        **{name: values.round(6).tolist() for name, values in zip(names, columns.T, strict=True)},
         "measured_near": [k < INSIDE for k in range(len(drawn))],
     }
