@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from toolpath_stiff.rig.fem_case import path_truth
 
 import toolpath_stiff as tps
 from benchmarks.bars import Record
@@ -17,9 +18,7 @@ from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.campaigns import Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text, read_plan
-from toolpath_stiff.rig.fem_case import path_truth
-from toolpath_stiff.rig.fem_faults import FAULTS
-from toolpath_stiff.rig.hidden import true_stiffness
+from toolpath_stiff.rig.fem_faults import faults
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 
@@ -58,10 +57,9 @@ def make_jobs(first_seed: int, counts: Mapping[str, int], built: Sequence[str]) 
 
 def kinds_of(built: str) -> tuple[list[str], list[str]]:
     """What can be hidden in and outside the catalogue."""
-    if built == "springs":
-        return list(CATALOGUE), list(UNKNOWNS)
-    named = [name for name, fault in FAULTS.items() if fault.names]
-    return named, [name for name in FAULTS if name not in named]
+    if built == "fem":
+        return faults(in_catalogue=True), faults(in_catalogue=False)
+    return list(CATALOGUE), list(UNKNOWNS)
 
 
 def small_campaign(seed: int) -> Table:
@@ -100,10 +98,8 @@ def _judged(job: Job, folder: Path) -> Record:
     if diagnosis.verdict == "ambiguous" and job.group == "single":
         after = {"planned": planned(diagnosis, file, case, np.random.default_rng([job.seed, 5]))}
     truths = [truth_of(effect, job.built) for effect in case.truth["effects"]]
-    path = case.truth.get("path") or path_truth(
-        case.nominal, lambda rows: true_stiffness(case.nominal, case.machine, rows), rig.rows_of(plan),
-        np.random.default_rng(job.seed),
-    )  # fmt: skip
+    rows, rng = rig.rows_of(plan), np.random.default_rng(job.seed)
+    path = case.truth.get("path") or path_truth(case.nominal, case.machine, rows, rng)
     return {
         "truths": truths, "poses": len(np.unique(plan["point"])), "readings": len(plan["point"]), "cpu": round(cpu, 2),
         **answer_of(diagnosis), **after, **along_path(diagnosis, file, path, folder),
