@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from toolpath_stiff.rig.fem_case import path_truth
 
 import toolpath_stiff as tps
 from benchmarks.bars import Record
@@ -19,6 +18,7 @@ from toolpath_stiff.rig.campaigns import Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text, read_plan
 from toolpath_stiff.rig.fem_faults import faults
+from toolpath_stiff.rig.fem_path import path_truth
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 
