@@ -26,6 +26,10 @@ GROUPS = {
         "place": "where the work should sit: Pareto front and one recommended placement",
         "case-study": "the paper's four regions: one path at two heights, displaced and turned",
     },
+    "cutting": {
+        "cut": "what a cut is computed from: setup files, materials",
+        "compensate": "a program shifted against the deflection of its final walls",
+    },
     "machine": {
         "pose": "stiffness, softest and stiffest direction, strut lengths at single poses",
         "map": "stiffness over planes of the workspace: picture, table, 3-D page",

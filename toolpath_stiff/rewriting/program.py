@@ -8,7 +8,7 @@ the one move that cannot match.
 
 import copy
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -23,10 +23,11 @@ from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import read_block
-from toolpath_stiff.poses import Pose, pose_in_mm
+from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
+from toolpath_stiff.rewriting.side_shift import Course
 from toolpath_stiff.rewriting.turn import Turn
 from toolpath_stiff.units import mm_from_m
 
@@ -131,6 +132,72 @@ def rewrite_program(
     """
     check_rewritable(program)
     placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
+    if placement == original:
+        return RewrittenProgram(program.name, *_text(program), [])
+    controls = _controls(program, control, placement, original, decimals)
+    controls.linearise = linearise and mm_from_m(linearise)
+    return _rewritten(program, controls, control)
+
+
+def shift_program(
+    program: ReadProgram,
+    origin: Pose,
+    courses: Mapping[int, Course],
+    *,
+    decimals: int | None = None,
+    control: Controller = UNKNOWN_CONTROL,
+) -> tuple[RewrittenProgram, list[int]]:
+    r"""A program with some moves on other courses, and of each of its moves the row of the move that was there before.
+
+    Parameters
+    ----------
+    program, decimals, control
+        As of `rewrite_program`.
+    origin
+        Where program zero sits.
+    courses
+        Row of `program.moves` -> where that move goes instead (`side_shift.SideShift`). What does not move keeps its
+        text; the words of what does get new numbers, and further blocks follow where a move becomes several.
+
+    Raises
+    ------
+    InputError
+        A block cannot be expressed so, with its line and the reason.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from toolpath_stiff.nc.reader import parse_program
+    >>> from toolpath_stiff.rewriting.side_shift import SideShift
+    >>> program = parse_program("G21 G90 F600
+    G0 X0 Y0 Z0
+    G1 X10
+    G1 Y20 (wall)
+    G1 X0
+    M30
+    ", "slot.nc")
+    >>> shift = SideShift(program.moves, {2: (np.array([0.0, 1.0]), np.array([-0.02, -0.02]))})  # mm, left is +
+    >>> shifted, rows = shift_program(program, (0.0,) * 6, shift.courses)
+    >>> print(shifted, end="")
+    G21 G90 F600
+    G0 X0 Y0 Z0
+    G1 X10.02
+    G1 Y20 (wall)
+    G1 X0
+    M30
+    >>> rows
+    [0, 1, 2, 3]
+    """
+    check_rewritable(program)
+    place = pose_in_mm(origin)
+    controls = _controls(program, control, place, place, decimals)
+    controls.courses = courses
+    return _rewritten(program, controls, control), controls.row_of
+
+
+def _controls(
+    program: ReadProgram, control: Controller, placement: ShopPose, original: ShopPose, decimals: int | None
+) -> Controls:
     source, out = (
         State(
             program.name,
@@ -139,10 +206,16 @@ def rewrite_program(
         )
         for origin in (placement, original)
     )
-    controls = Controls(source, out, Turn(placement, original), decimals, linearise and mm_from_m(linearise))
-    text, encoding = read_text(program.path) if program.path else ("\n".join([*program.source, ""]), "utf-8")
-    if placement == original:
-        return RewrittenProgram(program.name, text, encoding, [])
+    return Controls(source, out, Turn(placement, original), decimals, None)
+
+
+def _text(program: ReadProgram) -> tuple[str, str]:
+    """A program's text with its line ends, and its encoding."""
+    return read_text(program.path) if program.path else ("\n".join([*program.source, ""]), "utf-8")
+
+
+def _rewritten(program: ReadProgram, controls: Controls, control: Controller) -> RewrittenProgram:
+    text, encoding = _text(program)
     lines = list(_rewritten_lines(controls, text, program.name, control.switches))
     return RewrittenProgram(program.name, "".join(lines), encoding, sorted(controls.notes))
 

@@ -1,0 +1,247 @@
+"""Engagement: where the cutter's envelope meets what stands before it, and how much it takes.
+
+Tested on rings around the envelope, one for each layer of height: a point of the front (where the motion has a part
+along the outward normal) is in the material if this stands above it after all pieces before the station's. Where that
+changes along a ring, the step is halved until it is exact: so a wall stands where the path that made it put it.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.stations import BLOCK, STATION, TOUCH, blocks_of_stations, heights_around, stations_along
+from toolpath_stiff.cutting.workpiece import Workpiece
+from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.path.sampling import Samples
+from toolpath_stiff.results import Progress, counter
+
+AROUND = 33  # points of a ring, denser at the sides, where a light cut is
+LEVELS, CORNER_LAYERS, COARSE = (
+    8,
+    10,
+    6,
+)  # layers of the cylinder, of a corner or ball; rings that look how high it cuts
+HALVINGS = 14  # of up to 9 degrees: 1e-5 rad
+NARROW = 1e-4  # rad, arcs below are rounding
+PLATEAU = 1e-6  # m: heights closer than this are a level
+CHANGE, FINE = 0.02, 0.05  # of the rate of removal between stations that is looked into; radii, steps in between
+
+SIDES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, AROUND))  # shares of a ring
+
+
+def engage(
+    work: Workpiece,
+    moves: Moves,
+    samples: Samples,
+    cutters: Mapping[int, Cutter],
+    progress: Progress | None = None,
+) -> Iterator[tuple[slice, Patches, FloatArray]]:
+    """Blocks of samples with their patches of contact and the volume removed since the sample before.
+
+    Parameters
+    ----------
+    work, moves, samples
+        In the set-up frame: `workpiece_of` the moves as read, and their samples without a placement.
+        `Patches.station` is a row of `samples`.
+    cutters
+        By number of the tool.
+
+    Yields
+    ------
+    Rows of `samples`, in order and together all; patches; (rows,) m3 taken between the sample before and this one,
+    0 for rapids and at the first sample of a move. Plunges remove, but have no patches: end cutting is not modelled.
+    """
+    last: AnyArray = np.zeros(1, dtype=STATION)
+    last["move"], last_rate, begin = -1, np.zeros(1), 0
+    tell = counter(progress, "engagement")
+    for rows, stations in blocks_of_stations(work, moves, samples, cutters):
+        patches, rate = _contact(work, stations)
+        end = int(rows[-1]) + 1
+        removed = np.zeros(end - begin)
+        joined = np.concatenate([last, stations]), np.concatenate([last_rate, rate])
+        removed[rows - begin] = _volumes(work, moves, cutters, *joined)
+        yield slice(begin, end), replace(patches, station=rows[patches.station]), removed
+        last, last_rate, begin = stations[-1:], rate[-1:], end
+        if tell:
+            tell(begin, len(samples))
+    if begin < len(samples):
+        none = np.zeros(0)
+        yield slice(begin, len(samples)), Patches(none.astype(np.int64), *[none] * 4), np.zeros(len(samples) - begin)
+
+
+def _volumes(
+    work: Workpiece, moves: Moves, cutters: Mapping[int, Cutter], stations: AnyArray, rate: FloatArray
+) -> FloatArray:
+    """(n,) m3 between n + 1 stations; in finer steps where the rate of removal changes."""
+    together = stations["move"][1:] == stations["move"][:-1]
+    length, share = np.where(together, np.diff(stations["path"]), 0.0), np.diff(stations["share"])
+    volume = 0.5 * length * (rate[1:] + rate[:-1])
+    steps = np.maximum(np.ceil(length / (FINE * stations["reach"][1:]) - 1e-9), 1.0).astype(np.int64)
+    rows = np.flatnonzero((np.abs(np.diff(rate)) > CHANGE * np.maximum(rate[1:], rate[:-1])) & (steps > 1))
+    for some in np.array_split(rows, len(rows) * 8 // BLOCK + 1):
+        inner = steps[some] - 1
+        each = np.repeat(some, inner)
+        number = np.arange(len(each)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
+        between = stations["share"][each] + share[each] * number / steps[each]
+        finer = stations_along(work, moves, cutters, stations["move"][each], between)
+        sums = np.bincount(each, _contact(work, finer)[1], len(length))[some]
+        volume[some] = length[some] / steps[some] * (0.5 * (rate[some] + rate[some + 1]) + sums)
+    return volume
+
+
+def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
+    """Patches of stations, numbered from 0, and (n,) m2 the volume that each removes per length of path."""
+    rate = _end_area(work, stations) * np.maximum(stations["down"], 0.0)
+    low, high = _layers(work, stations)
+    station, layer = np.nonzero((high > low) & ~stations["plunge"][:, None])
+    low, high = low[station, layer], high[station, layer]
+    at_each = stations[station]
+    corner = at_each["reach"] - at_each["flat"]
+    height = 0.5 * (low + high)
+    angle = np.where(
+        height < corner, np.arccos(np.clip(1.0 - height / np.where(corner > 0.0, corner, 1.0), -1.0, 1.0)), 0.5 * np.pi
+    )
+    radius = at_each["flat"] + corner * np.sin(angle) - TOUCH
+    steep = at_each["down"] / np.maximum(at_each["level"], 1e-12) / np.maximum(np.tan(angle), 1e-12)
+    back = np.arcsin(np.clip(np.where(height < corner, steep, 0.0), -1.0, 1.0))
+    ring = -back[:, None] + (np.pi + 2.0 * back)[:, None] * SIDES
+    inside = _in_material(work, at_each, radius[:, None], ring, height[:, None])
+    row, entry, exit_ = _arcs(work, at_each, radius, height, ring, inside)
+    patches = Patches(station[row], low[row], high[row], entry, exit_)
+    rate += np.bincount(patches.station, _rates(stations[patches.station], patches), len(stations))
+    return _merged(patches, stations), rate
+
+
+def _in_material(
+    work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray, height: FloatArray
+) -> BoolArray:
+    top, bottom = heights_around(work, stations, radius, angle)
+    return np.asarray((top > height) & (bottom < height))
+
+
+def _layers(work: Workpiece, stations: AnyArray) -> tuple[FloatArray, FloatArray]:
+    """(n, layers) m above the tip: borders of layers in which the angles of contact hardly change."""
+    corner = (stations["reach"] - stations["flat"])[:, None]
+    angle = np.pi * SIDES[None, :]
+    top, bottom = heights_around(work, stations, (stations["reach"] - TOUCH)[:, None], angle)
+    base = np.maximum(np.clip(bottom, 0.0, None).min(axis=1, keepdims=True), corner)
+    top = np.maximum(np.minimum(top, stations["longest"][:, None]), base)
+    borders = _levels(np.concatenate([base, top], axis=1))
+    low, high = borders[:, :-1], borders[:, 1:]
+    if not corner.any():
+        return low, high
+    # Of a corner or a ball: up to the highest contact, narrowed down twice.
+    steepest = np.full((len(stations), 1), 0.5 * np.pi)
+    for _ in range(2):
+        rings = steepest * np.linspace(0.0, 1.0, COARSE + 1)[1:]
+        heights = (corner * (1.0 - np.cos(rings)))[:, :, None]
+        radius = (stations["flat"][:, None] + corner * np.sin(rings))[:, :, None] - TOUCH
+        around = heights_around(work, stations, radius, np.pi * SIDES[None, None, ::2])[0]
+        inner = np.concatenate([around[:, :1], around[:, :-1]], axis=1)
+        reached = np.clip(np.minimum(np.maximum(around, inner), heights).max(axis=(1, 2))[:, None], 0.0, corner)
+        steepest = np.arccos(1.0 - reached / np.where(corner > 0.0, corner, 1.0))
+    rings = corner * (1.0 - np.cos(steepest * np.linspace(0.0, 1.0, CORNER_LAYERS + 1)))
+    return np.concatenate([rings[:, :-1], low], axis=1), np.concatenate([rings[:, 1:], high], axis=1)
+
+
+def _levels(heights: FloatArray) -> FloatArray:
+    """(n, LEVELS + 1) levels among heights (n, k), the first of which is the lowest: all, or evenly many of more."""
+    heights = np.sort(heights, axis=1)
+    rank = np.zeros(heights.shape, dtype=np.int64)
+    rank[:, 1:] = np.cumsum(np.diff(heights, axis=1) > PLATEAU, axis=1)
+    levels = np.full((len(heights), LEVELS + 1), -np.inf)
+    row, column = np.nonzero(rank <= LEVELS)
+    levels[row, rank[row, column]] = heights[row, column]
+    levels[:, 0] = heights[:, 0]
+    many = rank[:, -1] > LEVELS
+    levels[many] = heights[many][:, np.round(np.linspace(0, heights.shape[1] - 1, LEVELS + 1)).astype(np.int64)]
+    return np.asarray(np.maximum.accumulate(levels, axis=1))
+
+
+def _arcs(
+    work: Workpiece, stations: AnyArray, radius: FloatArray, height: FloatArray, ring: FloatArray, inside: BoolArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Row, entry and exit of each arc in the material, in [0, 2 pi]; its ends by halving between points of the ring."""
+    padded = np.pad(inside, ((0, 0), (1, 1)))
+    row, start = np.nonzero(padded[:, 1:-1] & ~padded[:, :-2])
+    stop = np.nonzero(padded[:, 1:-1] & ~padded[:, 2:])[1]
+    points = ring.shape[1]
+    ends = [
+        _ends(work, stations[row], radius[row], height[row], ring[row, np.clip(out, 0, points - 1)], ring[row, within])
+        for out, within in ((start - 1, start), (stop + 1, stop))
+    ]
+    wide = ends[1] - ends[0] > NARROW
+    row, entry, exit_ = row[wide], ends[0][wide], ends[1][wide]
+    # Behind the left side: an arc across 0 is two.
+    across = np.flatnonzero(entry < 0.0)
+    row = np.concatenate([row, row[across]])
+    behind = np.minimum(exit_[across], 0.0) + 2.0 * np.pi
+    exit_ = np.concatenate([exit_, behind])
+    entry = np.concatenate([np.maximum(entry, 0.0), entry[across] + 2.0 * np.pi])
+    order = np.argsort(row, kind="stable")
+    order = order[(exit_ - entry)[order] > 0.0]
+    return row[order], entry[order], exit_[order]
+
+
+def _ends(
+    work: Workpiece, stations: AnyArray, radius: FloatArray, height: FloatArray, out: FloatArray, within: FloatArray
+) -> FloatArray:
+    """(k,) rad, where a ring leaves the material between a point outside and one within; equal: the ring's end."""
+    moving = np.flatnonzero(out != within)
+    some, r, z, a, b = stations[moving], radius[moving], height[moving], out[moving], within[moving]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (a + b)
+        inside = _in_material(work, some, r, middle, z)
+        a, b = np.where(inside, a, middle), np.where(inside, middle, b)
+    ends = within.copy()
+    ends[moving] = 0.5 * (a + b)
+    return ends
+
+
+def _rates(stations: AnyArray, patches: Patches) -> FloatArray:
+    """(p,) m2 of each patch: the motion along the normal, over its area (r dz / sin kappa dphi)."""
+    corner = stations["reach"] - stations["flat"]
+    safe = np.where(corner > 0.0, corner, 1.0)
+    rounded = patches.low < corner
+    first, second = (np.arccos(np.clip(1.0 - z / safe, 0.0, 1.0)) for z in (patches.low, patches.high))
+    area = (second - first - np.sin(second) * np.cos(second) + np.sin(first) * np.cos(first)) * 0.5 * corner**2
+    sideways = np.where(rounded, area, 0.0) + (patches.high - patches.low) * np.where(
+        rounded, stations["flat"], stations["reach"]
+    )
+    outer, inner = (stations["flat"] + corner * np.sin(angle) for angle in (second, first))
+    downward = np.where(rounded, 0.5 * (outer**2 - inner**2), 0.0) * (patches.exit - patches.entry)
+    turned = np.cos(patches.entry) - np.cos(patches.exit)
+    return np.asarray(stations["level"] * turned * sideways + stations["down"] * downward)
+
+
+def _end_area(work: Workpiece, stations: AnyArray) -> FloatArray:
+    """(n,) m2 of material under the flat end where the cutter descends; of a plunge under the whole of it."""
+    area = np.zeros(len(stations))
+    rows = np.flatnonzero((stations["down"] > 0.0) & (stations["plunge"] | (stations["flat"] > 0.0)))
+    some = stations[rows]
+    widest = np.where(some["plunge"], some["reach"], some["flat"])
+    radius = widest[:, None, None] * np.sqrt((np.arange(8) + 0.5) / 8.0)[None, :, None]
+    corner = (some["reach"] - some["flat"])[:, None, None]
+    height = corner - np.sqrt(np.maximum(corner**2 - np.maximum(radius - some["flat"][:, None, None], 0.0) ** 2, 0.0))
+    inside = _in_material(work, some, radius, (np.arange(24) * np.pi / 12.0)[None, None, :], height)
+    area[rows] = np.pi * widest**2 * inside.mean(axis=(1, 2))
+    return area
+
+
+def _merged(patches: Patches, stations: AnyArray) -> Patches:
+    """Patches of neighbouring layers with the same angles as one; none goes across the end of a corner."""
+    order = np.lexsort((patches.low, patches.entry.round(6), patches.station))
+    patches = patches.take(order)
+    corner = (stations["reach"] - stations["flat"])[patches.station]
+    same = (np.diff(patches.station) == 0) & (np.abs(patches.low[1:] - patches.high[:-1]) < TOUCH)
+    same &= (np.abs(np.diff(patches.entry)) < NARROW) & (np.abs(np.diff(patches.exit)) < NARROW)
+    same &= (patches.low[1:] < corner[1:]) == (patches.low[:-1] < corner[1:])
+    firsts = np.flatnonzero(np.append(True, ~same)[: len(patches.low)])
+    lasts = np.append(firsts[1:], len(patches.low)) - 1 if len(firsts) else firsts
+    high = patches.high[lasts]
+    patches = patches.take(firsts)
+    return Patches(patches.station, patches.low, high, patches.entry, patches.exit)
