@@ -13,6 +13,7 @@ import toolpath_stiff as tps
 from benchmarks.bars import Record
 from benchmarks.case_loop import record_of
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.planning.result import plan_csv
 from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.campaigns import Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE
@@ -27,6 +28,7 @@ BUILT = ("fem", "springs")
 POSES = (12, 28)  # fewest and most of a campaign
 PAIR_SIZES = (0.10, 0.05)  # rms change of ln k of the two, as in `benchmarks.several`
 SERIES = {"joints", "struts", "one strut"}  # all in series along a strut: the tip cannot tell them apart
+WORTH_A_LAW = 1.0  # points of mean error from which on the law of an adequate model is refitted
 PLANNED = 6  # visits of a plan
 
 
@@ -109,10 +111,10 @@ def _judged(job: Job, folder: Path) -> Record:
 def planned(diagnosis: tps.Diagnosis, file: Path, case: rig.DrawnCase, rng: np.random.Generator) -> Record:
     """What is said after a plan of a few visits was measured on the same machine; the same where nothing tells more."""
     plan = tps.plan(file, n=PLANNED, indicators=True, diagnosis=diagnosis)
-    if plan.to_frame().empty:
+    if not plan.rows:
         return answer_of(diagnosis)
     more = file.with_name("plan.csv")
-    more.write_text(str(plan.files(plots=False)["plan.csv"]))
+    more.write_text(plan_csv(plan.rows))
     more.write_text(csv_text(case.again(read_plan(str(more), case.nominal), rng)))
     return answer_of(tps.diagnose([file, more]))
 
@@ -172,7 +174,7 @@ def _percent(model: FloatArray, true: FloatArray, rows: FloatArray) -> float:
 
 
 def updated(diagnosis: tps.Diagnosis, file: Path, folder: Path) -> tps.Update | None:
-    """The update that a verdict leads to: its first explanation, a draft, or the strut law; None where refused."""
+    """The update that a verdict leads to: its first explanation, a draft, or the strut law; None for none."""
     said = diagnosis.to_dict()
     try:
         if said["verdict"] == "unexplained":
@@ -182,9 +184,11 @@ def updated(diagnosis: tps.Diagnosis, file: Path, folder: Path) -> tps.Update | 
             (folder / "missing.toml").write_text(draft.text)
             with_draft = tps.Machine.load("nist", effects=[folder / "missing.toml"])
             return tps.update(file, with_draft, add=list(draft.effects))
-        first = next((words for words in said["explanations"] if words != "none"), "none")
-        if said["verdict"] == "adequate" or first == "none":
-            return tps.update(file, strut_law=True)
+        first = next((words for words in said["explanations"] if words != "none"), "")
+        if said["verdict"] == "adequate":
+            law = tps.update(file, strut_law=True)
+            errors = law.to_frame()["mean_abs_error_percent"]
+            return law if errors.iloc[0] > errors.iloc[-1] + WORTH_A_LAW else None
         return tps.update(file, add=first.split(" + "))
     except tps.InputError:
         return None
