@@ -2,8 +2,9 @@
 
 Small campaigns: 12 to 28 tilted poses along X, Y, Z, one or two loads, 2 % repeat noise, 1 % clamping (of machines of
 elements otherwise in each direction). Sizes are drawn: 4 to 20 % rms of elements, from just detectable to 30 % of
-springs; pairs 10 and 5 %. Errors are means along 24 poses amid those measured, X, Y, Z, against the true stiffness;
-12 more lie beyond. After a verdict its first explanation is added, or a draft, or the strut law refitted.
+springs; pairs 10 and 5 %. A verdict's first explanation is added, or a draft; of an adequate model the strut law is
+refitted where a point of mean error is gained. Errors are means along 24 poses amid those measured, X, Y, Z, against
+the true stiffness; 12 more lie beyond.
 """
 
 import argparse

@@ -13,13 +13,13 @@ import toolpath_stiff as tps
 from benchmarks.bars import Record
 from benchmarks.case_loop import record_of
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.planning.result import plan_csv
 from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.campaigns import Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text, read_plan
-from toolpath_stiff.rig.fem_case import path_truth
-from toolpath_stiff.rig.fem_faults import FAULTS
-from toolpath_stiff.rig.hidden import true_stiffness
+from toolpath_stiff.rig.fem_faults import faults
+from toolpath_stiff.rig.fem_path import path_truth
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 
@@ -28,6 +28,7 @@ BUILT = ("fem", "springs")
 POSES = (12, 28)  # fewest and most of a campaign
 PAIR_SIZES = (0.10, 0.05)  # rms change of ln k of the two, as in `benchmarks.several`
 SERIES = {"joints", "struts", "one strut"}  # all in series along a strut: the tip cannot tell them apart
+WORTH_A_LAW = 1.0  # points of mean error from which on the law of an adequate model is refitted
 PLANNED = 6  # visits of a plan
 
 
@@ -58,10 +59,9 @@ def make_jobs(first_seed: int, counts: Mapping[str, int], built: Sequence[str]) 
 
 def kinds_of(built: str) -> tuple[list[str], list[str]]:
     """What can be hidden in and outside the catalogue."""
-    if built == "springs":
-        return list(CATALOGUE), list(UNKNOWNS)
-    named = [name for name, fault in FAULTS.items() if fault.names]
-    return named, [name for name in FAULTS if name not in named]
+    if built == "fem":
+        return faults(in_catalogue=True), faults(in_catalogue=False)
+    return list(CATALOGUE), list(UNKNOWNS)
 
 
 def small_campaign(seed: int) -> Table:
@@ -100,10 +100,8 @@ def _judged(job: Job, folder: Path) -> Record:
     if diagnosis.verdict == "ambiguous" and job.group == "single":
         after = {"planned": planned(diagnosis, file, case, np.random.default_rng([job.seed, 5]))}
     truths = [truth_of(effect, job.built) for effect in case.truth["effects"]]
-    path = case.truth.get("path") or path_truth(
-        case.nominal, lambda rows: true_stiffness(case.nominal, case.machine, rows), rig.rows_of(plan),
-        np.random.default_rng(job.seed),
-    )  # fmt: skip
+    rows, rng = rig.rows_of(plan), np.random.default_rng(job.seed)
+    path = case.truth.get("path") or path_truth(case.nominal, case.machine, rows, rng)
     return {
         "truths": truths, "poses": len(np.unique(plan["point"])), "readings": len(plan["point"]), "cpu": round(cpu, 2),
         **answer_of(diagnosis), **after, **along_path(diagnosis, file, path, folder),
@@ -113,10 +111,10 @@ def _judged(job: Job, folder: Path) -> Record:
 def planned(diagnosis: tps.Diagnosis, file: Path, case: rig.DrawnCase, rng: np.random.Generator) -> Record:
     """What is said after a plan of a few visits was measured on the same machine; the same where nothing tells more."""
     plan = tps.plan(file, n=PLANNED, indicators=True, diagnosis=diagnosis)
-    if plan.to_frame().empty:
+    if not plan.rows:
         return answer_of(diagnosis)
     more = file.with_name("plan.csv")
-    more.write_text(str(plan.files(plots=False)["plan.csv"]))
+    more.write_text(plan_csv(plan.rows))
     more.write_text(csv_text(case.again(read_plan(str(more), case.nominal), rng)))
     return answer_of(tps.diagnose([file, more]))
 
@@ -176,7 +174,7 @@ def _percent(model: FloatArray, true: FloatArray, rows: FloatArray) -> float:
 
 
 def updated(diagnosis: tps.Diagnosis, file: Path, folder: Path) -> tps.Update | None:
-    """The update that a verdict leads to: its first explanation, a draft, or the strut law; None where refused."""
+    """The update that a verdict leads to: its first explanation, a draft, or the strut law; None for none."""
     said = diagnosis.to_dict()
     try:
         if said["verdict"] == "unexplained":
@@ -186,9 +184,11 @@ def updated(diagnosis: tps.Diagnosis, file: Path, folder: Path) -> tps.Update | 
             (folder / "missing.toml").write_text(draft.text)
             with_draft = tps.Machine.load("nist", effects=[folder / "missing.toml"])
             return tps.update(file, with_draft, add=list(draft.effects))
-        first = next((words for words in said["explanations"] if words != "none"), "none")
-        if said["verdict"] == "adequate" or first == "none":
-            return tps.update(file, strut_law=True)
+        first = next((words for words in said["explanations"] if words != "none"), "")
+        if said["verdict"] == "adequate":
+            law = tps.update(file, strut_law=True)
+            errors = law.to_frame()["mean_abs_error_percent"]
+            return law if errors.iloc[0] > errors.iloc[-1] + WORTH_A_LAW else None
         return tps.update(file, add=first.split(" + "))
     except tps.InputError:
         return None

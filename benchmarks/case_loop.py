@@ -59,12 +59,13 @@ def record_of(heading: Record, work: Callable[[Path], Record]) -> Record:
 def run_cases(
     jobs: Sequence[Any], run: Callable[[Any], Record], workers: int, into: Path, *, resume: bool = False
 ) -> None:
-    """Each record is written as it comes, a line of JSON; `resume` leaves out jobs whose fields a record holds."""
+    """Each record is written as it comes, a line of JSON; `resume` keeps those there of cases that did not break."""
     into.parent.mkdir(parents=True, exist_ok=True)
-    if resume and into.exists():
-        kept = [json.loads(line) for line in into.read_text(encoding="utf-8").splitlines()]
-        jobs = [job for job in jobs if not any(asdict(job).items() <= record.items() for record in kept)]
-    with into.open("a" if resume else "w", encoding="utf-8") as stream, Pool(workers) as pool:
+    kept = into.read_text(encoding="utf-8").splitlines() if resume and into.exists() else []
+    records = [record for record in map(json.loads, kept) if "error" not in record]
+    jobs = [job for job in jobs if not any(asdict(job).items() <= record.items() for record in records)]
+    with into.open("w", encoding="utf-8") as stream, Pool(workers) as pool:
+        stream.writelines(json.dumps(record) + "\n" for record in records)
         for count, record in enumerate(pool.imap_unordered(run, jobs, chunksize=1), 1):
             stream.write(json.dumps(record) + "\n")
             stream.flush()

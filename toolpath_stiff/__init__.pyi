@@ -7,6 +7,7 @@ from toolpath_stiff.analysis.program_check import ProgramCheck as ProgramCheck
 from toolpath_stiff.analysis.results import Analysis as Analysis
 from toolpath_stiff.api.by_hand import Preview as Preview
 from toolpath_stiff.api.by_hand import preview as preview
+from toolpath_stiff.api.compensation import compare_walls as compare_walls
 from toolpath_stiff.api.compensation import compensate as compensate
 from toolpath_stiff.api.cutting import cut_template as cut_template
 from toolpath_stiff.api.effects import check_effects as check_effects
@@ -38,6 +39,7 @@ from toolpath_stiff.api.questions import plan as plan
 from toolpath_stiff.api.questions import update as update
 from toolpath_stiff.case.case import Case as Case
 from toolpath_stiff.comparison.compare import Comparison as Comparison
+from toolpath_stiff.comparison.walls import WallComparison as WallComparison
 from toolpath_stiff.correction.draft import EffectDraft as EffectDraft
 from toolpath_stiff.correction.result import Update as Update
 from toolpath_stiff.cutting.compensation import Compensation as Compensation

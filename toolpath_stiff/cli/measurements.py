@@ -8,6 +8,7 @@ from typing import Annotated
 import toolpath_stiff as tps
 from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import DATA, FILES, FOLDER, JSON, NO_PLOTS, REPLACE, command
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import Option
 from toolpath_stiff.workbooks import split_name
 
@@ -58,7 +59,7 @@ def reduce(
     return run.show(args, reduction, f"\nwrote {' and '.join(written)}", document=lambda: document)
 
 
-@command("compare", DATA, "Machine.load", "compare", *FOLDER)
+@command("compare", DATA, "Machine.load", "compare", "compare_walls", "Program.read", *FOLDER)
 def compare(args: Namespace) -> int:
     """Where the model fails: errors, structure in the residuals, pictures, page.
 
@@ -66,12 +67,17 @@ def compare(args: Namespace) -> int:
       tps compare nist-table1
       tps compare measurements.csv --machine my_machine.toml
       tps compare first.csv second.csv --noise 2,1 --out reports/again
+      tps compare points.csv --program part.nc --cut cut.toml        measured walls of a part
 
     The machine file is compared as it stands; `tps diagnose` asks which effect it lacks. A finding is a pattern in the
     residuals that fewer than 5 % of campaigns of mere scatter would show anywhere among all patterns looked for.
     Files written to --out: compare.json, residuals.csv, report.html, measured_modelled.png, machine.png,
-    variables.png.
+    variables.png. With --cut DATA are points of a part's walls, and compare.json and residuals.csv are written.
     """
+    if args.cut or args.material or args.stock_mm:
+        if len(args.data) != 1:
+            raise InputError("several files of measured walls", expected="a file")
+        return run.to_folder(args, tps.compare_walls, tps.WallComparison, args.data, data=args.data[0])
     return run.to_folder(args, tps.compare, tps.Comparison, args.data)
 
 
