@@ -13,6 +13,7 @@ from toolpath_stiff.api.cutting import cut_template as cut_template
 from toolpath_stiff.api.effects import check_effects as check_effects
 from toolpath_stiff.api.effects import effect_template as effect_template
 from toolpath_stiff.api.effects import effects as effects
+from toolpath_stiff.api.forces import forces as forces
 from toolpath_stiff.api.machines import Machine as Machine
 from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
 from toolpath_stiff.api.machines import machine_template as machine_template
@@ -57,6 +58,7 @@ from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
 from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
 from toolpath_stiff.placement.result import Placement as Placement
 from toolpath_stiff.planning.result import Plan as Plan
+from toolpath_stiff.readings.forces import CoefficientFit as CoefficientFit
 from toolpath_stiff.readings.raw import Reduction as Reduction
 from toolpath_stiff.readings.raw import reduce as reduce
 from toolpath_stiff.results import TextFile as TextFile

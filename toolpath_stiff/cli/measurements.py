@@ -147,3 +147,27 @@ def plan(
     Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json and plan.png.
     """
     return run.to_folder(args, tps.plan, tps.Plan, data or [args.machine], minutes=dict(args.minutes or ()))
+
+
+@command("forces", "forces", *FOLDER)
+def forces(args: Namespace, records: Annotated[Sequence[str], Option("RECORDS", count="+")]) -> int:
+    """Coefficients of the cutting force from dynamometer records of slots.
+
+    columns of RECORDS, a row a moment:
+      time_s, fx_N, fy_N, fz_N     what the dynamometer reads: forces on the work; fx and fz may lack
+      feed_per_tooth_mm            or feed_mm_per_min; the same in all rows of a record, as are
+      spindle_rpm, depth_mm        speed and depth of the slot
+      record                       tells several records of a file apart
+    Other names and units are said by a mapping, also kept as RECORDS.columns.toml; "==" is one value for all rows:
+      tps forces s1.csv s2.csv s3.csv --cut cut.toml --columns "fx=Kraft X:kN, spindle_rpm==6000, depth==3"
+
+    Slots of full width at three feeds or more, best five, with air before and after the cut. Whole turns are averaged,
+    so that run-out cancels; the zero is a line through the air. What comes out goes into a setup file as
+    [coefficients] with file = "forces.json". Files written to --out: forces.json, forces.csv, forces.png.
+
+    Parameters
+    ----------
+    records
+        Records: files, FILE.xlsx[#SHEET].
+    """
+    return run.to_folder(args, tps.forces, tps.CoefficientFit, records, records=records)

@@ -23,15 +23,15 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document, json_number
 from toolpath_stiff.inference.covariances import Groups, Precision
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
-from toolpath_stiff.inference.left_out import gain_in_standard_errors, held_out
+from toolpath_stiff.inference.left_out import HeldOut, held_out
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import SETUP, Effect
 
-NONE = "none"
 SMALL = 4.0
 CHANCE = 0.05  # one-sided
 DRAWS = 2000
+UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
 FEWEST_POSES = 6  # below, no spread over poses can be told
 Votes = Mapping[str, FloatArray]  # rival -> (poses,) log predictive density of the explanation above the rival's
 
@@ -115,17 +115,21 @@ def vote_words(rival: str, differences: FloatArray) -> str:
     return f"{rival} foretells left-out poses {'worse' if gain > 0.0 else 'better'} by {abs(gain):.1f} +- {error:.1f}"
 
 
-def rivals_of(fit: Fit, base: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
-    """Explanations that an explanation must outvote: the model alone, those of other parts, those with less of itself.
+def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
+    """Explanations that one must outvote beside the model alone: those of other parts, those with less of itself.
 
     `fits`: all explanations by name; of those with more effects the search has its own price.
     """
     own, names = parts_of(fit), {*fit.names}
     others = {name: other for name, other in fits.items() if {*other.names} != names and len(other.names) <= len(names)}
-    return {NONE: base} | {name: o for name, o in others.items() if parts_of(o) != own or {*o.names} < names}
+    return {name: o for name, o in others.items() if parts_of(o) != own or {*o.names} < names}
 
 
-def lowers_error(fit: Fit, base: Fit, data: Readings) -> bool:
+def lowers_error(before: HeldOut, after: HeldOut) -> bool:
     """Whether an explanation lowers the mean error at left-out points: one that does not is no answer."""
-    before, after = (held_out(model, data.point).of_readings(data.tip) for model in (base, fit))
-    return not gain_in_standard_errors(before, after) <= 0.0
+    return not before.mean_error - after.mean_error <= UNSEEN
+
+
+def left_out_of(fit: Fit, data: Readings) -> HeldOut:
+    """Residuals at the tip's left-out points."""
+    return held_out(fit, data.point).of_readings(data.tip)
