@@ -26,9 +26,11 @@ POSES = pulled(
     np.array([[0.1, -0.2, 0.8], [-0.15, 0.26, 1.1], [0.0, 0.0, 0.45]]),
     np.radians([[10.0, -15.0, 20.0], [0.0, 12.0, -5.0], [0.0, 0.0, 0.0]]),
 )
-COMPLETE = dataclasses.replace(
-    POSES, time=np.full(9, 60.0), force=np.full(9, 4000.0), setup=np.array(["riser"] * 9), extension=np.full(9, 0.05)
-)  # every fault can show
+REFERENCE = reference_rows(NIST)
+COMPLETE = dataclasses.replace(  # every fault can show
+    REFERENCE, time=REFERENCE.force * 0.06, force=4.0 * REFERENCE.force, setup=np.full(72, "riser"),
+    extension=REFERENCE.force * 5e-5,
+)  # fmt: skip
 
 
 def opensees_compliance(machine: fem.FemMachine, tip: np.ndarray, turned: np.ndarray) -> np.ndarray:
@@ -200,15 +202,14 @@ def test_the_weight_closes_a_play_until_the_load_opens_it():
 def test_indicators_beside_the_tip_add_up():
     machine = dataclasses.replace(SOUND, joint=3e-9, riser=1e-9, bearings=np.full(3, 1e-9))
     loops = ["tip", "spindle", "platform", "table", "strut 2", "joint 2", "frame 1"]
-    read = {loop: fem.displacements(NIST, machine, COMPLETE, [loop] * 9, np.full(9, np.nan)) for loop in loops}
+    read = {loop: fem.displacements(NIST, machine, COMPLETE, [loop] * 72, np.full(72, np.nan)) for loop in loops}
     assert read["tip"] == pytest.approx(1.0 / machine.stiffness(NIST, COMPLETE), rel=1e-12)
     assert read["spindle"] + read["platform"] == pytest.approx(read["tip"], rel=1e-12)
     stiff = dataclasses.replace(machine, riser=0.0)
-    rest = fem.displacements(NIST, stiff, COMPLETE, ["table"] * 9, np.full(9, np.nan))
-    assert read["table"] - rest == pytest.approx(
-        read["tip"] - 1.0 / stiff.stiffness(NIST, COMPLETE), rel=1e-6, abs=1e-15
-    )
-    alone = fem.displacements(NIST, machine, COMPLETE, ["strut 2 alone"] * 9, np.full(9, 2.5616))
+    rest = fem.displacements(NIST, stiff, COMPLETE, ["table"] * 72, np.full(72, np.nan))
+    column = read["tip"] - 1.0 / stiff.stiffness(NIST, COMPLETE)
+    assert read["table"] - rest == pytest.approx(column, rel=1e-6, abs=1e-15)
+    alone = fem.displacements(NIST, machine, COMPLETE, ["strut 2 alone"] * 72, np.full(72, 2.5616))
     assert alone == pytest.approx(1.0 / 46.5e6, rel=1e-9)
     assert 0.0 < np.abs(read["joint 2"]).min() < np.abs(read["strut 2"]).min()
     assert np.all(np.abs(read["frame 1"]) < 1e-9)
