@@ -40,6 +40,7 @@ GROUPS = {
         "compare": "where the model fails: errors, structure in the residuals, pictures, page",
         "diagnose": "which physical effect the model lacks, if any: verdict, candidates, confounding",
         "update": "fit effects to measurements, see how far the error falls, write the machine file",
+        "forces": "coefficients of the cutting force from dynamometer records of slots",
         "plan": "what to measure next to tell explanations apart, or a first campaign",
     },
     "effects": {"effects": "physical effects that a machine can carry; write your own"},

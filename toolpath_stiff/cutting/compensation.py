@@ -86,7 +86,7 @@ def walls_of(cut: Cut, written: Moves, row_of: IntArray, untouched: Moves) -> Wa
     first = np.unique(row_of, return_index=True)[1]  # rows ascend, so does where each begins
     whole = np.bincount(row_of, length)[row_of[move]]
     start = before[first][np.searchsorted(row_of[first], row_of[move])]
-    share, shift = _beside(untouched, row_of[move], points_along(written, move, along)[0], (s - start) / whole)
+    share, shift = places_beside(untouched, row_of[move], points_along(written, move, along)[0], (s - start) / whole)
     sides = np.array([-1.0, 1.0])
     return Walls(
         row=row_of[move],
@@ -99,7 +99,7 @@ def walls_of(cut: Cut, written: Moves, row_of: IntArray, untouched: Moves) -> Wa
     )
 
 
-def _beside(moves: Moves, row: IntArray, points: FloatArray, near: FloatArray) -> tuple[FloatArray, FloatArray]:
+def places_beside(moves: Moves, row: IntArray, points: FloatArray, near: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n,) share of moves beside which points lie, and how far left of them, m; of a circle's turns the one `near`."""
     start, end, center, point = (
         place[:, 0] + 1j * place[:, 1] for place in (moves.start[row], moves.end[row], moves.arc_center[row], points)
@@ -321,8 +321,8 @@ def _intended(shifts: Shifts, walls: Walls) -> FloatArray:
 
 
 def _worse(was: Mapping[str, FloatArray], now: Mapping[str, FloatArray]) -> BoolArray:
-    """(rows, 2) walls whose error grew, in its mean size or its rms; one that is new counts against nothing."""
-    grown = [now[name] - np.where(was["length"] > 0.0, was[name], 0.0) for name in ("size", "rms")]
+    """(rows, 2) walls whose error grew, in its mean size or its rms; one that is new, against the worst there was."""
+    grown = [now[name] - np.where(was["length"] > 0.0, was[name], np.nanmax(was[name])) for name in ("size", "rms")]
     return np.asarray(np.fmax(*grown) > SAME)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
@@ -14,6 +15,7 @@ from toolpath_stiff.cutting.final_surface import final_strip, final_walls
 from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.patches import Patches
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
+from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import floor_error, shares, wall_error
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
@@ -27,6 +29,7 @@ from toolpath_stiff.units import per_min_from_rad_per_s
 
 BLOCK = 16_384  # stations at a time
 MOST_NAMED = 5  # lines in a warning
+ROUNDED = 1e-12  # of a cosine
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -53,6 +56,8 @@ class Cut:
         (n, 3) m of tip and tool under the mean force.
     wall_heights
         (n, 2, 2) m above the tip: of the left and right wall that stays, lowest and highest point.
+    wall_force
+        (n, 2, 3) N, force when the left and right wall is made, mean over its height: the one behind its mean error.
     errors, lowest, highest
         (n, 3) m, error of left wall, right wall, and the floor or a ball's contact: mean over it, extremes.
     deviation
@@ -75,6 +80,7 @@ class Cut:
     peak_force: FloatArray
     deflection: FloatArray
     wall_heights: FloatArray
+    wall_force: FloatArray
     errors: FloatArray
     lowest: FloatArray
     highest: FloatArray
@@ -143,6 +149,9 @@ def evaluate_cut(
     patches = Patches.joined(parts)
     walls, strips = final_walls(*given), final_strip(*given)
     cut = replace(cut, removed=removed, wall_heights=walls)
+    made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
+    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
+        values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
     _note_engagement(cut, patches)
     for number, cutter in cutters.items():
         engaged = np.zeros(len(samples), dtype=bool)
@@ -172,6 +181,7 @@ def _nothing_cut(
         **{name: np.zeros(n) for name in ("ap", "ae", "entry", "exit", "removed")},
         **{name: np.zeros((n, 3)) for name in ("mean_force", "peak_force", "deflection")},
         wall_heights=np.full((n, 2, 2), np.nan),
+        wall_force=np.full((n, 2, 3), np.nan),
         **{name: np.full((n, 3), np.nan) for name in ("errors", "lowest", "highest", "deviation")},
         assumptions=(),
         warnings=(),
@@ -218,11 +228,11 @@ def _evaluate(
     given = (kept, cutter, cut.coefficients, feed, turning)
     mean = mean_force(*given)
     cut.mean_force[rows], cut.peak_force[rows] = mean, peak_force(*given)
-    axes = station_axes(np.arctan2(samples.tangent[:, 1], samples.tangent[:, 0]), origin)
+    axes = station_axes(headings(samples), origin)
     machine = tip_compliances(model, samples, origin, axes, mean)
     whole = with_tools(machine, samples, cut.cutters)
     cut.deflection[rows] = product(whole, mean[:, :, None])[..., 0]
-    walls, of_walls = wall_error(*given, whole, cut.wall_heights[rows])
+    walls, of_walls, cut.wall_force[rows] = wall_error(*given, whole, cut.wall_heights[rows])
     floors, of_floors = floor_error(*given, whole, strips[rows])
     _enter(cut, rows, slice(0, 2), walls @ shares()[1], walls)
     _enter(cut, rows, slice(2, 3), floors.mean(axis=1)[:, None], floors[:, None])
@@ -249,7 +259,8 @@ def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str,
     sentences += [
         "errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; the chip "
         "is not thinner for them",
-        "a spring pass cuts the stock as programmed, not what the pass before left by its error",
+        "a spring pass meets the part as programmed, not what the pass before left by its error: where it takes nothing "
+        "off, its error counts as 0",
     ]
     if model.load_dependent:
         sentences.append("effects that depend on the load act as under the mean force of a turn")
@@ -269,7 +280,7 @@ def _warnings(cut: Cut) -> tuple[str, ...]:
             "the machine (stick_out_mm in [[tool]] of cut.toml)"
         )
     engaged = cut.ap > 0.0
-    plunges = samples.cutting & ~engaged & (cut.removed > 0.0)
+    plunges = (cut.removed > 0.0) & (np.abs(samples.tangent[:, 2]) >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
     warnings += _lines_warning(
         samples, plunges, "plunges: cutting with the end is not modelled, no force is known there"
     )

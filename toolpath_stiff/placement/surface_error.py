@@ -24,7 +24,7 @@ def errors_of_walls(model: StiffnessModel, cut: Cut, present: Pose, name: str) -
     what the machine gives way, across the wall under the force at the wall's moment, is that of the placement.
     Raises `ProgramError` where no pass makes a final wall.
     """
-    rows, side = np.nonzero(np.isfinite(cut.wall_mean))
+    rows, side = np.nonzero(np.isfinite(cut.wall_mean) & np.isfinite(cut.wall_force[..., 1]))
     if not len(rows):
         raise ProgramError("no pass makes a wall of the finished part", file=name)
     along = np.cumsum(cut.samples.weight[rows])

@@ -168,7 +168,7 @@ def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
         "frame": frame.tolist(),
         "error": fractions,
         "error_range": ends,
-        "limit": um_from_m(error_limit(error)),
+        "limit": um_from_m(error_limit(cut)),
         "sample": _base64(np.where(sample < 0, -1, nearest).astype("<i4")),
         "colours": error_colours(),
     }

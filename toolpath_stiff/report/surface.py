@@ -31,10 +31,10 @@ def in_machine(points: FloatArray, origin: ArrayLike) -> FloatArray:
     return np.asarray(product(points, rotation_matrices(zero[3:]).T) + zero[:3])
 
 
-def error_limit(error: FloatArray) -> float:
-    """End of a scale of colours, m: what 99 % of the quadrangles with an error keep within, a nanometre at least."""
-    known = np.abs(error[np.isfinite(error)])
-    return max(float(np.quantile(known, 0.99)), 1e-9) if len(known) else 1e-9
+def error_limit(cut: Cut) -> float:
+    """End of a scale of colours, m: what 99 % of the walls keep within, or of the floors if that is more."""
+    known = [np.abs(error[np.isfinite(error)]) for error in (cut.wall_mean, cut.errors[:, 2])]
+    return max([1e-9, *(float(np.quantile(size, 0.99)) for size in known if len(size))])
 
 
 def _walls(cut: Cut, side: int, most: int) -> Quads:
@@ -46,8 +46,7 @@ def _walls(cut: Cut, side: int, most: int) -> Quads:
         return np.empty((0, 4, 3)), np.empty(0), rows
     many = -(-len(rows) // most)
     starts = (np.diff(rows, prepend=-2) != 1) | (np.diff(samples.move[rows], prepend=-1) != 0)
-    if many > 1:
-        starts |= np.arange(len(rows)) % many == 0
+    starts |= np.arange(len(rows)) % many == 0
     first = np.flatnonzero(starts)
     last = np.append(first[1:], len(rows)) - 1
     error = 0.5 * (cut.errors[rows, side] + cut.errors[rows + 1, side])
@@ -79,7 +78,7 @@ def _floors(cut: Cut, most: int) -> Quads:
     corners = [(slice(None, -1), slice(None, -1)), (slice(1, None), slice(None, -1)), (slice(1, None), slice(1, None))]
     corners.append((slice(None, -1), slice(1, None)))
     height = np.stack([top[corner] for corner in corners], axis=-1)
-    known = np.isfinite(height).all(axis=-1)
+    known = np.asarray(np.isfinite(height).all(axis=-1))
     i, j = np.nonzero(known & (np.ptp(np.where(known[..., None], height, 0.0), axis=-1) <= STEEP * (x[1] - x[0])))
     places = ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))
     quads = np.stack([np.stack([x[a], y[b], top[a, b]], axis=1) for a, b in places], axis=1)
