@@ -83,7 +83,7 @@ FAULTS: dict[str, Fault] = {
     "joints_turn_hard": _fault("joints", "joint_moment_stiffness", 2e6, _grown("turning", *[1] * 6)),
     "struts_curved": _fault(ALL, "strut_law", 0.4, _grown("curvature"), signed),
     "strut_weak": _fault(ONE, "weak_strut", 2.3, _softened("strut_factors", _strut), one_strut),
-    "frame_soft": _fault("frame", "frame_compliance", CRACKED, _softened("members")),
+    "frame_soft": _fault("frame", "frame_compliance frame_sway", CRACKED, _softened("members")),
     "frame_corner_soft": _fault(
         "frame", "frame_compliance", SOFT,
         lambda m, p: {"brackets": np.outer(_number("corner", 6)(p), [p["size"] * p["radial"], p["size"]])},
@@ -99,8 +99,17 @@ FAULTS: dict[str, Fault] = {
         drawn(whole("axis", 0, 3), signed),
     ),
     "indicator_drifts": _fault("instrument", "thermal_drift", 3.3e-7, _grown("drift"), signed, "time_min"),
-    # Outside the catalogue. A slender tool bends with the cube of its length.
-    "tool_slender": _fault("tool", "", 3.0, _softened("tool")),
+    "tool_slender": _fault("tool", "tool_bending", 3.0, _softened("tool")),
+    "frame_feet_soft": _fault(WORK, "frame_sway", CRACKED, _softened("feet")),
+    "joint_off_its_place": _fault(
+        f"{ONE},platform,frame,geometry", "joint_offset", 0.03,
+        lambda m, p: {"platform_errors": m.platform_errors + p["size"] * np.outer(_strut(p), _unit(p))},
+        drawn(one_strut, _direction),
+    ),
+    "indicator_above_tip": _fault("instrument", "indicator_off_tip", 0.06, _grown("touches_above")),
+    "cell_curved": _fault("instrument", "load_cell_curvature", 0.3, _grown("cell_curve"), signed, "force_N"),
+    "stand_gives": _fault("instrument", "stand_compliance", SOFT, _grown("stand")),
+    # Outside the catalogue.
     "spindle_bearing_oval": _fault("tool", "", SOFT, _grown("bearings", 1, 0, 0)),
     "spindle_flange_loose": _fault("tool,platform", "", 4e-6, _about("flange"), _azimuth),
     "platform_plate_bends": _fault("platform", "", CRACKED, _softened("spokes")),
@@ -115,7 +124,6 @@ FAULTS: dict[str, Fault] = {
     "frame_beam_cracked": _fault("frame", "", CRACKED, _softened("members", _number("beam", 24)), whole("beam", 0, 12)),
     "frame_diagonals_soft": _fault("frame", "", CRACKED, _softened("members", lambda p: np.arange(24) >= 6)),
     "frame_foot_soft": _fault(WORK, "", CRACKED, _softened("feet", _number("foot", 6)), whole("foot", 0, 3)),
-    "frame_feet_soft": _fault(WORK, "", CRACKED, _softened("feet")),
     "table_side_soft": _fault(  # two neighbours of the four mounts
         WORK, "", CRACKED,
         _softened("mounts", lambda p: np.isin(np.arange(4), ((0, 1), (0, 2), (1, 3), (2, 3))[p["edge"]])),
@@ -125,11 +133,6 @@ FAULTS: dict[str, Fault] = {
     "floor_tilts": _fault(WORK, "", 1e-7, _about("floor"), _azimuth),
     "joint_seat_soft": _fault(
         f"{ONE},platform", "", 4 * SOFT, _both(_about("seat"), lambda m, p: {"seat_strut": p["strut"]}),
-        drawn(one_strut, _direction),
-    ),
-    "joint_off_its_place": _fault(
-        f"{ONE},platform,frame,geometry", "", 0.03,
-        lambda m, p: {"platform_errors": m.platform_errors + p["size"] * np.outer(_strut(p), _unit(p))},
         drawn(one_strut, _direction),
     ),
     "joints_soften_swinging": _fault(ALL, "", 8 * SOFT, _grown("swing")),
@@ -146,9 +149,6 @@ FAULTS: dict[str, Fault] = {
     "hose_pulls": _fault(
         "platform,tool", "", 4e7, lambda m, p: {"hose": np.array([p["size"], p["azimuth"]])}, _azimuth
     ),
-    "indicator_above_tip": _fault("instrument", "", 0.06, _grown("touches_above")),
-    "cell_curved": _fault("instrument", "", 0.3, _grown("cell_curve"), signed, "force_N"),
-    "stand_gives": _fault("instrument", "", SOFT, _grown("stand")),
 }  # fmt: skip
 
 
