@@ -15,6 +15,7 @@ from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
+from toolpath_stiff.inference.noise import REST
 from toolpath_stiff.inference.nuisances import findings, nuisance_words
 from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
@@ -248,6 +249,8 @@ def assumptions(diagnosis: Examination) -> list[str]:
         f"noise: {noise.origin}",
         f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
         f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
+        f"frame, table, platform and tool give a little more or less than the model says: {100 * REST:.1g} % of the tip's "
+        "stiffness (sd) along each of their axes: assumed",
         f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: "
         + ("assumed" if noise.outliers == OUTLIERS else "as the repeats have it"),
         f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "
