@@ -57,7 +57,7 @@ def _figures(cut: Cut, rows: IntArray) -> Document:
     """Errors of walls and floors at some samples, the largest force, the volume removed."""
     weight, mean = cut.samples.weight[rows], cut.errors[rows]
     low, high = cut.lowest[rows], cut.highest[rows]
-    force = np.linalg.norm(cut.peak_force[rows], axis=1)
+    force = np.abs(cut.peak_force[rows]).max(axis=1, initial=0.0)
     return {
         "removed_mm3": mm3_from_m3(float(cut.removed[rows].sum())),
         "largest_force_N": float(force.max(initial=0.0)),
@@ -164,7 +164,7 @@ def line_columns(cut: Cut) -> dict[str, AnyArray]:
     cuts = np.flatnonzero(cut.samples.cutting)
     cuts = cuts[np.argsort(cut.samples.line[cuts], kind="stable")]
     first = np.flatnonzero(np.diff(cut.samples.line[cuts], prepend=-1))
-    force = np.linalg.norm(cut.peak_force[cuts], axis=1)
+    force = np.abs(cut.peak_force[cuts]).max(axis=1)
     columns: dict[str, AnyArray] = {
         "line": cut.samples.line[cuts[first]],
         "tool": cut.samples.tool[cuts[first]],

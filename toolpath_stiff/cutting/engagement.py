@@ -6,21 +6,19 @@ changes along a ring, the step is halved until it is exact: so a wall stands whe
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.patches import Patches
-from toolpath_stiff.cutting.stations import TOUCH, cutting_samples, heights_around, stations_along
-from toolpath_stiff.cutting.stock import Stock
-from toolpath_stiff.cutting.workpiece import Workpiece, workpiece_of
-from toolpath_stiff.nc.courses import move_lengths
+from toolpath_stiff.cutting.stations import BLOCK, STATION, TOUCH, blocks_of_stations, heights_around, stations_along
+from toolpath_stiff.cutting.workpiece import Workpiece
 from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.results import Progress, counter
 
-BLOCK = 2048  # stations at a time
 AROUND = 33  # points of a ring, denser at the sides, where a light cut is
 LEVELS, CORNER_LAYERS, COARSE = (
     8,
@@ -36,7 +34,7 @@ SIDES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, AROUND))  # shares of a ring
 
 
 def engage(
-    stock: Stock,
+    work: Workpiece,
     moves: Moves,
     samples: Samples,
     cutters: Mapping[int, Cutter],
@@ -46,8 +44,9 @@ def engage(
 
     Parameters
     ----------
-    stock, moves, samples
-        In the set-up frame: the moves as read, sampled without a placement. `Patches.station` is a row of `samples`.
+    work, moves, samples
+        In the set-up frame: `workpiece_of` the moves as read, and their samples without a placement.
+        `Patches.station` is a row of `samples`.
     cutters
         By number of the tool.
 
@@ -55,57 +54,42 @@ def engage(
     ------
     Rows of `samples`, in order and together all; patches; (rows,) m3 taken between the sample before and this one,
     0 for rapids and at the first sample of a move. Plunges remove, but have no patches: end cutting is not modelled.
-
-    Raises
-    ------
-    ProgramError
-        A tool that cuts is tilted or not known.
     """
-    work, tell = workpiece_of(stock, moves, cutters), counter(progress, "engagement")
-    rows, shares = cutting_samples(moves, samples)
-    last: tuple[int, float, float] = (-1, 0.0, 0.0)  # move, share and rate of the last station
-    begin = 0
-    for first in range(0, max(len(rows), 1), BLOCK):
-        some = slice(first, first + BLOCK)
-        move, share = samples.move[rows[some]], shares[some]
-        stations = stations_along(work, moves, cutters, move, share)
+    last: AnyArray = np.zeros(1, dtype=STATION)
+    last["move"], last_rate, begin = -1, np.zeros(1), 0
+    tell = counter(progress, "engagement")
+    for rows, stations in blocks_of_stations(work, moves, samples, cutters):
         patches, rate = _contact(work, stations)
-        end = len(samples) if first + BLOCK >= len(rows) else int(rows[first + BLOCK])
+        end = int(rows[-1]) + 1
         removed = np.zeros(end - begin)
-        if len(move):
-            volumes = _volumes(
-                work, moves, cutters, *(np.append(a, b) for a, b in zip(last, (move, share, rate), strict=True))
-            )
-            removed[rows[some] - begin] = volumes
-            last = (int(move[-1]), float(share[-1]), float(rate[-1]))
-        station = rows[some][patches.station]
-        yield slice(begin, end), Patches(station, patches.low, patches.high, patches.entry, patches.exit), removed
-        begin = end
+        joined = np.concatenate([last, stations]), np.concatenate([last_rate, rate])
+        removed[rows - begin] = _volumes(work, moves, cutters, *joined)
+        yield slice(begin, end), replace(patches, station=rows[patches.station]), removed
+        last, last_rate, begin = stations[-1:], rate[-1:], end
         if tell:
             tell(begin, len(samples))
+    if begin < len(samples):
+        none = np.zeros(0)
+        yield slice(begin, len(samples)), Patches(none.astype(np.int64), *[none] * 4), np.zeros(len(samples) - begin)
 
 
 def _volumes(
-    work: Workpiece, moves: Moves, cutters: Mapping[int, Cutter], move: FloatArray, share: FloatArray, rate: FloatArray
+    work: Workpiece, moves: Moves, cutters: Mapping[int, Cutter], stations: AnyArray, rate: FloatArray
 ) -> FloatArray:
-    """(n,) m3 between n + 1 stations; finer steps where the rate of removal changes."""
-    move = move.astype(np.int64)
-    length = np.where(move[1:] == move[:-1], np.diff(share) * move_lengths(moves)[move[1:]], 0.0)
+    """(n,) m3 between n + 1 stations; in finer steps where the rate of removal changes."""
+    together = stations["move"][1:] == stations["move"][:-1]
+    length, share = np.where(together, np.diff(stations["path"]), 0.0), np.diff(stations["share"])
     volume = 0.5 * length * (rate[1:] + rate[:-1])
-    radius = np.array([cutters[tool].radius for tool in moves.tool[move[1:]].tolist()])
-    steps = np.ceil(length / (FINE * radius) - 1e-9).astype(np.int64)
-    changing = np.abs(np.diff(rate)) > CHANGE * np.maximum(rate[1:], rate[:-1])
-    rows = np.flatnonzero(changing & (steps > 1) & (length > 0.0))
-    for first in range(0, len(rows), BLOCK // 8):
-        some = rows[first : first + BLOCK // 8]
+    steps = np.maximum(np.ceil(length / (FINE * stations["reach"][1:]) - 1e-9), 1.0).astype(np.int64)
+    rows = np.flatnonzero((np.abs(np.diff(rate)) > CHANGE * np.maximum(rate[1:], rate[:-1])) & (steps > 1))
+    for some in np.array_split(rows, len(rows) * 8 // BLOCK + 1):
         inner = steps[some] - 1
         each = np.repeat(some, inner)
         number = np.arange(len(each)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
-        between = share[each] + (share[each + 1] - share[each]) * number / steps[each]
-        sums = np.bincount(
-            each, _contact(work, stations_along(work, moves, cutters, move[each + 1], between))[1], len(length)
-        )
-        volume[some] = length[some] / steps[some] * (0.5 * (rate[some] + rate[some + 1]) + sums[some])
+        between = stations["share"][each] + share[each] * number / steps[each]
+        finer = stations_along(work, moves, cutters, stations["move"][each], between)
+        sums = np.bincount(each, _contact(work, finer)[1], len(length))[some]
+        volume[some] = length[some] / steps[some] * (0.5 * (rate[some] + rate[some + 1]) + sums)
     return volume
 
 

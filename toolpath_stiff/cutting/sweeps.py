@@ -108,8 +108,9 @@ def _refuse(moves: Moves, cuts: BoolArray, cutters: Mapping[int, Cutter]) -> Non
 
 
 def foot(sweeps: AnyArray, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Where each point lies beside its piece (a row each): place of the nearest point of the whole line or circle
-    along it, distance from there, a unit of the place in m there, and the distance of point and centre of an arc.
+    """(e,) place along the line or circle of a piece that is nearest to a point, the distance, and two more.
+
+    These are the unit of the place, m, at the point, and for arcs its square, else 0.
     """
     dx, dy = x - sweeps["x"], y - sweeps["y"]
     along = dx * sweeps["cos"] + dy * sweeps["sin"]

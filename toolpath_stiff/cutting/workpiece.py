@@ -1,8 +1,8 @@
 """The stock and what the program takes from it: heights of the part at any point and any time, by an index of cells.
 
-A cell of the index lists the pieces that pass over it, in the order of time. A piece that lies nowhere in the cell below
-what an earlier one left all over it is not listed; a query begins at the first piece that still counts at its time. So
-neither the number of levels nor of passes lengthens a query, and there is no grid on which heights would be rounded.
+A cell of the index lists the pieces that pass over it, in the order of time. A piece that lies nowhere in the cell
+below what an earlier one left all over it is not listed; a query begins at the first piece that still counts at its
+time. So neither levels nor passes lengthen a query, and there is no grid on which heights would be rounded.
 """
 
 from collections.abc import Iterator, Mapping
@@ -56,10 +56,10 @@ class Workpiece:
         slack_from: IntArray | None = None,
         slack: float = 0.0,
     ) -> tuple[FloatArray, IntArray]:
-        """(n,) m, height of what stands at points after the pieces first <= piece < last of `window`, each (n,), and
-        the piece that left it, the last of several; -1: none, the stock.
+        """(n,) m, height of what some pieces leave at points, and (n,) the last piece that left it; -1: the stock.
 
-        Of the pieces from `slack_from` (n,) on the cutter is taken for smaller and higher by `slack`, m.
+        The pieces are first <= piece < last of `window`, (n,) each. Of those from `slack_from` (n,) on the cutter is
+        taken for smaller and higher by `slack`, m.
         """
         top, owner = self.stock.heights(x, y)[0], np.full(len(x), -1)
         low, high = self._entries(x, y, window)
@@ -150,7 +150,7 @@ def _along(pieces: AnyArray, share: float) -> tuple[FloatArray, FloatArray]:
 def _rasters(
     pieces: AnyArray, low: IntArray, high: IntArray, corner: FloatArray, size: float
 ) -> Iterator[tuple[IntArray, IntArray, FloatArray, FloatArray]]:
-    """(k, 2) cells that pieces pass, in portions, (k,) piece, and m, bounds of the height it leaves all over the cell."""
+    """(k, 2) cells that pieces pass, in portions, (k,) the piece, and m, bounds of the height that it leaves there."""
     wide = high - low + 1
     counts = wide.prod(axis=1)
     ends = np.cumsum(counts)

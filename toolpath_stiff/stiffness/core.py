@@ -16,6 +16,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness import closed_form, exact
 from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.geometry_slopes import geometry_slopes
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small
@@ -93,6 +94,21 @@ def compliance_along(
     for rows, path in _paths(model, position, rotation, tool_length, force):
         compliance[rows] = exact.compliance_along(model, path, direction[rows])
     return compliance
+
+
+def geometry_slopes_along(
+    model: StiffnessModel,
+    direction: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray | None = None,
+    tool_length: Tools = np.nan,
+    force: float = defaults.FORCE,
+) -> FloatArray:
+    """(n, 42) as of `geometry_slopes`; arguments as of `compliance_along`."""
+    slopes = np.empty((len(position), 42))
+    for rows, path in _paths(model, position, rotation, tool_length, force):
+        slopes[rows] = geometry_slopes(model, path, direction[rows])
+    return slopes
 
 
 def rows_of_tools(tool_length: FloatArray) -> list[tuple[float, IntArray | slice]]:
