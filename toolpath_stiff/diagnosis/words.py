@@ -249,8 +249,8 @@ def assumptions(diagnosis: Examination) -> list[str]:
         f"noise: {noise.origin}",
         f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
         f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
-        f"frame, table, platform and tool give a little more or less than the model says: {100 * REST:.1g} % of the tip's "
-        "stiffness (sd) along each of their axes: assumed",
+        f"frame, table, platform and tool give a little more or less than in the model: {100 * REST:.1g} % (sd) of the "
+        "tip's stiffness along each of their axes: assumed",
         f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: "
         + ("assumed" if noise.outliers == OUTLIERS else "as the repeats have it"),
         f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "

@@ -240,8 +240,8 @@ class Predictor:
     def rest_columns(self) -> FloatArray:
         """(n, 7) d ln k to the links that the model takes for rigid, each of rms 1: what a little give of them changes.
 
-        Of work and frame along X, Y, Z and in rocking, of platform and tool along their own three axes. Readings of loops
-        beside the tip are left out.
+        Of work and frame along X, Y, Z and in rocking, of platform and tool along their own three axes. Readings of
+        loops beside the tip are left out.
         """
         data, path = self.data, self.full_path
         moment = np.cross(data.position, data.direction)

@@ -52,7 +52,7 @@ def votes(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, Fl
             mine[wild] = precision, _log_predictive(fit, precision, points)
         precision, density = mine[wild]
         against[name] = density - _log_predictive(rival, precision, points)
-    return dict(sorted(against.items(), key=lambda item: (float(item[1].sum()), item[0])))
+    return closest(against)
 
 
 def _log_predictive(fit: Fit, precision: Precision, points: Groups) -> FloatArray:
@@ -113,6 +113,15 @@ def vote_words(rival: str, differences: FloatArray) -> str:
     """The same as a clause."""
     gain, error = float(differences.sum()), standard_error(differences)
     return f"{rival} foretells left-out poses {'worse' if gain > 0.0 else 'better'} by {abs(gain):.1f} +- {error:.1f}"
+
+
+def closest(*ballots: Votes) -> dict[str, FloatArray]:
+    """Votes against each rival in its strongest form, the closest rival first."""
+    names = {name for votes_for in ballots for name in votes_for}
+    strongest = {
+        name: min((votes_for[name] for votes_for in ballots if name in votes_for), key=np.sum) for name in sorted(names)
+    }
+    return dict(sorted(strongest.items(), key=lambda item: (float(item[1].sum()), item[0])))
 
 
 def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
