@@ -27,7 +27,9 @@ def p95(origin):
 def test_the_least_error():
     program = tps.Program.from_text(TEXT, name="part.nc")
     placed = {
-        aim: tps.place(program, objective=aim, points=5, step_mm=2.0, **BOX, **({"cut": GIVEN} if aim == "error" else {}))
+        aim: tps.place(
+            program, objective=aim, points=5, step_mm=2.0, **BOX, **({"cut": GIVEN} if aim == "error" else {})
+        )
         for aim in ("balanced", "error")
     }
     best = placed["error"]
