@@ -7,7 +7,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.examination import NAMING, Examination
+from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Examination
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.confounding import CONFOUNDED
@@ -31,7 +31,7 @@ MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has
 
 def verdict_text(diagnosis: Examination) -> str:
     """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
-    same = [] if diagnosis.alike is None else [alike_text(diagnosis.explanations[0], diagnosis.alike)]
+    same = [alike_text(name, alike) for name, alike in diagnosis.alike.items()]
     return " ".join([_verdict_text(diagnosis), *same, *(f"{_capital(doubt)}." for doubt in doubts(diagnosis))])
 
 
@@ -87,6 +87,9 @@ def _cause(diagnosis: Examination, name: str) -> str:
     if name not in diagnosis.fits:
         return f"({name}, probability {chance})"
     fit = diagnosis.fits[name]
+    if diagnosis.main.probability.get(name, 0.0) < SHOWN and name in diagnosis.main.votes:
+        titles = joined([candidate.effect.title for candidate in fit.candidates])
+        return f"{titles} ({name}: less likely than {100 * SHOWN:g} %, but foretells left-out poses as well)"
     unusual = f", more than is usual ({joined(sizes)}) " if (sizes := _unusual(fit)) else " "
     return f"{joined(fit.findings)}{unusual}({name}, probability {chance})"
 

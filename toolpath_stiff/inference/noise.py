@@ -33,6 +33,7 @@ from toolpath_stiff.readings.measurements import Readings
 # Sd of what the links that the model takes for rigid change ln stiffness by, rms; assumed: along each axis 1 % in all,
 # as much as struts differ, of which the work's side and the head's side, which look alike at the tip, have half each.
 REST = 0.01 / np.sqrt(2.0)
+REST_COLUMNS = 7
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
 # Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
