@@ -178,6 +178,8 @@ class ReadProgram:
         Where the run left the order of the lines, for a subprogram or back from it.
     parametric
         Whether variables, expressions or loops made the moves.
+    stock
+        (2, 3) m, the smallest and the largest corner of the blank in the set-up frame, where the program says (BLK FORM).
 
     Examples
     --------
@@ -205,6 +207,7 @@ class ReadProgram:
     marks: tuple[tuple[int, str], ...] | None = None
     jumps: tuple[Jump, ...] = ()
     parametric: bool = False
+    stock: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
 
     def __repr__(self) -> str:
         return f"<ReadProgram {self.name}: {len(self.moves)} moves, read as {self.dialect}>"
