@@ -164,7 +164,7 @@ class Conversational:
     pole, heading
         Circle centre (CC) and the direction in which the last contour element ended, in the plane; None: not known.
     held, corner
-        A contour element that waits for the corner behind it, and that corner's statement (CHF, RND).
+        A contour element that waits for the corner behind it, with its end and feed, and that corner's statement (CHF, RND).
     approach
         The contour point of an APPR, and what it does once the first element's direction is known; `fast`: the last positioning was a rapid.
     to_corner
@@ -185,7 +185,7 @@ class Conversational:
 
     pole: tuple[float, float] | None = None
     heading: tuple[float, float] | None = None
-    held: tuple[CurrentBlock, dict[int, float]] | None = None
+    held: tuple[CurrentBlock, dict[int, float], float | None] | None = None
     corner: CurrentBlock | None = None
     approach: tuple[dict[int, float], Callable[[complex], None]] | None = None
     fast: bool = False

@@ -15,6 +15,7 @@ from toolpath_stiff.nc.heidenhain.contour import SIDES, begin_compensation, feed
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
+NO_ARC_MM = 1e-3  # an arc of LCT that is shorter is none: the line goes on smoothly
 OF_CONTOUR = (
     "the arcs of APPR and DEP belong to the contour: the radius of the tool centre's is smaller by the tool's radius"
 )
@@ -75,7 +76,8 @@ def begin_contour(
     if depth is not None:
         go(state, block, {normal: depth}, rapid=rapid)
     state.cutter, state.feed = cutter, own
-    go(state, block, {first: apex.real, second: apex.imag}, center, turn)
+    if turn == 0 or abs(apex - place) > NO_ARC_MM:
+        go(state, block, {first: apex.real, second: apex.imag}, center, turn)
     unused = next(iter(block.free), None)
     block.refuse_if(unused, unused, f"is no word of {code}", "its own words")
     state.feed = after
@@ -134,7 +136,9 @@ def depart(state: State, block: CurrentBlock, code: str) -> None:
         assert cutter is not None
         block.refuse_if(not there.keys() >= {first, second}, None, "without its end point", "X and Y")
         end = complex(there[first], there[second])
-        _go(state, block, _touching(block, end - center, radius, cutter.radius, turn) + center, center, turn)
+        place = _touching(block, end - center, radius, cutter.radius, turn) + center
+        if abs(place - apex) > NO_ARC_MM:
+            _go(state, block, place, center, turn)
     stop(state, block)
     if code == "DEP LN":
         here = in_plane(state, present(state))

@@ -172,13 +172,15 @@ def go(
         current.groups["motion"] = "G0" if rapid else "G1"
     held, plain.held = plain.held, None
     if held is not None and plain.corner is not None:
+        modal, state.feed = state.feed, held[2]
         _cut_corner(state, held[0], current, (a, b))
+        state.feed = modal
     ahead = b - a if not turn else turn * 1j * (b - (center or 0.0))
     plain.heading = (ahead.real, ahead.imag) if abs(ahead) > 0.0 and not there.keys() - {first, second} else None
     plain.fast = rapid
     if plain.to_corner:
         block.refuse_if(rapid or normal in there or turns > 1 or there.keys() & {3, 4, 5}, None, *_NO_CORNER)
-        plain.held = (current, {axis: end[axis] for axis in (first, second)})
+        plain.held = (current, {axis: end[axis] for axis in (first, second)}, state.feed)
     else:
         execute(state, current)
 
@@ -233,6 +235,7 @@ def line(state: State, block: CurrentBlock, code: str) -> None:
             code == "LP" or any(letter[0] == "I" for letter in block.values), "M91", "with polar words or steps"
         )
         current = to_words(state, block, {AXES[axis]: value for axis, value in there.items()})
+        block.take("R0")
         current.codes["G53"] = block.values["M91"]
         state.motion, plain.heading, plain.pole = "G0" if rapid else "G1", None, None
         plain.unknown -= there.keys()

@@ -80,6 +80,8 @@ def miscellaneous(state: State, block: CurrentBlock) -> None:
 def retract(state: State, block: CurrentBlock) -> None:
     """M140 MB: away from the work along the tool, by a distance or to the end of the travel."""
     block.take("M140")
+    axis = next((letter for letter in block.values if letter.lstrip("I") in AXES), None)
+    block.refuse_if(axis, axis, "beside M140", "a statement of its own for it")
     feed_given, rapid = block.has("F"), feed(state, block)
     normal, distance = PLANES[state.plane][2], block.take("MB")
     if distance is None:

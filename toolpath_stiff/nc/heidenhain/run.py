@@ -33,6 +33,7 @@ ASSIGNED = re.compile(r"\s*(Q[LR]?\d+)?\s*=\s*(.+)$")
 SPECIAL = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
 KINDS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
 EQUAL = 1e-9
+TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control works out for a tilted plane
 SUFFIXES = (".h", ".H", "")
 
 
@@ -144,7 +145,7 @@ class HeidenhainRun(ProgramRun):
         if code is None:
             problem, hint = refusal_of(head)
             raise self._fail(row, f"{head} {problem}", "", hint, statement.column)
-        block = CurrentBlock(self.name, statement.block(lambda text, column: self._value(row, text, column)))
+        block = CurrentBlock(self.name, statement.block(lambda *word: self._word_value(row, *word)))
         for word in block.block.words[1:]:
             if word.letter in block.values:
                 raise block.fail(word, f"repeats the word {word.letter} of its statement", "each word once")
@@ -176,7 +177,12 @@ class HeidenhainRun(ProgramRun):
             retract(self.state, block)
         once, modal = block.take("M99"), block.take("M89")
         before = len(self.state.recorder)
-        code.act(self.state, block, head)
+        try:
+            code.act(self.state, block, head)
+        except InputError as error:
+            if error.column == statement.column and not error.found.startswith(head):
+                error.found = f"{head}: {error.found}"
+            raise
         plain = self.state.plain
         unused = next((letter for letter in block.values if letter in block.free), None)
         if unused is not None and not head.startswith("APPR") and head not in ("RND", "CHF"):
@@ -197,7 +203,12 @@ class HeidenhainRun(ProgramRun):
         number = re.search(r"(\d+(?:[.,]\d+)?|Q[LR]?\d+)\s*$", rest)
         if number is None:
             raise self._fail(row, "CYCL DEF 9.1 without its time", "CYCL DEF 9.1 DWELL 1.5")
-        return self._value(row, number[1], 1)
+        return self._value(row, number[1].replace(",", "."), 1)
+
+    def _word_value(self, row: int, key: str, text: str, column: int) -> float:
+        """The number of a word; of rotary axes in a tilted plane, which the control works out, none that counts."""
+        tilted = self.state.plain.tilt is not None and key in ("A", "B", "C")
+        return 0.0 if tilted and text.lstrip("+-") in TILTING else self._value(row, text, column)
 
     def _value(self, row: int, text: str, column: int) -> float:
         """The number of a word: as written, or of a Q parameter."""

@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from toolpath_stiff.nc.heidenhain.vocabulary import look_up
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.words import LONGEST_BLOCK, MOST_DIGITS, Block, Word
 
@@ -24,7 +25,7 @@ _HEAD = re.compile(
 _WORD = re.compile(
     r"(R0(?![\d.,])|R[LR]|DR[+-](?!\s*[\d.,Q])|F\s*MAX|F\s*AUTO|MB\s*MAX|SEQ[+-]|STAY|TURN|MOVE|SYM|(?:TABLE|COORD)\s+ROT"
     r"|AXIS\s+(?:POS|SPAT)|PATHCTRL\s+(?:AXIS|VECTOR)|F\s+(?:TCP|CONT)|REFPNT\s+[A-Z-]+)"
-    rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-Z])\s*({VALUE})"
+    rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
     rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
     r"|([XYZABCUVW])(?![A-Z])"
     rf"|({VALUE})|\"([^\"]*)\"",
@@ -51,10 +52,10 @@ class Statement:
     optional: bool
     after: int
 
-    def block(self, value: Callable[[str, int], float]) -> Block:
-        """Its words with numbers, the head first; `value` works out what is written in a column."""
+    def block(self, value: Callable[[str, str, int], float]) -> Block:
+        """Its words with numbers, the head first; `value` works out what is written behind a key, in a column."""
         words = (
-            Word(key, value(written, column) if written else 0.0, column, text)
+            Word(key, value(key, written, column) if written else 0.0, column, text)
             for key, written, column, text in self.words
         )
         return Block(self.line, (Word("", 0.0, self.column, self.head), *words), optional=self.optional)
@@ -83,7 +84,7 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> Statement:
         raise place.fail(f"a statement of {len(text)} characters", f"at most {LONGEST_BLOCK}")
     end, optional = head.start() if shown == "M" else head.end(), bool(begin[1] or begin[2])
     rest, words = text[end:], list[tuple[str, str, int, str]]()
-    if not _OTHERWISE.match(shown):
+    if look_up(shown) is not None and not _OTHERWISE.match(shown):
         words = _words(text, end, place, shown)
         if shown.startswith("CYCL DEF") and "." not in shown:
             while after < len(lines) and PARAMETER.match(lines[after]):
