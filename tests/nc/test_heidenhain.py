@@ -10,11 +10,7 @@ import math
 import numpy as np
 import pytest
 
-from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.controller import Controller
-from toolpath_stiff.nc.heidenhain import functions
-from toolpath_stiff.nc.heidenhain.vocabulary import REFUSED, STATEMENTS
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 

@@ -248,9 +248,10 @@ class Recorder:
     recent: list[Move] = field(default_factory=list)
     parts: list[Moves] = field(default_factory=list)
     cuts: bool = False  # whether any move is a cutting one
+    packed: int = 0  # number of moves in `parts`
 
     def __len__(self) -> int:
-        return len(self.recent) + sum(len(part) for part in self.parts)
+        return len(self.recent) + self.packed
 
     def add(self, move: Move) -> bool:
         """Add a move. Returns whether it was one."""
@@ -277,12 +278,14 @@ class Recorder:
             return
         self.pack()
         self.parts.append(in_si(moves))
+        self.packed += len(moves)
         self.cuts = self.cuts or bool((moves.motion != RAPID).any())
 
     def pack(self) -> None:
         """The recent moves to arrays, which take a fifth of their memory."""
         if self.recent:
             self.parts.append(self._recent_in_si())
+            self.packed += len(self.recent)
             self.recent = []
 
     def add_dwell(self, seconds: float) -> None:
@@ -295,7 +298,7 @@ class Recorder:
     def moves(self) -> Moves:
         """The moves as arrays, SI; the recorder is empty afterwards."""
         parts = [*self.parts, self._recent_in_si()]
-        self.recent, self.parts = [], []
+        self.recent, self.parts, self.packed = [], [], 0
         return _joined(parts)
 
     def _recent_in_si(self) -> Moves:

@@ -12,6 +12,7 @@ from typing import Literal, get_args
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
+from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
@@ -185,7 +186,7 @@ class Conversational:
 
     pole: tuple[float, float] | None = None
     heading: tuple[float, float] | None = None
-    held: tuple[CurrentBlock, dict[int, float], float | None] | None = None
+    held: tuple[CurrentBlock, Element, float | None] | None = None
     corner: CurrentBlock | None = None
     approach: tuple[dict[int, float], Callable[[complex], None]] | None = None
     fast: bool = False

@@ -8,28 +8,35 @@ as these do (`codes.motion`).
 import cmath
 import math
 
+from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.cutter import LEFT, RIGHT, switch_off
 from toolpath_stiff.nc.codes.feeds import SLOWEST
-from toolpath_stiff.nc.codes.motion import arc, machine_move, straight
+from toolpath_stiff.nc.codes.motion import machine_move, record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
 from toolpath_stiff.nc.compensation import Cutter
+from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
 from toolpath_stiff.nc.geometry import PLANES, ArcError
-from toolpath_stiff.nc.heidenhain.corners import STRAIGHT_ON, Element, cut_off
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.words import AXES, Block, Word
+from toolpath_stiff.nc.words import AXES, Word
 from toolpath_stiff.units import MM_PER_INCH
 
 MANUAL = "HEIDENHAIN, user's manual of the iTNC 530"
 PATHS, POLAR = f"{MANUAL}, Path contours: Cartesian coordinates", f"{MANUAL}, Path contours: Polar coordinates"
 SIDES = {"RL": LEFT, "RR": RIGHT}
+WORDS_OF_AXES = {f"{step}{letter}": axis for axis, letter in enumerate(AXES) for step in ("", "I")}
 ON_CIRCLE_MM = 0.016  # how far an end may lie off its circle (user's manual, "Circular path C")
 
 
 def present(state: State) -> list[float]:
     """The programmed point in program axes: of an element that waits the end, of an APPR the contour point."""
     here, plain = state.frames.to_program(state.frames.position), state.plain
-    ahead = plain.held[1] if plain.held is not None else plain.approach[0] if plain.approach is not None else {}
-    return [ahead.get(axis, value) for axis, value in enumerate(here)]
+    if plain.held is not None:
+        first, second, _ = PLANES[state.plane]
+        here[first], here[second] = plain.held[1].end.real, plain.held[1].end.imag
+    elif plain.approach is not None:
+        here = [plain.approach[0].get(axis, value) for axis, value in enumerate(here)]
+    return here
 
 
 def in_plane(state: State, point: list[float]) -> complex:
@@ -40,15 +47,16 @@ def in_plane(state: State, point: list[float]) -> complex:
 
 def named(state: State, block: CurrentBlock) -> dict[int, float]:
     """Axis -> coordinate of the axis words, steps added to the present point; they then count as used."""
+    words = block.free & WORDS_OF_AXES.keys()
     here, there = present(state), dict[int, float]()
-    for axis, letter in enumerate(AXES):
-        scale = state.length_scale if axis < 3 else 1.0
-        value, step = block.take(letter), block.take(f"I{letter}")
-        block.refuse_if(value is not None and step is not None, letter, "and its step are both given", "one of them")
-        if value is not None or step is not None:
-            there[axis] = value * scale if value is not None else here[axis] + (step or 0.0) * scale
-        if value is not None and axis > 2 and state.plain.shorter:  # M126
-            there[axis] = here[axis] + math.remainder(there[axis] - here[axis], 360.0)
+    for letter in sorted(words):
+        axis, value = WORDS_OF_AXES[letter], block.values[letter].value
+        value = value * state.length_scale if axis < 3 else value
+        block.refuse_if(axis in there, letter, "and its step are both given", "one of them")
+        there[axis] = here[axis] + value if letter[0] == "I" else value
+        if letter[0] != "I" and axis > 2 and state.plain.shorter:  # M126
+            there[axis] = here[axis] + math.remainder(value - here[axis], 360.0)
+    block.free -= words
     return there
 
 
@@ -129,16 +137,6 @@ def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
     )
 
 
-def to_words(state: State, block: CurrentBlock, words: dict[str, float]) -> CurrentBlock:
-    """The block with other words, as the functions of G codes take them; lengths in mm, angles in degrees."""
-    head, scale = block.block.words[0], state.length_scale
-    values = {
-        letter: Word(letter, value if letter in "ABCP" else value / scale, head.column, head.text)
-        for letter, value in words.items()
-    }
-    return CurrentBlock(block.name, Block(block.line, (head,)), {}, {"motion": ""}, values, set(values))
-
-
 def go(
     state: State,
     block: CurrentBlock,
@@ -149,40 +147,57 @@ def go(
     rapid: bool = False,
 ) -> None:
     """A contour element from the present point; `turn`: an arc, +1 counter-clockwise. Waits if a corner follows."""
-    plain, (first, second, normal) = state.plain, PLANES[state.plane]
-    start, words = present(state), {AXES[axis]: value for axis, value in there.items()}
-    end = [there.get(axis, value) for axis, value in enumerate(start)]
-    a, b = in_plane(state, start), in_plane(state, end)
+    plain, (first, second, _) = state.plain, PLANES[state.plane]
+    start = present(state)
+    begin, end = in_plane(state, start), complex(there.get(first, start[first]), there.get(second, start[second]))
     if plain.approach is not None:
-        _approach(state, block, b - a if center is None else turn * 1j * (a - center))
+        _approach(state, block, end - begin if center is None else turn * 1j * (begin - center))
     check_known(state, block, there, rapid)
     if center is not None:
-        off = abs(abs(a - center) - abs(b - center))
-        block.refuse_if(
-            off > ON_CIRCLE_MM,
-            None,
-            f"ends {off:.4f} mm off its circle",
-            f"at most {ON_CIRCLE_MM} mm (its CC, or its end)",
-        )
-        words |= {"IJK"[first]: (center - a).real, "IJK"[second]: (center - a).imag, "P": float(turns)}
-    current = to_words(state, block, words)
-    if turn:
-        current.groups["motion"] = "G3" if turn > 0 else "G2"
-    else:
-        current.groups["motion"] = "G0" if rapid else "G1"
-    held, plain.held = plain.held, None
-    if held is not None and plain.corner is not None:
-        modal, state.feed = state.feed, held[2]
-        _cut_corner(state, held[0], current, (a, b))
-        state.feed = modal
-    ahead = b - a if not turn else turn * 1j * (b - (center or 0.0))
-    plain.heading = (ahead.real, ahead.imag) if abs(ahead) > 0.0 and not there.keys() - {first, second} else None
-    plain.fast = rapid
+        off = abs(abs(begin - center) - abs(end - center))
+        block.refuse_if(off > ON_CIRCLE_MM, None, f"ends {off:.4f} mm off its circle", f"at most {ON_CIRCLE_MM} mm")
+    if plain.held is not None:
+        _cut_corner(state, block, Element(begin, end, center, turn), there, rapid)
+    ahead = end - begin if center is None else turn * 1j * (end - center)
+    flat = abs(ahead) > 0.0 and not there.keys() - {first, second}
+    plain.heading, plain.fast = ((ahead.real, ahead.imag) if flat else None), rapid
     if plain.to_corner:
-        block.refuse_if(rapid or normal in there or turns > 1 or there.keys() & {3, 4, 5}, None, *_NO_CORNER)
-        plain.held = (current, {axis: end[axis] for axis in (first, second)}, state.feed)
+        block.refuse_if(rapid or turns > 1 or there.keys() - {first, second}, None, *_NO_CORNER)
+        plain.held = (block, Element(begin, end, center, turn), state.feed)
     else:
-        execute(state, current)
+        move(state, block, there, center, turn, turns, rapid)
+
+
+def move(
+    state: State,
+    block: CurrentBlock,
+    there: dict[int, float],
+    center: complex | None = None,
+    turn: int = 0,
+    turns: int = 1,
+    rapid: bool = False,
+) -> None:
+    """Record a straight move or an arc from where the tool stands, as G0 to G3 do."""
+    frames = state.frames
+    here = frames.to_program(frames.position)
+    control = frames.to_control([there.get(axis, value) for axis, value in enumerate(here)])
+    if not frames.rotated:  # an axis that is not named keeps its number to the last digit
+        control = [control[axis] if axis in there else value for axis, value in enumerate(frames.position)]
+    try:
+        if center is None:
+            record(state, block, RAPID if rapid else FEED, control, there)
+            return
+        block.refuse_if(state.beside, None, "is an arc right after R0", "a straight statement (L) between")
+        first, second, _ = PLANES[state.plane]
+        end = there.get(first, here[first]), there.get(second, here[second])
+        middle, start = (center.real, center.imag), (here[first], here[second])
+        sweep = geometry.sweep_about(middle, start, end, turn < 0, state.inch, turns)
+        here[first], here[second] = middle
+        x, y, z = frames.to_setup(frames.to_control(here))[:3]
+        normal = frames.turn_direction(geometry.normal_of(state.plane))
+        record(state, block, ARC, control, there, arc=Arc((x, y, z), normal, sweep))
+    except ArcError as error:
+        raise block.fail(None, error.found, error.expected) from None
 
 
 def _approach(state: State, block: CurrentBlock, ahead: complex) -> None:
@@ -215,15 +230,6 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
         block.refuse_if(leans, None, "turns rotary axes under M128 (FUNCTION TCPM)", hint=HOLDS_HINT)
 
 
-def execute(state: State, current: CurrentBlock) -> None:
-    """A straight move or an arc, by the functions of G0 to G3."""
-    code = current.groups["motion"]
-    try:
-        (arc if code in ("G2", "G3") else straight)(state, current, code)
-    except ArcError as error:
-        raise current.fail(None, error.found, error.expected) from None
-
-
 def line(state: State, block: CurrentBlock, code: str) -> None:
     """L, LP: straight to a point. In machine coordinates under M91."""
     plain, there, rapid = state.plain, polar(state, block) if code == "LP" else named(state, block), feed(state, block)
@@ -234,9 +240,10 @@ def line(state: State, block: CurrentBlock, code: str) -> None:
         block.refuse_if(
             code == "LP" or any(letter[0] == "I" for letter in block.values), "M91", "with polar words or steps"
         )
-        current = to_words(state, block, {AXES[axis]: value for axis, value in there.items()})
         block.take("R0")
-        current.codes["G53"] = block.values["M91"]
+        unit = state.length_scale
+        values = {AXES[a]: Word(AXES[a], v / unit if a < 3 else v, 1, AXES[a]) for a, v in there.items()}
+        current = CurrentBlock(block.name, block.block, {"G53": block.values["M91"]}, {}, values, set(values))
         state.motion, plain.heading, plain.pole = "G0" if rapid else "G1", None, None
         plain.unknown -= there.keys()
         machine_move(state, current, "G53")
@@ -335,51 +342,25 @@ def corner(state: State, block: CurrentBlock, code: str) -> None:
     state.plain.corner = block
 
 
-def _cut_corner(state: State, held: CurrentBlock, after: CurrentBlock, ends: tuple[complex, complex]) -> None:
-    """Carry out the element that waited, shortened, and its corner; the one after begins at the corner's end."""
-    block, state.plain.corner = state.plain.corner, None
-    assert block is not None
-    first, second, normal = PLANES[state.plane]
-    size, rounded = block.values["size"].value, block.block.words[0].text == "RND"
-    outside = AXES[normal] in after.values or after.groups["motion"] == "G0" or {*"ABC"} & after.values.keys()
-    after.refuse_if(outside, None, *_NO_CORNER)
-    start = in_plane(state, state.frames.to_program(state.frames.position))
-    elements = _element(state, held, start, ends[0]), _element(state, after, *ends)
-    straight_ones = elements[0].center is None and elements[1].center is None
-    block.refuse_if(not rounded and not straight_ones, None, "beside an arc", "CHF between two lines")
-    try:
-        cut = cut_off(*elements, size, rounded)
-    except ArcError as error:
-        raise block.fail(None, error.found, error.expected) from None
-    if cut is None:  # the path goes straight on
-        execute(state, held)
-        return
-    begin, end, center, turn = cut
-    letters, centers = (AXES[first], AXES[second]), ("IJK"[first], "IJK"[second])
-
-    def go_to(current: CurrentBlock, place: complex, toward: complex | None = None) -> None:
-        pairs = [(letters, place)] + ([(centers, toward)] if toward is not None else [])
-        words = {letter: v for names, z in pairs for letter, v in zip(names, (z.real, z.imag), strict=True)}
-        current.values |= to_words(state, current, words).values
-        current.free |= set(words)
-
-    go_to(held, begin)
-    execute(state, held)
-    own, modal = block.values.get("own"), state.feed
-    between = to_words(state, block, {})
-    between.groups["motion"] = ("G3" if turn > 0 else "G2") if center is not None else "G1"
-    go_to(between, end, None if center is None else center - begin)
-    state.feed = own.value if own else modal
-    execute(state, between)
-    state.feed = modal
-    if elements[1].center is not None:
-        go_to(after, ends[1], elements[1].center - end)
-
-
-def _element(state: State, current: CurrentBlock, start: complex, end: complex) -> Element:
-    """A contour element that waits, from its words."""
+def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict[int, float], rapid: bool) -> None:
+    """Carry out the element that waited, shortened, and its corner; the tool then stands where the next one begins."""
+    (block, held, rate), corner_block, modal = state.plain.held or (None, None, None), state.plain.corner, state.feed
+    state.plain.held = state.plain.corner = None
+    assert block is not None and held is not None and corner_block is not None
     first, second, _ = PLANES[state.plane]
-    if current.groups["motion"] not in ("G2", "G3"):
-        return Element(start, end)
-    offset = complex(*(current.values["IJK"[axis]].value * state.length_scale for axis in (first, second)))
-    return Element(start, end, start + offset, 1 if current.groups["motion"] == "G3" else -1)
+    size, rounded = corner_block.values["size"].value, corner_block.block.words[0].text == "RND"
+    after.refuse_if(rapid or there.keys() - {first, second}, None, *_NO_CORNER)
+    lines = held.center is None and element.center is None
+    corner_block.refuse_if(not rounded and not lines, None, "beside an arc", "CHF between two lines")
+    try:
+        cut = cut_off(held, element, size, rounded)
+    except ArcError as error:
+        raise corner_block.fail(None, error.found, error.expected) from None
+    begin, end, center, turn = cut or (held.end, held.end, None, 0)
+    state.feed = rate
+    move(state, block, {first: begin.real, second: begin.imag}, held.center, held.turn)
+    own = corner_block.values.get("own")
+    state.feed = own.value if own else rate
+    if cut is not None:
+        move(state, corner_block, {first: end.real, second: end.imag}, center, turn)
+    state.feed = modal

@@ -4,9 +4,13 @@ HEIDENHAIN, user's manual of the iTNC 530, "Programming: subprograms and program
 straight statements, most of a CAM system's program, are written as G0 and G1 and executed many at a time.
 """
 
+import math
 import re
 from pathlib import Path
 
+import numpy as np
+
+from toolpath_stiff.nc.heidenhain.contour import ON_CIRCLE_MM
 from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX, call
 from toolpath_stiff.nc.heidenhain.expressions import work_out
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
@@ -22,7 +26,15 @@ from toolpath_stiff.nc.state import CurrentBlock, Flow
 
 MOST_STEPS = 1_000_000  # statements that run, all repeats counted
 MOST_IDLE = 100_000  # of them without a move between
-PLAIN = re.compile(r"\s*\d*\s*L((?:\s*[XYZ][+-]?\d+\.?\d*)+)(?:\s*R0)?\s*(?:F\s*(MAX|\d+\.?\d*))?\s*", re.IGNORECASE)
+_NUMBER = r"[+-]?\d{1,6}(?:\.\d{0,6})?"
+PLAIN = re.compile(
+    rf"\s*\d*\s*(?P<head>L|C)(?P<axes>(?:\s*[XYZ]{_NUMBER})+)(?:\s*DR(?P<turn>[+-]))?(?:\s*R0)?"
+    r"(?:\s*F\s*(?:(?P<max>MAX)|(?P<feed>\d{1,6}(?:\.\d*)?)))?\s*",
+    re.IGNORECASE,
+)
+CENTER = re.compile(rf"\s*\d*\s*CC\s*X\s*({_NUMBER})\s*Y\s*({_NUMBER})\s*", re.IGNORECASE)
+AXIS = re.compile(rf"[XYZ]{_NUMBER}", re.IGNORECASE)
+HEAD = re.compile(r"\s*\d*\s*([A-Z]+)", re.IGNORECASE)
 EMPTY = re.compile(r"\s*\d*\s*(?:[;*].*)?")
 CORNER = re.compile(r"\s*/?\s*(?:N?\d+\s)?\s*(?:RND|CHF)\b", re.IGNORECASE)
 INCH = re.compile(r"\s*(?:N?\d+\s+)?BEGIN\s+PGM\b.*\bINCH\s*(?:;.*)?$", re.IGNORECASE)
@@ -37,6 +49,15 @@ TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control work
 SUFFIXES = (".h", ".H", "")
 
 
+def _center_words(here: dict[str, float], there: dict[str, float], center: tuple[float, float] | None) -> str:
+    """I and J of an arc in the plane whose start and centre are known; "" where they are not, or do not fit."""
+    if center is None or not here.keys() >= {"X", "Y"} or here.get("Z") != there.get("Z"):
+        return ""
+    (x, y), start, end = center, math.dist(center, (here["X"], here["Y"])), math.dist(center, (there["X"], there["Y"]))
+    fits = min(start, end) > ON_CIRCLE_MM and abs(start - end) < ON_CIRCLE_MM / 2.0
+    return f"I{x - here['X']:.9f}J{y - here['Y']:.9f}" if fits else ""
+
+
 class HeidenhainRun(ProgramRun):
     """A run of a program in the plain language; parameters as of `ProgramRun`.
 
@@ -46,6 +67,7 @@ class HeidenhainRun(ProgramRun):
     def __init__(self, request: Request, tally: Tally | None = None) -> None:
         super().__init__(request, tally, fast=False)
         self.folder = request.controller.subprograms
+        self._poles: dict[int, tuple[float, float]] = {}  # centres of CC by line, of plain statements
         self._inch = any(INCH.match(line) for line in self.lines[:100])
         self._lexer: PlainRun | None = PlainRun(self.state, self._as_g_code(), self.name)
         self._plain = self._lexer
@@ -63,35 +85,66 @@ class HeidenhainRun(ProgramRun):
         self._row = 0
 
     def _as_g_code(self) -> list[str]:
-        """Plain straight statements as G0 and G1; "?", which no run of plain lines takes, for all others."""
-        lines = []
+        """Plain statements as G0 to G3; "?", which no run of plain lines takes, for all others.
+
+        Where the tool stands is followed as far as plain statements say: arcs get their centre from it.
+        """
+        lines, self._poles = list[str](), dict[int, tuple[float, float]]()
+        self._to_corner = [self._corner_follows(row + 1) for row in range(len(self.lines))]
+        here, center = dict[str, float](), None
         for row, line in enumerate(self.lines):
-            plain = PLAIN.fullmatch(line)
-            if plain is None:
-                lines.append("" if EMPTY.fullmatch(line) else "?")
+            if EMPTY.fullmatch(line):
+                lines.append("")
                 continue
-            feed = plain[2] or ""
-            rapid = feed.upper() == "MAX"
-            slow = (self._inch and feed and not rapid) or feed.strip("0.") == "" != feed
-            follows = self.lines[row + 1] if row + 1 < len(self.lines) else ""
-            corner = CORNER.match(follows) or (EMPTY.fullmatch(follows) and not PLAIN.fullmatch(follows))
-            g = f"G{0 if rapid else 1}{plain[1]}{f'F{feed}' if feed and not rapid else ''}"
-            lines.append("?" if slow or corner else g)
+            text, plain, pole = "?", PLAIN.fullmatch(line), CENTER.fullmatch(line)
+            if pole is not None:
+                center = self._poles[row] = (float(pole[1]), float(pole[2]))
+                text = ""
+            elif (
+                plain is not None
+                and (plain["head"] in "cC") == (plain["turn"] is not None)
+                and not (self._inch and plain["feed"])
+                and not (plain["feed"] or "1").strip("0.") == ""
+            ):
+                there = here | {word[0].upper(): float(word[1:]) for word in AXIS.findall(plain["axes"])}
+                code, middle = "G0" if plain["max"] else "G1", ""
+                if plain["turn"]:
+                    code, middle = "G3" if plain["turn"] == "+" else "G2", _center_words(here, there, center)
+                if not plain["turn"] or middle:
+                    text, here = (
+                        f"{code}{plain['axes']}{middle}{'F' if plain['feed'] else ''}{plain['feed'] or ''}",
+                        there,
+                    )
+            if text == "?" or self._to_corner[row]:
+                text, here, center = "?", {}, None
+            lines.append(text)
         return lines
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
-        """Count plain statements; the direction in which the last one ended."""
-        plain, last = self.state.plain, len(words.code) - 1
-        self.state.recorder.pack()
+        """Count plain statements; circle centre and direction as the last ones left them."""
+        plain, last, unit = self.state.plain, len(words.code) - 1, self.state.length_scale
+        centers = [row for row in range(first, first + last + 1) if row in self._poles]
+        if centers:
+            x, y = self._poles[centers[-1]]
+            plain.pole = (x * unit, y * unit)
         moves = self.state.recorder.parts[-1] if self.state.recorder.parts else None
-        given = words.forms
-        plain.fast, plain.heading = bool(words.code[last] == 0), None
-        if moves is not None and moves.line[-1] == first + last + 1 and not ("Z" in given and given["Z"][last]):
-            x, y = (moves.end[-1] - moves.start[-1])[:2].tolist()
-            plain.heading = (x, y) if self.state.plane == "G17" and (x or y) else None
-        if self.tally is not None and words.count.any():
-            self.tally.first.setdefault("L", (first + 1, 1))
-            self.tally.count["L"] += int((words.count > 0).sum())
+        if moves is not None and first < moves.line[-1] <= first + last + 1:
+            plain.fast = bool(moves.motion[-1] == 0)
+            ahead = moves.end[-1] - moves.start[-1]
+            flat = not ahead[2] and not self.lines[moves.line[-1] : first + last + 1].count("L")
+            if moves.arc_sweep[-1]:
+                out = (moves.end[-1, :3] - moves.arc_center[-1]) * np.sign(
+                    moves.arc_sweep[-1] * moves.arc_normal[-1, 2]
+                )
+                ahead = np.array([-out[1], out[0]])
+            plain.heading = (float(ahead[0]), float(ahead[1])) if flat and (ahead[0] or ahead[1]) else None
+        if self.tally is not None:
+            for row in range(first, first + last + 1):
+                if self.lines[row] and not EMPTY.fullmatch(self.lines[row]):
+                    head = HEAD.match(self.lines[row])
+                    name = head[1].upper() if head else ""
+                    self.tally.first.setdefault(name, (row + 1, (head.start(1) if head else 0) + 1))
+                    self.tally.count[name] += 1
 
     def _place_name(self, row: int) -> tuple[str, int]:
         for first, stop, name in self._files:
@@ -127,7 +180,15 @@ class HeidenhainRun(ProgramRun):
             self._count(statement)
         after = self._acted(row, statement)
         plain = self.state.plain
-        waits = plain.modal or plain.unknown or plain.held or plain.approach or plain.held_tip or plain.doubt
+        waits = (
+            self.state.plane != "G17"
+            or plain.modal
+            or plain.unknown
+            or plain.held
+            or plain.approach
+            or plain.held_tip
+            or plain.doubt
+        )
         self._plain = None if waits else self._lexer
         return after
 
@@ -151,7 +212,7 @@ class HeidenhainRun(ProgramRun):
                 raise block.fail(word, f"repeats the word {word.letter} of its statement", "each word once")
             block.values[word.letter] = word
         block.free = set(block.values)
-        self.state.plain.to_corner = head[0] != "M" and self._corner_follows(statement.after)
+        self.state.plain.to_corner = self._to_corner[statement.after - 1]
         if head == "BEGIN PGM":
             block.free = {"INCH"} if re.search(r"\bINCH\s*$", statement.rest) else set()
             block.values |= {"INCH": block.block.words[0]}
