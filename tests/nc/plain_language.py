@@ -277,6 +277,8 @@ def _statements(chance: random.Random) -> list[str]:
         kind = chance.randrange(12)
         if kind == 0:
             lines += _frame(chance)
+        elif kind == 6:
+            lines += _cam(chance)
         elif kind == 1 and not tilted:
             angles = [chance.choice((0, 90, -90, round(chance.uniform(-80, 80), 2))) for _ in range(3)]
             lines += ["CYCL DEF 10.1 ROT+0", "CYCL DEF 8.1", "CYCL DEF 11.1 SCL 1", "CYCL DEF 7.1 X+0 Y+0 Z+0"]
@@ -326,6 +328,28 @@ def _statements(chance: random.Random) -> list[str]:
         else:
             lines += _run(chance)
     return [*lines, "M30", *subs, "END PGM HUNT MM"]
+
+
+def _cam(chance: random.Random) -> list[str]:
+    """A long stretch as CAM systems write it, arcs with their centres among it."""
+    lines, x, y = ["L X+0 Y+0 Z+5 FMAX"], 0.0, 0.0
+    for _ in range(chance.randrange(8, 30)):
+        kind = chance.randrange(6)
+        if kind == 0:
+            a, radius, sign = chance.uniform(-3, 3), chance.uniform(1, 20), chance.choice("+-")
+            cx, cy = round(x + radius * math.cos(a), 4), round(y + radius * math.sin(a), 4)
+            b, radius = chance.uniform(-3, 3), math.hypot(cx - x, cy - y)
+            x, y = round(cx + radius * math.cos(b), 4), round(cy + radius * math.sin(b), 4)
+            lines += [f"CC X{cx:+} Y{cy:+}", f"C X{x:+} Y{y:+} DR{sign}"]
+        elif kind == 1:
+            step = round(chance.uniform(-5, 5), 3)
+            y = round(y + step, 4)
+            lines.append(f"L IY{step:+} IZ{chance.choice('+-')}1 F{chance.randrange(100, 900)}")
+        else:
+            x, y = round(chance.uniform(-60, 60), 3), round(chance.uniform(-60, 60), 3)
+            end = chance.choice(("", "", " R0 FMAX", " F400", f" Z{chance.randrange(-9, 9):+}", " FMAX M3"))
+            lines.append(f"L X{x:+} Y{y:+}" + end.replace(" Z", " Z", 1))
+    return [*lines, f"CP IPA{chance.choice('+-')}90 DR+".replace("-90 DR+", "-90 DR-") if "CC" in "".join(lines) else "L IX+1", "L IX+3 IY+1", "CT IX+2 IY+7"]
 
 
 def _frame(chance: random.Random) -> list[str]:

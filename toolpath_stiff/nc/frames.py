@@ -176,7 +176,7 @@ class Frames:
 
     def set_tool(self, length: float) -> None:
         """Another tool length: the machine stands still, the controlled point's numbers change."""
-        self.position[2] += self.tool - length
+        self.position = [*self.position[:2], self.position[2] + (self.tool - length), *self.position[3:]]
         self.tool = length
 
 

@@ -209,6 +209,7 @@ class Conversational:
     names: dict[str, int] = field(default_factory=dict)
     stock: dict[str, list[float]] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
+    kept: tuple[tuple[object, ...], list[float]] = ((None, None, None), [])  # the present point, and what it was of
 
 
 @dataclass

@@ -30,7 +30,11 @@ ON_CIRCLE_MM = 0.016  # how far an end may lie off its circle (user's manual, "C
 
 def present(state: State) -> list[float]:
     """The programmed point in program axes: of an element that waits the end, of an APPR the contour point."""
-    here, plain = state.frames.to_program(state.frames.position), state.plain
+    frames, plain = state.frames, state.plain
+    point = frames.position, frames.g92, frames.linear
+    if any(kept is not part for kept, part in zip(plain.kept[0], point, strict=True)):
+        plain.kept = point, frames.to_program(frames.position)
+    here = list(plain.kept[1])
     if plain.held is not None:
         first, second, _ = PLANES[state.plane]
         here[first], here[second] = plain.held[1].end.real, plain.held[1].end.imag
@@ -178,8 +182,8 @@ def move(
     rapid: bool = False,
 ) -> None:
     """Record a straight move or an arc from where the tool stands, as G0 to G3 do."""
-    frames = state.frames
-    here = frames.to_program(frames.position)
+    frames, plain = state.frames, state.plain
+    here = frames.to_program(frames.position) if plain.held or plain.approach else present(state)
     control = frames.to_control([there.get(axis, value) for axis, value in enumerate(here)])
     if not frames.rotated:  # an axis that is not named keeps its number to the last digit
         control = [control[axis] if axis in there else value for axis, value in enumerate(frames.position)]

@@ -28,12 +28,12 @@ MOST_STEPS = 1_000_000  # statements that run, all repeats counted
 MOST_IDLE = 100_000  # of them without a move between
 _NUMBER = r"[+-]?\d{1,6}(?:\.\d{0,6})?"
 PLAIN = re.compile(
-    rf"\s*\d*\s*(?P<head>L|C)(?P<axes>(?:\s*[XYZ]{_NUMBER})+)(?:\s*DR(?P<turn>[+-]))?(?:\s*R0)?"
-    r"(?:\s*F\s*(?:(?P<max>MAX)|(?P<feed>\d{1,6}(?:\.\d*)?)))?\s*",
+    rf"\s*\d*\s*(?P<head>L|C)(?P<axes>(?:\s*I?[XYZ]{_NUMBER})+)(?:\s*DR(?P<turn>[+-]))?(?:\s*R0)?"
+    r"(?:\s*F\s*(?:(?P<max>MAX)|(?P<feed>\d{1,6}(?:\.\d*)?)))?(?P<m>(?:\s*M0?(?:[345789]|1[34]))*)\s*",
     re.IGNORECASE,
 )
 CENTER = re.compile(rf"\s*\d*\s*CC\s*X\s*({_NUMBER})\s*Y\s*({_NUMBER})\s*", re.IGNORECASE)
-AXIS = re.compile(rf"[XYZ]{_NUMBER}", re.IGNORECASE)
+AXIS = re.compile(rf"(I?)([XYZ])({_NUMBER})", re.IGNORECASE)
 HEAD = re.compile(r"\s*\d*\s*([A-Z]+)", re.IGNORECASE)
 EMPTY = re.compile(r"\s*\d*\s*(?:[;*].*)?")
 CORNER = re.compile(r"\s*/?\s*(?:N?\d+\s)?\s*(?:RND|CHF)\b", re.IGNORECASE)
@@ -47,6 +47,17 @@ KINDS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
 EQUAL = 1e-9
 TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control works out for a tilted plane
 SUFFIXES = (".h", ".H", "")
+
+
+def _followed(here: dict[str, float], axes: str) -> tuple[dict[str, float], str]:
+    """Where axis words lead as far as that is known, and the words as they name that point; none where it is not."""
+    there, words = dict(here), dict[str, str]()
+    for step, letter, digits in AXIS.findall(axes):
+        if letter in words or (step and letter not in here):
+            return {key: value for key, value in there.items() if key not in axes}, ""
+        there[letter] = round(here[letter] + float(digits), 6) if step else float(digits)
+        words[letter] = f"{there[letter]:.6f}" if step else digits
+    return there, "".join(letter + words[letter] for letter in "XYZ" if letter in words)
 
 
 def _center_words(here: dict[str, float], there: dict[str, float], center: tuple[float, float] | None) -> str:
@@ -100,24 +111,17 @@ class HeidenhainRun(ProgramRun):
             if pole is not None:
                 center = self._poles[row] = (float(pole[1]), float(pole[2]))
                 text = ""
-            elif (
-                plain is not None
-                and (plain["head"] in "cC") == (plain["turn"] is not None)
-                and not (self._inch and plain["feed"])
-                and not (plain["feed"] or "1").strip("0.") == ""
-            ):
-                there = here | {word[0].upper(): float(word[1:]) for word in AXIS.findall(plain["axes"])}
+            elif plain is not None and (plain["head"] in "cC") == (plain["turn"] is not None):
+                there, axes = _followed(here, plain["axes"].upper())
                 code, middle = "G0" if plain["max"] else "G1", ""
                 if plain["turn"]:
                     code, middle = "G3" if plain["turn"] == "+" else "G2", _center_words(here, there, center)
-                if not plain["turn"] or middle:
-                    text, here = (
-                        f"{code}{plain['axes']}{middle}{'F' if plain['feed'] else ''}{plain['feed'] or ''}",
-                        there,
-                    )
-            if text == "?" or self._to_corner[row]:
-                text, here, center = "?", {}, None
-            lines.append(text)
+                feed = plain["feed"] or ""
+                slow = plain["m"] or (feed and (self._inch or not feed.strip("0."))) or (plain["turn"] and not middle)
+                text, here = f"{code}{axes}{middle}{'F' if feed else ''}{feed}" if axes and not slow else "?", there
+            else:
+                here, center = {}, None
+            lines.append("?" if self._to_corner[row] else text)
         return lines
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
