@@ -349,7 +349,12 @@ def _cam(chance: random.Random) -> list[str]:
             x, y = round(chance.uniform(-60, 60), 3), round(chance.uniform(-60, 60), 3)
             end = chance.choice(("", "", " R0 FMAX", " F400", f" Z{chance.randrange(-9, 9):+}", " FMAX M3"))
             lines.append(f"L X{x:+} Y{y:+}" + end.replace(" Z", " Z", 1))
-    return [*lines, f"CP IPA{chance.choice('+-')}90 DR+".replace("-90 DR+", "-90 DR-") if "CC" in "".join(lines) else "L IX+1", "L IX+3 IY+1", "CT IX+2 IY+7"]
+    return [
+        *lines,
+        f"CP IPA{chance.choice('+-')}90 DR+".replace("-90 DR+", "-90 DR-") if "CC" in "".join(lines) else "L IX+1",
+        "L IX+3 IY+1",
+        "CT IX+2 IY+7",
+    ]
 
 
 def _frame(chance: random.Random) -> list[str]:

@@ -6,11 +6,19 @@ and pitch; behind = the feed in mm/min, behind & the pause in s.
 """
 
 import math
+import random
 
 import numpy as np
 import pytest
 
+from benchmarks import heidenhain
+from tests.nc.plain_language import random_program
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.controller import Controller
+from toolpath_stiff.nc.heidenhain import functions
+from toolpath_stiff.nc.heidenhain.vocabulary import REFUSED, STATEMENTS
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
 
@@ -180,10 +188,6 @@ PATHS["rounding of a line and an arc"] = (
 )
 
 
-def moves_of(program) -> list[str]:
-    return [program.moves.line[i] for i in range(len(program.moves))]
-
-
 def check_path(program, path: str) -> None:
     moves, expected = program.moves, [part.strip() for part in path.split(";")]
     shown = [f"{'RFAC'[m]} {np.round(e[:3] * 1e3, 6)}" for m, e in zip(moves.motion, moves.end, strict=True)]
@@ -215,3 +219,188 @@ def test_paths_known_from_geometry(name):
 
 def test_there_are_forty_of_them():
     assert len(PATHS) >= 40
+
+
+@pytest.mark.parametrize("first", range(0, 100, 25))
+def test_random_programs_are_read_as_the_independent_reader_reads_them(first):
+    assert [seed for seed in range(first, first + 25) if heidenhain.difference(random_program(seed))] == []
+
+
+def test_a_reading_that_errs_is_found_out():
+    text = random_program(7)
+    assert not heidenhain.difference(text)
+    for right, wrong in (("DR+", "DR-"), (" FMAX", " F20"), ("+ 0", "+ 0")):
+        wronged = text.replace(right, wrong, 1)
+        assert (wronged == text) == (moves_of(wronged) == moves_of(text))
+
+
+def moves_of(text: str) -> list:
+    return [
+        (kind, points.round(6).tolist()) for kind, points, _ in heidenhain.seen(parse_program(text, "hunt.h").moves)
+    ]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_tool_beside_a_random_contour_touches_it_and_never_cuts_into_it(seed):
+    """Distances from the tool's centre to the contour, which the test makes itself."""
+    chance, side = random.Random(seed), "RL" if seed % 2 else "RR"
+    radius, wide = 5.0, 8 * 2.0 * math.pi
+    corners = sorted(chance.uniform(0.0, wide) / 8 for _ in range(7))
+    points = [complex(math.cos(t), math.sin(t)) * chance.uniform(60, 90) for t in corners]
+    points = [p for p, q in zip(points, points[1:] + points[:1], strict=True) if abs(p - q) > 25]
+    if side == "RL":
+        points.reverse()  # clockwise with the tool on the left: outside
+    away = points[0] * 2.0
+    body = f"L X{away.real:+.4f} Y{away.imag:+.4f}\nL X{points[0].real:+.4f} Y{points[0].imag:+.4f} {side}\n"
+    body += "".join(
+        f"L X{p.real:+.4f} Y{p.imag:+.4f}\n" + ("RND R12\n" if chance.random() < 0.3 else "") for p in points[1:]
+    )
+    try:
+        moves = heidenhain.seen(
+            read(body.removesuffix("RND R12\n") + f"L X{away.real:+.4f} Y{away.imag:+.4f} R0").moves
+        )
+    except InputError as error:
+        assert "gouging" in str(error) or "corner" in str(error) or "turns back" in str(error)
+        return
+    contour = heidenhain.seen(read(body.removesuffix("RND R12\n").replace(f" {side}", "")).moves)[1:]
+    lines = [part[1] for part in contour]
+    dense = np.concatenate([_densely(a[1][-1], b) for a, b in zip(contour, lines[1:], strict=False)])
+    for _, places, _ in moves[2:-1]:
+        apart = np.linalg.norm(dense[:, None, :2] - places[None, :, :2], axis=2).min(axis=0)
+        assert apart.min() > radius - 1e-3 and apart.max() < radius + 0.02
+
+
+def _densely(start: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points of a line or of an arc through its start and three of its quarters."""
+    middle = points[1]
+    bend = np.cross((points[3] - start)[:2], (middle - start)[:2])
+    shares = np.linspace(0.0, 1.0, 2001)[:, None]
+    if abs(bend) < 1e-6:
+        return start + shares * (points[3] - start)
+    (ax, ay), (bx, by), (cx, cy) = start[:2], middle[:2], points[3][:2]
+    d = 2.0 * (ax * (by - cy) + bx * (cy - ay) + cx * (ay - by))
+    squares = [ax**2 + ay**2, bx**2 + by**2, cx**2 + cy**2]
+    ux = (squares[0] * (by - cy) + squares[1] * (cy - ay) + squares[2] * (ay - by)) / d
+    uy = (squares[0] * (cx - bx) + squares[1] * (ax - cx) + squares[2] * (bx - ax)) / d
+    first, last = math.atan2(ay - uy, ax - ux), math.atan2(cy - uy, cx - ux)
+    turn = math.remainder(last - first, 2.0 * math.pi)
+    angle = first + shares * turn
+    radius = math.hypot(ax - ux, ay - uy)
+    return np.hstack([ux + radius * np.cos(angle), uy + radius * np.sin(angle), np.full_like(angle, start[2])])
+
+
+REFUSALS = {
+    "FC DR- R10": ("FC is free contour programming", 3),
+    "CYCL DEF 251 POCKET": ("cycle that is not supported", 3),
+    "CYCL DEF 208 BORE Q200=2": ("draws without numbers", 3),
+    "TCH PROBE 412 X": ("probing", 3),
+    "PATTERN DEF POS1": ("points of other files or patterns|no statement", 3),
+    "PLANE VECTOR BX1": ("given otherwise", 3),
+    "G1 X10": ("no statement that is known", 3),
+    "?? 5": ("is no statement", 3),
+    "L X+10 FOO": ("no word of L", 3),
+    "L X+10 X+5": ("repeats the word X", 3),
+    "L X+10 IX+5": ("both given", 3),
+    "L X+10 F0": ("no feed that moves", 3),
+    "L X+10 M97 M98\nL X+Q7": ("Q7 is read before it is set", 4),
+    "L X+200000": ("beyond 100 m", 3),
+    "TOOL CALL 9 Z\nL X+1 RL": ("radius of tool 9.*--tools", 4),
+    "L X+1 M92": ("machine builder", 3),
+    "L Z-5 RL": ("does not move in the plane", 3),
+    "C X+1 Y+1 DR+": ("without a circle centre", 3),
+    "CC X+0 Y+0\nL X+10\nC X+0 Y+10.1 DR+": ("0.1000 mm off its circle", 5),
+    "L X+1\nCC X+5 Y+0\nC X+1 Y+0": ("without its direction", 5),
+    "CC X+1\n": ("with one coordinate", 3),
+    "CC X+0 Y+0\nL X+10\nCP IPA+90 DR-": ("against the direction", 5),
+    "CR X+20 R+5 DR+": ("of radius 5 mm", 3),
+    "CT X+10 Y+10": ("without a contour element", 3),
+    "L X+10\nRND R20\nL Y+10": ("does not fit", 4),
+    "L X+10\nRND R2\nL Z+10": ("out of the plane", 5),
+    "L X+10\nRND R2\nM5": ("stands between a corner", 5),
+    "L X+10\nRND R2": ("stands between a corner", 5),
+    "RND R2\nL X+1": ("without a contour element", 3),
+    "APPR CT X+0 Y+10 CCA90 R+10 RL\nL Z+1": ("no direction in the plane", 4),
+    "L X-20\nAPPR CT X+0 Y+10 CCA90 R+4 RL\nL Y+50": ("inside arc", 4),
+    "CYCL DEF 10.1 ROT+10\nCYCL DEF 7.1 X+5\nL X+1": ("order decides", 5),
+    "CYCL DEF 8.1 X\nCYCL DEF 10.1 ROT+10\nL X+1": ("order decides", 5),
+    "CYCL DEF 7.1 #3": ("no word of CYCL DEF 7.1", 3),
+    "L X+1\nCYCL DEF 247 D ~\n Q339=2": ("preset table", 4),
+    "CC X+0 Y+0\nCYCL DEF 7.1 X+5\nLP PR+5 PA+0": ("after a change of the coordinates", 5),
+    "PLANE SPATIAL SPA+0 SPB+9 SPC+0 STAY\nL X+1": ("tool's place is not known", 4),
+    "M140 MB MAX\nL X+1": ("tool's place is not known", 4),
+    "M128\nL X+1 A+5": ("under M128", 4),
+    "M99": ("calls a cycle, and none is defined", 3),
+    "CYCL DEF 200 D Q200=2 Q201=-5\nM99": ("without Q206", 3),
+    "CYCL DEF 200 D Q200=2 Q201=5 Q206=9 Q202=5 Q203=0": ("above the surface", 3),
+    "CALL LBL 7": ("LBL 7: the program has none", 3),
+    "LBL 1\nLBL 1\nCALL LBL 1": ("has several", 5),
+    "LBL 1\nCALL LBL 1": ("calls within each other", 4),
+    "LBL 1\nQ1 = 2\nFN 9: IF +Q1 EQU +2 GOTO LBL 1": ("never ends", 5),
+    "CALL PGM OTHER": ("--subprograms FOLDER", 3),
+    "FN 14: ERROR= 1000": ("stops with its error", 3),
+    "FN 18: SYSREAD Q1 = ID1": ("data of the control", 3),
+    "Q1 = 3 / 0": ("cannot be worked out", 3),
+    "Q1 = ((3": ("cannot be worked out", 3),
+    "L X+1 L Y+2": ("no word|is no word", 3),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("body", REFUSALS)
+def test_refusals_name_line_and_word(body):
+    text, line = REFUSALS[body]
+    with pytest.raises(InputError, match=text) as caught:
+        read(body + "\nL X+1" if not body.startswith(("L X+10\nRND R2",)) or body.endswith(("+10", "M5")) else body)
+    assert caught.value.line == line
+
+
+def test_every_statement_and_function_has_its_source_and_meaning():
+    for name, row in STATEMENTS.items():
+        assert row.meaning and row.source.startswith("HEIDENHAIN") and row.controls == ("heidenhain",), name
+    assert all(refused.what and refused.hint and refused.source for refused in REFUSED.values())
+    assert not REFUSED.keys() & STATEMENTS.keys() and set(functions.SHARED) <= CODES.keys()
+    assert not functions.PASSIVE.keys() & functions.REFUSED.keys()
+    # each statement that moves or changes coordinates stands in a program above
+    bodies = "\n".join(body for body, _ in PATHS.values())
+    silent = (functions.nothing, functions.listed)
+    unproved = [name for name, row in STATEMENTS.items() if row.act not in silent and name not in bodies]
+    assert unproved == ["BEGIN PGM", "BLK FORM 0.1", "BLK FORM 0.2", *[f"CYCL DEF 7.{n}" for n in (3, 4, 5, 6)], "CYCL DEF 247",
+                        "FUNCTION TCPM", "FUNCTION RESET TCPM", "CYCL DEF 240", "CYCL CALL POS", "STOP"]  # fmt: skip
+
+
+def test_inch_programs_count_feeds_in_tenths():
+    program = read("L X+1 R0 F100\nCC X+1 Y+1\nC X+2 Y+1 DR-", "INCH")
+    assert program.moves.end[:, 0] * 1e3 == pytest.approx([25.4, 50.8])
+    assert program.moves.feed * 6e4 == pytest.approx([254.0, 254.0])
+
+
+def test_blank_tools_and_what_is_said():
+    text = "BLK FORM 0.1 Z X-5 Y+0 Z-20\nBLK FORM 0.2 X+100 IY+80 Z+0\nCYCL DEF 247 D Q339=+1\nCYCL DEF 240 Z Q200=2 Q343=0 Q201=-1 Q206=9 Q203=0\n"
+    text += 'TOOL CALL "MILL 10" Z S500\nSTOP M0\nL X+1 M8\nCYCL CALL POS X+5 Y+5 F MAX\nTOOL CALL 2 Z\nFUNCTION TCPM F TCP AXIS POS\nL X+7\nFUNCTION RESET TCPM'
+    program = read(text)
+    assert program.stock == ((-0.005, 0.0, -0.02), (0.1, 0.08, 0.0))
+    assert program.dialect == "heidenhain" and [tool.number for tool in program.tools] == [1, 2]
+    assert program.moves.tool_length[-1] == 0.05 and ("M8", 9) in [(u.word, u.line) for u in program.unsupported]
+    assert program.moves.end[-1, 2] == pytest.approx(0.002 - 0.05)  # the numbers of the tip change with the length
+    assert any("preset table" in text for text in program.assumptions)
+
+
+def test_programs_that_are_called(tmp_path):
+    (tmp_path / "SUB.H").write_text("BEGIN PGM SUB MM\nL IX+Q5\nLBL 1\nL IY+1\nCALL LBL 1 REP 1\nEND PGM SUB MM\n")
+    control = Controller(subprograms=str(tmp_path))
+    check_path(read("Q5 = 2\nLBL 1\nCALL PGM SUB.H\nCALL LBL 1 REP 1\nL X+9", controller=control),
+               "F 2 0 0; F 2 1 0; F 2 2 0; F 4 2 0; F 4 3 0; F 4 4 0; F 9 4 0")  # fmt: skip
+
+
+def test_check_says_the_language_why_and_what_it_needs(capsys, tmp_path):
+    file = tmp_path / "part.h"
+    file.write_text("0 BEGIN PGM PART MM\n1 TOOL CALL 3 Z S1 F100\n2 L X+10\n3 L X+20 RL\n4 END PGM PART MM\n")
+    assert main(["check", str(file)]) == 1
+    said = capsys.readouterr().out
+    assert "language: Heidenhain's conversational language (line 1: '0 BEGIN PGM PART MM')" in said
+    assert "needs: --tools (line 4)" in said and "extents" not in said
+    file.write_text("G21\nG1 X5 F100\n")
+    assert main(["check", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert "language: G code (no sign of another language)" in said and "extents" in said
+    assert main(["check", str(file), "--dialect", "heidenhain"]) == 1
+    assert "as asked for: --dialect heidenhain" in capsys.readouterr().out

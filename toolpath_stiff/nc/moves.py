@@ -25,6 +25,7 @@ from toolpath_stiff.units import (
 
 RAPID, FEED, ARC, CYCLE = 0, 1, 2, 3
 CUTTER_LOCATION = "cutter-location file"
+Blank = tuple[tuple[float, float, float], tuple[float, float, float]]
 MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
 
 
@@ -207,7 +208,7 @@ class ReadProgram:
     marks: tuple[tuple[int, str], ...] | None = None
     jumps: tuple[Jump, ...] = ()
     parametric: bool = False
-    stock: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+    stock: Blank | None = None
 
     def __repr__(self) -> str:
         return f"<ReadProgram {self.name}: {len(self.moves)} moves, read as {self.dialect}>"

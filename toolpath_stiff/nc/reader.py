@@ -1,6 +1,7 @@
 """An NC program or a cutter-location file, from file or text, to `ReadProgram`."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from toolpath_stiff.nc.languages import (
 )
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
-from toolpath_stiff.nc.moves import RAPID, ReadProgram, Remark
+from toolpath_stiff.nc.moves import RAPID, Blank, ReadProgram, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
@@ -28,7 +29,7 @@ from toolpath_stiff.nc.request import ORIGIN_WINS, ZERO, Request
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.poses import Pose, pose_in_si
-from toolpath_stiff.units import mm_per_min_from_m_per_s
+from toolpath_stiff.units import m_from_mm, mm_per_min_from_m_per_s
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
 LANGUAGE_RUNS: dict[str, type[ProgramRun]] = {"heidenhain": HeidenhainRun}  # by the dialect of the language
@@ -185,7 +186,17 @@ def program_of(run: ProgramRun, request: Request, ending: Sequence[Remark]) -> R
         tools=tuple(state.used_tools.values()),
         dialect=request.controller.label,
         jumps=tuple(run.jumps),
+        stock=blank_of(state.plain.stock),
     )
+
+
+def blank_of(stock: Mapping[str, Sequence[float]]) -> Blank | None:
+    """The corners of BLK FORM in m, where both are whole."""
+    corners = [[m_from_mm(v) for v in corner] for corner in stock.values()]
+    if len(corners) != 2 or any(map(math.isnan, [*corners[0], *corners[1]])):
+        return None
+    (a, b, c), (d, e, f) = corners
+    return (a, b, c), (d, e, f)
 
 
 def on_the_part(program: ReadProgram, request: Request, state: State | None = None) -> ReadProgram:

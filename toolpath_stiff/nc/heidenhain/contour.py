@@ -18,6 +18,7 @@ from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
 from toolpath_stiff.nc.geometry import PLANES, ArcError
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, Word
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -157,6 +158,7 @@ def go(
     if plain.approach is not None:
         _approach(state, block, end - begin if center is None else turn * 1j * (begin - center))
     check_known(state, block, there, rapid)
+    block.refuse_if(any(abs(v) > LARGEST_MM for v in there.values()), None, "leads beyond 100 m")
     if center is not None:
         off = abs(abs(begin - center) - abs(end - center))
         block.refuse_if(off > ON_CIRCLE_MM, None, f"ends {off:.4f} mm off its circle", f"at most {ON_CIRCLE_MM} mm")

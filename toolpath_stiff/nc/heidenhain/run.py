@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from toolpath_stiff.nc.heidenhain.contour import ON_CIRCLE_MM
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.heidenhain.contour import ON_CIRCLE_MM, WORDS_OF_AXES
 from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX, call
 from toolpath_stiff.nc.heidenhain.expressions import work_out
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
@@ -23,6 +24,7 @@ from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.program_run import DEEPEST, ProgramRun, Tally, beyond_the_end
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import CurrentBlock, Flow
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 
 MOST_STEPS = 1_000_000  # statements that run, all repeats counted
 MOST_IDLE = 100_000  # of them without a move between
@@ -169,8 +171,6 @@ class HeidenhainRun(ProgramRun):
     def _steered(self, row: int) -> int:
         """Carry out the statement in a line; where the run goes on."""
         self._row = row
-        if any(row == first for first, *_ in self._files):  # beyond the program before it
-            return len(self.lines)
         self._steps += 1
         moves = len(self.state.recorder)
         if moves != self._moved[0]:
@@ -214,6 +214,10 @@ class HeidenhainRun(ProgramRun):
         for word in block.block.words[1:]:
             if word.letter in block.values:
                 raise block.fail(word, f"repeats the word {word.letter} of its statement", "each word once")
+            largest = LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD
+            block.refuse_if(
+                abs(word.value) > largest, word, "is beyond 100 m, or any number of a control", f"{largest:g}"
+            )
             block.values[word.letter] = word
         block.free = set(block.values)
         self.state.plain.to_corner = self._to_corner[statement.after - 1]
@@ -423,12 +427,12 @@ class HeidenhainRun(ProgramRun):
             if file is None:
                 problem = f"CALL PGM {name}: no folder of programs has it"
                 raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=statement.column)
-            known = len(self.lines)
-            self.lines = (*self.lines, *read_lines(file))
+            known = len(self.lines) + 1
+            self.lines = (*self.lines, "END PGM", *read_lines(file))  # which ends what has no END PGM before it
             self._files.append((known, len(self.lines), file.name))
             self._labels, self._lexer = None, PlainRun(self.state, self._as_g_code(), self.name)
         self._enter_call(row, statement.after, -1)
-        return known + 0
+        return known
 
     def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
         """A warning about what follows END PGM; an error where a corner or an approach still waits."""
