@@ -28,7 +28,9 @@ class Milling:
         """All patches, and the removed volume of each sample."""
         blocks = list(engage(*self.context))
         assert [rows.start for rows, _, _ in blocks[1:]] == [rows.stop for rows, _, _ in blocks[:-1]]
-        return Patches.joined([patches for _, patches, _ in blocks]), np.concatenate([volume for _, _, volume in blocks])
+        return Patches.joined([patches for _, patches, _ in blocks]), np.concatenate(
+            [volume for _, _, volume in blocks]
+        )
 
     def removed(self):
         return self.engaged()[1]

@@ -120,7 +120,9 @@ def _contact_at_corners(work: Workpiece, stations: AnyArray) -> tuple[Patches, F
     station = np.repeat(np.arange(len(stations)), counts)
     rows = np.arange(len(station)) + np.repeat(first - np.cumsum(counts) + counts, counts)
     patches, by = patches.take(rows), np.where(again, turn, 0.0)[station]
-    entry = np.where((patches.entry > 0.0) & (patches.entry < np.pi), np.maximum(patches.entry + by, 0.0), patches.entry)
+    entry = np.where(
+        (patches.entry > 0.0) & (patches.entry < np.pi), np.maximum(patches.entry + by, 0.0), patches.entry
+    )
     exit_ = np.where((patches.exit > 0.0) & (patches.exit < np.pi), np.minimum(patches.exit + by, np.pi), patches.exit)
     kept = exit_ - entry > NARROW
     return Patches(station, patches.low, patches.high, entry, exit_).take(kept), rate[source]
@@ -159,7 +161,7 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
 def _above(
     work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray, height: FloatArray
 ) -> FloatArray:
-    """m of material above points of the envelope; below 0: none there."""
+    """M of material above points of the envelope; below 0: none there."""
     top, bottom = heights_around(work, stations, radius, angle)
     return np.where(bottom < height, np.maximum(top - height, -1.0), -1.0)
 

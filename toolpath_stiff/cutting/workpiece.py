@@ -152,7 +152,9 @@ def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> W
     order = np.argsort(cell, kind="stable")
     cell, piece, below, outdone = _without_outdone(cell[order], piece[order], below[order], above[order])
     counts_from = np.searchsorted(np.maximum.accumulate(outdone), np.arange(len(cell)), side="right")
-    return Workpiece(stock, pieces, first, corner, size, columns, cell * len(pieces) + piece, counts_from, below, compiled)
+    return Workpiece(
+        stock, pieces, first, corner, size, columns, cell * len(pieces) + piece, counts_from, below, compiled
+    )
 
 
 def _boxes(pieces: AnyArray) -> tuple[FloatArray, FloatArray]:
