@@ -21,7 +21,7 @@ from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.results import Progress, counter
 
 AROUND = 33  # points of a ring, denser at the sides, where a light cut is
-LEVELS, CORNER_LAYERS = 8, 8  # layers of the cylinder; of a corner or ball
+LEVELS, CORNER_LAYERS = 12, 8  # layers of the cylinder; of a corner or ball
 COARSE = 3  # rings that look how high a corner or ball cuts
 END_POINTS = 200  # of the end of a cutter that descends
 HALVINGS, SECANTS = 14, 8  # of up to 9 degrees: 1e-5 rad; in turn with halvings
