@@ -356,9 +356,8 @@ class Follower:
             machine = self.moves_of_line > 0
             named = named or (set(range(6)) if machine else set())
         self.moves_of_line += 1
-        if self.cycle and not program_words.HOME_MOVE.search(
-            words
-        ):  # to the hole at the old height, or along the normal
+        # To the hole at the old height, or along the normal.
+        if self.cycle and not program_words.HOME_MOVE.search(words):
             normal = geometry.PLANES[self.plane][2]
             along = all(start[axis] == end[axis] for axis in range(6) if axis != normal)
             named = {normal} if along else named - {normal}
