@@ -13,7 +13,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.cutting.coefficients import Coefficients, coefficients_from, material, read_coefficients
 from toolpath_stiff.cutting.cutters import Cutter, cutter_of, merged_tool
-from toolpath_stiff.cutting.stock import Stock, box_stock, stock_of_extents
+from toolpath_stiff.cutting.stock import Stock, box_stock, stock_from_stl, stock_of_extents
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.courses import Extents, extents
