@@ -7,7 +7,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.examination import NAMING, Examination
+from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Examination
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.confounding import CONFOUNDED
@@ -15,6 +15,7 @@ from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
+from toolpath_stiff.inference.noise import REST
 from toolpath_stiff.inference.nuisances import findings, nuisance_words
 from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
@@ -30,7 +31,7 @@ MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has
 
 def verdict_text(diagnosis: Examination) -> str:
     """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
-    same = [] if diagnosis.alike is None else [alike_text(diagnosis.explanations[0], diagnosis.alike)]
+    same = [alike_text(name, alike) for name, alike in diagnosis.alike.items()]
     return " ".join([_verdict_text(diagnosis), *same, *(f"{_capital(doubt)}." for doubt in doubts(diagnosis))])
 
 
@@ -86,6 +87,9 @@ def _cause(diagnosis: Examination, name: str) -> str:
     if name not in diagnosis.fits:
         return f"({name}, probability {chance})"
     fit = diagnosis.fits[name]
+    if diagnosis.main.probability.get(name, 0.0) < SHOWN and name in diagnosis.main.votes:
+        titles = joined([candidate.effect.title for candidate in fit.candidates])
+        return f"{titles} ({name}: less likely than {100 * SHOWN:g} %, but foretells left-out poses as well)"
     unusual = f", more than is usual ({joined(sizes)}) " if (sizes := _unusual(fit)) else " "
     return f"{joined(fit.findings)}{unusual}({name}, probability {chance})"
 
@@ -248,6 +252,8 @@ def assumptions(diagnosis: Examination) -> list[str]:
         f"noise: {noise.origin}",
         f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
         f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
+        f"frame, table, platform and tool give a little more or less than in the model: {100 * REST:.1g} % (sd) of the "
+        "tip's stiffness along each of their axes: assumed",
         f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: "
         + ("assumed" if noise.outliers == OUTLIERS else "as the repeats have it"),
         f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "

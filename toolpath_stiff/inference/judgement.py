@@ -35,6 +35,7 @@ from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.doubts import noise_doubt, question
 from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fair_forms import fair_rivals
 from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
@@ -42,7 +43,7 @@ from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import findings, fitted_nuisances
 from toolpath_stiff.inference.several import search_pairs, search_triples
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
-from toolpath_stiff.inference.votes import Votes, left_out_of, lowers_error, outvoted, rivals_of, votes
+from toolpath_stiff.inference.votes import Votes, closest, left_out_of, lowers_error, outvoted, rivals_of, votes
 from toolpath_stiff.stiffness.contract import Effect
 
 NONE = "none"
@@ -421,6 +422,7 @@ def put_to_vote(
     if top is None:
         return ("adequate", (NONE,), {}) if gates.none_stands else ("unexplained", (), {})
     ballots = votes(problem, fits[top], {NONE: base} | rivals_of(fits[top], fits))
+    ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
     open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
     beside = tuple(dict.fromkeys([*standing, *open_rivals]))[: max(len(standing), MOST_BESIDE)]
     return "ambiguous" if open_rivals else verdict, beside, ballots

@@ -16,6 +16,7 @@ A rival is outvoted where the sum of them is
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from toolpath_stiff.documents import Document, json_number
 from toolpath_stiff.inference.covariances import Groups, Precision
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.left_out import HeldOut, held_out
+from toolpath_stiff.inference.noise import REST_COLUMNS
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import SETUP, Effect
@@ -42,17 +44,19 @@ def votes(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, Fl
     Readings that either of the two takes for wild scatter widely for both.
     """
     scatter, points = problem.scatter, Groups.by(problem.predictor.data.point)
+    # Other poses would tell how much the rest gives, at no price: as a free part that any explanation has beside it.
+    given = replace(scatter.covariance, shared=scatter.covariance.shared[:-REST_COLUMNS])
     mine: dict[tuple[int, ...], tuple[Precision, FloatArray]] = {}
     against = {}
     for name, rival in rivals.items():
         wild = tuple(sorted({*fit.scatter.wild, *rival.scatter.wild}))
         if wild not in mine:
             rows = np.array(wild, dtype=np.int64)
-            precision = scatter.covariance.widened(rows, scatter.widening[rows]).precision
+            precision = given.widened(rows, scatter.widening[rows]).precision
             mine[wild] = precision, _log_predictive(fit, precision, points)
         precision, density = mine[wild]
         against[name] = density - _log_predictive(rival, precision, points)
-    return dict(sorted(against.items(), key=lambda item: (float(item[1].sum()), item[0])))
+    return closest(against)
 
 
 def _log_predictive(fit: Fit, precision: Precision, points: Groups) -> FloatArray:
@@ -113,6 +117,15 @@ def vote_words(rival: str, differences: FloatArray) -> str:
     """The same as a clause."""
     gain, error = float(differences.sum()), standard_error(differences)
     return f"{rival} foretells left-out poses {'worse' if gain > 0.0 else 'better'} by {abs(gain):.1f} +- {error:.1f}"
+
+
+def closest(*ballots: Votes) -> dict[str, FloatArray]:
+    """Votes against each rival in its strongest form, the closest rival first."""
+    names = {name for votes_for in ballots for name in votes_for}
+    strongest = {
+        name: min((votes_for[name] for votes_for in ballots if name in votes_for), key=np.sum) for name in sorted(names)
+    }
+    return dict(sorted(strongest.items(), key=lambda item: (float(item[1].sum()), item[0])))
 
 
 def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
