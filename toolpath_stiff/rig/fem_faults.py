@@ -102,7 +102,7 @@ FAULTS: dict[str, Fault] = {
     "tool_slender": _fault("tool", "tool_bending", 3.0, _softened("tool")),
     "frame_feet_soft": _fault(WORK, "frame_sway", CRACKED, _softened("feet")),
     "joint_off_its_place": _fault(
-        f"{ONE},platform,frame,geometry", "joint_offset", 0.03,
+        f"{ONE},platform,frame,geometry", "joint_offset", 0.012,
         lambda m, p: {"platform_errors": m.platform_errors + p["size"] * np.outer(_strut(p), _unit(p))},
         drawn(one_strut, _direction),
     ),
