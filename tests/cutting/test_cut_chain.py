@@ -1,4 +1,4 @@
-"""The chain of a cut: setup files, spindle and tools, forces and errors in the station's frame, files and exit codes."""
+"""The chain of a cut: setup files, spindle, tools, forces and errors in the station's frame, files and exit codes."""
 
 from __future__ import annotations
 

@@ -259,8 +259,8 @@ def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str,
     sentences += [
         "errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; the chip "
         "is not thinner for them",
-        "a spring pass meets the part as programmed, not what the pass before left by its error: where it takes nothing "
-        "off, its error counts as 0",
+        "a spring pass meets the part as programmed, not what the pass before left by its error: where it takes "
+        "nothing off, its error counts as 0",
     ]
     if model.load_dependent:
         sentences.append("effects that depend on the load act as under the mean force of a turn")

@@ -21,7 +21,7 @@ from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.results import Progress, counter
 
 AROUND = 33  # points of a ring, denser at the sides, where a light cut is
-LEVELS, CORNER_LAYERS = 8, 8  # layers of the cylinder; of a corner or ball
+LEVELS, CORNER_LAYERS = 12, 8  # layers of the cylinder; of a corner or ball
 COARSE = 3  # rings that look how high a corner or ball cuts
 END_POINTS = 200  # of the end of a cutter that descends
 HALVINGS, SECANTS = 14, 8  # of up to 9 degrees: 1e-5 rad; in turn with halvings
@@ -84,7 +84,7 @@ def _volumes(
     joined: BoolArray,
     level: int = 0,
 ) -> FloatArray:
-    """(n - 1,) m3 between n stations that are `joined` (n - 1,); in ever finer steps where the rate of removal changes."""
+    """(n - 1,) m3 between n stations, where `joined` (n - 1,); in ever finer steps where the rate of removal changes."""
     length, share = np.where(joined, np.diff(stations["path"]), 0.0), np.diff(stations["share"])
     volume = 0.5 * length * (rate[1:] + rate[:-1])
     if level == len(STEPS):
@@ -120,10 +120,10 @@ def _contact_at_corners(work: Workpiece, stations: AnyArray) -> tuple[Patches, F
     station = np.repeat(np.arange(len(stations)), counts)
     rows = np.arange(len(station)) + np.repeat(first - np.cumsum(counts) + counts, counts)
     patches, by = patches.take(rows), np.where(again, turn, 0.0)[station]
-    entry = np.where(
-        (patches.entry > 0.0) & (patches.entry < np.pi), np.maximum(patches.entry + by, 0.0), patches.entry
+    entry, exit_ = (
+        np.where((ends > 0.0) & (ends < np.pi), np.clip(ends + by, 0.0, np.pi), ends)
+        for ends in (patches.entry, patches.exit)
     )
-    exit_ = np.where((patches.exit > 0.0) & (patches.exit < np.pi), np.minimum(patches.exit + by, np.pi), patches.exit)
     kept = exit_ - entry > NARROW
     return Patches(station, patches.low, patches.high, entry, exit_).take(kept), rate[source]
 

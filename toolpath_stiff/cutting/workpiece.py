@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
+from toolpath_stiff.cutting.cells import cells_of_boxes, portions
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.sweeps import FIELDS, PIECE, heights_above, nearest, rise, sweeps_of
@@ -21,7 +22,6 @@ CELL = 0.3  # radii of the smallest cutter, size of a cell of the index
 MANY = 5_000  # pieces from where on it pays to import numba: half a second
 CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
 MOST_ENTRIES = 60_000_000  # of the index; larger cells beyond
-SHARE = 20_000  # entries at a time: they stay in the cache
 OFFSET = np.array([0.3819e-3, 0.2764e-3])  # m: walls at round coordinates shall not run along borders of cells
 
 
@@ -81,13 +81,10 @@ class Workpiece:
             lowest(self.table, self.key, self.below, x, y, low, high, late, slack, CLEAR, top, owner)
             return top, owner
         counts = high - low
-        ends = np.cumsum(counts)
-        for rows in _portions(ends):
+        for rows in portions(counts):
             some = counts[rows]
             point = np.repeat(np.arange(rows.start, rows.stop), some)
-            entry = np.arange(len(point)) + np.repeat(
-                low[rows] - (ends[rows] - some - (ends[rows.start] - some[0])), some
-            )
+            entry = np.arange(len(point)) + np.repeat(low[rows] - np.cumsum(some) + some, some)
             piece = self.key[entry] % len(self.pieces)
             late = np.zeros(len(point)) if slack_from is None else np.where(piece >= slack_from[point], slack, 0.0)
             part = np.take(self.table, piece, axis=0).view(PIECE)[:, 0]
@@ -123,15 +120,6 @@ def every(n: int, value: int) -> IntArray:
     return np.full(n, value, dtype=np.int64)
 
 
-def _portions(ends: IntArray) -> Iterator[slice]:
-    """Slices of rows with some entries each: at least a row, and no more entries than a portion."""
-    first, before = 0, 0
-    while first < len(ends):
-        end = max(int(np.searchsorted(ends, before + SHARE, side="right")), first + 1)
-        yield slice(first, end)
-        first, before = end, int(ends[end - 1])
-
-
 def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> Workpiece:
     """The stock with all pieces of the program's cuts. Raises `ProgramError`."""
     pieces, first = sweeps_of(moves, cutters)
@@ -152,9 +140,8 @@ def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> W
     order = np.argsort(cell, kind="stable")
     cell, piece, below, outdone = _without_outdone(cell[order], piece[order], below[order], above[order])
     counts_from = np.searchsorted(np.maximum.accumulate(outdone), np.arange(len(cell)), side="right")
-    return Workpiece(
-        stock, pieces, first, corner, size, columns, cell * len(pieces) + piece, counts_from, below, compiled
-    )
+    key = cell * len(pieces) + piece
+    return Workpiece(stock, pieces, first, corner, size, columns, key, counts_from, below, compiled)
 
 
 def _boxes(pieces: AnyArray) -> tuple[FloatArray, FloatArray]:
@@ -177,16 +164,8 @@ def _rasters(
     pieces: AnyArray, low: IntArray, high: IntArray, corner: FloatArray, size: float
 ) -> Iterator[tuple[IntArray, IntArray, FloatArray, FloatArray]]:
     """(k, 2) cells that pieces pass, in portions, (k,) the piece, and m, bounds of the height that it leaves there."""
-    wide = high - low + 1
-    counts = wide.prod(axis=1)
-    ends = np.cumsum(counts)
     half = size / np.sqrt(2.0) + 1e-6
-    for rows in _portions(ends):
-        piece = np.repeat(np.arange(rows.start, rows.stop), counts[rows])
-        index = np.arange(len(piece)) - np.repeat(
-            ends[rows] - counts[rows] - (ends[rows.start] - counts[rows.start]), counts[rows]
-        )
-        cell = low[piece] + np.stack([index // wide[piece, 1], index % wide[piece, 1]], axis=1)
+    for piece, cell in cells_of_boxes(low, high):
         part, middle = pieces[piece], corner + (cell + 0.5) * size
         place, distance = nearest(part, middle[:, 0], middle[:, 1])
         near = np.flatnonzero(distance <= part["reach"] + half)
