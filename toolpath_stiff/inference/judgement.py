@@ -420,7 +420,8 @@ def put_to_vote(
     ]
     top = next((name for name in standing if name in fits), None)
     if top is None:
-        return ("adequate", (NONE,), {}) if gates.none_stands else ("unexplained", (), {})
+        beside = tuple(dict.fromkeys([*explanations, NONE]))
+        return ("ambiguous", beside, {}) if gates.none_stands else ("unexplained", (), {})
     ballots = votes(problem, fits[top], {NONE: base} | rivals_of(fits[top], fits))
     ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
     open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
