@@ -109,8 +109,8 @@ def test_a_shift_that_varies(move, values):
     old = parse_program(text).moves
     row = int(np.flatnonzero(old.line == 3)[0])
     new = np.flatnonzero(np.array(rows) == row)
-    there = points(again.moves, new, 60)
-    untouched = points(old, row, 40_000)
+    there = points(again.moves, new, 20)
+    untouched = points(old, row, 20_000)
     nearest = np.array([np.linalg.norm(untouched - p, axis=1).argmin() for p in there]) / (len(untouched) - 1)
     length = np.linalg.norm(np.diff(untouched, axis=0), axis=1).sum()
     inner = (nearest * length > 2.0) & ((1.0 - nearest) * length > 2.0)

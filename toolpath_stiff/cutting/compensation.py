@@ -8,7 +8,7 @@ that of the cut less the shift; what varies over the height no shift removes.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -117,12 +117,17 @@ def places_beside(moves: Moves, row: IntArray, points: FloatArray, near: FloatAr
     return np.clip(share, 0.0, 1.0), left
 
 
+def _by_row(walls: Walls) -> Iterator[tuple[int, IntArray]]:
+    """Rows, and the stations of each."""
+    order = np.argsort(walls.row, kind="stable")
+    rows, first = np.unique(walls.row[order], return_index=True)
+    yield from zip(rows.tolist(), np.split(order, first[1:]), strict=True)
+
+
 def _shifts(walls: Walls, alone: Collection[int]) -> Shifts:
     """Shifts of moves, mm to the left, by the stations of their walls; 0 of those that are left alone."""
     shifts, wanted = {}, mm_from_m(walls.wanted)
-    order = np.lexsort((walls.share, walls.row))
-    rows, first = np.unique(walls.row[order], return_index=True)
-    for row, some in zip(rows.tolist(), np.split(order, first[1:]), strict=True):
+    for row, some in _by_row(walls):
         shares, which = np.unique(walls.share[some], return_inverse=True)
         means = np.bincount(which, wanted[some]) / np.bincount(which)
         knots = np.union1d(shares, [0.0, 1.0])
@@ -314,8 +319,7 @@ def _quantile(values: FloatArray) -> float:
 def _intended(shifts: Shifts, walls: Walls) -> FloatArray:
     """(n,) m, the shift that was asked for at each station."""
     intended = np.zeros(len(walls.row))
-    for row in np.unique(walls.row).tolist():
-        some = walls.row == row
+    for row, some in _by_row(walls):
         intended[some] = m_from_mm(np.interp(walls.share[some], *shifts[row])) if row in shifts else 0.0
     return intended
 

@@ -23,24 +23,24 @@ STRAIGHT, ARC_TURN = 4.0, 0.5 * np.pi  # longest pieces: radii of the cutter; ra
 
 
 # A piece of the cutting path; SI. Pieces stand in the order of time.
-PIECE = np.dtype([
-    ("move", np.int64),  # row of the move
-    ("before", np.float64),  # path from the program's start to where the piece begins, rapids included
-    ("after", np.float64),  # ... and to where it ends
-    ("x", np.float64),  # start of a line, or centre of an arc ...
-    ("y", np.float64),
-    ("z", np.float64),  # ... at the height of its start
-    ("turn", np.float64),  # 0: line; 1, -1: arc counter-clockwise, clockwise
-    ("heading", np.float64),  # direction of a line, or where on its circle an arc begins
-    ("cos", np.float64),  # of the heading
-    ("sin", np.float64),
-    ("extent", np.float64),  # length in the plane, m, or turn, rad
-    ("slope", np.float64),  # climb per unit of it
-    ("radius", np.float64),  # of an arc at its start
-    ("growth", np.float64),  # of the radius per rad
-    ("reach", np.float64),  # radius of the cutter
-    ("flat", np.float64),  # radius of the flat part of its end
-])  # fmt: skip
+FIELDS = (
+    "before",  # path from the program's start to where the piece begins, rapids included
+    "after",  # ... and to where it ends
+    "x",  # start of a line, or centre of an arc ...
+    "y",
+    "z",  # ... at the height of its start
+    "turn",  # 0: line; 1, -1: arc counter-clockwise, clockwise
+    "heading",  # direction of a line, or where on its circle an arc begins
+    "cos",  # of the heading
+    "sin",
+    "extent",  # length in the plane, m, or turn, rad
+    "slope",  # climb per unit of it
+    "radius",  # of an arc at its start
+    "growth",  # of the radius per rad
+    "reach",  # radius of the cutter
+    "flat",  # radius of the flat part of its end
+)
+PIECE = np.dtype([(name, np.float64) for name in FIELDS])
 
 
 def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, IntArray]:
@@ -72,7 +72,7 @@ def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, In
     level = np.hypot(along[:, 0], along[:, 1])
     plunge = level < 1e-9
     pieces = np.zeros(len(move), dtype=PIECE)
-    pieces["move"], pieces["reach"], pieces["flat"] = move, radius[move], flat[move]
+    pieces["reach"], pieces["flat"] = radius[move], flat[move]
     pieces["before"] = (np.cumsum(length) - length)[move] + share * length[move]
     pieces["after"] = pieces["before"] + length[move] / counts[move]
     pieces["x"], pieces["y"] = start[:, 0], start[:, 1]

@@ -75,7 +75,7 @@ def text(analysis: Analysis) -> list[str]:
             lines += [f"{label}, worst lines:", *places(document[table]).lines(2, 0)]
     if "tolerance" in document:
         sentence, beyond = tolerance(analysis)
-        lines += [sentence, *beyond.lines(2, 0)[1:]]
+        lines += [sentence, *(beyond.lines(2, 0)[1:] if beyond.rows else ())]
     return lines
 
 
