@@ -124,6 +124,12 @@ PATHS = {
         "PLANE SPATIAL SPA+0 SPB+0 SPC+90 STAY\nCYCL DEF 7.1 X+10\nL X+1 Y+1 Z+0 FMAX\nCC X+0 Y+0\nL X+5 Y+0 F100",
         "R -1 11 0; F 0 15 0",
     ),
+    "reset of the shift before that of the plane": (
+        "CYCL DEF 7.1 X+9\nPLANE SPATIAL SPA+0 SPB+0 SPC+90 STAY SEQ- TABLE ROT\nL A+Q120 C+Q122 R0 FMAX M126\nCALL LBL 1\n"
+        "PLANE SPATIAL SPA0 SPB0 SPC0 STAY\nL A+Q120 C+Q122 R0 FMAX\nL X+1 Y+2 Z+3 FMAX\nL X+2 M30\n"
+        "/77 LBL 1 ; RESET\nCYCL DEF 7.0 D\nCYCL DEF 7.1 X0\nCYCL DEF 7.2 Y0\nPLANE RESET STAY\nLBL 0",
+        "R 1 2 3; F 2 2 3",
+    ),
     "arc of ZX": ("TOOL CALL 2 Y S1000 F200\nL Z+10 X+0\nCC Z+0 X+0\nC Z+0 X+10 DR+\nCYCL DEF 7.1 X+0", "F 0 0 10; A 10 0 0@0 0 90"),
     "machine coordinates": ("L X+1 Y+2 Z-3 R0 FMAX M91\nL X+5 Y+5 Z+5 F100", "R 1 2 -3; F 5 5 5"),
     "M140": ("L Z-5\nL M140 MB20\nM140 MB MAX\nL X+3 Z+2 FMAX\nL X+4", "F 0 0 -5; R 0 0 15; R 3 0 2; F 4 0 2"),
@@ -306,6 +312,7 @@ REFUSALS = {
     "L X+200000": ("beyond 100 m", 3),
     "TOOL CALL 9 Z\nL X+1 RL": ("radius of tool 9.*--tools", 4),
     "L X+1 M92": ("machine builder", 3),
+    "L X+1 FMAX M92\nL X+2 Y+2": ("place is not known", 4),
     "L Z-5 RL": ("does not move in the plane", 3),
     "C X+1 Y+1 DR+": ("without a circle centre", 3),
     "CC X+0 Y+0\nL X+10\nC X+0 Y+10.1 DR+": ("0.1000 mm off its circle", 5),
@@ -323,8 +330,10 @@ REFUSALS = {
     "L X-20\nAPPR CT X+0 Y+10 CCA90 R+4 RL\nL Y+50": ("inside arc", 4),
     "CYCL DEF 10.1 ROT+10\nCYCL DEF 7.1 X+5\nL X+1": ("order decides", 5),
     "CYCL DEF 8.1 X\nCYCL DEF 10.1 ROT+10\nL X+1": ("order decides", 5),
-    "CYCL DEF 7.1 #3": ("no word of CYCL DEF 7.1", 3),
-    "L X+1\nCYCL DEF 247 D ~\n Q339=2": ("preset table", 4),
+    "L X+1\nCYCL DEF 7.1 #3": ("another datum than before", 4),
+    "CYCL DEF 7.1 X+9\nPLANE SPATIAL SPA+9 SPB+0 SPC+0 STAY\nCYCL DEF 7.1 X+0\nL X+1 Y+1 Z+1 FMAX": ("order decides", 6),
+    "CYCL DEF 7.1 X+9\nPLANE SPATIAL SPA+9 SPB+0 SPC+0 STAY\nCYCL DEF 7.1 Y+3": ("before the tilting", 5),
+    "L X+1\nCYCL DEF 247 D ~\n Q339=2": ("table of the control", 4),
     "CC X+0 Y+0\nCYCL DEF 7.1 X+5\nLP PR+5 PA+0": ("after a change of the coordinates", 5),
     "PLANE SPATIAL SPA+0 SPB+9 SPC+0 STAY\nL X+1": ("tool's place is not known", 4),
     "M140 MB MAX\nL X+1": ("tool's place is not known", 4),
@@ -381,7 +390,7 @@ def test_blank_tools_and_what_is_said():
     assert program.dialect == "heidenhain" and [tool.number for tool in program.tools] == [1, 2]
     assert program.moves.tool_length[-1] == 0.05 and ("M8", 9) in [(u.word, u.line) for u in program.unsupported]
     assert program.moves.end[-1, 2] == pytest.approx(0.002 - 0.05)  # the numbers of the tip change with the length
-    assert any("preset table" in text for text in program.assumptions)
+    assert any("cycle 247" in text for text in program.assumptions)
 
 
 def test_programs_that_are_called(tmp_path):

@@ -16,7 +16,7 @@ from toolpath_stiff.nc.codes.tools import HOLDS_HINT
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
 from toolpath_stiff.nc.geometry import PLANES, ArcError
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, Word
@@ -228,7 +228,8 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
     )  # fmt: skip
     plain.unknown = set(lost)
     inner = plain.angle != 0.0, bool(plain.mirrored), plain.scale != 1.0
-    block.refuse_if(plain.doubt and any(inner), None, plain.doubt, "cycle 7 first, then 8, 10 or 11")
+    uncertain = plain.doubt and (any(inner) or plain.tilt is not None)
+    block.refuse_if(uncertain, None, plain.doubt, "cycle 7 first, then PLANE, then 8, 10 or 11")
     plain.doubt = ""
     block.refuse_if(all(inner[:2]), None, "under cycle 8 and cycle 10: their order decides the path", "one of them")
     if plain.held_tip and state.frames.posted is None:
@@ -239,6 +240,14 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
 def line(state: State, block: CurrentBlock, code: str) -> None:
     """L, LP: straight to a point. In machine coordinates under M91."""
     plain, there, rapid = state.plain, polar(state, block) if code == "LP" else named(state, block), feed(state, block)
+    if block.take("M92") is not None:
+        block.refuse_if(not rapid, "M92", "in a cut: the machine builder says where its points are", "FMAX")
+        state.warnings.append(
+            Remark("M92 goes to points that the machine builder sets: left out of the path", block.line)
+        )
+        plain.unknown |= there.keys() & {0, 1, 2}
+        block.take("R0")
+        return
     if block.take("M91") is not None:
         block.refuse_if(
             state.cutter or plain.held or plain.to_corner, "M91", "beside a contour with compensation or a corner"

@@ -35,7 +35,7 @@ PASSIVE = {
     "M145": "machine compensation off", "M148": "lift-off at a stop", "M149": "no lift-off at a stop", "M150": "limit switch message off",
 }  # fmt: skip
 REFUSED = {
-    "M92": "points of the machine builder's", "M94": "other numbers of the rotary axes", "M97": "small contour steps",
+    "M94": "other numbers of the rotary axes", "M97": "small contour steps",
     "M98": "open contour corners", "M104": "the datum set last", "M105": "another feedback", "M114": "compensation for tilting axes",
     "M130": "points in the untilted system", "M136": "feed per revolution", "M143": "basic rotation deleted",
     "M144": "compensation of the machine's kinematics", "M146": "the same", "M197": "corner rounding",
@@ -50,7 +50,7 @@ def miscellaneous(state: State, block: CurrentBlock) -> None:
     """The M functions of a statement that act at its beginning, or leave the path alone."""
     for letter in [letter for letter in block.values if letter[0] == "M" and letter[1:].isdigit()]:
         word = block.values[letter]
-        if letter in ("M91", "M89", "M99", "M140"):
+        if letter in ("M89", "M91", "M92", "M99", "M140"):
             continue
         block.take(letter)
         block.refuse_if(

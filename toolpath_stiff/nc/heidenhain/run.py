@@ -40,7 +40,7 @@ HEAD = re.compile(r"\s*\d*\s*([A-Z]+)", re.IGNORECASE)
 EMPTY = re.compile(r"\s*\d*\s*(?:[;*].*)?")
 CORNER = re.compile(r"\s*/?\s*(?:N?\d+\s)?\s*(?:RND|CHF)\b", re.IGNORECASE)
 INCH = re.compile(r"\s*(?:N?\d+\s+)?BEGIN\s+PGM\b.*\bINCH\s*(?:;.*)?$", re.IGNORECASE)
-LABEL = re.compile(r"\s*(?:N?\d+\s+)?LBL\s*(?:(\d+)|\"([^\"]*)\")\s*$", re.IGNORECASE)
+LABEL = re.compile(r"\s*/?\s*(?:N?\d+\s+)?LBL\s*(?:(\d+)|\"([^\"]*)\")\s*$", re.IGNORECASE)
 CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*\d+)?)?\s*$')
 JUMP = re.compile(r'\s*IF\s*(.+?)\s*(EQU|NE|GT|LT)\s*(.+?)\s*GOTO\s*LBL\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*$')
 ASSIGNED = re.compile(r"\s*(Q[LR]?\d+)?\s*=\s*(.+)$")
@@ -275,9 +275,9 @@ class HeidenhainRun(ProgramRun):
         return self._value(row, number[1].replace(",", "."), 1)
 
     def _word_value(self, row: int, key: str, text: str, column: int) -> float:
-        """The number of a word; of rotary axes in a tilted plane, which the control works out, none that counts."""
-        tilted = self.state.plain.tilt is not None and key in ("A", "B", "C")
-        return 0.0 if tilted and text.lstrip("+-") in TILTING else self._value(row, text, column)
+        """The number of a word; of axes that the control turns to a plane 0, which counts in an untilted one alone."""
+        turns = key in ("A", "B", "C") and text.lstrip("+-") in TILTING
+        return 0.0 if turns else self._value(row, text, column)
 
     def _value(self, row: int, text: str, column: int) -> float:
         """The number of a word: as written, or of a Q parameter."""

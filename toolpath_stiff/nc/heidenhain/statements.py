@@ -28,7 +28,7 @@ _WORD = re.compile(
     rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
     rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
     r"|([XYZABCUVW])(?![A-Z])"
-    rf"|({VALUE})|\"([^\"]*)\"",
+    rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"",
 )
 PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
 # Heads whose rest has another form, or does not matter.
@@ -109,9 +109,13 @@ def _words(text: str, position: int, place: Place, head: str) -> list[tuple[str,
         match = _WORD.match(text, position)
         if match is None:
             raise place.fail(f"{text[position : position + 12]!r} is no word of {head}", "", "", position + 1)
-        flag, key, value, parameter, given, axis, bare, quoted = match.groups()
-        key = "".join(flag.split()) if flag else key or parameter or (f"{axis}!" if axis else "#" if bare else '"')
-        written = "".join((value or given or bare or "").split()).replace(",", ".")
+        flag, key, value, parameter, given, axis, table, bare, quoted = match.groups()
+        key = (
+            "".join(flag.split())
+            if flag
+            else key or parameter or (f"{axis}!" if axis else "TABLE" if table else "#" if bare else '"')
+        )
+        written = "".join((value or given or bare or (table or "")[1:]).split()).replace(",", ".")
         if sum(map(str.isdigit, written)) > 2 * MOST_DIGITS:
             raise place.fail(f"a number of {len(written)} characters", "", "", position + 1)
         if key == "M":

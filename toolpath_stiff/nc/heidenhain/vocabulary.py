@@ -150,7 +150,7 @@ def meaning_of(name: str) -> str:
     ('arc of a radius', 'spindle on, coolant on: not acted upon', 'is free contour programming (FK), which is not supported')
     """
     if name[0] == "M" and name[1:].isdigit():
-        special = {"M89": "the cycle after each positioning", "M99": "the cycle here", "M91": "machine coordinates",
+        special = {"M89": "the cycle after each positioning", "M99": "the cycle here", "M91": "machine coordinates", "M92": "points of the machine builder's",
                    "M126": "rotary axes go the shorter way", "M128": "tool centre point control",
                    "M129": "tool centre point control off", "M140": "retract along the tool"}  # fmt: skip
         passive = functions.PASSIVE.get(name)
