@@ -9,17 +9,21 @@ the one move that cannot match.
 import copy
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.lines import read_text, split_lines
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, ReadProgram
 from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.reader import read
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import read_block
@@ -27,11 +31,13 @@ from toolpath_stiff.poses import Pose, pose_in_mm
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
+from toolpath_stiff.rewriting.plain_language import PlacedLanguage
 from toolpath_stiff.rewriting.turn import Turn
 from toolpath_stiff.units import mm_from_m
 
+MOST_ROUNDINGS = 100  # by which rounded numbers of a path of steps may add up
 LINE_END = re.compile("\r\n|\n|\r")
-PLAIN_DIALECTS = ("generic", "linuxcnc")
+PLAIN_DIALECTS = ("generic", "linuxcnc", "heidenhain")
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
 
@@ -139,12 +145,33 @@ def rewrite_program(
         )
         for origin in (placement, original)
     )
-    controls = Controls(source, out, Turn(placement, original), decimals, linearise and mm_from_m(linearise))
+    turn = Turn(placement, original)
+    controls = Controls(source, out, turn, decimals, linearise and mm_from_m(linearise))
     text, encoding = read_text(program.path) if program.path else ("\n".join([*program.source, ""]), "utf-8")
     if placement == original:
         return RewrittenProgram(program.name, text, encoding, [])
+    if program.dialect == "heidenhain":
+        written = _plain_language(program, text, turn, decimals, replace(control, dialect=DIALECTS[program.dialect]))
+        return RewrittenProgram(program.name, written, encoding, [])
     lines = list(_rewritten_lines(controls, text, program.name, control.switches))
     return RewrittenProgram(program.name, "".join(lines), encoding, sorted(controls.notes))
+
+
+def _plain_language(program: ReadProgram, text: str, turn: Turn, decimals: int | None, control: Controller) -> str:
+    """Heidenhain's text at its new place, read again: where the path is not the placed one, it is refused."""
+    language = PlacedLanguage(turn, split_lines(text, program.name), program.name, decimals)
+    lines = language.write()
+    again, moves = read(Request(tuple(lines), program.name, controller=control)).moves, program.moves
+    cuts = (moves.motion != RAPID) & ~moves.from_machine.any(axis=1)
+    ends = np.array([turn.point(mm_from_m(end[:3]).tolist()) for end in moves.end])
+    same = len(again) == len(moves) and np.array_equal(again.motion, moves.motion)
+    off = np.abs(mm_from_m(again.end[:, :3]) - ends).max(axis=1) if same else np.zeros(0)
+    wrong = np.flatnonzero(cuts & (off > MOST_ROUNDINGS * language.unit * 10.0**-language.decimals)) if same else [0]
+    if len(wrong):
+        problem = "the program written for the placement would go another way"
+        raise Place(program.name, int(moves.line[wrong[0]])).fail(problem, hint="place it without --write")
+    ending = LINE_END.search(text)
+    return (ending[0] if ending else "\n").join([*lines, ""])
 
 
 def check_rewritable(program: ReadProgram) -> None:
