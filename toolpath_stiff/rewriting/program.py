@@ -19,6 +19,7 @@ from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.heidenhain.plain_statements import in_inches
 from toolpath_stiff.nc.lines import read_text, split_lines
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, ReadProgram
 from toolpath_stiff.nc.place import Place
@@ -30,10 +31,10 @@ from toolpath_stiff.nc.words import read_block
 from toolpath_stiff.poses import Pose, pose_in_mm
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
-from toolpath_stiff.rewriting.controls import Controls
-from toolpath_stiff.rewriting.plain_language import PlacedLanguage
+from toolpath_stiff.rewriting.controls import DECIMALS_INCH, DECIMALS_MM, Controls
+from toolpath_stiff.rewriting.plain_language import placed_lines
 from toolpath_stiff.rewriting.turn import Turn
-from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.units import MM_PER_INCH, mm_from_m
 
 MOST_ROUNDINGS = 100  # by which rounded numbers of a path of steps may add up
 LINE_END = re.compile("\r\n|\n|\r")
@@ -159,19 +160,21 @@ def rewrite_program(
 
 def _plain_language(program: ReadProgram, text: str, turn: Turn, decimals: int | None, control: Controller) -> str:
     """Heidenhain's text at its new place, read again: where the path is not the placed one, it is refused."""
-    language = PlacedLanguage(turn, split_lines(text, program.name), program.name, decimals)
-    lines = language.write()
-    again, moves = read(Request(tuple(lines), program.name, controller=control)).moves, program.moves
-    cuts = (moves.motion != RAPID) & ~moves.from_machine.any(axis=1)
-    ends = np.array([turn.point(mm_from_m(end[:3]).tolist()) for end in moves.end])
-    same = len(again) == len(moves) and np.array_equal(again.motion, moves.motion)
-    off = np.abs(mm_from_m(again.end[:, :3]) - ends).max(axis=1) if same else np.zeros(0)
-    wrong = np.flatnonzero(cuts & (off > MOST_ROUNDINGS * language.unit * 10.0**-language.decimals)) if same else [0]
+    lines, inch = split_lines(text, program.name), in_inches(program.source)
+    unit, usual = (MM_PER_INCH, DECIMALS_INCH) if inch else (1.0, DECIMALS_MM)
+    decimals = usual if decimals is None else decimals
+    placed = placed_lines(turn, lines, program.name, unit, decimals)
+    again, moves = read(Request(tuple(placed), program.name, controller=control)).moves, program.moves
+    wrong = np.zeros(1, dtype=int)
+    if np.array_equal(again.motion, moves.motion):
+        ends = np.array([turn.point(mm_from_m(end[:3]).tolist()) for end in moves.end])
+        off = np.abs(mm_from_m(again.end[:, :3]) - ends).max(axis=1)
+        wrong = np.flatnonzero((moves.motion != RAPID) & (off > MOST_ROUNDINGS * unit * 10.0**-decimals))
     if len(wrong):
         problem = "the program written for the placement would go another way"
         raise Place(program.name, int(moves.line[wrong[0]])).fail(problem, hint="place it without --write")
     ending = LINE_END.search(text)
-    return (ending[0] if ending else "\n").join([*lines, ""])
+    return (ending[0] if ending else "\n").join([*placed, ""])
 
 
 def check_rewritable(program: ReadProgram) -> None:

@@ -2,8 +2,8 @@
 
 HEIDENHAIN, user's manual "Cycles" of the iTNC 530, "Coordinate transformation cycles"; user's manual of the iTNC 530,
 "The PLANE function". Whatever is in force becomes the frames' linear part and shift: first cycle 7, then the tilting,
-cycle 7 in the tilted plane, then mirror image or rotation, and the scale. Where the order of programming is another one,
-moves are refused. mm, degrees.
+cycle 7 in the tilted plane, then mirror image or rotation, and the scale. Where the order of programming is another
+one, moves are refused. mm, degrees.
 """
 
 import math
@@ -11,7 +11,7 @@ import math
 from toolpath_stiff.nc.codes import tools
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.geometry import PLANES, roll_pitch_of_axis
-from toolpath_stiff.nc.heidenhain.contour import inch_tenths
+from toolpath_stiff.nc.heidenhain.points import inch_tenths
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import ToolEntry, tool_of
@@ -59,8 +59,8 @@ def apply(state: State, block: CurrentBlock) -> None:
     frames.linear = None if inner == unit else inner
     frames.g92 = [*(a + b for a, b in zip(plain.outer, shift, strict=True)), 0.0, 0.0, 0.0]
     plain.pole = plain.heading = None
-    inner = plain.angle or plain.mirrored or plain.scale != 1.0 or plain.tilt is not None
-    plain.doubt = plain.doubt if inner else ""
+    settled = not plain.angle and not plain.mirrored and plain.scale == 1.0 and plain.tilt is None
+    plain.doubt = "" if settled else plain.doubt
 
 
 def shift(state: State, block: CurrentBlock, code: str) -> None:

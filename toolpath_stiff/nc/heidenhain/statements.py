@@ -1,8 +1,8 @@
 """Lines of the plain language to statements: a head, and words with their columns.
 
-A statement is a line, `~` at its end continues it; `;` begins a comment, `*` a heading, `/` a statement that may be left
-out. Cycles from 200 on have their parameters in lines that follow (HEIDENHAIN, user's manuals of the iTNC 530 and the
-TNC 640, "Programming fundamentals", "Structuring programs", "Fixed cycles").
+A statement is a line, `~` at its end continues it; `;` begins a comment, `*` a heading, `/` a statement that may be
+left out. Cycles from 200 on have their parameters in lines that follow (HEIDENHAIN, user's manuals of the iTNC 530 and
+the TNC 640, "Programming fundamentals", "Structuring programs", "Fixed cycles").
 """
 
 import re
@@ -33,7 +33,7 @@ _WORD = re.compile(
 PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
 # Heads whose rest has another form, or does not matter.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\.|TCH|FUNCTION MODE"
+    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 
 
