@@ -28,6 +28,7 @@ def make_moves(rows: list[dict[str, object]]) -> Moves:
             "dwell": row.get("dwell", 0.0),
             "tool": row.get("tool", 0),
             "tool_length": row.get("tool_length", np.nan),
+            "spindle": row.get("spindle", 0.0),
             "from_machine": [False, False],
         }
         for name, value in values.items():

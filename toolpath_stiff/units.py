@@ -26,6 +26,11 @@ def m_from_mm(mm: T) -> T:
     return mm / 1e3
 
 
+def mm3_from_m3(m3: T) -> T:
+    """Cubic millimetres from cubic metres."""
+    return m3 * 1e9
+
+
 def mm_from_m(m: T) -> T:
     """Millimetres from metres."""
     return m * 1e3
@@ -39,6 +44,21 @@ def um_from_m(m: T) -> T:
 def m_from_um(um: T) -> T:
     """Metres from micrometres."""
     return um / 1e6
+
+
+def m_from_nm(nm: T) -> T:
+    """Metres from nanometres, as of nm/N."""
+    return nm / 1e9
+
+
+def nm_from_m(m: T) -> T:
+    """Nanometres from metres, as of nm/N."""
+    return m * 1e9
+
+
+def pa_from_gpa(gpa: T) -> T:
+    """Pascal from gigapascal."""
+    return gpa * 1e9
 
 
 def rad_from_deg(deg: T) -> T:
@@ -86,6 +106,16 @@ def per_s_from_per_min(rate: T) -> T:
     return rate / 60.0
 
 
+def rad_per_s_from_per_min(speed: T) -> T:
+    """rad/s from revolutions per minute."""
+    return speed * (360.0 * RAD_PER_DEG / SECONDS_PER_MINUTE)
+
+
+def per_min_from_rad_per_s(speed: T) -> T:
+    """Revolutions per minute from rad/s."""
+    return speed / (360.0 * RAD_PER_DEG / SECONDS_PER_MINUTE)
+
+
 def m_per_s_from_mm_per_min(feed: T) -> T:
     """m/s from mm/min."""
     return feed / 60e3
@@ -99,3 +129,13 @@ def rad_per_s_from_deg_per_min(feed: T) -> T:
 def mm_per_min_from_m_per_s(feed: T) -> T:
     """mm/min from m/s."""
     return feed * 60e3
+
+
+def pa_from_n_per_mm2(pressure: T) -> T:
+    """N/m2 from N/mm2."""
+    return pressure * 1e6
+
+
+def n_per_mm2_from_pa(pressure: T) -> T:
+    """N/mm2 from N/m2."""
+    return pressure / 1e6

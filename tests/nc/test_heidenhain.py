@@ -436,7 +436,9 @@ WRITTEN = """0 BEGIN PGM P MM
 """
 
 
-@pytest.mark.parametrize(("x", "y", "z", "degrees"), [(100, 20, 3, 0), (0, 0, 0, 90), (12.5, -7, 0.125, 33.3), (5, 5, 0, -150)])
+@pytest.mark.parametrize(
+    ("x", "y", "z", "degrees"), [(100, 20, 3, 0), (0, 0, 0, 90), (12.5, -7, 0.125, 33.3), (5, 5, 0, -150)]
+)
 def test_a_program_is_written_for_another_placement(x, y, z, degrees):
     program, turn = parse_program(WRITTEN, "p.h", controller=TOOLS), math.radians(degrees)
     placement = (x / 1e3, y / 1e3, z / 1e3, 0.0, 0.0, turn)

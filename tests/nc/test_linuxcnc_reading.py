@@ -45,10 +45,37 @@ def assert_same(first: Moves, second: Moves) -> None:
     for name in ("start", "end", "tool_length"):
         np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=0, atol=TOLERANCE_M, err_msg=name)
     np.testing.assert_allclose(one.feed, two.feed, rtol=1e-3)
+    np.testing.assert_allclose(one.spindle, two.spindle)
     np.testing.assert_allclose(one.dwell, two.dwell, atol=1e-4)
     np.testing.assert_allclose(one.arc_normal, two.arc_normal, atol=1e-6)
     # Four decimals of an inch of a small radius are some thousandths of a radian.
     np.testing.assert_allclose(one.arc_sweep, two.arc_sweep, atol=1e-2)
+
+
+SPINDLE = """G21 G90 F600
+S9000 M3
+G1 X10
+M4 X20
+M5
+X30
+M3
+T1 M6
+X40
+M3 S500 X50
+G96 D2500 S250
+X60
+G97 S100
+X70
+M30
+"""
+
+
+@needs_rs274
+def test_the_spindle_turns_as_the_program_says():
+    speeds = np.array([9000, -9000, 0, 0, 500, np.nan, 100]) * np.pi / 30
+    for interpreter in ("builtin", "linuxcnc"):
+        moves = parse_program(SPINDLE, "part.nc", interpreter=interpreter).moves
+        np.testing.assert_allclose(moves.spindle, speeds)
 
 
 @needs_rs274

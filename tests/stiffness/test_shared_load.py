@@ -228,3 +228,21 @@ def test_loads_that_mean_the_softest_direction_mean_it_under_the_load():
     soft = evaluate(model, *place, axis, load=Load("softest"), force=500.0)
     poses = evaluate_poses(model, *place, force=500.0)
     assert soft.stiffness == pytest.approx(poses.softest_stiffness, rel=1e-9)
+
+
+def test_the_tip_compliance_holds_what_acts_under_the_load():
+    """Its column along each axis is the stiffness that the pose states there, gaps and contacts included."""
+    model = model_of(kappa=2e4, gap=2e-6, contact=3e-9)
+    poses = evaluate_poses(model, POSITION, roll_pitch_yaw(ROTATION), force=400.0)
+    np.testing.assert_allclose(1.0 / np.diagonal(poses.tip_compliance, axis1=1, axis2=2), poses.along_axes, rtol=1e-7)
+    load = np.random.default_rng(3).normal(size=POSITION.shape) * 200.0
+    size = np.linalg.norm(load, axis=1)
+    tensor = core.tip_compliance(model, POSITION, ROTATION, load=load)
+    along = np.einsum("ni,nij,nj->n", load, tensor, load) / size**2
+    expected = [
+        core.compliance_along(model, load[[i]] / size[i], POSITION[[i]], ROTATION[[i]], force=size[i])[0]
+        for i in range(len(load))
+    ]
+    np.testing.assert_allclose(along, expected, rtol=1e-7)
+    plain = evaluate_poses(model_of(), POSITION, roll_pitch_yaw(ROTATION))
+    np.testing.assert_allclose(np.diagonal(plain.tip_compliance, axis1=1, axis2=2) * plain.along_axes, 1.0, rtol=1e-12)

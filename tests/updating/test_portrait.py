@@ -265,6 +265,6 @@ def test_a_shape_is_tried_at_every_place_that_may_feel_it(folder):
     ground = Ground(predictor, np.exp(-predictor.log_stiffness()), np.zeros(2))
     term = Term("table", "Y", "y", "bump", "give", at=(("centre", 0.1), ("width", 0.05)))
     terms = crossed(term, ground)
-    assert {"table", "frame", "struts", "one strut", "instrument"} == {other.link for other in terms}
+    assert {"table", "frame", "struts", "one strut", "instrument", "platform"} == {other.link for other in terms}
     assert term in terms
     assert all("y is about 100 mm" in term_words(other) for other in terms)

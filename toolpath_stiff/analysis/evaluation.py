@@ -1,6 +1,6 @@
 """Stiffness along a load, strut lengths and reach at many poses, block by block, fast where that is safe."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_from_m
 
 BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
+FEW_CORNERS = 0.2  # share of the rows; a second load of every pose costs more than these poses twice
 Progress = Callable[[int, int], None]
 # Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, length of the tool (nan: the reference tool).
 Poses = tuple[FloatArray, FloatArray | None, float]
@@ -100,7 +101,8 @@ def evaluate(
     """
     n, load = len(position), load or Load()
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    route = core.choose_route(model, n)
+    corners = _corners(position, abc, lengths)
+    route = core.choose_route(model, n - int(np.count_nonzero(corners)))
     stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(model.machine))
     substituted, extrapolated = np.zeros((2, n), dtype=bool)
     result = Evaluation(np.empty(n), substituted, np.empty((n, 6)), extrapolated, stand)
@@ -109,9 +111,15 @@ def evaluate(
         for tool, some in core.rows_of_tools(lengths[block]):
             rows = block[some]
             if route != "exact" and load.kind != "softest":
-                fast, sure = _by_closed_form(model, load, tangent[rows], _poses(position, abc, tool, rows), route)
-                result.put(rows, fast)
-                rows = rows[~sure]
+                last = corners[rows] & (rows < block[-1])
+                first = rows[~np.append(False, last[:-1])]
+                ends = (first, first + corners[first] * (first < block[-1])) if last.any() else (first,)
+                loads, left = [tangent[part] for part in ends], []
+                fast = _by_closed_form(model, load, loads, _poses(position, abc, tool, first), route)
+                for part, (evaluated, sure) in zip(ends, fast, strict=True):
+                    result.put(part, evaluated)
+                    left.append(part[~sure])
+                rows = np.unique(np.concatenate(left))
             if len(rows):
                 result.put(rows, _by_solution(model, load, tangent[rows], _poses(position, abc, tool, rows), force))
         if progress:
@@ -124,25 +132,37 @@ def _poses(position: FloatArray, abc: FloatArray, tool: float, rows: IntArray) -
     return position[rows], rotation_matrices(angles) if angles.any() else None, tool
 
 
-def _by_closed_form(
-    model: StiffnessModel, load: Load, tangent: FloatArray, poses: Poses, route: str
-) -> tuple[Evaluation, BoolArray]:
-    """Struts on a rigid platform along loads that the geometry directs; and (n,) where the figures hold.
+def _corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolArray:
+    """(n,) where a move ends and the next one starts in the row after: one pose, two tangents. None where few are."""
+    corners = np.zeros(len(position), dtype=bool)
+    corners[:-1] = True
+    for values in (*position.T, *abc.T, np.nan_to_num(lengths, nan=-1.0)):
+        corners[:-1] &= values[1:] == values[:-1]
+    corners[1:] &= ~corners[:-1]  # of more than two rows alike the others are poses of their own
+    return corners if np.count_nonzero(corners) > FEW_CORNERS * len(corners) else np.zeros_like(corners)
 
-    They do not for other directions, at poses near singular ones, and where an angle near zero decides.
+
+def _by_closed_form(
+    model: StiffnessModel, load: Load, tangents: list[FloatArray], poses: Poses, route: str
+) -> Iterator[tuple[Evaluation, BoolArray]]:
+    """Struts on a rigid platform along loads that the geometry directs, for each of the tangents (n, 3) at the poses.
+
+    With each (n,) where the figures hold: not for other directions, at poses near singular ones, and where an angle
+    near zero decides.
     """
     machine, (tip, rotation, tool) = model.machine, poses
-    direction, known = geometric_directions(load, tip, rotation, tangent)
-    position, towards = np.ascontiguousarray(tip.T), np.ascontiguousarray(direction.T)
+    directed = [geometric_directions(load, tip, rotation, tangent) for tangent in tangents]
+    position, towards = np.ascontiguousarray(tip.T), np.stack([direction.T for direction, _ in directed])
     turns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
     compliance, determinant, lengths, good = core.compliance_along_columns(
         machine, position, towards, turns, tool, route
     )
-    stand, sure = Extremes(machine, position, lengths, determinant, turns, tool).reach()
-    sure &= good & known & (compliance > 0.0) & (compliance < np.inf)
-    compliance[~(stand.reachable & known)] = np.nan
+    stand, certain = Extremes(machine, position, lengths, determinant, turns, tool).reach()
     extrapolated = machine.strut_law.room(lengths).min(axis=0) < 0.0
-    return Evaluation(1.0 / compliance, np.zeros(len(tip), dtype=bool), lengths.T, extrapolated, stand), sure
+    for (_, known), along in zip(directed, compliance, strict=True):
+        sure = certain & good & known & (along > 0.0) & (along < np.inf)
+        along[~(stand.reachable & known)] = np.nan
+        yield Evaluation(1.0 / along, np.zeros(len(tip), dtype=bool), lengths.T, extrapolated, stand), sure
 
 
 def _by_solution(model: StiffnessModel, load: Load, tangent: FloatArray, poses: Poses, force: float) -> Evaluation:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.evaluation import compliance_along, tip_compliances
+from toolpath_stiff.analysis.evaluation import Poses, compliance_along, tip_compliances
 from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
@@ -17,8 +17,9 @@ from toolpath_stiff.documents import Document, without_nan
 from toolpath_stiff.machine.limits import Reach
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, nm_from_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,6 +44,9 @@ class PoseStiffness(Result):
         (n, 3) unit vectors of the softest and the stiffest direction.
     softest_stiffness, stiffest_stiffness
         (n,) N/m along them.
+    tip_compliance
+        (n, 3, 3) m/N, column j the displacement of the tip for each newton of the load along axis j, all effects
+        included.
     strut_lengths
         (n, 6) m.
     extrapolated
@@ -81,6 +85,7 @@ class PoseStiffness(Result):
     softest_stiffness: FloatArray
     stiffest: FloatArray
     stiffest_stiffness: FloatArray
+    tip_compliance: FloatArray
     strut_lengths: FloatArray
     extrapolated: BoolArray
     reach: Reach
@@ -129,7 +134,11 @@ class PoseStiffness(Result):
         about = {"machine": self.model.machine.name, **effects_stated(self.model), "warnings": self.warnings}
         cells = zip(*(column.tolist() for column in self.columns.values()), strict=True)
         rows = [without_nan(dict(zip(self.columns, row, strict=True))) for row in cells]
-        rows = [{**row, "extrapolated": bool(row["extrapolated"])} for row in rows]
+        tensors = (nm_from_m(self.tip_compliance).round(6) + 0.0).tolist()  # no digits of rounding
+        rows = [
+            {**row, "extrapolated": bool(row["extrapolated"]), **without_nan({"tip_compliance_nm_per_N": tensor})}
+            for row, tensor in zip(rows, tensors, strict=True)
+        ]
         return {**about, **rows[0]} if self.single else {**about, "poses": rows}
 
     def csv(self) -> str:
@@ -167,7 +176,20 @@ def evaluate_poses(
         softest_stiffness=along(soft),
         stiffest=stiff,
         stiffest_stiffness=along(stiff),
+        tip_compliance=_by_axes(model, compliance, poses, force),
         strut_lengths=lengths,
         extrapolated=extrapolated,
         reach=stand,
     )
+
+
+def _by_axes(model: StiffnessModel, compliance: FloatArray, poses: Poses, force: float) -> FloatArray:
+    """(n, 3, 3) m/N: each column with the load along that axis; `compliance` as of `tip_compliances`."""
+    by_axes, within = compliance.copy(), ~np.isnan(compliance[:, 0, 0])
+    if model.load_dependent and within.any():
+        tip, rotation, tool = poses
+        some = (tip[within], None if rotation is None else rotation[within], tool)
+        for axis, load in enumerate(force * np.eye(3)):
+            tensor = core.tip_compliance(model, *some, load=np.broadcast_to(load, some[0].shape))
+            by_axes[within, :, axis] = tensor[:, :, axis]
+    return by_axes

@@ -192,6 +192,16 @@ def per_tool(path: EvaluatedPath) -> list[Document]:
     return rows
 
 
+def parts_of_path(path: EvaluatedPath) -> tuple[list[IntArray], dict[int, IntArray]]:
+    """Rows of the samples of each operation, in order; of each tool that cuts, by its number."""
+    samples = path.samples
+    operations = _rows_of(path.operations.of_move[samples.move], len(path.operations.rows))
+    tools, of_sample = np.unique(samples.tool, return_inverse=True)
+    cutting = np.unique(samples.tool[samples.cutting])
+    rows = dict(zip(tools.tolist(), _rows_of(of_sample, len(tools)), strict=True))
+    return operations, {number: rows[number] for number in cutting.tolist()}
+
+
 def _parts(path: EvaluatedPath, of_move: IntArray, count: int) -> list[Document]:
     """The figures of `count` parts of a program; `of_move` (n,) says to which each move belongs."""
     samples, moves = path.samples, path.program.moves

@@ -1,9 +1,12 @@
-"""How far the uncertainty of a machine's fitted parameters reaches into the stiffness along a path.
+"""How far the stiffness along a path may be off on a machine that was fitted to measurements.
 
-A linear propagation (JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation 13): the covariance
-of the parameters between two slopes of the stiffness, which are differences of whole evaluations.
+A linear propagation (JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation 13): the errors of
+the parameters times slopes of the stiffness, which are differences of whole evaluations; where the machine file states
+them (`[uncertainty.errors]`), beside the errors of struts and joints, which belong to the machine and which the
+parameters have partly taken up, and what the model lacks.
 """
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -11,45 +14,62 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.evaluation import evaluate
-from toolpath_stiff.analysis.loads import Load
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.analysis.loads import Load, load_directions
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.error_model import FEW, GEOMETRY, alike, coordinates
 from toolpath_stiff.path.sampling import Samples
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
+BLOCK = 8192  # samples whose struts and joints are looked at at a time
+MOST_OF_MEAN = 400  # samples by which it is told how far what the model lacks averages out along a path
 
 
 @dataclass(frozen=True)
 class ParameterBand:
-    """Uncertainty of the stiffness of n samples that comes from p fitted parameters.
+    """Uncertainty of the stiffness of n samples.
 
     Attributes
     ----------
     names
-        Of the parameters, as in machine files.
-    slopes
-        (n, p) N/m by which the stiffness changes with one standard deviation of each; nan out of reach.
-    correlation
-        (p, p) of the parameters.
+        Of the p fitted parameters, as in machine files.
+    factors
+        (n, r) N/m by which the stiffness changes with each of r independent errors; nan out of reach.
+    form
+        (n,) N/m, standard deviation of what the model lacks; 0 where nobody states it.
+    few
+        (n,) few readings near there.
+    place, direction
+        (n, 6) `coordinates` and (n, 3) unit vectors of the load.
     """
 
     names: tuple[str, ...]
-    slopes: FloatArray
-    correlation: FloatArray
+    factors: FloatArray
+    form: FloatArray
+    few: BoolArray
+    place: FloatArray
+    direction: FloatArray
 
     @property
     def deviation(self) -> FloatArray:
         """(n,) N/m, standard deviation of the stiffness of each sample."""
-        squared = np.einsum("ni,ij,nj->n", self.slopes, self.correlation, self.slopes)
-        return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+        return np.asarray(np.sqrt((self.factors**2).sum(axis=1) + self.form**2))
 
     def deviation_of_mean(self, weight: FloatArray) -> float:
-        """N/m, standard deviation of the mean stiffness of samples with weights (n,); the errors do not average out."""
-        slope: FloatArray = weight[weight > 0.0] @ self.slopes[weight > 0.0] / weight.sum()
-        return float(np.sqrt(max(float(slope @ self.correlation @ slope), 0.0)))
+        """N/m, standard deviation of the mean stiffness of samples with weights (n,).
+
+        Errors of parameters do not average out; what the model lacks does as far as poses and directions differ.
+        """
+        counted = np.flatnonzero(weight > 0.0)
+        mean = weight[counted] @ self.factors[counted] / weight.sum()
+        few = counted[np.linspace(0, len(counted) - 1, min(len(counted), MOST_OF_MEAN)).round().astype(np.int64)]
+        parts = weight[few] * self.form[few] / weight[few].sum()
+        return float(np.sqrt(mean @ mean + parts @ alike(self.place[few], self.direction[few]) @ parts))
 
 
 def parameter_band(
@@ -75,8 +95,27 @@ def parameter_band(
         )
 
     names = tuple(uncertainty.names[i] for i in kept)
-    correlation = np.asarray(uncertainty.correlation[np.ix_(kept, kept)])
-    return ParameterBand(names, np.stack([slope(name) for name in names], axis=1), correlation)
+    slopes = np.stack([slope(name) for name in names], axis=1)
+    place = coordinates(samples.position, samples.abc)
+    if uncertainty.errors is None:
+        values, vectors = np.linalg.eigh(uncertainty.correlation[np.ix_(kept, kept)])
+        factors = slopes @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+        n = len(slopes)
+        return ParameterBand(names, factors, np.zeros(n), np.zeros(n, dtype=bool), place, np.zeros((n, 3)))
+    errors, direction = uncertainty.errors.of(kept), np.zeros_like(samples.position)
+    factors = slopes @ errors.loadings
+    for rows in _blocks(np.flatnonzero(np.isfinite(stiffness))):
+        turn, tools = rotation_matrices(samples.abc[rows]), np.broadcast_to(samples.tool_length, len(place))[rows]
+        compliance = core.tip_compliance(model, samples.position[rows], turn, tools, force)
+        direction[rows] = load_directions(load, compliance, samples.position[rows], turn, samples.tangent[rows])[0]
+        by_geometry = core.geometry_slopes_along(model, direction[rows], samples.position[rows], turn, tools, force)
+        factors[rows, -GEOMETRY:] -= stiffness[rows, None] * by_geometry * errors.geometry
+    near = errors.nearness(place)
+    return ParameterBand(names, factors, stiffness * errors.form(near), near < FEW, place, direction)
+
+
+def _blocks(rows: IntArray) -> Iterator[IntArray]:
+    yield from (rows[start : start + BLOCK] for start in range(0, len(rows), BLOCK))
 
 
 def band_figures(band: ParameterBand, stiffness: FloatArray, weight: FloatArray) -> Document | None:
@@ -93,4 +132,5 @@ def band_figures(band: ParameterBand, stiffness: FloatArray, weight: FloatArray)
         ends = (value - defaults.NORMAL_95 * sd, value + defaults.NORMAL_95 * sd)
         figures[f"{name}_sd_N_per_mm"] = n_per_mm_from_n_per_m(sd)
         figures[f"{name}_95_N_per_mm"] = [n_per_mm_from_n_per_m(end) for end in ends]
-    return figures
+    few = float(weight[band.few].sum() / weight.sum())
+    return {**figures, "few_readings_share": few, "few_readings_at_min": bool(band.few[low])}

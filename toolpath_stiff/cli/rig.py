@@ -34,6 +34,7 @@ def new(
     hidden: Annotated[str | None, Option("--hidden", "WHAT")] = None,
     noise: Annotated[float, Option("--noise", "%")] = 2.0,
     machine: Annotated[str, Option("--machine", "NAME|FILE")] = "nist",
+    built: Annotated[str, Option("--built", choices=("springs", "fem"))] = "springs",
 ) -> int:
     """Make a blind exercise.
 
@@ -54,8 +55,10 @@ def new(
         Repeat noise of a reading.
     machine
         Nominal machine.
+    built
+        How the hidden machine is built: springs and bars, or finite elements (whose faults have other names).
     """
-    case = blind_case(seed, layout, hidden, noise / 100.0, machine, at)
+    case = blind_case(seed, layout, hidden, noise / 100.0, machine, at, built)
     count = new_exercise(out, case, run.rules_of(args, fresh=True))
     print(f"{out}: {count} measurements, the nominal machine and the sealed truth", _diagnose(out), sep="\n")
     return 0
@@ -114,5 +117,6 @@ def _wording(truth: Document) -> str:
         change = f"changes the readings by {100 * effect['size']:.1f} % (rms)"
         lines.append(f"hidden: {effect['effect']} ({sizes}); {change}")
         if "links" in effect:
-            lines.append(f"it is in: {' or '.join(effect['links'])}; varies with: {' or '.join(effect['variables'])}")
+            varies = f"; varies with: {' or '.join(effect['variables'])}" if "variables" in effect else ""
+            lines.append(f"it is in: {' or '.join(effect['links'])}{varies}")
     return "\n".join(lines if truth["effects"] else [*lines, "nothing was hidden"])

@@ -11,11 +11,14 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.prediction import scaled_law
+from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.machine.model import EffectEntry, Hexapod, StrutLaw, Uncertainty
 from toolpath_stiff.readings.measurements import NIST_TABLE_1
 from toolpath_stiff.stiffness.contract import SETUP
 from toolpath_stiff.units import n_per_um_from_n_per_m
 from toolpath_stiff.workbooks import split_name
+
+LOADING_DIGITS = 6  # of standard deviations, on which all processors agree
 
 
 def data_hash(files: Sequence[str]) -> str:
@@ -29,7 +32,12 @@ def data_hash(files: Sequence[str]) -> str:
 
 
 def fitted_machine(
-    machine: Hexapod, fit: Fit, provenance: Document, widened: float = 1.0, setups: Iterable[str] = ()
+    machine: Hexapod,
+    fit: Fit,
+    provenance: Document,
+    widened: float = 1.0,
+    setups: Iterable[str] = (),
+    errors: ErrorModel | None = None,
 ) -> Hexapod:
     """The machine with a fit's strut law and effects, their joint uncertainty, and where they come from.
 
@@ -45,6 +53,8 @@ def fitted_machine(
         Factor on the standard deviations.
     setups
         Names of the set-ups that were measured: where an effect belongs to one, the machine file lists them all.
+    errors
+        Of the fit, for bands.
     """
     effects, instruments = list(machine.effects), list(machine.instruments)
     for candidate, active in zip(fit.candidates, fit.effects, strict=True):
@@ -64,7 +74,7 @@ def fitted_machine(
         effects=tuple(effects),
         instruments=tuple(instruments),
         setups=known,
-        uncertainty=_uncertainty(machine, law, fit, widened),
+        uncertainty=_uncertainty(machine, law, fit, widened, errors),
     )
     if not fit.law_free:
         return carrying
@@ -81,7 +91,9 @@ def _certain(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def _uncertainty(machine: Hexapod, law: StrutLaw, fit: Fit, widened: float) -> Uncertainty | None:
+def _uncertainty(
+    machine: Hexapod, law: StrutLaw, fit: Fit, widened: float, errors: ErrorModel | None
+) -> Uncertainty | None:
     """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already."""
     names = list(law.parameters) if fit.law_free else []
     slopes = [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)][: len(names)]
@@ -98,6 +110,9 @@ def _uncertainty(machine: Hexapod, law: StrutLaw, fit: Fit, widened: float) -> U
     scale = widened * np.array(slopes)
     fitted = Uncertainty.of(names, np.outer(scale, scale) * fit.covariance[np.ix_(rows, rows)])
     sd = np.array([_certain(float(sd)) for sd in fitted.sd])
-    certain = replace(fitted, sd=sd, correlation=np.round(fitted.correlation, 9))
+    if errors is not None:
+        of_keys = np.array(slopes) / np.where(sd > 0.0, sd, np.inf)
+        errors = replace(errors, loadings=np.round(of_keys[:, None] * errors.loadings[rows], LOADING_DIGITS))
+    certain = replace(fitted, sd=sd, correlation=np.round(fitted.correlation, 9), errors=errors)
     kept = None if machine.uncertainty is None else machine.uncertainty.without(names)
     return kept.beside(certain) if kept and kept.names else certain

@@ -22,8 +22,10 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.drawn import Drawn
+from toolpath_stiff.inference.error_model import error_model
 from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent, errors_text
 from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.results import FolderResult, frame_of
@@ -168,6 +170,13 @@ class Update(FolderResult):
         return float(np.sqrt(dispersion(self.last.fit))) if self.task.objective == LIKELIHOOD else 1.0
 
     @cached_property
+    def errors(self) -> ErrorModel | None:
+        """How far the last model may be off at a pose; None where too little was measured to tell."""
+        if self.task.objective != LIKELIHOOD:
+            return None
+        return error_model(self.last.fit, self.task.problem.predictor.data, self.noise)
+
+    @cached_property
     def corrected(self) -> Hexapod | None:
         """The machine with the last model; None where nothing is to be written."""
         return self.fitted(self.provenance) if self.accepted else None
@@ -175,7 +184,7 @@ class Update(FolderResult):
     def fitted(self, provenance: Document) -> Hexapod:
         """The machine with the last model, which comes from there."""
         setups = self.task.data.setup.tolist()
-        return fitted_machine(self.task.machine, self.last.fit, provenance, self.widening, setups)
+        return fitted_machine(self.task.machine, self.last.fit, provenance, self.widening, setups, self.errors)
 
     def _written(self) -> Hexapod:
         if self.corrected is None:

@@ -24,6 +24,7 @@ from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.contract import Effect, Parameter
+from toolpath_stiff.stiffness.effects.joint_offset import JointOffset
 
 SMALLEST, LARGEST = 2e-3, 0.7  # rms change of ln stiffness between which sizes are tabulated
 POINTS = 9  # sizes a sign
@@ -130,7 +131,8 @@ class Candidate:
     def subsets(self) -> Iterator[tuple[int, ...]]:
         """Sets of components that are not neutral."""
         count = len(self.components)
-        for size in range(1, count + 1) if count <= MOST_COMPONENTS else (1, count):
+        some = (count,) if self.effect.vector else (1, count)
+        for size in range(1, count + 1) if count <= MOST_COMPONENTS and not self.effect.vector else some:
             yield from combinations(range(count), size)
 
 
@@ -248,9 +250,17 @@ def table_of(candidate: Candidate, predictor: Predictor) -> CandidateTable | Non
     """`tabulate` at the machine file's own strut law, once for a set of readings."""
     key = (candidate.name, candidate.choice)
     if key not in predictor.tables:
-        predictor.tables[key] = tabulate(candidate, predictor, np.zeros(2))
+        joint = dict(candidate.choice).get("joint") if isinstance(candidate.effect, JointOffset) else None
+        known = None if joint is None else _of_joint(candidate, predictor, joint)
+        predictor.tables[key] = known or tabulate(candidate, predictor, np.zeros(2))
     table: CandidateTable | None = predictor.tables[key]
     return table
+
+
+def _of_joint(candidate: Candidate, predictor: Predictor, joint: int) -> CandidateTable:
+    """The table of a joint off its place: what the nuisance of the joints has worked out already."""
+    logs = predictor.joint_columns[:, 3 * (joint - 1) : 3 * joint]
+    return CandidateTable(candidate, -np.exp(-predictor.log_stiffness())[:, None] * logs, dict)
 
 
 def tabulate(

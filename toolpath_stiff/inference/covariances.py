@@ -15,6 +15,7 @@ rows in F, so that a fit costs as much as there are readings. Readings always ru
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -57,6 +58,14 @@ class Groups:
     def members(self) -> list[Rows]:
         """Readings of each group."""
         return np.split(self._order, self._starts[1:])
+
+    def by_size(self) -> Iterator[tuple[Rows, Rows]]:
+        """Groups of k readings together: the groups (m,), their readings (m, k)."""
+        members = self.members()
+        sizes = np.array([len(group) for group in members])
+        for size in np.unique(sizes):
+            which = np.flatnonzero(sizes == size)
+            yield which, np.array([members[k] for k in which])
 
     @cached_property
     def _width(self) -> int:

@@ -9,10 +9,10 @@ import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, FloatArray
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.error_model import RANGE_ANGLE, RANGE_POSITION, coordinates
 
-# Ranges over which a smooth discrepancy stays alike; assumed: about half a workspace, half a tilting range, a few
-# turns of a screw, a third of a campaign.
-RANGE_POSITION, RANGE_ANGLE, RANGE_LENGTH, RANGE_ORDER = 0.25, np.radians(15.0), 0.05, 0.3
+# Ranges over which a smooth discrepancy stays alike; assumed: a few turns of a screw, a third of a campaign.
+RANGE_LENGTH, RANGE_ORDER = 0.05, 0.3
 # Features of a form, and of the one that has one for each point and direction: what varies faster is left out.
 MOST_FEATURES, MOST_POINTS = 300, 2000
 
@@ -40,7 +40,7 @@ def _kernels(predictor: Predictor) -> dict[str, Kernel]:
     """Every form in words, and its covariance."""
     data = predictor.data
     same_direction = linear_kernel(data.direction, 2)
-    near = gaussian_kernel(np.concatenate([data.position / RANGE_POSITION, data.angles / RANGE_ANGLE], axis=1))
+    near = gaussian_kernel(coordinates(data.position, data.angles))
     place = np.concatenate([_centred(data.position / RANGE_POSITION), _centred(data.angles / RANGE_ANGLE)], axis=1)
     linear = linear_kernel(place)
     in_order = gaussian_kernel(np.linspace(0.0, 1.0, len(data))[:, None] / RANGE_ORDER)

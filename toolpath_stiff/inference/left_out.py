@@ -88,11 +88,7 @@ def products_without(
     """
     solved = precision.times(np.concatenate([columns.T, residual[None]]))
     whole = solved[:-1] @ np.concatenate([columns, residual[:, None]], axis=1)
-    members = points.members()
-    sizes = np.array([len(out) for out in members])
-    for size in np.unique(sizes):
-        which = np.flatnonzero(sizes == size)
-        out = np.array([members[k] for k in which])
+    for which, out in points.by_size():
         part = np.moveaxis(solved[:, out], 0, 1)  # (m, p + 1, k)
         yield which, out, whole - part[:, :-1] @ np.linalg.solve(precision.block(out), np.swapaxes(part, 1, 2))
 

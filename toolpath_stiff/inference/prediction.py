@@ -120,15 +120,23 @@ class Predictor:
 
     def _solved(self, law: ArrayLike, effects: Sequence[ActiveEffect]) -> FloatArray:
         machine = self.machine.with_changes(strut_law=scaled_law(self.machine.strut_law, law))
+        own = [active for active in effects if active.effect.is_instrument]
+        if own and not self.base.instruments:  # they read the same mechanics at every size of theirs
+            logs = self.log_stiffness(law, [active for active in effects if not active.effect.is_instrument])
+            return self._read(np.exp(logs), own, build_model(machine, self.effect_files, effects).machine)
         model = build_model(machine, self.effect_files, effects)
         prepared = self._timed if any("time_min" in a.effect.needs for a in model.effects) else self._timeless
         try:
             stiffness = self._mechanics(model, prepared)[prepared.which]
         except InputError:  # no pose, or no stiffness left: a fit walks away from there
             return np.full(len(self.data), np.nan)
-        if model.instruments:
-            path = replace(self.full_path, machine=model.machine)
-            for active in model.instruments:
+        return self._read(stiffness, model.instruments, model.machine)
+
+    def _read(self, stiffness: FloatArray, instruments: Sequence[ActiveEffect], machine: Hexapod) -> FloatArray:
+        """(n,) ln of what the instruments show of stiffnesses (n,)."""
+        if instruments:
+            path = replace(self.full_path, machine=machine)
+            for active in instruments:
                 stiffness = shown_by(active, stiffness, path, self.data)
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(np.where(stiffness > 0.0, np.log(stiffness), np.nan))
@@ -228,6 +236,19 @@ class Predictor:
                 stiffness = mechanical_stiffness(model, measured_path(model, prepared.data), prepared.data)
                 columns.append((np.log(stiffness) - self._base_log)[prepared.which] / JOINT_STEP)
         return np.stack(columns, axis=1)
+
+    def rest_columns(self) -> FloatArray:
+        """(n, 7) d ln k to the links that the model takes for rigid, each of rms 1: what a little give of them changes.
+
+        Of work and frame along X, Y, Z and in rocking, of platform and tool along their own three axes. Readings of
+        loops beside the tip are left out.
+        """
+        data, path = self.data, self.full_path
+        moment = np.cross(data.position, data.direction)
+        along = np.einsum("nij,ni->nj", path.rotation, data.direction)
+        added = np.column_stack([data.direction**2, (moment[:, :2] ** 2).sum(axis=1), along**2])
+        columns = -added * np.exp(self._base_log[self.distinct])[:, None] * data.tip[:, None]
+        return np.asarray(columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300))
 
     @cached_property
     def _base_log(self) -> FloatArray:

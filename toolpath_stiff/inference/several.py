@@ -101,7 +101,8 @@ class LinearSearch:
         pieces = [
             (table, columns, bounds)
             for family in families
-            for table in family.tables
+            # Of a vector, whose every choice could stand for much, the likeliest alone; it pays for all of them.
+            for table in (family.best.tables if family.best and family.effect.vector else family.tables)
             for columns, bounds in _linear_pieces(table, problem.base_compliance)
         ]
         self.tables = tuple(table for table, _, _ in pieces)

@@ -19,6 +19,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
+from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.poses import Pose
 from toolpath_stiff.units import n_per_m_from_n_per_um
 
@@ -309,11 +310,14 @@ class Uncertainty:
         (p,) standard deviations in the units of the keys.
     correlation
         (p, p).
+    errors
+        How far the stiffness may be off at a pose, for bands; None where nobody states it.
     """
 
     names: tuple[str, ...]
     sd: FloatArray
     correlation: FloatArray
+    errors: ErrorModel | None = None
 
     @classmethod
     def of(cls, names: Sequence[str], covariance: FloatArray) -> Uncertainty:
@@ -332,12 +336,15 @@ class Uncertainty:
     def without(self, names: Sequence[str]) -> Uncertainty:
         """The same without some parameters."""
         kept = [i for i, name in enumerate(self.names) if name not in names]
-        return Uncertainty(tuple(self.names[i] for i in kept), self.sd[kept], self.correlation[np.ix_(kept, kept)])
+        errors = None if self.errors is None else self.errors.of(kept)
+        correlation = self.correlation[np.ix_(kept, kept)]
+        return Uncertainty(tuple(self.names[i] for i in kept), self.sd[kept], correlation, errors)
 
     def beside(self, other: Uncertainty) -> Uncertainty:
-        """Both, independent of each other."""
+        """Both, independent of each other; errors are known where both state them."""
         count = len(self.names)
         correlation = np.eye(count + len(other.names))
         correlation[:count, :count] = self.correlation
         correlation[count:, count:] = other.correlation
-        return Uncertainty(self.names + other.names, np.concatenate([self.sd, other.sd]), correlation)
+        errors = self.errors.beside(other.errors) if self.errors and other.errors else None
+        return Uncertainty(self.names + other.names, np.concatenate([self.sd, other.sd]), correlation, errors)

@@ -34,6 +34,9 @@ HEADINGS = {
     "setup": "Where program zero sits unless the user or the program says so (x, y, z in mm[, A, B, C in degrees]);\n"
     "# feed of rapid moves in mm/min, for times only.",
     "uncertainty": "What was fitted to measurements: standard deviations in the units of the keys, and correlations.",
+    "uncertainty.errors": "How far the stiffness may be off at a pose, for bands. Rows of loadings: by how many of\n"
+    "# its standard deviations each parameter is off by scatter, then by struts 1 to 6 and the joints' coordinates.\n"
+    "# form_percent: what the model lacks, at the measured places and away from them.",
 }
 
 
@@ -84,6 +87,16 @@ def machine_toml(machine: Hexapod, preamble: str = "") -> str:
     if (known := machine.uncertainty) is not None:
         figures = {"parameters": known.names, "sd": known.sd, "correlation": known.correlation}
         lines += ["", f"# {HEADINGS['uncertainty']}", "[uncertainty]", *_rows(figures)]
+        if (errors := known.errors) is not None:
+            position, angles = errors.poses
+            written = {
+                "loadings": errors.loadings,
+                "struts_percent": 100.0 * errors.struts,
+                "joints_mm": mm_from_m(errors.joints),
+                "form_percent": [100.0 * errors.near, 100.0 * errors.away],
+                "places_mm_deg": np.round(np.hstack([mm_from_m(position), deg_from_rad(angles)]), 6),
+            }
+            lines += ["", f"# {HEADINGS['uncertainty.errors']}", "[uncertainty.errors]", *_rows(written)]
     return "\n".join([*lines, ""])
 
 

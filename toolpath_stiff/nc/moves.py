@@ -21,12 +21,14 @@ from toolpath_stiff.units import (
     mm_per_min_from_m_per_s,
     rad_from_deg,
     rad_per_s_from_deg_per_min,
+    rad_per_s_from_per_min,
 )
 
 RAPID, FEED, ARC, CYCLE = 0, 1, 2, 3
 CUTTER_LOCATION = "cutter-location file"
 Blank = tuple[tuple[float, float, float], tuple[float, float, float]]
 MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
+HELD = ("tool", "tool_length", "spindle")  # columns that most programs have one value of
 
 
 @dataclass(frozen=True, repr=False)
@@ -60,6 +62,9 @@ class Moves(ArrayColumns):
         (n,) tool number in the spindle (T with M6), 0 for none.
     tool_length
         (n,) m, the length in force through G43; nan: the machine's reference tool.
+    spindle
+        (n,) rad/s, clockwise seen from behind the spindle (M3) above 0, M4 below; 0: it stands, or nothing is said;
+        nan: not known (constant surface speed).
     from_machine
         (n, 2) whether start, end were given in machine coordinates (G53, G28, G30): these ends do
         not follow the work when it is placed elsewhere.
@@ -87,6 +92,7 @@ class Moves(ArrayColumns):
     dwell: FloatArray
     tool: IntArray
     tool_length: FloatArray
+    spindle: FloatArray
     from_machine: BoolArray
 
     def __len__(self) -> int:
@@ -228,7 +234,7 @@ NO_ARC = Arc((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 
 @dataclass
 class Move:
-    """A move as it is recorded, as in `Moves` but in mm, degrees, mm/min (deg/min of the rotary axes alone)."""
+    """A move as it is recorded, as in `Moves` but in mm, degrees, mm/min (deg/min of the rotary axes alone), 1/min."""
 
     line: int
     motion: int
@@ -237,6 +243,7 @@ class Move:
     feed: float
     tool: int
     tool_length: float
+    spindle: float
     from_machine: tuple[bool, bool]
     arc: Arc | None = None
     dwell: float = 0.0
@@ -319,6 +326,7 @@ class Recorder:
             dwell=column("dwell"),
             tool=column("tool", np.int64),
             tool_length=column("tool_length"),
+            spindle=column("spindle"),
             from_machine=column("from_machine", np.bool_, 2),
         )
         return in_si(moves)
@@ -338,13 +346,14 @@ def in_si(moves: Moves) -> Moves:
         arc_center=m_from_mm(moves.arc_center),
         feed=np.where(rotary, rad_per_s_from_deg_per_min(moves.feed), m_per_s_from_mm_per_min(moves.feed)),
         tool_length=m_from_mm(moves.tool_length),
+        spindle=rad_per_s_from_per_min(moves.spindle),
     )
 
 
 def _joined(parts: list[Moves]) -> Moves:
     """All parts, column by column."""
     columns = {column.name: _end_to_end([getattr(part, column.name) for part in parts]) for column in fields(Moves)}
-    return replace(Moves(**columns), tool=held_once(columns["tool"]), tool_length=held_once(columns["tool_length"]))
+    return replace(Moves(**columns), **{name: held_once(columns[name]) for name in HELD})
 
 
 def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:

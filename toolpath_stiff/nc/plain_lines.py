@@ -156,11 +156,21 @@ class Lines:
                 dwell=np.zeros(n),
                 tool=np.full(n, state.tool),
                 tool_length=np.full(n, state.tool_length),
+                spindle=self._spindle()[rows],
                 from_machine=np.zeros((n, 2), dtype=bool),
             )
         )
         if n:
             note_tool(state)
+
+    def _spindle(self) -> FloatArray:
+        """1/min of the spindle on each line, as `State.spindle` has it."""
+        given = self.words.values.get("S", np.full(self.n, math.nan))
+        if self.state.turn == 0 or self.state.surface_speed or np.isnan(given).all():
+            return np.full(self.n, self.state.spindle)
+        has_speed = ~np.isnan(given)
+        speeds = np.concatenate([[self.state.speed], given[has_speed]])[np.cumsum(has_speed)]
+        return np.asarray(self.state.turn * speeds)
 
     def _any(self, letters: str) -> BoolArray:
         columns = [self.given[letter] for letter in letters if letter in self.given]

@@ -236,8 +236,8 @@ class State:
         "G93", "G94" or "G95".
     feed
         F in force: mm/min, mm per revolution or, in G93, one over minutes; None before there is one.
-    speed
-        S in force, 1/min.
+    speed, turn, surface_speed
+        S in force, 1/min; 1 after M3, -1 after M4, 0 while the spindle stands; whether S is of the surface (G96).
     retract
         "G98" or "G99", once the program or the dialect says; LinuxCNC starts as in G99.
     polar
@@ -295,6 +295,8 @@ class State:
     feed_mode: str = "G94"
     feed: float | None = None
     speed: float = 0.0
+    turn: int = 0
+    surface_speed: bool = False
     retract: str | None = field(init=False)
     polar: list[float] | None = None
     tool: int = 0
@@ -333,6 +335,11 @@ class State:
     def feed_scale(self) -> float:
         """Millimetres of the length unit of F."""
         return MM_PER_INCH if self.inch and self.feed_mode != "G93" else 1.0
+
+    @property
+    def spindle(self) -> float:
+        """1/min of the spindle, below 0 after M4; nan: not known."""
+        return math.nan if self.turn and self.surface_speed else self.turn * self.speed
 
     def note(self, line: int, word: Word, reason: str) -> None:
         """List a word that is not acted upon."""

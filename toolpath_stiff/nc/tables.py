@@ -21,7 +21,13 @@ LARGEST_WORD = 1e9  # any other word: the radius of an arc that is nearly straig
 FIRST_OFFSET, OFFSET_STRIDE, ROTATION = 5221, 20, 9
 HOME_G28, HOME_G30 = 5161, 5181
 HOMES = ("G28", "G30")
-TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "remark", "material")
+# Of a cutter, beyond what a path asks for (`cutting.cutters`): key -> smallest and largest number.
+CUTTER_KEYS = {
+    "flutes": (1.0, 100.0), "helix_deg": (-80.0, 80.0), "corner_radius_mm": (0.0, 1000.0), "core_mm": (0.01, 1000.0),
+    "cutting_length_mm": (0.01, 1000.0), "modulus_GPa": (1.0, 2000.0), "lateral_nm_per_N": (0.0, 1e6),
+    "axial_nm_per_N": (0.0, 1e6), "run_out_um": (0.0, 1000.0), "run_out_angle_deg": (-360.0, 360.0),
+}  # fmt: skip
+TOOL_KEYS = ("number", "length_mm", "diameter_mm", "stick_out_mm", "remark", "material", *CUTTER_KEYS)
 TOOL_WORD = re.compile(r"([A-Za-z])\s*([^\sA-Za-z]+(?:[eE][+-]?\d+)?)")
 PARAMETER = re.compile(r"[0-9]{1,9}")
 OFFSET_KEY = re.compile(r"^[ \t]*([Gg][\d.]+(?: ?[Pp]\d+)?)\s*=", re.MULTILINE)  # G54.1 P1 in TOML has quotes
@@ -38,7 +44,10 @@ def tool_table_hint(tool: int) -> str:
 
 @dataclass
 class ToolEntry:
-    """A tool: length, diameter and stick-out (out of its holder) in mm, nan where the table does not say."""
+    """A tool: length, diameter and stick-out (out of its holder) in mm, nan where the table does not say.
+
+    `cutter`: those of `CUTTER_KEYS` that the table gives.
+    """
 
     number: int
     length: float = math.nan
@@ -46,6 +55,7 @@ class ToolEntry:
     remark: str = ""
     stick_out: float = math.nan
     material: str = ""
+    cutter: dict[str, float] = field(default_factory=dict)
 
 
 def tool_of(tools: dict[int, ToolEntry] | None, number: int) -> ToolEntry:
@@ -126,22 +136,22 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
     return tools
 
 
-def tools_of(toml: TomlReader) -> dict[int, ToolEntry] | None:
-    """Tool number -> tool, of `tools` of a controller file: a list of tables, or the name of a file."""
-    given = toml.data.get("tools")
+def tools_of(toml: TomlReader, key: str = "tools") -> dict[int, ToolEntry] | None:
+    """Tool number -> tool, of `tools` of a controller file or `tool` of `cut.toml`: tables, or the name of a file."""
+    given = toml.data.get(key)
     if given is None:
         return None
     if isinstance(given, str):
         return read_tool_table(Path(toml.file).parent / given)
     if not isinstance(given, list) or not all(isinstance(tool, dict) for tool in given):
         raise toml.error(
-            "tools is not a list of tables",
-            "[[tools]] with number, length_mm, ..., or the name of a file",
-            where="tools",
+            f"{key} is not a list of tables",
+            f"[[{key}]] with number, length_mm, ..., or the name of a file",
+            where=key,
         )
     tools: dict[int, ToolEntry] = {}
     for place, row in enumerate(given, 1):
-        where = f"tools[{place}]"
+        where = f"{key}[{place}]"
         toml.only(where, row, TOOL_KEYS)
         try:
             tool = _tool(row)
@@ -154,14 +164,15 @@ def tools_of(toml: TomlReader) -> dict[int, ToolEntry] | None:
 
 def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
     columns = ("tool", *TOOL_KEYS[1:])
-    table = parse_table(text, file, Columns(columns[:4], columns[4:]))
+    numbers_of = (*columns[:4], *CUTTER_KEYS)
+    table = parse_table(text, file, Columns(numbers_of, columns[4:6]))
     unknown = [f"{name!r} is not known" for name in table.heading if name not in columns]
     for problem in unknown + [f"{name!r} is missing" for name in columns[:2] if name not in table.heading]:
         raise Place(file, table.heading_line).fail(f"column {problem}", f"columns {', '.join(columns)}")
     for line, cells in table.rows:
         try:
             row = {key: cell for key, cell in table.record(cells).items() if cell}
-            numbers = {key: _number(row[key], key) for key in columns[:4] if key in row}
+            numbers = {key: _number(row[key], key) for key in numbers_of if key in row}
             tool = _tool({**row, **numbers, "number": numbers.get("tool")})
         except InputError as error:
             raise error.in_line(file, line) from None
@@ -179,9 +190,16 @@ def _tool(row: Mapping[str, object]) -> ToolEntry:
         if not is_number(value) or abs(value) > LARGEST_MM or (positive and value <= 0.0):
             raise ProgramError(f"{key} = {value!r}", expected=f"a number of mm{', more than 0' * positive}")
         lengths[key.removesuffix("_mm")] = float(value)
+    cutter: dict[str, float] = {}
+    for key, (low, high) in CUTTER_KEYS.items():
+        value = row.get(key, low)
+        if not is_number(value) or not low <= value <= high or (key == "flutes" and value != int(value)):
+            whole = "a whole number" if key == "flutes" else "a number"
+            raise ProgramError(f"{key} = {value!r}", expected=f"{whole} from {low:g} to {high:g}")
+        cutter |= {key: float(value)} if key in row else {}
     if not isinstance(remark, str) or not isinstance(material, str):
         raise ProgramError(f"remark and material {remark!r}, {material!r}", expected="texts")
-    return ToolEntry(int(number), remark=remark, material=material, **lengths)
+    return ToolEntry(int(number), remark=remark, material=material, cutter=cutter, **lengths)
 
 
 def _linuxcnc_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:

@@ -16,7 +16,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import arc_frame, extents, move_lengths, points_along
-from toolpath_stiff.nc.moves import RAPID, Moves, held_once
+from toolpath_stiff.nc.moves import HELD, RAPID, Moves, held_once
 from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.rotations import along_tool_axis
 from toolpath_stiff.units import mm_from_m, rad_from_deg
@@ -45,6 +45,8 @@ class Samples(ArrayColumns):
         (n,) as in `Moves`.
     tool_length
         (n,) m; nan: the machine's reference tool.
+    spindle
+        (n,) rad/s, as in `Moves`.
     s
         (n,) m, length of tip path from the program's start, rapids included.
     t
@@ -76,6 +78,7 @@ class Samples(ArrayColumns):
     motion: IntArray
     tool: IntArray
     tool_length: FloatArray
+    spindle: FloatArray
     s: FloatArray
     t: FloatArray
     position: FloatArray
@@ -173,7 +176,7 @@ def sample_moves(
         put = slice(*np.searchsorted(border[0], (block.start, block.stop)))
         extra = border[0][put] - block.start, border[1][put]
         _sample_block(moves.take(block), counts[block], some, extra, block.start, origin, samples.take(rows))
-    return replace(samples, tool=held_once(samples.tool), tool_length=held_once(samples.tool_length))
+    return replace(samples, **{name: held_once(getattr(samples, name)) for name in HELD})
 
 
 def _blocks(counts: IntArray) -> Iterator[slice]:
@@ -257,7 +260,9 @@ def _pieces(moves: Moves, length: FloatArray, step: float) -> FloatArray:
 
 
 def _empty_samples(n: int) -> Samples:
-    columns: dict[str, NDArray[Any]] = {name: np.empty(n) for name in ("tool_length", "s", "t", "weight", "feed")}
+    columns: dict[str, NDArray[Any]] = {
+        name: np.empty(n) for name in ("tool_length", "spindle", "s", "t", "weight", "feed")
+    }
     columns |= {name: np.empty(n, dtype=np.int64) for name in ("move", "line", "motion", "tool")}
     return Samples(**columns, position=np.empty((n, 3)), abc=np.zeros((n, 3)), tangent=np.empty((n, 3)))
 
@@ -290,7 +295,7 @@ def _sample_block(
     if angles.any():  # pages of zeros that nobody writes to take no memory
         into.abc[:] = angles
     into.move[:] = move + first_move
-    for name in ("line", "motion", "tool", "tool_length", "feed"):
+    for name in ("line", "motion", "feed", *HELD):
         getattr(into, name)[:] = np.repeat(getattr(moves, name), counts)
     into.s[:] = np.repeat(columns["length_before"], counts) + u * np.repeat(columns["length"], counts)
     into.t[:] = np.repeat(columns["time_before"], counts) + u * np.repeat(columns["duration"], counts)

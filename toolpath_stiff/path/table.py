@@ -17,7 +17,7 @@ from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.results import Result, frame_of
-from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, per_min_from_rad_per_s
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,12 +94,15 @@ class SampledPath(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
-        columns = without_nan(to_dict(path_columns(self.samples)))
+        columns = without_nan(to_dict(self._columns()))
         return {"program": self.name, "warnings": self.warnings, "unsupported": self.unsupported, **columns}
 
     def to_frame(self) -> pd.DataFrame:
         """The samples, one a row."""
-        return frame_of(path_columns(self.samples))
+        return frame_of(self._columns())
+
+    def _columns(self) -> dict[str, NDArray[Any]]:
+        return {**path_columns(self.samples), "spindle_rpm": per_min_from_rad_per_s(self.samples.spindle)}
 
     def csv(self) -> Iterator[bytes]:
         """The table as the command writes it, in pieces."""

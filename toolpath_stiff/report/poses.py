@@ -3,6 +3,7 @@
 from toolpath_stiff.analysis.poses import POSE_COLUMNS, PoseStiffness
 from toolpath_stiff.report.words import machine_text
 from toolpath_stiff.stiffness.model import condition_warnings, effects_stated
+from toolpath_stiff.units import nm_from_m
 
 
 def text(poses: PoseStiffness) -> str:
@@ -18,6 +19,9 @@ def text(poses: PoseStiffness) -> str:
         lines.append(
             f"  {which:<10} direction{values[f'{which}_N_per_mm']:10.0f} N/mm along ({dx:.3f}, {dy:.3f}, {dz:.3f})"
         )
+    for axis, row in zip("XYZ", nm_from_m(poses.tip_compliance[0]), strict=True):
+        figures = "".join(f"{value:10.3f}" for value in row)
+        lines.append(f"  motion along {axis}    {figures} nm/N by a load along X, Y, Z")
     lengths = "  ".join(f"{values[f'strut{i}_mm']:.3f}" for i in range(1, 7))
     lines.append(f"  struts 1 to 6        {lengths} mm")
     lines.append(f"  nearest limit        {poses.reach.describe(0)} (margin {values['margin']:.3f} of its span)")

@@ -13,6 +13,7 @@ from toolpath_stiff.nc.moves import RAPID, Arc, Move
 from toolpath_stiff.nc.state import Flow
 from toolpath_stiff.nc.words import AXES, CORNERS, POLAR, Block
 from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
+from toolpath_stiff.rewriting.side_shift import Course
 from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, point_at
 
 Piece = tuple[str, list[float], float]  # G0 or G1, end in the set-up frame, dwell after it in s
@@ -43,7 +44,13 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     plane_before = out.plane
     begin(out, block)
     goes_on = finish(source, current) is Flow.NEXT
-    lines = _lines(controls, current.groups.get("non-modal"), controls.plane_word(plane_before), first)
+    plane, course = controls.plane_word(plane_before), (controls.courses or {}).get(first)
+    if course is not None and len(source.recorder.recent) > first:
+        lines = _shifted(controls, plane, course)
+    elif controls.courses is not None and out.absolute:
+        lines = [controls.emit()]
+    else:
+        lines = _lines(controls, current.groups.get("non-modal"), plane, first)
     controls.check(first, first_out, pieces=len(lines) > 1)
     return lines, goes_on
 
@@ -92,7 +99,7 @@ def _home(controls: Controls) -> None:
 
 
 def _arc(controls: Controls, plane: str, move: Move, arc: Arc) -> None:
-    source, out, edit, axes = controls.source, controls.out, controls.edit, controls.axes
+    source, edit, axes = controls.source, controls.edit, controls.axes
     name, sign = controls.image(source.plane) or (source.plane, 1.0)
     if name != plane:
         edit.write_code(name)
@@ -105,7 +112,13 @@ def _arc(controls: Controls, plane: str, move: Move, arc: Arc) -> None:
         edit.remove((AXES[first], AXES[second]))  # a circle ends where it begins, whatever is rounded
         only = (normal, 3, 4, 5)
     controls.go(controls.target(move.end), axes, only=only)
-    # I, J, K of the centre, in place of R too.
+    _write_center(controls, name, arc)
+
+
+def _write_center(controls: Controls, plane: str, arc: Arc) -> None:
+    """I, J, K of the centre, in place of R too."""
+    out, edit = controls.out, controls.edit
+    first, second, normal = geometry.PLANES[plane]
     here = out.frames.to_program(out.frames.position)
     there = out.frames.to_program(controls.of_setup([*arc.center, 0.0, 0.0, 0.0]))
     edit.remove(("R", geometry.CENTER_WORDS[normal]))
@@ -165,14 +178,36 @@ def _piece_count(controls: Controls, move: Move) -> int:
     return count
 
 
-def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
-    """Straight moves, the first in the block's own line."""
+def _lead(controls: Controls) -> str:
+    """How the further lines in a block's place begin; its words that belong to a whole move are taken out."""
     stop, edit = controls.current and controls.current.code("M stop"), controls.edit
     several = f"{stop[0] if stop else 'inverse-time feed (G93)'} in a block that is written as several"
     controls.refuse_if(stop or controls.out.feed_mode == "G93", several, "give it a block of its own, or G94")
     edit.remove("IJKRPLQ")
-    lead = "".join(SLASH.findall(edit.render())) if edit.block.optional else ""
-    lines = []
+    return "".join(SLASH.findall(edit.render())) if edit.block.optional else ""
+
+
+def _shifted(controls: Controls, plane: str, course: Course) -> list[str]:
+    """Straight moves and arcs in place of a move, the first in the block's line."""
+    lead = _lead(controls) if len(course) > 1 else ""
+    edit, axes = controls.edit, controls.axes
+    lines: list[str] = []
+    for start, end, arc in course:
+        if lines:
+            controls.edit, controls.current, axes = edit.next_line(lead), None, []
+        controls.motion_word("G1" if arc is None else ARCS[arc.sweep * arc.normal[2] > 0.0])
+        closed = arc is not None and math.dist(start[:2], end[:2]) < SAME
+        controls.edit.remove("IJKR" if arc is None else "XY" if closed else "")  # as `_arc` has closed circles
+        controls.go(controls.of_setup(end), axes, only=range(2, 6) if closed else range(6))
+        if arc is not None:
+            _write_center(controls, plane, arc)
+        lines.append(controls.emit())
+    return lines
+
+
+def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
+    """Straight moves, the first in the block's own line."""
+    lead, edit, lines = _lead(controls), controls.edit, []
     for number, (code, point, dwell) in enumerate(pieces):
         if number:
             controls.edit, controls.current = edit.next_line(lead), None

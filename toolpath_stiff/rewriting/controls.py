@@ -9,7 +9,7 @@ Edits replace, add and take out words of one line; everything else of it stays a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from toolpath_stiff.arrays import FloatArray
@@ -19,6 +19,7 @@ from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.moves import RAPID, Move
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Block, Word, read_block
+from toolpath_stiff.rewriting.side_shift import Course
 from toolpath_stiff.rewriting.turn import Turn, differences
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -127,6 +128,10 @@ class Controls:
         The moves of that block as the untouched program makes them.
     notes
         What the user should know.
+    courses
+        Where moves go instead, by the row of the untouched program's move; None: the program is placed elsewhere.
+    row_of
+        Of each move of the written program, the row of the move in whose place it stands.
     """
 
     def __init__(self, source: State, out: State, turn: Turn, decimals: int | None, linearise: float | None) -> None:
@@ -134,6 +139,8 @@ class Controls:
         self.decimals, self.linearise = decimals, linearise
         self.known = set("ABC")
         self.notes: set[str] = set()
+        self.courses: Mapping[int, Course] | None = None
+        self.row_of: list[int] = []
         self.edit = LineEdit("", Block(0, ()))
         self.current: CurrentBlock | None = None
         self.axes: list[str] = []
@@ -236,6 +243,11 @@ class Controls:
     def check(self, first: int, first_out: int, pieces: bool) -> None:
         """Every cutting move of the block must be the placed one within the rounding; of one in `pieces` the ends."""
         source, out = self.source.recorder.recent[first:], self.out.recorder.recent[first_out:]
+        rows = range(first, first + len(source))
+        self.row_of += rows if len(source) == len(out) else [first] * len(out)
+        if self.courses and first in self.courses and source:
+            source = [replace(source[0], start=start, end=end, arc=arc) for start, end, arc in self.courses[first]]
+            pieces = False
         wanted, written = ([move for move in moves if move.motion != RAPID] for moves in (source, out))
         if pieces and len(wanted) == 1 and written:
             wanted = [replace(wanted[0], arc=None)]

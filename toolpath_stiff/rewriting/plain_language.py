@@ -6,10 +6,21 @@ where the run comes from (a coordinate alone in a turned program, behind a label
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
+
+from toolpath_stiff.nc.controller import DIALECTS, Controller
+from toolpath_stiff.nc.heidenhain.plain_statements import in_inches
 from toolpath_stiff.nc.heidenhain.statements import Statement, read_statement
+from toolpath_stiff.nc.lines import split_lines
+from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.reader import read
+from toolpath_stiff.nc.request import Request
+from toolpath_stiff.rewriting.controls import DECIMALS_INCH, DECIMALS_MM
 from toolpath_stiff.rewriting.turn import Turn
+from toolpath_stiff.units import MM_PER_INCH, mm_from_m
 
 PLACED = ("L", "LN", "C", "CR", "CT", "CC", "LP", "CP", "APPR LT", "APPR LN", "APPR CT", "APPR LCT", "DEP LCT")
 # What stays as it stands: what has no coordinates, or those of the machine or of the control.
@@ -19,7 +30,27 @@ KEPT = ("", "BEGIN PGM", "END PGM", "BLK FORM 0.1", "BLK FORM 0.2", "TOOL CALL",
 DRILLING = tuple(f"CYCL DEF {number}" for number in (200, 201, 202, 203, 205, 206, 207, 209, 240))  # at a height
 FORGETS = ("LBL", "CALL LBL", "DEP LT", "DEP LN", "DEP CT", "LP", "CP")  # after which X and Y are not known
 COORDINATES = ("X", "Y", "Z", "IX", "IY", "PA")
+MOST_ROUNDINGS = 100  # by which rounded numbers of a path of steps may add up
 HINT = "place it without --write, and set the datum that is printed"
+
+
+def write_placed(program: ReadProgram, text: str, turn: Turn, decimals: int | None, control: Controller) -> str:
+    """Heidenhain's text at its new place, read again: where the path is not the placed one, it is refused."""
+    lines, inch = split_lines(text, program.name), in_inches(program.source)
+    unit, usual = (MM_PER_INCH, DECIMALS_INCH) if inch else (1.0, DECIMALS_MM)
+    decimals = usual if decimals is None else decimals
+    placed = placed_lines(turn, lines, program.name, unit, decimals)
+    control = replace(control, dialect=DIALECTS[program.dialect])
+    again, moves = read(Request(tuple(placed), program.name, controller=control)).moves, program.moves
+    wrong = np.zeros(1, dtype=int)
+    if np.array_equal(again.motion, moves.motion):
+        ends = np.array([turn.point(mm_from_m(end[:3]).tolist()) for end in moves.end])
+        off = np.abs(mm_from_m(again.end[:, :3]) - ends).max(axis=1)
+        wrong = np.flatnonzero((moves.motion != RAPID) & (off > MOST_ROUNDINGS * unit * 10.0**-decimals))
+    if len(wrong):
+        problem = "the program written for the placement would go another way"
+        raise Place(program.name, int(moves.line[wrong[0]])).fail(problem, hint="place it without --write")
+    return ("\r\n" if "\r\n" in text else "\n").join([*placed, ""])
 
 
 def placed_lines(turn: Turn, lines: Sequence[str], name: str, unit: float, decimals: int) -> list[str]:

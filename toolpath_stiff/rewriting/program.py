@@ -8,37 +8,32 @@ the one move that cannot match.
 
 import copy
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.heidenhain.plain_statements import in_inches
 from toolpath_stiff.nc.lines import read_text, split_lines
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, ReadProgram
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.nc.place import Place
-from toolpath_stiff.nc.reader import read
-from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import read_block
-from toolpath_stiff.poses import Pose, pose_in_mm
+from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
-from toolpath_stiff.rewriting.controls import DECIMALS_INCH, DECIMALS_MM, Controls
-from toolpath_stiff.rewriting.plain_language import placed_lines
+from toolpath_stiff.rewriting.controls import Controls
+from toolpath_stiff.rewriting.plain_language import write_placed
+from toolpath_stiff.rewriting.side_shift import Course
 from toolpath_stiff.rewriting.turn import Turn
-from toolpath_stiff.units import MM_PER_INCH, mm_from_m
+from toolpath_stiff.units import mm_from_m
 
-MOST_ROUNDINGS = 100  # by which rounded numbers of a path of steps may add up
 LINE_END = re.compile("\r\n|\n|\r")
-PLAIN_DIALECTS = ("generic", "linuxcnc", "heidenhain")
+PLAIN_DIALECTS = ("generic", "linuxcnc")
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
 
@@ -136,8 +131,79 @@ def rewrite_program(
     X100 Y40
     M30
     """
-    check_rewritable(program)
     placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
+    if program.dialect == "heidenhain" and not program.kinematics:
+        text, encoding = _text(program)
+        turn = Turn(placement, original)
+        written = text if placement == original else write_placed(program, text, turn, decimals, control)
+        return RewrittenProgram(program.name, written, encoding, [])
+    check_rewritable(program)
+    if placement == original:
+        return RewrittenProgram(program.name, *_text(program), [])
+    controls = _controls(program, control, placement, original, decimals)
+    controls.linearise = linearise and mm_from_m(linearise)
+    return _rewritten(program, controls, control)
+
+
+def shift_program(
+    program: ReadProgram,
+    origin: Pose,
+    courses: Mapping[int, Course],
+    *,
+    decimals: int | None = None,
+    control: Controller = UNKNOWN_CONTROL,
+) -> tuple[RewrittenProgram, list[int]]:
+    r"""A program with some moves on other courses, and of each of its moves the row of the move that was there before.
+
+    Parameters
+    ----------
+    program, decimals, control
+        As of `rewrite_program`.
+    origin
+        Where program zero sits.
+    courses
+        Row of `program.moves` -> where that move goes instead (`side_shift.SideShift`). What does not move keeps its
+        text; the words of what does get new numbers, and further blocks follow where a move becomes several.
+
+    Raises
+    ------
+    InputError
+        A block cannot be expressed so, with its line and the reason.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from toolpath_stiff.nc.reader import parse_program
+    >>> from toolpath_stiff.rewriting.side_shift import SideShift
+    >>> program = parse_program("G21 G90 F600
+    G0 X0 Y0 Z0
+    G1 X10
+    G1 Y20 (wall)
+    G1 X0
+    M30
+    ", "slot.nc")
+    >>> shift = SideShift(program.moves, {2: (np.array([0.0, 1.0]), np.array([-0.02, -0.02]))})  # mm, left is +
+    >>> shifted, rows = shift_program(program, (0.0,) * 6, shift.courses)
+    >>> print(shifted, end="")
+    G21 G90 F600
+    G0 X0 Y0 Z0
+    G1 X10.02
+    G1 Y20 (wall)
+    G1 X0
+    M30
+    >>> rows
+    [0, 1, 2, 3]
+    """
+    check_rewritable(program)
+    place = pose_in_mm(origin)
+    controls = _controls(program, control, place, place, decimals)
+    controls.courses = courses
+    return _rewritten(program, controls, control), controls.row_of
+
+
+def _controls(
+    program: ReadProgram, control: Controller, placement: ShopPose, original: ShopPose, decimals: int | None
+) -> Controls:
     source, out = (
         State(
             program.name,
@@ -146,35 +212,18 @@ def rewrite_program(
         )
         for origin in (placement, original)
     )
-    turn = Turn(placement, original)
-    controls = Controls(source, out, turn, decimals, linearise and mm_from_m(linearise))
-    text, encoding = read_text(program.path) if program.path else ("\n".join([*program.source, ""]), "utf-8")
-    if placement == original:
-        return RewrittenProgram(program.name, text, encoding, [])
-    if program.dialect == "heidenhain":
-        written = _plain_language(program, text, turn, decimals, replace(control, dialect=DIALECTS[program.dialect]))
-        return RewrittenProgram(program.name, written, encoding, [])
+    return Controls(source, out, Turn(placement, original), decimals, None)
+
+
+def _text(program: ReadProgram) -> tuple[str, str]:
+    """A program's text with its line ends, and its encoding."""
+    return read_text(program.path) if program.path else ("\n".join([*program.source, ""]), "utf-8")
+
+
+def _rewritten(program: ReadProgram, controls: Controls, control: Controller) -> RewrittenProgram:
+    text, encoding = _text(program)
     lines = list(_rewritten_lines(controls, text, program.name, control.switches))
     return RewrittenProgram(program.name, "".join(lines), encoding, sorted(controls.notes))
-
-
-def _plain_language(program: ReadProgram, text: str, turn: Turn, decimals: int | None, control: Controller) -> str:
-    """Heidenhain's text at its new place, read again: where the path is not the placed one, it is refused."""
-    lines, inch = split_lines(text, program.name), in_inches(program.source)
-    unit, usual = (MM_PER_INCH, DECIMALS_INCH) if inch else (1.0, DECIMALS_MM)
-    decimals = usual if decimals is None else decimals
-    placed = placed_lines(turn, lines, program.name, unit, decimals)
-    again, moves = read(Request(tuple(placed), program.name, controller=control)).moves, program.moves
-    wrong = np.zeros(1, dtype=int)
-    if np.array_equal(again.motion, moves.motion):
-        ends = np.array([turn.point(mm_from_m(end[:3]).tolist()) for end in moves.end])
-        off = np.abs(mm_from_m(again.end[:, :3]) - ends).max(axis=1)
-        wrong = np.flatnonzero((moves.motion != RAPID) & (off > MOST_ROUNDINGS * unit * 10.0**-decimals))
-    if len(wrong):
-        problem = "the program written for the placement would go another way"
-        raise Place(program.name, int(moves.line[wrong[0]])).fail(problem, hint="place it without --write")
-    ending = LINE_END.search(text)
-    return (ending[0] if ending else "\n").join([*placed, ""])
 
 
 def check_rewritable(program: ReadProgram) -> None:

@@ -5,7 +5,7 @@ effect alone.
 """
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,6 +18,9 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE, with_effect
+from toolpath_stiff.rig.fem import FemMachine, sound_machine
+from toolpath_stiff.rig.fem_faults import FAULTS, faults
+from toolpath_stiff.rig.fem_path import path_truth
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, disturb_machine, disturb_readings, readings
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
@@ -27,6 +30,7 @@ from toolpath_stiff.rig.sizes import Scale
 from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
+BUILT = ("springs", "fem")  # ways to build a machine, the first by default
 # How often a blind draw hides what, where nothing is said (assumed).
 BLIND = {"none": 0.2, "one": 0.45, "two": 0.15, "outside": 0.2}
 
@@ -79,7 +83,8 @@ class DrawnCase:
     truth
         What was hidden: `hidden` (names; empty if nothing), `kind`, `effects` with parameters in shop units,
         their `size` (rms change of ln stiffness) and `detectability` (see `sizes.DETECTABLE`); of an unknown also
-        `links` and `variables`, what a description may name.
+        `links` and `variables`, what a description may name. Of a machine of finite elements `links` and `names`, what
+        the catalogue calls it, and `path`, the true stiffness at poses (`path_truth`).
     nominal, machine, nuisances
         To measure the same machine again.
     seed, layout
@@ -103,7 +108,8 @@ class DrawnCase:
                 f"row {bad[0] + 1}: the indicator would run backwards on the hidden machine",
                 hint="use a larger load or zero the indicator later (time_min)",
             )
-        stiffness = n_per_mm_from_n_per_m(disturb_readings(shown, clamp_of(table), nuisances, rng))
+        apart = self.machine.clamping_axes * rows.direction**2 if isinstance(self.machine, FemMachine) else None
+        stiffness = n_per_mm_from_n_per_m(disturb_readings(shown, clamp_of(table), nuisances, rng, apart))
         measured: Table = {}
         for name, values in table.items():
             measured[name] = values
@@ -138,6 +144,7 @@ def draw_case(
     machine: str | Nominal = defaults.MACHINE,
     plan: Table | None = None,
     size: float | Sequence[float] | None = None,
+    built: str = BUILT[0],
 ) -> DrawnCase:
     """A blind campaign on a machine that hides something; the same arguments give the same rows.
 
@@ -159,6 +166,8 @@ def draw_case(
     size
         Rms change of ln stiffness that each effect makes, instead of a draw; less where its bound is reached. Several:
         one for each effect, in the order of `truth["hidden"]`.
+    built
+        Of `springs`, or of finite elements (`fem`), whose faults have names of their own (`fem_faults.FAULTS`).
 
     Raises
     ------
@@ -173,11 +182,12 @@ def draw_case(
     nominal = load_nominal(machine) if isinstance(machine, str) else machine
     streams = {name: np.random.default_rng([seed, i]) for i, name in enumerate(_STREAMS)}
     table = campaign(layout, nominal, plan, streams["campaign"])
-    names = _names(hidden, layout, table, streams["kind"])
+    names = _names(hidden, layout, table, streams["kind"], fem=built == "fem")
     rows = rows_of(table)
-    true, effects = HiddenMachine(), []
+    true: HiddenMachine = sound_machine(nominal) if built == "fem" else HiddenMachine()
+    effects = []
     if names:
-        scale = Scale(nominal, rows, clamp_of(table), nuisances)
+        scale = Scale(nominal, rows, clamp_of(table), nuisances, true)
         for name, wanted in zip(names, _sizes(size, len(names)), strict=True):
             # A stream of its own for each effect: sizes of different effects of one seed have nothing in common.
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
@@ -185,13 +195,20 @@ def draw_case(
             true = with_effect(true, name, parameters)
             kind = UNKNOWNS.get(name)  # what a description may name
             words = {} if kind is None else {"links": sorted(kind.links), "variables": sorted(kind.variables)}
+            if name in FAULTS:
+                words = {"links": sorted(FAULTS[name].links), "names": sorted(FAULTS[name].names)}
             effects.append({"effect": name, "parameters": parameters, **strength, **words})
     true = disturb_machine(true, nuisances, streams["machine"])
-    truth = {
+    beyond = {*OUTSIDE, *faults(in_catalogue=False)}
+    truth: dict[str, object] = {
         "hidden": list(names),
-        "kind": "outside" if {*names} & {*OUTSIDE} else ("none", "one", "two", "three")[min(len(names), 3)],
+        "kind": "outside" if {*names} & beyond else ("none", "one", "two", "three")[min(len(names), 3)],
         "effects": effects,
     }
+    if isinstance(true, FemMachine):
+        if nuisances.joint_error > 0.0:  # no machine is quite like its drawing, unless none of it shall be
+            true = true.scattered(streams["machine"])
+        truth["path"] = path_truth(nominal, true, rows, np.random.default_rng([seed, len(_STREAMS)]))
     case = DrawnCase(table, truth, nominal, true, nuisances, seed, layout)
     return replace(case, rows=case.measure(table, rows, streams["noise"], stated_sd=layout == "paper"))
 
@@ -204,31 +221,38 @@ def _sizes(size: float | Sequence[float] | None, count: int) -> Sequence[float |
     return sizes
 
 
-def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: Generator) -> tuple[str, ...]:
-    """Names of what is hidden."""
+def _names(
+    hidden: str | Sequence[str] | None, layout: str, table: Table, rng: Generator, *, fem: bool
+) -> tuple[str, ...]:
+    """Names of what is hidden, in a machine of finite elements or of springs."""
     if hidden is None:
         hidden = str(rng.choice(list(BLIND), p=list(BLIND.values())))
-    known = effects_of_layout(layout)
+    outside: Sequence[str] = (*ODDITIES, *(() if layout == "paper" else ODDITIES_IN_TIME))
+    unknown: Sequence[str] = [name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)]
+    known: Sequence[str] = effects_of_layout(layout)
+    if fem:
+        known, outside = (
+            [name for name in faults(in_catalogue=inside) if all(c in table for c in FAULTS[name].columns)]
+            for inside in (True, False)
+        )
+        unknown = outside
     if hidden in ("two", "three"):
         return tuple(known[i] for i in rng.choice(len(known), size=2 if hidden == "two" else 3, replace=False))
-    drawn: dict[str, Callable[[], Sequence[str]]] = {
-        "one": lambda: known,
-        "unknown": lambda: [name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)],
-        "outside": lambda: [*ODDITIES, *(() if layout == "paper" else ODDITIES_IN_TIME)],
-    }
+    drawn = {"one": known, "unknown": unknown, "outside": outside}
     if isinstance(hidden, str) and hidden in drawn:
-        return (str(rng.choice(drawn[hidden]())),)
+        return (str(rng.choice(drawn[hidden])),)
     if hidden == "none":
         return ()
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
-    everything = (*CATALOGUE, *OUTSIDE)
-    if unknown := [name for name in names if name not in everything]:
+    everything = FAULTS if fem else (*CATALOGUE, *OUTSIDE)
+    if strange := [name for name in names if name not in everything]:
         expected = f"none, one, two, three, outside, unknown, or of {', '.join(everything)}"
-        raise InputError(f"nothing called {unknown[0]!r} to hide", expected=expected)
+        raise InputError(f"nothing called {strange[0]!r} to hide", expected=expected)
     if len(set(names)) < len(names) or sum(name in OUTSIDE for name in names) > 1:
         raise InputError(f"hidden effects {', '.join(names)}", expected="each once, at most one outside the catalogue")
     for name in names:
-        needed = ("time_min",) if name == "thermal_drift" else OUTSIDE[name].columns if name in OUTSIDE else ()
+        kinds = FAULTS if fem else OUTSIDE
+        needed = ("time_min",) if name == "thermal_drift" else kinds[name].columns if name in kinds else ()
         for column in needed:
             if column not in table:
                 raise InputError(f"{name} needs the column {column}", expected="layout tilted, or a plan with it")

@@ -23,8 +23,10 @@ from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.files import Content, read_bytes, read_text
 from toolpath_stiff.results_folder import Rules, write_folder
 from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, POSE, Table
-from toolpath_stiff.rig.case import DrawnCase, clamp_of, draw_case, rows_of
+from toolpath_stiff.rig.case import BUILT, DrawnCase, clamp_of, draw_case, rows_of
 from toolpath_stiff.rig.effects import CATALOGUE
+from toolpath_stiff.rig.fem import FemMachine
+from toolpath_stiff.rig.fem_faults import FAULTS, faults
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
 from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable
@@ -71,6 +73,8 @@ def seal(case: DrawnCase) -> bytes:
         "columns": list(case.rows),
         "clamps": int(max(case.rows.get("clamp", [0]))),
     }
+    if isinstance(case.machine, FemMachine):
+        content["built"] = "fem"
     packed = zlib.compress(json.dumps(content, sort_keys=True).encode(), 9)
     body = packed + hashlib.shake_256(packed).digest(-len(packed) % BLOCK)
     return MAGIC + hashlib.sha256(body).digest() + body
@@ -88,7 +92,8 @@ def unseal(file: str | Path) -> tuple[DrawnCase, Document]:
     }
     machine["unknown"] = machine["unknown"] and Unknown(**machine["unknown"])
     nominal = parse_nominal(sealed["nominal"]["text"], sealed["nominal"]["name"])
-    return DrawnCase({}, sealed["truth"], nominal, HiddenMachine(**machine), Nuisances(**sealed["nuisances"])), sealed
+    true = (FemMachine if sealed.get("built") == "fem" else HiddenMachine)(**machine)
+    return DrawnCase({}, sealed["truth"], nominal, true, Nuisances(**sealed["nuisances"])), sealed
 
 
 def score(hidden: list[str], claim: list[str]) -> str:
@@ -98,7 +103,8 @@ def score(hidden: list[str], claim: list[str]) -> str:
     """
     claimed, truth = set(claim) - set(SOUND), set(hidden)
     if claimed & set(OTHER):
-        claimed = (claimed - set(OTHER)) | ((truth & {*OUTSIDE}) or {"outside"})
+        beyond = {*OUTSIDE, *faults(in_catalogue=False)}
+        claimed = (claimed - set(OTHER)) | ((truth & beyond) or {"outside"})
     if claimed == truth:
         return "right" if truth else "correctly none"
     return "partly" if claimed & truth else "wrong"
@@ -192,10 +198,12 @@ def blind_case(
     noise: float = 0.02,
     machine: str = defaults.MACHINE,
     plan_file: str | None = None,
+    built: str = BUILT[0],
 ) -> DrawnCase:
     """A case as of `draw_case`, with the poses of a file. Raises `InputError`."""
     nominal = load_nominal(machine)
-    return draw_case(seed, layout, hidden, noise, nominal, None if plan_file is None else read_plan(plan_file, nominal))
+    plan = None if plan_file is None else read_plan(plan_file, nominal)
+    return draw_case(seed, layout, hidden, noise, nominal, plan, built=built)
 
 
 def new_exercise(folder: str | Path, case: DrawnCase, rules: Rules = NO_OTHER) -> int:
@@ -229,10 +237,15 @@ def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
     """What was hidden, and how the claim scores: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
     claims = [name.strip() for name in claim.split(",") if name.strip()]
-    known = (*SOUND, *OTHER, *CATALOGUE, *OUTSIDE)
+    known = (*SOUND, *OTHER, *CATALOGUE, *OUTSIDE, *FAULTS)
     alone = len(claims) == 1 or (claims and not {*SOUND} & {*claims})
     if not alone or not {*claims} <= {*known}:
         raise InputError(f"a claim {claim!r}", expected=f"none, or one or several of {', '.join(known)}")
     case, sealed = unseal(Path(folder) / SEALED)
-    verdict = {"verdict": score(case.truth["hidden"], claims), "claim": claims}
+    # A fault of elements that the catalogue has a name for is claimed by that.
+    hidden = [
+        next((name for name in claims if name in effect.get("names", ())), effect["effect"])
+        for effect in case.truth["effects"]
+    ]
+    verdict = {"verdict": score(hidden, claims), "claim": claims}
     return {**verdict, **case.truth, "seed": sealed["seed"], "layout": sealed["layout"]}

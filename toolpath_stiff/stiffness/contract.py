@@ -240,6 +240,10 @@ class Effect:
     unknown_to_control
         Of a geometry effect: whether the control computes with the geometry before it. The struts then get the
         lengths of the programmed pose on that geometry, and the platform goes where they put it.
+    told_by
+        A reading that tells it from what looks the same at the tip, words for people; "" where its link says it.
+    vector
+        Whether its real parameters are one vector, which is there as a whole or not at all.
     described_from
         Of an effect whose form was read off measurements: the marks of those readings (`measurements.reading_marks`).
         A diagnosis of the same readings calls it `described`, not `identified`, until others confirm it.
@@ -272,6 +276,8 @@ class Effect:
     unknown_to_control: bool = False
     clause: str = ""  # what a fit has found, parameters by name: "the tool is {error} mm {error:longer/shorter}"
     parts: tuple[tuple[str, str], ...] = ()  # parameter, words after its size, where the clause says {sizes}
+    told_by: str = ""
+    vector: bool = False
     described_from: tuple[str, ...] = ()
     file: str = ""  # that declares it without code
 

@@ -16,14 +16,16 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.stiffness import closed_form, exact
 from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.geometry_slopes import geometry_slopes
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small
 CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2 ms a call is not earned back
 # Poses; numba takes about 0.5 s to import and load from its cache, which the closed form spends on 1.5 million.
 COMPILED_FROM = 1_500_000
+LEAST_LOAD = 1.0  # N
 
-Tools = FloatArray | float  # m, length of the tool: of all poses, or (n,)
+Tools = FloatArray | float  # m, length of the tool; N, size of the load: of all poses, or (n,)
 
 
 def is_closed_form(model: StiffnessModel) -> bool:
@@ -46,8 +48,9 @@ def tip_compliance(
     rotation: FloatArray | None = None,
     tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
+    load: FloatArray | None = None,
 ) -> FloatArray:
-    """Compliance of the tool tip at n poses, load-dependent effects left out.
+    """Compliance of the tool tip at n poses; load-dependent effects as under the load, left out where none is given.
 
     Parameters
     ----------
@@ -61,14 +64,20 @@ def tip_compliance(
         m, scalar or (n,); nan: the reference tool.
     force
         N, the size of the load.
+    load
+        (n, 3) N, the force on the tip that acts; less than `LEAST_LOAD` counts as that.
 
     Returns
     -------
     (n, 3, 3) m/N; nan where the machine is singular.
     """
-    compliance = np.empty((len(position), 3, 3))
-    for rows, path in _paths(model, position, rotation, tool_length, force):
-        compliance[rows] = exact.tip_compliance(model, path)
+    compliance, size, towards = np.empty((len(position), 3, 3)), np.full(len(position), force), None
+    if load is not None:
+        size = np.maximum(np.linalg.norm(load, axis=1), LEAST_LOAD)
+        towards = np.where((load == 0.0).all(axis=1)[:, None], (0.0, 0.0, 1.0), load)
+        towards = towards / np.linalg.norm(towards, axis=1)[:, None]
+    for rows, path in _paths(model, position, rotation, tool_length, size):
+        compliance[rows] = exact.tip_compliance(model, path, None if towards is None else towards[rows])
     return compliance
 
 
@@ -85,6 +94,21 @@ def compliance_along(
     for rows, path in _paths(model, position, rotation, tool_length, force):
         compliance[rows] = exact.compliance_along(model, path, direction[rows])
     return compliance
+
+
+def geometry_slopes_along(
+    model: StiffnessModel,
+    direction: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray | None = None,
+    tool_length: Tools = np.nan,
+    force: float = defaults.FORCE,
+) -> FloatArray:
+    """(n, 42) as of `geometry_slopes`; arguments as of `compliance_along`."""
+    slopes = np.empty((len(position), 42))
+    for rows, path in _paths(model, position, rotation, tool_length, force):
+        slopes[rows] = geometry_slopes(model, path, direction[rows])
+    return slopes
 
 
 def rows_of_tools(tool_length: FloatArray) -> list[tuple[float, IntArray | slice]]:
@@ -167,11 +191,11 @@ def compliance_with_effects(
 
 
 def _paths(
-    model: StiffnessModel, position: FloatArray, rotation: FloatArray | None, tool_length: Tools, force: float
+    model: StiffnessModel, position: FloatArray, rotation: FloatArray | None, tool_length: Tools, force: Tools
 ) -> Iterator[tuple[slice, LoadPath]]:
     """Rows of some poses of a program, and what the effects see there, the model's conditions included."""
-    lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(position),))
+    lengths, size = (np.broadcast_to(np.asarray(of, dtype=float), (len(position),)) for of in (tool_length, force))
     for start in range(0, len(position), BLOCK):
         rows = slice(start, start + BLOCK)
         some, turn = position[rows], None if rotation is None else rotation[rows]
-        yield rows, load_path(model, some, turn, lengths[rows], force, **model.conditions.columns(len(some)))
+        yield rows, load_path(model, some, turn, lengths[rows], size[rows], **model.conditions.columns(len(some)))

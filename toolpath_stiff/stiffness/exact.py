@@ -143,8 +143,14 @@ def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
         return solution
 
 
-def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
-    """(n, 3, 3) m/N, displacements of the tip under forces at it; load-dependent effects are not in it."""
+def tip_compliance(model: StiffnessModel, path: LoadPath, direction: FloatArray | None = None) -> FloatArray:
+    """(n, 3, 3) m/N, displacements of the tip under forces at it.
+
+    Load-dependent effects are in it where the direction (n, 3) of the load that acts is given, as under that load: it
+    is the secant compliance there.
+    """
+    if direction is not None and model.load_dependent:
+        path = under_load(model, path, direction)[0]
     forces = np.broadcast_to(np.eye(6)[:, :3], (len(path), 6, 3))
     return possible(model, path, respond(path, *assemble_links(model, path), forces)[0][:, :3])
 

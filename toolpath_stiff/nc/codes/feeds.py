@@ -1,6 +1,6 @@
 """Feed, speed and time: F and S, G93 G94 G95, G96 G97, the feed of a move; G4 and words of time. mm/min, s inside."""
 
-from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes, holds_anyway
+from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes
 from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
 from toolpath_stiff.nc.courses import length_of_move
 from toolpath_stiff.nc.frames import Numbers
@@ -48,9 +48,19 @@ def speed_word(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
-    """G96: D is its greatest spindle speed, which does not enter."""
+    """G96: D is its greatest spindle speed, which does not enter; G97: S is revolutions again, not known before it."""
+    if code == "G97":
+        state.speed = state.speed if "S" in block.values or not state.surface_speed else 0.0
+        state.surface_speed = False
+        return
     block.take("D")
+    state.surface_speed = True
     state.turning.setdefault("constant surface speed (G96)", block.line)
+
+
+def turn_spindle(state: State, block: CurrentBlock, code: str) -> None:
+    """M3: clockwise, M4: the other way, M5, M19: it stands."""
+    state.turn = {"M3": 1, "M4": -1}.get(code, 0)
 
 
 def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: list[float], arc: Arc | None) -> float:
@@ -125,5 +135,5 @@ FEED_CODES = (
     *family(_FEEDS, "feed mode", feed_mode, g_codes("G93 G94 G95")),
     Code("G96", "spindle mode", surface_speed, "constant surface speed", _SPINDLE, listed=_UNUSED),
     Code("G4", "non-modal", dwell, "dwell", f"{g_codes('G4')}; {FANUC}, Dwell (G04); Marlin, G004", step="dwell"),
-    Code("G97", "spindle mode", holds_anyway, "spindle speed in revolutions", _SPINDLE),
+    Code("G97", "spindle mode", surface_speed, "spindle speed in revolutions", _SPINDLE),
 )

@@ -60,7 +60,8 @@ def record(
     feed = math.nan if motion == RAPID else feed_of_move(state, block, start, end, arc)
     if state.beside is not None:  # the tool centre still stands where compensation left it
         start, state.beside = [s + b for s, b in zip(start, state.beside, strict=True)], None
-    move = Move(block.line, motion, start, end, feed, state.tool, state.tool_length, (was, frames.bound), arc)
+    flags = (was, frames.bound)
+    move = Move(block.line, motion, start, end, feed, state.tool, state.tool_length, state.spindle, flags, arc)
     if state.cutter is not None and state.cutter.radius:
         added = offset_move(state, state.cutter, move, control)
     else:

@@ -4,6 +4,7 @@ What Fanuc's and Haas' programs begin with ("safe start") is here: it switches o
 """
 
 from toolpath_stiff.nc.codes.code import FANUC, HAAS, Code, family, g_codes, holds_anyway, m_codes
+from toolpath_stiff.nc.codes.feeds import turn_spindle
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State
 
@@ -74,8 +75,8 @@ PASSIVE_CODES = (
     Code("G61", "path control", take_words, "exact path", g_codes("G61"), listed=_EXACT),
     Code("G61.1", "path control", take_words, "exact stop", g_codes("G61.1"), listed=_EXACT),
     Code("G64", "path control", take_words, "path blending", g_codes("G64"), listed=_BLENDED),
-    *family(_SPINDLE, "M spindle", holds_anyway, m_codes("M3 M4 M5")),
-    Code("M19", "M spindle", holds_anyway, "spindle orientation", m_codes("M19"), listed="spindle orientation"),
+    *family(_SPINDLE, "M spindle", turn_spindle, m_codes("M3 M4 M5")),
+    Code("M19", "M spindle", turn_spindle, "spindle orientation", m_codes("M19"), listed="spindle orientation"),
     *family(_COOLANT, "M coolant", holds_anyway, m_codes("M7 M8 M9"), listed="coolant"),
     *family(_OVERRIDES, "M overrides", holds_anyway, m_codes("M48 - M53"), listed="overrides"),
     Code(

@@ -25,6 +25,8 @@ def change_tool(state: State, block: CurrentBlock, code: str) -> None:
     if number is None:
         raise block.fail(code, "needs the tool number", "Q with a whole number")
     state.tool, state.renamed = number, code == "M61"
+    if code == "M6":
+        state.turn = 0  # LinuxCNC, M-Codes, M6: "the spindle will be stopped"
     # What LinuxCNC's rs274 forgets at a tool change.
     state.height_lost = state.height_lost or state.length_changed
     if state.rotation_changed:

@@ -84,11 +84,13 @@ def spindl(state: CutterLocationState, statement: MajorStatement) -> None:
     if "OFF" in words or "STOP" in words:
         state.speed = 0.0
         return
+    if words != ["ON"]:
+        state.turn = -1.0 if "CCLW" in words else 1.0
     numbers = [index for index, word in enumerate(words) if is_number(word)]
     speeds = [index for index in numbers if index == 0 or words[index - 1] in ("RPM", "CLW", "CCLW", "SFM", "SMM")]
     if "SFM" in words or "SMM" in words or (numbers and not speeds):
         state.note("a speed that is not a number of revolutions")
-        state.revolutions = 0.0
+        state.revolutions, state.turn = 0.0, math.nan
     elif speeds:
         state.revolutions = abs(state.number(statement.arguments[speeds[0]]))
     state.speed = state.revolutions

@@ -41,7 +41,8 @@ class CutterLocationState:
     scale: float = 1.0  # mm of the length unit
     units_given: bool = False
     per_revolution: bool = False
-    speed: float = 0.0
+    speed: float = 0.0  # of the spindle, 1/min; 0: not known, or it stands
+    turn: float = 1.0  # -1: counter-clockwise; nan: a speed of the surface
     revolutions: float = 0.0  # that SPINDL/ON goes back to
     frames: dict[str, tuple[float, ...]] = field(default_factory=dict)  # who names a coordinate system: its numbers
 
@@ -234,8 +235,8 @@ def _add(
 ) -> None:
     assert state.point is not None
     start = [*state.point, *state.angles, 0.0]
-    tool, there = state.tool, [*end, *angles, 0.0]
-    move = Move(state.statement.line, motion, start, there, feed, tool, state.tool_length, NOT_MOVED, arc)
+    tool, there, spindle = state.tool, [*end, *angles, 0.0], state.turn * state.speed
+    move = Move(state.statement.line, motion, start, there, feed, tool, state.tool_length, spindle, NOT_MOVED, arc)
     added = state.recorder.add(move)
     state.point, state.angles = end, angles
     if added and tool not in state.used_tools:  # the tool table wins over the file

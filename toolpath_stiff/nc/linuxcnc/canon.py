@@ -75,6 +75,8 @@ class Follower:
     per_revolution: bool = False
     synchronised: float = 0.0
     speed: float = 0.0
+    turn: int = 0  # of the spindle: 1 clockwise, -1 the other way
+    surface_speed: bool = False
     tool: int = 0
     tool_length: float = math.nan
     line: int = 0  # that moves; 0: one before the program
@@ -230,6 +232,18 @@ class Follower:
     def _on_set_spindle_speed(self, inner: str) -> None:
         self.speed = _numbers(inner)[-1]
 
+    def _on_set_spindle_mode(self, inner: str) -> None:
+        self.surface_speed = _numbers(inner)[-1] != 0.0
+
+    def _on_start_spindle_clockwise(self, _: str) -> None:
+        self.turn = 1
+
+    def _on_start_spindle_counterclockwise(self, _: str) -> None:
+        self.turn = -1
+
+    def _on_stop_spindle_turning(self, _: str) -> None:
+        self.turn = 0
+
     def _on_start_speed_feed_sync(self, inner: str) -> None:
         self.synchronised = abs(_numbers(inner)[0]) * self.scale
 
@@ -299,7 +313,8 @@ class Follower:
         end = [value - zero for value, zero in zip(end, shift, strict=True)]
         feed = math.nan if motion == RAPID else self._feed_of(start, end, arc is not None)
         flags = self._machine_flags(start, end)
-        move = Move(self.line, motion, start, end, feed, self.tool, self.tool_length, flags, centred)
+        spindle = math.nan if self.turn and self.surface_speed else self.turn * self.speed
+        move = Move(self.line, motion, start, end, feed, self.tool, self.tool_length, spindle, flags, centred)
         if self.recorder.add(move) and self.tool not in self.used_tools:
             self.used_tools.append(self.tool)
 

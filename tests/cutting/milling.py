@@ -1,0 +1,56 @@
+"""A program on a box of stock, for tests of engagement; mm in, SI out."""
+
+import numpy as np
+
+from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.engagement import engage
+from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.stock import box_stock
+from toolpath_stiff.cutting.workpiece import workpiece_of
+from toolpath_stiff.nc.courses import points_along
+from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.path.sampling import sample_moves
+
+
+class Milling:
+    """The program `text` of a cutter on the box between `low` and `high`."""
+
+    def __init__(self, text, low=(-30, -30, -10), high=(60, 30, 0), diameter=10.0, corner=0.0, step=1.0):
+        self.cutter = Cutter(0, diameter * 1e-3, corner * 1e-3, 3, 0.5)
+        self.moves = parse_program(text).moves
+        self.samples = sample_moves(self.moves, step * 1e-3)
+        self.cutters = {0: self.cutter}
+        stock = box_stock(tuple(np.multiply(low, 1e-3)), tuple(np.multiply(high, 1e-3)), "given")
+        self.work = workpiece_of(stock, self.moves, self.cutters)
+        self.context = self.work, self.moves, self.samples, self.cutters
+
+    def engaged(self):
+        """All patches, and the removed volume of each sample."""
+        blocks = list(engage(*self.context))
+        assert [rows.start for rows, _, _ in blocks[1:]] == [rows.stop for rows, _, _ in blocks[:-1]]
+        return Patches.joined([patches for _, patches, _ in blocks]), np.concatenate(
+            [volume for _, _, volume in blocks]
+        )
+
+    def removed(self):
+        return self.engaged()[1]
+
+    def contact(self, x, y=None):
+        """Patches of the last sample at x, y (mm): rows of low, high (mm), entry, exit (degrees)."""
+        x_m, y_m, _ = self.samples.position.T
+        near = np.abs(x_m * 1e3 - x) < 1e-6
+        if y is not None:
+            near &= np.abs(y_m * 1e3 - y) < 1e-6
+        patches = self.engaged()[0]
+        some = patches.take(patches.station == np.flatnonzero(near & (self.samples.motion != 0))[-1])
+        return np.stack([some.low * 1e3, some.high * 1e3, np.degrees(some.entry), np.degrees(some.exit)], axis=1)
+
+    def chords(self, sagitta):
+        """Start and end, mm, of chords of all cutting moves."""
+        for row in np.flatnonzero(self.moves.motion != 0):
+            sweep = abs(self.moves.arc_sweep[row])
+            radius = np.linalg.norm(self.moves.start[row, :3] - self.moves.arc_center[row]) * 1e3
+            count = max(int(np.ceil(sweep / np.sqrt(8.0 * sagitta / radius))), 1) if sweep else 1
+            shares = np.linspace(0.0, 1.0, count + 1)
+            points = points_along(self.moves, np.full(count + 1, row), shares)[0] * 1e3
+            yield from zip(points[:-1], points[1:], strict=True)

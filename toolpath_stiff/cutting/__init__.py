@@ -1,0 +1,1 @@
+"""Cutting forces and what they make of the part: stock, engagement, forces, the error of a surface."""

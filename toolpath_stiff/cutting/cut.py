@@ -1,0 +1,300 @@
+"""A cut along a program: engagement, forces, what gives way, and the error of the surface that is left."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from toolpath_stiff import defaults
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
+from toolpath_stiff.cutting.coefficients import Coefficients
+from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.engagement import engage
+from toolpath_stiff.cutting.final_surface import final_strip, final_walls
+from toolpath_stiff.cutting.forces import mean_force, peak_force
+from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
+from toolpath_stiff.cutting.stations import headings
+from toolpath_stiff.cutting.stock import Stock
+from toolpath_stiff.cutting.surface_error import floor_error, shares, wall_error
+from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
+from toolpath_stiff.cutting.workpiece import Workpiece, workpiece_of
+from toolpath_stiff.nc.moves import ReadProgram
+from toolpath_stiff.path.sampling import Samples, sample_moves
+from toolpath_stiff.poses import Pose
+from toolpath_stiff.results import Progress
+from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.units import per_min_from_rad_per_s
+
+BLOCK = 16_384  # stations at a time
+MOST_NAMED = 5  # lines in a warning
+ROUNDED = 1e-12  # of a cosine
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Cut:
+    """What is cut at n samples of a program, and the error of the surface that they leave. SI.
+
+    Vectors are in the station's frame: x along the horizontal feed, y to its left, z up; forces act on the tool. Errors
+    count out of the part: + material is left, - it is cut too deep. nan: there is no such thing at that sample.
+
+    Attributes
+    ----------
+    samples
+        In the set-up frame, row for row those of the analysis.
+    cutters, work, coefficients
+        By tool number; the stock and what is taken from it, set-up frame; of the cutting force.
+    feed_per_tooth
+        (n,) m.
+    ap, ae, entry, exit, removed
+        (n,) m, m, rad, rad, m3: depth along the tool, width across the feed, first and last angle in the stock (0 left,
+        90 degrees ahead), volume removed since the sample before.
+    mean_force, peak_force
+        (n, 3) N of a turn.
+    deflection
+        (n, 3) m of tip and tool under the mean force.
+    wall_heights
+        (n, 2, 2) m above the tip: of the left and right wall that stays, lowest and highest point.
+    wall_force
+        (n, 2, 3) N, force when the left and right wall is made, mean over its height: the one behind its mean error.
+    errors, lowest, highest
+        (n, 3) m, error of left wall, right wall, and the floor or a ball's contact: mean over it, extremes.
+    deviation
+        (n, 3) m, standard deviation of `errors`, from the coefficients and the machine.
+    assumptions, warnings
+        Sentences.
+    """
+
+    samples: Samples
+    cutters: Mapping[int, Cutter]
+    work: Workpiece
+    coefficients: Coefficients
+    feed_per_tooth: FloatArray
+    ap: FloatArray
+    ae: FloatArray
+    entry: FloatArray
+    exit: FloatArray
+    removed: FloatArray
+    mean_force: FloatArray
+    peak_force: FloatArray
+    deflection: FloatArray
+    wall_heights: FloatArray
+    wall_force: FloatArray
+    errors: FloatArray
+    lowest: FloatArray
+    highest: FloatArray
+    deviation: FloatArray
+    assumptions: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def stock(self) -> Stock:
+        """The stock before the first cut."""
+        return self.work.stock
+
+    @property
+    def wall_mean(self) -> FloatArray:
+        """(n, 2) m, error of the left and right wall, mean over the height."""
+        return self.errors[:, :2]
+
+    @property
+    def wall_low(self) -> FloatArray:
+        """(n, 2) m, its smallest value over the height."""
+        return self.lowest[:, :2]
+
+    @property
+    def wall_high(self) -> FloatArray:
+        """(n, 2) m, its largest."""
+        return self.highest[:, :2]
+
+    @property
+    def machine_only(self) -> bool:
+        """Whether a tool's own compliance is not known, so that the errors are too small."""
+        return any(np.isnan(cutter.lateral_compliance) for cutter in self.cutters.values())
+
+
+def evaluate_cut(
+    model: StiffnessModel,
+    program: ReadProgram,
+    origin: Pose,
+    setup: CutSetup,
+    step: float,
+    progress: Progress | None = None,
+) -> Cut:
+    """The cut of a program whose zero sits at `origin` (m, rad), with samples at most `step` (m) apart.
+
+    Parameters
+    ----------
+    model
+        The machine with its effects, under its conditions; those that depend on the load take the force that acts.
+    program
+        As it was read; the tool has to stand upright in the set-up frame.
+    progress
+        Called with what is being done, samples done, samples in all.
+
+    Raises
+    ------
+    InputError
+        Something is missing (which, and where to write it), or a tool is tilted.
+    """
+    cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
+    spindle = spindle_of(setup, program, samples)
+    work = workpiece_of(stock_of(setup, program.moves, cutters), program.moves, cutters)
+    cut = _nothing_cut(samples, cutters, work, setup.coefficients, spindle)
+    given, parts, removed = (work, program.moves, samples, cutters), [], np.zeros(len(samples))
+    for block, some, volume in engage(*given, progress):
+        removed[block] = volume
+        parts.append(some)
+    patches = Patches.joined(parts)
+    walls, strips = final_walls(*given), final_strip(*given)
+    cut = replace(cut, removed=removed, wall_heights=walls)
+    made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
+    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
+        values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
+    _note_engagement(cut, patches)
+    for number, cutter in cutters.items():
+        engaged = np.zeros(len(samples), dtype=bool)
+        engaged[patches.station] = True
+        rows = np.flatnonzero(engaged & (samples.tool == number))
+        for start in range(0, len(rows), BLOCK):
+            _evaluate(cut, model, origin, cutter, patches, spindle, strips, rows[start : start + BLOCK])
+    return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=_warnings(cut))
+
+
+def _nothing_cut(
+    samples: Samples, cutters: Mapping[int, Cutter], work: Workpiece, coefficients: Coefficients, spindle: FloatArray
+) -> Cut:
+    """A cut to be filled in."""
+    n = len(samples)
+    teeth = np.ones(n)
+    for number, cutter in cutters.items():
+        teeth[samples.tool == number] = cutter.flutes
+    turning = samples.cutting & (np.abs(spindle) > 0.0)
+    per_second = np.where(turning, teeth * np.abs(spindle) / (2.0 * np.pi), 1.0)
+    return Cut(
+        samples=samples,
+        cutters=cutters,
+        work=work,
+        coefficients=coefficients,
+        feed_per_tooth=np.where(turning, samples.feed / per_second, np.nan),
+        **{name: np.zeros(n) for name in ("ap", "ae", "entry", "exit", "removed")},
+        **{name: np.zeros((n, 3)) for name in ("mean_force", "peak_force", "deflection")},
+        wall_heights=np.full((n, 2, 2), np.nan),
+        wall_force=np.full((n, 2, 3), np.nan),
+        **{name: np.full((n, 3), np.nan) for name in ("errors", "lowest", "highest", "deviation")},
+        assumptions=(),
+        warnings=(),
+    )
+
+
+def _note_engagement(cut: Cut, patches: Patches) -> None:
+    """Enter depth, width and angles from all patches of each station."""
+    if not len(patches.station):
+        return
+    first = np.flatnonzero(np.diff(patches.station, prepend=-1))
+    rows = patches.station[first]
+    low, high = np.minimum.reduceat(patches.low, first), np.maximum.reduceat(patches.high, first)
+    cut.ap[rows] = high - low
+    cut.entry[rows] = np.minimum.reduceat(patches.entry, first)
+    cut.exit[rows] = np.maximum.reduceat(patches.exit, first)
+    radius = np.zeros(len(cut.samples))
+    for number, cutter in cut.cutters.items():
+        radius[cut.samples.tool == number] = cutter.radius
+    ahead = np.minimum(patches.entry, np.pi), np.minimum(patches.exit, np.pi)
+    left, right = (np.cos(angle) for angle in ahead)
+    widths = np.maximum.reduceat(left, first) - np.minimum.reduceat(right, first)
+    cut.ae[rows] = radius[rows] * widths
+
+
+def _evaluate(
+    cut: Cut,
+    model: StiffnessModel,
+    origin: Pose,
+    cutter: Cutter,
+    patches: Patches,
+    spindle: FloatArray,
+    strips: FloatArray,
+    rows: IntArray,
+) -> None:
+    """Enter forces, deflections and errors of some samples (m,) that cut with one cutter, in their order."""
+    samples = cut.samples.take(rows)
+    kept = patches.take(slice(*np.searchsorted(patches.station, (rows[0], rows[-1] + 1))))
+    place = np.searchsorted(rows, kept.station).clip(max=len(rows) - 1)
+    kept = replace(kept, station=place).take(rows[place] == kept.station)
+    slope = np.hypot(samples.tangent[:, 0], samples.tangent[:, 1]), samples.tangent[:, 2]
+    feed = cut.feed_per_tooth[rows, None] * np.stack(slope, axis=1)
+    turning = np.sign(spindle[rows])
+    given = (kept, cutter, cut.coefficients, feed, turning)
+    mean = mean_force(*given)
+    cut.mean_force[rows], cut.peak_force[rows] = mean, peak_force(*given)
+    axes = station_axes(headings(samples), origin)
+    machine = tip_compliances(model, samples, origin, axes, mean)
+    whole = with_tools(machine, samples, cut.cutters)
+    cut.deflection[rows] = product(whole, mean[:, :, None])[..., 0]
+    walls, of_walls, cut.wall_force[rows] = wall_error(*given, whole, cut.wall_heights[rows])
+    floors, of_floors = floor_error(*given, whole, strips[rows])
+    _enter(cut, rows, slice(0, 2), walls @ shares()[1], walls)
+    _enter(cut, rows, slice(2, 3), floors.mean(axis=1)[:, None], floors[:, None])
+    # Of the machine as a share of the compliance that acts along the normal.
+    compliance = whole[:, (1, 1, 2), (1, 1, 2)]
+    share = machine_deviation(model, samples, origin, axes, machine)[:, (0, 0, 1)] / compliance
+    of_coefficients = np.concatenate([of_walls, of_floors[:, None]], axis=1)
+    cut.deviation[rows] = np.hypot(of_coefficients, share * cut.errors[rows])
+
+
+def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: FloatArray) -> None:
+    """Enter mean (m, k) and extremes over the last axis of values (m, k, h)."""
+    cut.errors[rows, surfaces] = mean
+    cut.lowest[rows, surfaces], cut.highest[rows, surfaces] = values.min(axis=-1), values.max(axis=-1)
+
+
+def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str, ...]:
+    """All that was assumed, a sentence each."""
+    sentences = [
+        f"stock: {cut.stock.origin}",
+        f"coefficients of {cut.coefficients.material}: {cut.coefficients.origin}",
+    ]
+    sentences += [sentence for cutter in cut.cutters.values() for sentence in cutter.origin]
+    sentences += [
+        "errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; the chip "
+        "is not thinner for them",
+        "a spring pass meets the part as programmed, not what the pass before left by its error: where it takes nothing "
+        "off, its error counts as 0",
+    ]
+    if model.load_dependent:
+        sentences.append("effects that depend on the load act as under the mean force of a turn")
+    if not math.isnan(setup.spindle):
+        speed = abs(per_min_from_rad_per_s(setup.spindle))
+        sentences.append(f"where the program names no speed the spindle turns at {speed:g} 1/min ({setup.file})")
+    return tuple(sentences)
+
+
+def _warnings(cut: Cut) -> tuple[str, ...]:
+    """What deserves a look, a sentence each."""
+    samples, warnings = cut.samples, []
+    if cut.machine_only:
+        numbers = [f"T{number}" for number, cutter in cut.cutters.items() if np.isnan(cutter.lateral_compliance)]
+        warnings.append(
+            f"machine only: the compliance of {', '.join(numbers)} is not known, and a slim tool gives way more than "
+            "the machine (stick_out_mm in [[tool]] of cut.toml)"
+        )
+    engaged = cut.ap > 0.0
+    plunges = (cut.removed > 0.0) & (np.abs(samples.tangent[:, 2]) >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
+    warnings += _lines_warning(
+        samples, plunges, "plunges: cutting with the end is not modelled, no force is known there"
+    )
+    chip = np.where(engaged, cut.feed_per_tooth, np.nan)
+    thin, thick = cut.coefficients.thinnest, cut.coefficients.thickest
+    for beyond, words in ((chip < thin, "thinner"), (chip > thick, "thicker")):
+        named = f"feeds per tooth {words} than those of the coefficients: extrapolated"
+        warnings += _lines_warning(samples, beyond, named)
+    return tuple(warnings)
+
+
+def _lines_warning(samples: Samples, rows: BoolArray, words: str) -> list[str]:
+    lines = np.unique(samples.line[rows]).tolist()
+    if not lines:
+        return []
+    more = f" and {len(lines) - MOST_NAMED} more" if len(lines) > MOST_NAMED else ""
+    return [f"lines {', '.join(map(str, lines[:MOST_NAMED]))}{more}: {words}"]

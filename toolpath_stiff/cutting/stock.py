@@ -1,0 +1,82 @@
+"""The stock: what stands on the table before the program runs, as heights of its top and underside over x and y."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.courses import extents
+from toolpath_stiff.nc.moves import RAPID, Moves
+from toolpath_stiff.units import m_from_mm, mm_from_m
+
+MOST_CELLS = 20_000_000  # of an STL's grid, 320 MB
+
+
+@dataclass(frozen=True)
+class Stock:
+    """Heights over cells of equal size in the set-up frame, SI; a box is a single cell.
+
+    Attributes
+    ----------
+    corner, cell
+        (2,) m, lowest x and y; (2,) m, size of a cell.
+    top, bottom
+        (nx, ny) m; top -inf: no material. Hollows below the top are taken as filled.
+    origin
+        Where this comes from, a sentence.
+
+    Examples
+    --------
+    >>> box_stock((0.0, 0.0, -0.02), (0.1, 0.08, 0.0), "given")
+    <Stock: 100 x 80 mm, z -20 to 0 mm: given>
+    """
+
+    corner: FloatArray
+    cell: FloatArray
+    top: FloatArray
+    bottom: FloatArray
+    origin: str
+
+    def __repr__(self) -> str:
+        x, y = mm_from_m(self.cell * self.top.shape)
+        low, high = mm_from_m(float(self.bottom.min())), mm_from_m(float(self.top.max()))
+        return f"<Stock: {x:g} x {y:g} mm, z {low:g} to {high:g} mm: {self.origin}>"
+
+    def heights(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Top and underside, m, at points x, y; beside the stock the top is -inf."""
+        i, j = np.floor((x - self.corner[0]) / self.cell[0]), np.floor((y - self.corner[1]) / self.cell[1])
+        inside = (i >= 0) & (j >= 0) & (i < self.top.shape[0]) & (j < self.top.shape[1])
+        i, j = np.where(inside, i, 0).astype(np.int64), np.where(inside, j, 0).astype(np.int64)
+        return np.where(inside, self.top[i, j], -np.inf), self.bottom[i, j]
+
+
+def box_stock(low: tuple[float, float, float], high: tuple[float, float, float], origin: str) -> Stock:
+    """A box between two corners, m."""
+    first, size = np.array(low[:2]), np.subtract(high, low)
+    if not (size > 0.0).all():
+        raise InputError(
+            f"a stock of {' x '.join(f'{mm_from_m(float(edge)):g}' for edge in size)} mm", expected="sizes above 0"
+        )
+    return Stock(first, size[:2], np.array([[high[2]]]), np.array([[low[2]]]), origin)
+
+
+def stock_of_extents(moves: Moves, cutters: Mapping[int, Cutter]) -> Stock:
+    """A box around all cuts, grown by the largest cutter's radius; its top is z = 0, or the highest level cut above it.
+
+    An assumption: how much the first passes cut from the side is a guess then.
+    """
+    cuts = moves.take((moves.motion != RAPID) & (np.hypot(*(moves.end - moves.start)[:, :2].T) > 0.0))
+    if not len(cuts):
+        raise InputError("no move cuts sideways", hint="give the stock's box")
+    ends = extents(cuts)
+    radius = max(cutters[tool].radius for tool in np.unique(cuts.tool).tolist())
+    low = tuple(m_from_mm(ends[axis][0]) - (radius if axis != "z" else 0.0) for axis in "xyz")
+    high = tuple(m_from_mm(ends[axis][1]) + radius for axis in "xy")
+    return box_stock(
+        (low[0], low[1], low[2]),
+        (high[0], high[1], max(0.0, m_from_mm(ends["z"][1]))),
+        "assumed: the extents of the cuts grown by the cutter's radius, top at z = 0 or the highest cut",
+    )

@@ -1,0 +1,192 @@
+"""Error of the surface that a cutter leaves: how far it stands aside at the moment when an edge makes the surface.
+
+A wall is made at height z when an edge passes it there (0 or 180 degrees), by the force of all slices that cut at that
+moment: not by the mean force (Kline, DeVor, Shareef, Journal of Engineering for Industry 104 (1982) 272; Budak,
+Altintas, International Journal of Machine Tools and Manufacture 34 (1994) 1141). A floor is passed twice, ahead and
+behind, and the lower pass counts; a ball or a corner radius makes a point of the surface where its normal is that of
+the surface.
+
+Errors count along the normal of the surface, out of the part: + material left, - cut too deep. With run-out the radius
+counts to the flute that stands out farthest, as where a tool is measured turning. The deflection is quasi-static and
+that of the tip; the chip is not thinner for it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from toolpath_stiff.arrays import BoolArray, FloatArray, product
+from toolpath_stiff.cutting.chips import flute_radii
+from toolpath_stiff.cutting.coefficients import Coefficients
+from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.forces import TURN, blocks, lag_per_height, responses
+from toolpath_stiff.cutting.patches import Patches
+
+HEIGHTS = 9  # of a wall at which its error is computed, both ends among them
+STRIPS = 5  # of a floor
+Passes = tuple[FloatArray, ...]  # errors (n, h) m, their slopes (n, h, 6) over the coefficients, forces (n, h, 3) N
+
+
+def shares() -> tuple[FloatArray, FloatArray]:
+    """Heights (HEIGHTS,) as shares of a wall, from its lower to its upper end, and their weights in a mean.
+
+    Gauss and Lobatto's nodes (Abramowitz, Stegun, Handbook of Mathematical Functions, 25.4.32).
+    """
+    legendre = np.polynomial.legendre.Legendre.basis(HEIGHTS - 1)
+    nodes = np.concatenate([[-1.0], np.sort(legendre.deriv().roots().real), [1.0]])
+    weights = 2.0 / (HEIGHTS * (HEIGHTS - 1) * legendre(nodes) ** 2)
+    return 0.5 * (nodes + 1.0), 0.5 * weights
+
+
+def wall_error(
+    patches: Patches,
+    cutter: Cutter,
+    coefficients: Coefficients,
+    feed: FloatArray,
+    turning: FloatArray,
+    compliance: FloatArray,
+    walls: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(n, 2, HEIGHTS) m, error of the walls to the left and right of n stations, from lower to upper end.
+
+    Parameters
+    ----------
+    patches, cutter, coefficients, feed, turning
+        As `forces.mean_force`.
+    compliance
+        (n, 3, 3) m/N of tip and cutter in the station's frame.
+    walls
+        (n, 2, 2) m: of the left and right wall the lowest and highest point above the tip; nan where there is none.
+
+    Returns
+    -------
+    tuple of FloatArray
+        Errors, nan where there is no wall; (n, 2) m, standard deviation of their mean over the height that comes from
+        the coefficients; (n, 2, 3) N, force on the tool while the wall is made, mean over its height.
+    """
+    error, deviation = np.full((len(feed), 2, HEIGHTS), np.nan), np.full((len(feed), 2), np.nan)
+    force = np.full((len(feed), 2, 3), np.nan)
+    nodes, weights = shares()
+    for side, (angle, outward) in enumerate(((0.0, -1.0), (np.pi, 1.0))):
+        cut = np.asarray(np.isfinite(walls[:, side]).all(axis=1))
+        low, high = walls[cut, side, :, None].swapaxes(0, 1)
+        heights = low + (high - low) * nodes
+        normal = np.broadcast_to([0.0, outward, 0.0], (*heights.shape, 3))
+        pull = _pull(normal, compliance[cut], turning[cut])
+        tip = _tip_angle(cutter, np.full_like(heights, angle), heights, turning[cut])
+        chosen = (_of(patches, cut), cutter, coefficients, feed[cut], turning[cut])
+        error[cut, side], slope, acting = _errors(*chosen, tip, pull)
+        deviation[cut, side] = _deviation((slope * weights[:, None]).sum(axis=1), coefficients)
+        force[cut, side] = (acting * weights[:, None]).sum(axis=1)
+    return error, deviation, force
+
+
+def floor_error(
+    patches: Patches,
+    cutter: Cutter,
+    coefficients: Coefficients,
+    feed: FloatArray,
+    turning: FloatArray,
+    compliance: FloatArray,
+    strip: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """(n, STRIPS) m, error of the surface below n stations, from the right to the left end of each strip.
+
+    Parameters
+    ----------
+    patches, cutter, coefficients, feed, turning, compliance
+        As `wall_error`.
+    strip
+        (n, 2) m to the left of the tip between which what the cutter leaves stays; nan where nothing does. Within
+        the flat end of a cutter that is a floor, beyond it the surface that a ball or a corner radius makes.
+
+    Returns
+    -------
+    tuple of FloatArray
+        Errors, nan where no surface stays; (n,) m, standard deviation of their mean that comes from the coefficients.
+    """
+    error, deviation = np.full((len(feed), STRIPS), np.nan), np.full(len(feed), np.nan)
+    cut = np.asarray(np.isfinite(strip).all(axis=1))
+    right, left = strip[cut, :, None].swapaxes(0, 1)
+    aside = right + (left - right) * (np.arange(STRIPS) + 0.5) / STRIPS
+    flat = cutter.radius - cutter.corner_radius
+    beyond = np.clip(np.abs(aside) - flat, 0.0, cutter.corner_radius)
+    out = beyond / (cutter.corner_radius or 1.0)  # sine of the angle between the tool and the surface's normal
+    along = np.sqrt(1.0 - out * out) / np.hypot(feed[cut, 0], feed[cut, 1])[:, None]
+    slope = feed[cut, :, None] * along[:, None]
+    normal = np.stack([-slope[:, 1], -np.sign(aside) * out, slope[:, 0]], axis=-1)  # square to a ramp's feed
+    pull = _pull(normal, compliance[cut], turning[cut])
+    ahead = np.arccos(np.clip(aside / max(flat, 1e-9), -1.0, 1.0))  # beyond the flat end: beside the axis
+    height = cutter.corner_radius - np.sqrt(np.maximum(cutter.corner_radius**2 - beyond**2, 0.0))
+    chosen = (_of(patches, cut), cutter, coefficients, feed[cut], turning[cut])
+    passes = [
+        _errors(*chosen, _tip_angle(cutter, angle, height, turning[cut]), pull) for angle in (ahead, TURN - ahead)
+    ]
+    error[cut], slopes, _ = _lowest(passes)
+    deviation[cut] = _deviation(slopes.mean(axis=1), coefficients)
+    return error, deviation
+
+
+def _of(patches: Patches, cut: BoolArray) -> Patches:
+    """Patches of some of the stations, counted among these."""
+    if cut.all():
+        return patches
+    kept = patches.take(cut[patches.station])
+    return replace(kept, station=(np.cumsum(cut) - 1)[kept.station])
+
+
+def _tip_angle(cutter: Cutter, angle: FloatArray, height: FloatArray, turning: FloatArray) -> FloatArray:
+    """(n, h) rad of flute 0 at the tip when it passes angles (n, h) at heights (n, h), as `forces.force_at` counts."""
+    sense = turning[:, None]
+    return np.asarray(np.where(sense < 0.0, np.pi - angle, angle) + lag_per_height(cutter) * sense * height)
+
+
+def _pull(normal: FloatArray, compliance: FloatArray, turning: FloatArray) -> FloatArray:
+    """(n, h, 3) m/N of error per force as `forces.responses` counts, by normals (n, h, 3)."""
+    pull = product(normal, compliance)
+    pull[..., 1] *= turning[:, None]
+    return pull
+
+
+def _errors(
+    patches: Patches,
+    cutter: Cutter,
+    coefficients: Coefficients,
+    feed: FloatArray,
+    turning: FloatArray,
+    tip: FloatArray,
+    pull: FloatArray,
+) -> Passes:
+    """The lowest of the flutes' passes."""
+    radii = flute_radii(cutter) if cutter.run_out else np.zeros(1)
+    lowest = np.zeros(tip.shape), np.zeros((*tip.shape, 6)), np.zeros((*tip.shape, 3))
+    for block, part in blocks(patches, len(tip)):
+        passes: list[Passes] = []
+        for flute, short in enumerate(radii.max() - radii):
+            angle = tip[block] + TURN * flute / cutter.flutes
+            response = responses(part, cutter, feed[block], turning[block], angle, coefficients.taper)
+            slope = product(pull[block][..., None, :], response)[..., 0, :]
+            force = product(response, coefficients.values[:, None])[..., 0]
+            passes.append(((pull[block] * force).sum(axis=-1) + short, slope, force))
+        for whole, values in zip(lowest, _lowest(passes), strict=True):
+            whole[block] = values
+    lowest[2][..., 1] *= turning[:, None]
+    return lowest
+
+
+def _lowest(passes: list[Passes]) -> Passes:
+    """Of several passes the one with the lowest error at each place."""
+    lowest = passes[0]
+    for other in passes[1:]:
+        lower = other[0] < lowest[0]
+        lowest = tuple(
+            np.where(lower if values.ndim == 2 else lower[..., None], values, old)
+            for values, old in zip(other, lowest, strict=True)
+        )
+    return lowest
+
+
+def _deviation(slope: FloatArray, coefficients: Coefficients) -> FloatArray:
+    """(n,) m from slopes (n, 6): JCGM 100:2008, equation 13."""
+    variance = (product(slope, coefficients.covariance) * slope).sum(axis=1)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))

@@ -1,0 +1,157 @@
+"""How far a fitted model may be off at a pose: for bands that hold where nobody has measured.
+
+The logarithm of the true stiffness differs from a fit's by three errors, whose sizes are read from the readings:
+
+    scatter    of readings and clampings, which law and sizes have taken up: times `SCATTERS` of the noise model;
+    geometry   struts that are not alike, joints off their places: times `GEOMETRIES` of what the noise model assumes.
+               They belong to the machine: where law and sizes have taken them up they are no error, elsewhere they are;
+    form       what neither describes, smooth over poses and different by direction, of `FORMS` (relative sd).
+
+A quarter of the measured poses is left out at a time, a region each, for a reading whose neighbours were fitted tells
+little of what is away from all of them. The sizes count by how likely they make the errors there: with four to eight
+regions a quantile of their scores, as split conformal prediction takes it, does not exist (95 % take 19 of them; Vovk,
+Gammerman and Shafer 2005, Algorithmic Learning in a Random World, 4.2), and it would hold for readings with their
+scatter, not for the stiffness under it.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
+from toolpath_stiff.defaults import NORMAL_95
+from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.fits import prior_of
+from toolpath_stiff.inference.least_squares import scaled_inverse
+from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.machine.error_model import ErrorModel, alike, coordinates
+from toolpath_stiff.readings.measurements import Readings
+
+# Sizes that are weighed, and how they are expected; assumed. The scatter is known to the noise model's degrees of
+# freedom (with Student's tails, for it may be wrong altogether); the geometry's tolerances are guesses, to a factor of
+# 2 or 3; the form is right with even odds, else off by a quarter of a per cent to 8 %, all orders alike.
+SCATTERS = np.geomspace(0.5, 3.0, 13)
+GEOMETRIES = {0.0: 1.0, 0.35: 1.0, 0.7: 1.0, 1.0: 1.0, 1.4: 0.5, 2.0: 0.25}
+FORMS = {0.0: 3.0, 0.0025: 0.5, 0.005: 0.5, 0.01: 0.5, 0.02: 0.5, 0.04: 0.5, 0.08: 0.5}
+FEWEST_PLACES, HALVINGS = 8, 2  # poses to be told from each other; regions are halved so often
+MOST_READINGS = 400  # spread over the campaign, from which the sizes are read
+MOST_DIRECTIONS, FORM_IN_AXES = 12, 0.01  # along which a region's errors may be other than scatter; by what form
+TAILS = 4.0  # degrees of freedom of the expected scatter
+ROUNDING = 1e-12
+
+
+def error_model(fit: Fit, data: Readings, noise: Noise) -> ErrorModel | None:
+    """The errors of a fit to n readings; None where too few poses were measured to tell.
+
+    Its loadings are those of law and free sizes, in units of the fit.
+    """
+    place = coordinates(data.position, data.angles)
+    places = np.unique(place, axis=0)
+    if len(places) < FEWEST_PLACES or not data.tip.all():
+        return None
+    rows = np.unique(np.linspace(0, len(data) - 1, min(len(data), MOST_READINGS)).round().astype(np.int64))
+    jacobian, residual, covariance = fit.jacobian[rows], fit.residual[rows], fit.scatter.covariance
+    same = covariance.groups.of[rows, None] == covariance.groups.of[rows]
+    parts = (
+        np.diag(covariance.own_variance[rows]) + covariance.common * same,
+        covariance.shared[:, rows].T @ covariance.shared[:, rows],
+        alike(place[rows], data.direction[rows]),
+    )
+    sizes = np.stack([axis.ravel() for axis in np.meshgrid(SCATTERS, [*GEOMETRIES], [*FORMS], indexing="ij")], axis=1)
+    beyond = np.log(SCATTERS) / np.sqrt(0.5 / noise.freedom)
+    expected = (1.0 + beyond**2 / TAILS) ** (-0.5 * (TAILS + 1.0))
+    prior = expected[:, None, None] * np.array([*GEOMETRIES.values()])[:, None] * np.array([*FORMS.values()])
+    log_weights, away = np.log(prior.ravel()), list[FloatArray]()
+    for out in regions(place[rows], data.point[rows]):
+        left = _left_out(out, jacobian, parts, fit.law_free)
+        log_weights += _log_likelihoods(left @ residual, [left @ part @ left.T for part in parts], sizes**2)
+        away.append(np.diag(left @ parts[2] @ left.T))
+    weights = np.exp(log_weights - log_weights.max())
+    weights /= weights.sum()
+
+    by_reading = fit.covariance @ fit.scatter.precision.times(fit.jacobian.T)  # of each unknown
+    taken_up = by_reading * covariance.own_variance
+    taken_up += covariance.common * covariance.groups.sums(by_reading)[:, covariance.groups.of]
+    own, geometry = _root(taken_up @ by_reading.T), by_reading @ covariance.shared.T
+    left = np.eye(len(rows)) - jacobian @ _estimator(jacobian, parts[0] + parts[1], fit.law_free)
+    near = float(np.diag(left @ parts[2] @ left.T).mean())
+    here = [fit.jacobian @ own, covariance.shared.T - fit.jacobian @ geometry]
+    typical = np.array([*(float((part**2).sum(axis=1).mean()) for part in here), near])
+    factor = _coverage_factor(weights, sizes**2 @ typical)
+    scatter, of_geometry, form = (factor * np.sqrt(weights @ sizes**2)).tolist()
+    return ErrorModel(
+        np.concatenate([scatter * own, of_geometry * geometry], axis=1),
+        of_geometry * noise.strut_spread, of_geometry * noise.joint_error,
+        form * float(np.sqrt(near)), form * float(np.sqrt(max(float(np.concatenate(away).mean()), near))), places,
+    )  # fmt: skip
+
+
+def regions(place: FloatArray, point: TextArray) -> Iterator[IntArray]:
+    """Rows of `coordinates` (n, 6) in regions of as many points each, halved along their longest side."""
+    points, first, which = np.unique(point, return_index=True, return_inverse=True)
+    parts = [np.arange(len(points))]
+    for _ in range(HALVINGS):
+        halves = []
+        for part in parts:
+            here = place[first[part]]
+            order = part[np.argsort(here[:, int(np.ptp(here, axis=0).argmax())], kind="stable")]
+            halves += [order[: len(order) // 2], order[len(order) // 2 :]]
+        parts = halves
+    return (np.flatnonzero(np.isin(which, part)) for part in parts)
+
+
+def _estimator(jacobian: FloatArray, covariance: FloatArray, law_free: bool) -> FloatArray:
+    """(q, n) by how much each reading moves the unknowns of a least-squares fit."""
+    weighted = np.linalg.solve(covariance, jacobian).T
+    information = weighted @ jacobian
+    information[:2, :2] += np.eye(2) * prior_of(law_free)
+    return np.asarray(scaled_inverse(information) @ weighted)
+
+
+def _left_out(out: IntArray, jacobian: FloatArray, parts: Sequence[FloatArray], law_free: bool) -> FloatArray:
+    """(m, n) matrix by which readings make the errors of m that are left out of the fit."""
+    kept = np.delete(np.arange(len(jacobian)), out)
+    covariance = (parts[0] + parts[1])[np.ix_(kept, kept)]
+    left = np.eye(len(jacobian))[out]
+    left[:, kept] = -jacobian[out] @ _estimator(jacobian[kept], covariance, law_free)
+    return left
+
+
+def _log_likelihoods(error: FloatArray, parts: Sequence[FloatArray], squares: FloatArray) -> FloatArray:
+    """(g,) of errors (m,) whose covariance is the three parts (m, m), times `squares` (g, 3)."""
+    lower = np.linalg.cholesky(parts[0])
+
+    def white(part: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.solve(lower, np.linalg.solve(lower, part).T))
+
+    geometry, form, whitened = white(parts[1]), white(parts[2]), np.linalg.solve(lower, error)
+    # Along all other directions there is nothing but scatter to speak of.
+    axes = np.linalg.eigh(geometry + FORM_IN_AXES**2 * form)[1][:, -MOST_DIRECTIONS:]
+    along = axes.T @ whitened
+    whitened_parts = np.stack([np.eye(len(along)), axes.T @ geometry @ axes, axes.T @ form @ axes])
+    covariance = np.tensordot(squares, whitened_parts, axes=1)
+    weighted = np.linalg.solve(covariance, np.broadcast_to(along[:, None], (len(squares), len(along), 1)))[..., 0]
+    scatter, rest = squares[:, 0], float(whitened @ whitened - along @ along)
+    of_rest = rest / scatter + (len(error) - len(along)) * np.log(scatter)
+    return np.asarray(-0.5 * (np.linalg.slogdet(covariance)[1] + weighted @ along + of_rest))
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """(q, q) lower R with R R^T a covariance in very different units; of what was not fitted, 0."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    safe = np.where(scale > 0.0, scale, 1.0)
+    correlation = covariance / np.outer(safe, safe)
+    return np.asarray(scale[:, None] * np.linalg.cholesky(correlation + ROUNDING * np.eye(len(scale))))
+
+
+def _coverage_factor(weights: FloatArray, variances: FloatArray) -> float:
+    """Factor on the root of the mean variance at which 95 % of a mixture of normal errors lie within 1.96 of it."""
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    sd, mean = np.sqrt(variances), float(np.sqrt(weights @ variances))
+
+    def outside(factor: float) -> float:
+        return float(weights @ (2.0 * ndtr(-factor * NORMAL_95 * mean / sd))) - 0.05
+
+    return float(brentq(outside, 0.5, 3.0, xtol=1e-6))

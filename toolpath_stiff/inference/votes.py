@@ -1,0 +1,148 @@
+"""How left-out readings vote between explanations: a name needs more than a probability.
+
+A probability holds the price of an explanation's parameters (Occam's factor). Of two explanations that foretell what
+their fits have not seen equally well it prefers the one with fewer, and so names a part for its bookkeeping. So every
+pose is left out in turn, and its readings are foretold from all the others: strut law and sizes integrated out, what
+struts, joints and clampings have in common known from the other readings (Rasmussen and Williams 2006, Gaussian
+Processes, 2.7 and 5.4.2). The differences of log predictive densities, paired by pose, are the votes.
+
+A rival is outvoted where the sum of them is
+
+- more than `SMALL`: below, two models foretell so much alike that the spread of the differences says little of the
+  error of their sum (Sivula, Magnusson, Matamoros and Vehtari 2020, Uncertainty in Bayesian leave-one-out
+  cross-validation based model comparison, arXiv 2008.10296);
+- above 0 in all but `CHANCE` of the draws of a Bayesian bootstrap over the poses (Rubin 1981), which unlike a standard
+  error sees where one pose carries it all.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document, json_number
+from toolpath_stiff.inference.covariances import Groups, Precision
+from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
+from toolpath_stiff.inference.left_out import HeldOut, held_out
+from toolpath_stiff.inference.noise import REST_COLUMNS
+from toolpath_stiff.inference.size_priors import EXPECTED
+from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.stiffness.contract import SETUP, Effect
+
+SMALL = 4.0
+CHANCE = 0.05  # one-sided
+DRAWS = 2000
+UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
+FEWEST_POSES = 6  # below, no spread over poses can be told
+Votes = Mapping[str, FloatArray]  # rival -> (poses,) log predictive density of the explanation above the rival's
+
+
+def votes(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, FloatArray]:
+    """Votes for an explanation against each rival, the closest rival first.
+
+    Readings that either of the two takes for wild scatter widely for both.
+    """
+    scatter, points = problem.scatter, Groups.by(problem.predictor.data.point)
+    # Other poses would tell how much the rest gives, at no price: as a free part that any explanation has beside it.
+    given = replace(scatter.covariance, shared=scatter.covariance.shared[:-REST_COLUMNS])
+    mine: dict[tuple[int, ...], tuple[Precision, FloatArray]] = {}
+    against = {}
+    for name, rival in rivals.items():
+        wild = tuple(sorted({*fit.scatter.wild, *rival.scatter.wild}))
+        if wild not in mine:
+            rows = np.array(wild, dtype=np.int64)
+            precision = given.widened(rows, scatter.widening[rows]).precision
+            mine[wild] = precision, _log_predictive(fit, precision, points)
+        precision, density = mine[wild]
+        against[name] = density - _log_predictive(rival, precision, points)
+    return closest(against)
+
+
+def _log_predictive(fit: Fit, precision: Precision, points: Groups) -> FloatArray:
+    """(points,) log density of each point's readings given all others, up to a constant of the data."""
+    prior = law_prior(fit.jacobian.shape[1])
+    sizes = np.arange(2, len(prior))
+    # A size is expected to change the stiffness by no more than any effect does.
+    prior[sizes, sizes] = np.mean(fit.jacobian[:, 2:] ** 2, axis=0) / EXPECTED[1] ** 2
+    projected = precision.beside(fit.jacobian.T, prior)
+    pull, density = projected.times(fit.residual), np.zeros(points.count)
+    for which, out in points.by_size():
+        block = projected.block(out)
+        squares = (pull[out] * np.linalg.solve(block, pull[out][..., None])[..., 0]).sum(axis=-1)
+        density[which] = 0.5 * (np.linalg.slogdet(block)[1] - squares)
+    return density
+
+
+def chance_of_losing(differences: FloatArray) -> float:
+    """Share of the draws of a Bayesian bootstrap over poses in which the sum of votes (poses,) is not above 0."""
+    if len(differences) < FEWEST_POSES:
+        return 1.0
+    weights = np.random.default_rng(0).dirichlet(np.ones(len(differences)), DRAWS)
+    return float((weights @ differences <= 0.0).mean())
+
+
+def outvoted(differences: FloatArray) -> bool:
+    """Whether votes (poses,) are against the rival beyond chance."""
+    return float(differences.sum()) > SMALL and chance_of_losing(differences) <= CHANCE
+
+
+def standard_error(differences: FloatArray) -> float:
+    """Of the sum of votes (poses,), paired by pose."""
+    return float(np.sqrt(len(differences)) * differences.std(ddof=1)) if len(differences) > 1 else float("nan")
+
+
+def part_of(effect: Effect) -> str:
+    """The link that an effect sits on; what belongs to one set-up is a part of its own."""
+    return SETUP if SETUP in effect.needs else effect.link
+
+
+def parts_of(fit: Fit) -> tuple[str, ...]:
+    """Of all effects of a fit, in order; none of the model alone."""
+    return tuple(sorted(part_of(candidate.effect) for candidate in fit.candidates))
+
+
+def vote_document(rival: str, differences: FloatArray) -> Document:
+    """Votes against a rival as diagnose.json has them."""
+    return {
+        "rival": rival,
+        "gain": json_number(float(differences.sum()), 3),
+        "standard_error": json_number(standard_error(differences), 3),
+        "chance": json_number(chance_of_losing(differences), 2),
+        "outvoted": outvoted(differences),
+    }
+
+
+def vote_words(rival: str, differences: FloatArray) -> str:
+    """The same as a clause."""
+    gain, error = float(differences.sum()), standard_error(differences)
+    return f"{rival} foretells left-out poses {'worse' if gain > 0.0 else 'better'} by {abs(gain):.1f} +- {error:.1f}"
+
+
+def closest(*ballots: Votes) -> dict[str, FloatArray]:
+    """Votes against each rival in its strongest form, the closest rival first."""
+    names = {name for votes_for in ballots for name in votes_for}
+    strongest = {
+        name: min((votes_for[name] for votes_for in ballots if name in votes_for), key=np.sum) for name in sorted(names)
+    }
+    return dict(sorted(strongest.items(), key=lambda item: (float(item[1].sum()), item[0])))
+
+
+def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
+    """Explanations that one must outvote beside the model alone: those of other parts, those with less of itself.
+
+    `fits`: all explanations by name; of those with more effects the search has its own price.
+    """
+    own, names = parts_of(fit), {*fit.names}
+    others = {name: other for name, other in fits.items() if {*other.names} != names and len(other.names) <= len(names)}
+    return {name: o for name, o in others.items() if parts_of(o) != own or {*o.names} < names}
+
+
+def lowers_error(before: HeldOut, after: HeldOut) -> bool:
+    """Whether an explanation lowers the mean error at left-out points: one that does not is no answer."""
+    return not before.mean_error - after.mean_error <= UNSEEN
+
+
+def left_out_of(fit: Fit, data: Readings) -> HeldOut:
+    """Residuals at the tip's left-out points."""
+    return held_out(fit, data.point).of_readings(data.tip)

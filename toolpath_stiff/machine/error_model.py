@@ -1,0 +1,90 @@
+"""How far a fitted model may be off at a pose, as `[uncertainty.errors]` of a machine file states it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+
+# Over which what a model lacks stays alike; assumed: about half a workspace, half a tilting range.
+RANGE_POSITION, RANGE_ANGLE = 0.25, np.radians(15.0)  # m, rad
+GEOMETRY = 42  # six struts, three coordinates each of twelve joints
+COMMON = 0.5  # share of what a model lacks that is alike at all poses; assumed
+BLOCK = 4096  # poses whose distances to the measured ones are worked out at a time
+FEW = 0.5  # nearness below which a pose counts as away from the measured ones: 1.18 ranges
+
+
+def coordinates(position: FloatArray, angles: FloatArray) -> FloatArray:
+    """(n, 6) places (n, 3) m and angles (n, 3) rad in ranges over which the stiffness stays alike."""
+    return np.concatenate([position / RANGE_POSITION, angles / RANGE_ANGLE], axis=1)
+
+
+def nearness(here: FloatArray, there: FloatArray) -> FloatArray:
+    """(n, m) 1 for the same `coordinates` (n, 6) and (m, 6), falling to 0 with the distance."""
+    # Differences, not squares that nearly cancel: the same pose is exactly 1.
+    distance = sum((here[:, None, axis] - there[None, :, axis]) ** 2 for axis in range(here.shape[1]))
+    return np.asarray(np.exp(-0.5 * distance))
+
+
+def alike(place: FloatArray, direction: FloatArray) -> FloatArray:
+    """(n, n) correlation of what a model lacks at `coordinates` (n, 6) along unit vectors (n, 3)."""
+    return np.asarray((direction @ direction.T) ** 2 * (COMMON + (1.0 - COMMON) * nearness(place, place)))
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """Errors of the logarithm of a model's stiffness: relative, normal, independent of each other.
+
+    Attributes
+    ----------
+    loadings
+        (p, k + 42) errors of p parameters, in the standard deviations that are stated of them, by k independent
+        errors of scatter and by the struts' and joints' own, one standard deviation of each.
+    struts, joints
+        Standard deviations of struts from their law, relative, and of each coordinate of a joint, m.
+    near, away
+        Standard deviation of what the model lacks, relative: at measured poses, and away from all of them.
+    places
+        (m, 6) `coordinates` of the measured poses.
+    """
+
+    loadings: FloatArray
+    struts: float
+    joints: float
+    near: float
+    away: float
+    places: FloatArray
+
+    @property
+    def geometry(self) -> FloatArray:
+        """(42,) standard deviations of the struts and of the joints' coordinates."""
+        return np.repeat([self.struts, self.joints], [6, GEOMETRY - 6])
+
+    @property
+    def poses(self) -> tuple[FloatArray, FloatArray]:
+        """(m, 3) m and (m, 3) rad of the measured poses."""
+        return self.places[:, :3] * RANGE_POSITION, self.places[:, 3:] * RANGE_ANGLE
+
+    def nearness(self, place: FloatArray) -> FloatArray:
+        """(n,) of `coordinates` (n, 6) to the nearest measured pose."""
+        blocks = np.split(place, range(BLOCK, len(place), BLOCK))
+        return np.concatenate([nearness(block, self.places).max(axis=1) for block in blocks])
+
+    def form(self, near: FloatArray) -> FloatArray:
+        """(n,) relative standard deviation of what the model lacks, by `nearness` (n,)."""
+        return np.asarray(np.sqrt(self.away**2 - (self.away**2 - self.near**2) * near))
+
+    def of(self, rows: IntArray | BoolArray | list[int]) -> ErrorModel:
+        """Of some of the parameters."""
+        return replace(self, loadings=self.loadings[rows])
+
+    def beside(self, later: ErrorModel) -> ErrorModel:
+        """Of the parameters of both; struts, joints and form as the later one has them."""
+        first, second = self.loadings, later.loadings
+        known, added = first.shape[1] - GEOMETRY, second.shape[1] - GEOMETRY
+        both = np.zeros((len(first) + len(second), known + added + GEOMETRY))
+        both[: len(first), :known], both[len(first) :, known : known + added] = first[:, :known], second[:, :added]
+        both[:, known + added :] = np.concatenate([first[:, known:], second[:, added:]])
+        return replace(later, loadings=both)
