@@ -38,7 +38,7 @@ def final_walls(work: Workpiece, moves: Moves, samples: Samples, cutters: Mappin
             np.minimum(work.tops(*wall, (np.zeros_like(every), every))[0], work.tops(*inner, (later, every))[0]) - tip
         )
         high = np.minimum(high, np.repeat(stations["longest"], 2))
-        low = np.maximum(work.stock.heights(*wall)[1] - tip, np.repeat(stations["reach"] - stations["flat"], 2))
+        low = np.maximum(work.stock.bottoms(*wall) - tip, np.repeat(stations["reach"] - stations["flat"], 2))
         stands = (high - low > BESIDE) & ~np.repeat(stations["plunge"], 2)
         walls[rows] = np.where(stands[:, None], np.stack([low, high], axis=1), np.nan).reshape(-1, 2, 2)
     return walls
@@ -63,7 +63,7 @@ def final_strip(work: Workpiece, moves: Moves, samples: Samples, cutters: Mappin
         later = np.repeat(np.searchsorted(work.pieces["before"], other, "right"), ACROSS)
         stays = np.abs(work.tops(*points, (np.zeros_like(every), every))[0] - surface) < BESIDE
         stays &= work.tops(*points, (later, every))[0] > surface + TOUCHED
-        stays &= work.stock.heights(*points)[1] < surface
+        stays &= work.stock.bottoms(*points) < surface
         stays = stays.reshape(offset.shape) & ~stations["plunge"][:, None]
         low, high = np.where(stays, offset, np.inf).min(axis=1), np.where(stays, offset, -np.inf).max(axis=1)
         strips[rows] = np.where(stays.any(axis=1)[:, None], np.stack([low, high], axis=1), np.nan)
