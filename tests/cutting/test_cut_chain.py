@@ -105,16 +105,13 @@ def test_of_two_levels_the_deeper_cut_stays(tmp_path):
     lines[2:4] = lines[3:4]
     alone.append(cut_of(parse_program("\n".join(lines), "slot.nc"), tmp_path, deep))
     first, second = (middle(cut) for cut in alone)
-    row = int(np.flatnonzero(both.samples.position[:, 2] == -6e-3)[0]) + middle(both)
     row = max(i for i in np.flatnonzero(both.ap > 0) if abs(both.samples.position[i, 0] - 0.05) < 1e-3)
     assert both.wall_heights[row] == pytest.approx(np.array([[0.0, 6e-3]] * 2), abs=1e-6)
     assert np.isnan(both.wall_mean[first]).all()  # the last pass owns the walls
-    for k, least in ((0, -1), (1, 0)):
-        lows = [alone[0].wall_low[first, k], alone[1].wall_low[second, k]]
-        assert both.wall_low[row, k] >= min(lows) - 1e-9
-        assert both.wall_mean[row, k] <= alone[1].wall_mean[second, k] + 1e-9
-    # Where the second has no slice in cut it stands straight, and the first's left wall stays too deep.
-    assert both.wall_mean[row, 0] == pytest.approx(np.mean([c.wall_mean[r, 0] for c, r in zip(alone, (first, second), strict=True)]), rel=0.25)
+    parts = [(cut.wall_mean[at], cut.wall_low[at]) for cut, at in zip(alone, (first, second), strict=True)]
+    means, lows = np.transpose(parts, (1, 0, 2)).min(axis=1)
+    np.testing.assert_allclose(both.wall_low[row], lows, rtol=0.01)  # a profile is known at nine heights
+    assert (both.wall_mean[row] <= means + 2e-8).all()
 
 
 def test_where_the_work_sits_and_how_it_is_turned_changes_nothing_but_the_machine(tmp_path):
