@@ -7,6 +7,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
@@ -32,11 +33,12 @@ def run_benchmark(
     """
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
     parser.add_argument("--records", type=Path, default=records, help="JSON lines, one a case")
+    parser.add_argument("--resume", action="store_true", help="keep the cases that --records holds")
     parser.add_argument("--table-only", action="store_true", help="print the tables from --records again")
     parser.add_argument("--out", type=Path, default=out, help="markdown file to write")
     args = parser.parse_args(arguments)
     if not args.table_only:
-        run_cases(make_jobs(args), run, args.jobs, args.records)
+        run_cases(make_jobs(args), run, args.jobs, args.records, resume=args.resume)
     made = [json.loads(line) for line in args.records.read_text(encoding="utf-8").splitlines()]
     text, cleared = report(made, f"{parser.prog} {shlex.join(sys.argv[1:] if arguments is None else arguments)}")
     print(text)
@@ -54,10 +56,16 @@ def record_of(heading: Record, work: Callable[[Path], Record]) -> Record:
         return heading | {"error": traceback.format_exc()}
 
 
-def run_cases(jobs: Sequence[Any], run: Callable[[Any], Record], workers: int, into: Path) -> None:
-    """Each record is written as it comes, a line of JSON."""
+def run_cases(
+    jobs: Sequence[Any], run: Callable[[Any], Record], workers: int, into: Path, *, resume: bool = False
+) -> None:
+    """Each record is written as it comes, a line of JSON; `resume` keeps those there of cases that did not break."""
     into.parent.mkdir(parents=True, exist_ok=True)
+    kept = into.read_text(encoding="utf-8").splitlines() if resume and into.exists() else []
+    records = [record for record in map(json.loads, kept) if "error" not in record]
+    jobs = [job for job in jobs if not any(asdict(job).items() <= record.items() for record in records)]
     with into.open("w", encoding="utf-8") as stream, Pool(workers) as pool:
+        stream.writelines(json.dumps(record) + "\n" for record in records)
         for count, record in enumerate(pool.imap_unordered(run, jobs, chunksize=1), 1):
             stream.write(json.dumps(record) + "\n")
             stream.flush()

@@ -7,10 +7,13 @@ from toolpath_stiff.analysis.program_check import ProgramCheck as ProgramCheck
 from toolpath_stiff.analysis.results import Analysis as Analysis
 from toolpath_stiff.api.by_hand import Preview as Preview
 from toolpath_stiff.api.by_hand import preview as preview
+from toolpath_stiff.api.compensation import compare_walls as compare_walls
+from toolpath_stiff.api.compensation import compensate as compensate
 from toolpath_stiff.api.cutting import cut_template as cut_template
 from toolpath_stiff.api.effects import check_effects as check_effects
 from toolpath_stiff.api.effects import effect_template as effect_template
 from toolpath_stiff.api.effects import effects as effects
+from toolpath_stiff.api.forces import forces as forces
 from toolpath_stiff.api.machines import Machine as Machine
 from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
 from toolpath_stiff.api.machines import machine_template as machine_template
@@ -36,8 +39,10 @@ from toolpath_stiff.api.questions import plan as plan
 from toolpath_stiff.api.questions import update as update
 from toolpath_stiff.case.case import Case as Case
 from toolpath_stiff.comparison.compare import Comparison as Comparison
+from toolpath_stiff.comparison.walls import WallComparison as WallComparison
 from toolpath_stiff.correction.draft import EffectDraft as EffectDraft
 from toolpath_stiff.correction.result import Update as Update
+from toolpath_stiff.cutting.compensation import Compensation as Compensation
 from toolpath_stiff.diagnosis.result import Diagnosis as Diagnosis
 from toolpath_stiff.errors import EffectError as EffectError
 from toolpath_stiff.errors import EffectFault as EffectFault
@@ -53,6 +58,7 @@ from toolpath_stiff.placement.case_study import CaseStudy as CaseStudy
 from toolpath_stiff.placement.keep_out import KeepOut as KeepOut
 from toolpath_stiff.placement.result import Placement as Placement
 from toolpath_stiff.planning.result import Plan as Plan
+from toolpath_stiff.readings.forces import CoefficientFit as CoefficientFit
 from toolpath_stiff.readings.raw import Reduction as Reduction
 from toolpath_stiff.readings.raw import reduce as reduce
 from toolpath_stiff.results import TextFile as TextFile

@@ -9,7 +9,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from toolpath_stiff.rig.hidden import HiddenMachine, readings, true_stiffness
+from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.nominal import commanded_lengths, load_nominal, rotations, true_poses
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.unknown import Unknown
@@ -229,7 +229,7 @@ def test_a_coupled_pair_of_struts_bends_reciprocally():
         one = dataclasses.replace(
             SOMEWHERE, direction=np.tile(d, (9, 1)), position=np.tile(SOMEWHERE.position[:1], (9, 1))
         )
-        tensor.append(1.0 / true_stiffness(NIST, hidden, one)[0])
+        tensor.append(1.0 / hidden.stiffness(NIST, one)[0])
     # A linear machine has a symmetric tensor: the diagonals' sum does not depend on the axes.
     assert tensor[0] + tensor[1] == pytest.approx(tensor[2] + tensor[3], rel=1e-12)
 

@@ -57,7 +57,7 @@ def _figures(cut: Cut, rows: IntArray) -> Document:
     """Errors of walls and floors at some samples, the largest force, the volume removed."""
     weight, mean = cut.samples.weight[rows], cut.errors[rows]
     low, high = cut.lowest[rows], cut.highest[rows]
-    force = np.linalg.norm(cut.peak_force[rows], axis=1)
+    force = np.abs(cut.peak_force[rows]).max(axis=1, initial=0.0)
     return {
         "removed_mm3": mm3_from_m3(float(cut.removed[rows].sum())),
         "largest_force_N": float(force.max(initial=0.0)),
@@ -91,7 +91,11 @@ def _worst(path: EvaluatedPath, cut: Cut, sign: float) -> list[Document]:
     size[cut.samples.weight <= 0.0] = -np.inf
     rows, worst = largest_of(cut.samples.line, size)
     chosen = np.argsort(-worst, kind="stable")[:PLACES]
-    return [surface_at(path, cut, *divmod(int(row), 3)) for row, by in zip(rows[chosen], worst[chosen], strict=True) if by > 0.0]
+    return [
+        surface_at(path, cut, *divmod(int(row), 3))
+        for row, by in zip(rows[chosen], worst[chosen], strict=True)
+        if by > 0.0
+    ]
 
 
 def largest_of(group: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -136,7 +140,11 @@ def lines_beyond(cut: Cut, tolerance: float) -> list[tuple[int, float]]:
 def cut_columns(path: EvaluatedPath, cut: Cut, rows: slice = slice(None)) -> dict[str, AnyArray]:
     """Column of `cut.csv` -> values in the shop's units, for some rows."""
     samples, low, high = path.samples, cut.lowest, cut.highest
-    columns: dict[str, AnyArray] = {"line": samples.line[rows], "tool": samples.tool[rows], "s_mm": mm_from_m(samples.s[rows])}
+    columns: dict[str, AnyArray] = {
+        "line": samples.line[rows],
+        "tool": samples.tool[rows],
+        "s_mm": mm_from_m(samples.s[rows]),
+    }
     columns |= {f"{axis}_mm": mm_from_m(samples.position[rows, i]) for i, axis in enumerate("xyz")}
     columns |= {"feed_per_tooth_um": um_from_m(cut.feed_per_tooth[rows])}
     columns |= {f"{name}_mm": mm_from_m(getattr(cut, name)[rows]) for name in ("ap", "ae")}
@@ -156,7 +164,7 @@ def line_columns(cut: Cut) -> dict[str, AnyArray]:
     cuts = np.flatnonzero(cut.samples.cutting)
     cuts = cuts[np.argsort(cut.samples.line[cuts], kind="stable")]
     first = np.flatnonzero(np.diff(cut.samples.line[cuts], prepend=-1))
-    force = np.linalg.norm(cut.peak_force[cuts], axis=1)
+    force = np.abs(cut.peak_force[cuts]).max(axis=1)
     columns: dict[str, AnyArray] = {
         "line": cut.samples.line[cuts[first]],
         "tool": cut.samples.tool[cuts[first]],

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
+from toolpath_stiff.analysis.cut_figures import cut_columns, cut_document, lines_beyond
 from toolpath_stiff.analysis.evaluation import Progress, evaluate
 from toolpath_stiff.analysis.loads import Load, parse_load
 from toolpath_stiff.analysis.statistics import (
@@ -23,6 +24,7 @@ from toolpath_stiff.analysis.statistics import (
 )
 from toolpath_stiff.analysis.uncertainty import band_figures
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
@@ -61,6 +63,8 @@ class Analysis(EvaluatedPath, FolderResult):
         Stiffness that every cut must have, N/m; None: none.
     on_other
         The same on the machine compared with; None without one.
+    cut, tolerance
+        What is cut and the error of the surface, None without a setup of the cut; m that it may have, or None.
 
     Examples
     --------
@@ -88,12 +92,15 @@ class Analysis(EvaluatedPath, FolderResult):
 
     required: float | None = None
     on_other: Analysis | None = None
+    cut: Cut | None = None
+    tolerance: float | None = None
     inputs: tuple[str, ...] = ()
 
     @cached_property
     def warnings(self) -> list[str]:
         """What deserves a look, the program's own warnings included."""
-        return [*map(str, self.program.warnings), *condition_warnings(self.model), *_warnings(self)]
+        of_cut = () if self.cut is None else self.cut.warnings
+        return [*map(str, self.program.warnings), *condition_warnings(self.model), *_warnings(self), *of_cut]
 
     @property
     def moves(self) -> Moves:
@@ -130,13 +137,18 @@ class Analysis(EvaluatedPath, FolderResult):
         return [] if self.required is None else required_stiffness_missed(self, self.required)
 
     @property
+    def beyond_tolerance(self) -> list[tuple[int, float]]:
+        """(line, error of the surface in um) of lines whose surface leaves the tolerance anywhere, worst first."""
+        return [] if self.cut is None or self.tolerance is None else lines_beyond(self.cut, self.tolerance)
+
+    @property
     def deviation_N_per_mm(self) -> FloatArray | None:  # noqa: N802
         """(n,) standard deviation of each sample's stiffness from the fitted parameters; None where none is stated."""
         return None if self.parameter_band is None else n_per_mm_from_n_per_m(self.parameter_band.deviation)
 
     def to_frame(self) -> pd.DataFrame:
-        """The samples as a pandas DataFrame, columns as in `samples.csv` (mm, degrees, N/mm)."""
-        return frame_of(sample_columns(self))
+        """The samples as a pandas DataFrame, columns as in `samples.csv` and `cut.csv` (mm, degrees, N/mm, um)."""
+        return frame_of(sample_columns(self) | ({} if self.cut is None else cut_columns(self, self.cut)))
 
     def to_dict(self) -> Document:
         """The document of `summary.json`."""
@@ -150,6 +162,8 @@ class Analysis(EvaluatedPath, FolderResult):
                 "required_N_per_mm": n_per_mm_from_n_per_m(self.required),
                 "below": without_nan([{"line": line, "min_N_per_mm": low} for line, low in self.below_required]),
             }
+        if self.cut is not None:
+            document["cut"] = without_nan(cut_document(self, self.cut, self.tolerance))
         if self.on_other is not None:
             other = self.on_other.to_dict()
             document["compare"] = compare_summaries(document, other)
@@ -174,7 +188,7 @@ class Analysis(EvaluatedPath, FolderResult):
         self, *, plots: bool = True, table: str = "csv", show_plunges: bool = False
     ) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps analyze`; samples as "csv" or "parquet"."""
-        return self._files(plots, self.view.other_samples(table), show_plunges=show_plunges)
+        return self._files(plots, self.view.unwritten(table, self.cut is not None), show_plunges=show_plunges)
 
 
 def analyze(
@@ -335,7 +349,8 @@ def _assumptions(analysis: Analysis) -> list[str]:
     sentences += [
         f"rapid moves take {mm_per_min_from_m_per_s(machine.rapid_feed):g} mm/min (time only)",
         *conditions_stated(model),
-        f"a force of {analysis.force:g} N for deflections{secant}",
+        f"a force of {analysis.force:g} N for deflections{secant}: these are along the load, under an assumed force, "
+        "not an error of the surface (--cut computes that)",
     ]
     low, high = sorted((mm_from_m(law.length_1), mm_from_m(law.length_2)))
     range_of_law = f"the strut law is extrapolated outside {low:.1f} to {high:.1f} mm of strut length"

@@ -26,7 +26,7 @@ from toolpath_stiff.files import writing_errors
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import arguments_of, checked
 from toolpath_stiff.processes import ProcessPool, death
-from toolpath_stiff.report.analysis import other_samples
+from toolpath_stiff.report.analysis import unwritten
 from toolpath_stiff.report.batch.index import files
 from toolpath_stiff.report.batch.outcomes import ProgramOutcome, columns_of, figures_of, terminal_summary
 from toolpath_stiff.report.batch.programs import RESERVED, Found, Listed, find_programs, report_folders
@@ -172,7 +172,9 @@ def analyze_many(
     for name, value in path_options.items():
         if value is not None:
             arguments[name].check(value)
-    other_samples(table)
+    unwritten(table, cut=False)
+    if any(path_options.get(name) is not None for name in ("cut", "material", "stock_mm", "tolerance_um")):
+        raise InputError("--cut with several programs", expected="one program, as a stock is that of one part")
     listed, given = _listed(programs)
     example = Program.from_text("", **options)
     each = [given.get(program.file) or _in_file(example, program.file) for program in listed]

@@ -11,8 +11,10 @@ import numpy as np
 
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.api import inputs
+from toolpath_stiff.api.cutting import Cutting, Material, StockBox, cut_setup
 from toolpath_stiff.api.inputs import origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Hexapod
@@ -25,12 +27,14 @@ from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import work_path
 from toolpath_stiff.placement.placing import place_program
 from toolpath_stiff.placement.result import Placement, PlacementTask
+from toolpath_stiff.placement.surface_error import errors_of_walls
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
 FARTHEST_TURN_DEG = 720.0
 MOST_FRONT_POINTS = 1000
+ERROR = "error"  # the objective that takes a cut
 Range = tuple[float, float] | float
 
 
@@ -51,13 +55,16 @@ def place(
     ] = (),
     margin_percent: Annotated[float, Option("--margin", "%", at_least=0, below=50)] = 1.0,
     allow_extrapolation: Annotated[bool, Option("--allow-extrapolation")] = False,
-    objective: Annotated[str, Option("--objective", choices=tuple(OBJECTIVES))] = "balanced",
+    objective: Annotated[str, Option("--objective", choices=(*OBJECTIVES, ERROR))] = "balanced",
     points: Annotated[int, Option("--points", at_least=2, at_most=MOST_FRONT_POINTS)] = 60,
     seed: Annotated[int, Option("--seed", at_least=0)] = 1,
     origin_mm_deg: inputs.Origin = None,
     load: inputs.LoadDirection = LOAD,
     step_mm: inputs.Step = 1.0,
     force_N: inputs.Force = FORCE,
+    cut: Cutting = None,
+    material: Material = None,
+    stock_mm: StockBox = None,
     write: Annotated[str | Path | None, Option("--write", "FILE")] = None,
     decimals: inputs.Decimals = None,
     linearise_mm: inputs.Linearised = None,
@@ -82,7 +89,8 @@ def place(
     allow_extrapolation
         Let struts leave the lengths of their law at more samples than now.
     objective
-        Balanced is mean - range; whatever it is, none of mean, range and weakest gets worse where that can be avoided.
+        Balanced is mean - range, error (with `cut`) the error that 95 % of the final walls stay below; whatever it is,
+        none of mean, range and weakest gets worse where that can be avoided.
     points
         Most points of the front.
     seed
@@ -96,6 +104,8 @@ def place(
         Largest distance of two samples.
     force_N
         Size of the load: for deflections, and for effects that depend on it.
+    cut, material, stock_mm
+        For the objective error, as of `analyze`.
     write
         The program itself, transformed so that, run at the present origin, it cuts at the placement: name of its file.
     decimals
@@ -124,12 +134,21 @@ def place(
         raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     on, part = machine_from(machine), program_from(program)
     model, origin = on.running(part), origin_si(origin_mm_deg)
-    default = model.machine.default_origin
+    default, setup = model.machine.default_origin, cut_setup(cut, material, stock_mm)
+    if (objective == ERROR) != (setup is not None):
+        raise InputError(
+            "--objective error and a cut need each other", hint="say --cut FILE, or --material and --stock"
+        )
     read = part.moves(origin, default)
+    present = origin or (read.origin if read.origin_source == "program" else default)
+    errors = None
+    if setup is not None:
+        cut_now = evaluate_cut(model, read, present, setup, m_from_mm(step_mm), progress)
+        errors = errors_of_walls(model, cut_now, present, read.name)
     task = PlacementTask(
         model=model,
         program=read,
-        present=origin or (read.origin if read.origin_source == "program" else default),
+        present=present,
         read=lambda other: part.moves(other, default),
         bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
         rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
@@ -140,6 +159,7 @@ def place(
         decimals=decimals,
         linearise=None if linearise_mm is None else m_from_mm(linearise_mm),
         control=part.request.controller,
+        errors=errors,
     )
     placed = place_program(task, counter(progress, f"{part.name}: search"))
     return replace(placed, inputs=(*part.inputs, *on.inputs))

@@ -8,8 +8,10 @@ from typing import Annotated
 from toolpath_stiff.analysis.program_check import ProgramCheck, check_program
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.results import analyze as analyze_path
+from toolpath_stiff.api.cutting import Cutting, Material, StockBox, Tolerance, cut_setup
 from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
+from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.program import Program, program_from
@@ -20,7 +22,7 @@ from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.path.table import SampledPath
 from toolpath_stiff.placement.case_study import MOST_REGIONS, CaseStudy, Region, run_case_study
 from toolpath_stiff.results import Progress, counter
-from toolpath_stiff.units import m_from_mm, n_per_m_from_n_per_mm
+from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm
 
 Jobs = Annotated[int | None, Option("--jobs", at_least=1)]
 Table = Annotated[str, Option("--format", choices=("csv", "parquet"))]
@@ -39,6 +41,10 @@ def analyze(
     partial: Annotated[bool, Option("--partial")] = False,
     require_N_per_mm: Annotated[float | None, Option("--require", "N/mm", above=0, at_most=1e7)] = None,
     compare_with: Annotated[Machine | str | Path | None, Option("--compare", "MACHINE")] = None,
+    cut: Cutting = None,
+    material: Material = None,
+    stock_mm: StockBox = None,
+    tolerance_um: Tolerance = None,
     progress: Progress | None = None,
 ) -> Analysis:
     r"""Stiffness along the path of a program.
@@ -62,13 +68,21 @@ def analyze(
         Stiffness that every cutting move must have; those below are listed (exit code 3).
     compare_with
         Another machine to analyze the program on.
+    cut
+        Setup file of the cut (`tps cut new` writes one): stock, tools, coefficients. It gives engagement, cutting
+        forces and the error of the surface.
+    material, stock_mm
+        In place of a setup file a packaged material, and the box of the stock, X, Y, Z in mm (or "extents"); the tool
+        table has the tools.
+    tolerance_um
+        Error that the surface may have; lines that leave it are listed (exit code 3).
     progress
         Called with what is being done, samples done, samples in all.
 
     Raises
     ------
     InputError
-        Something in a file or an argument is wrong: where, what was found, what was expected.
+        Something in a file or an argument is wrong or missing: where, what was found, what was expected.
     UnreachableError
         A sample of a cut is out of reach, and `partial` is not set.
 
@@ -81,8 +95,21 @@ def analyze(
     <Analysis: slot.nc on nist, mean 54 353 N/mm, min 53 875 N/mm>
     >>> found.to_frame()[["line", "x_mm", "stiffness_N_per_mm"]].tail(1).round(0).values.tolist()
     [[4.0, 40.0, 53875.0]]
+
+    The error of the surface, with the stock, tool and coefficients of a setup file:
+
+    >>> import pathlib, tempfile
+    >>> wall = "G21 G90 T1 M6 S9000 M3\nG0 X-70 Y44 Z5\nZ-5\nG1 X70 F900\nM2"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = tps.cut_template().save(pathlib.Path(folder, "cut.toml"))
+    ...     found = tps.analyze(tps.Program.from_text(wall), cut=file, tolerance_um=5)
+    >>> [line for line, error_um in found.beyond_tolerance], found.to_dict()["cut"]["walls"]["mean_um"] > 0.0
+    ([4], True)
     """
     first, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
+    setup = cut_setup(cut, material, stock_mm)
+    if tolerance_um is not None and setup is None:
+        raise InputError("--tolerance without a cut", hint="say --cut FILE, or --material and --stock")
     second = first.like(compare_with) if isinstance(compare_with, str | Path) else compare_with
 
     def on(machine: Machine, other: Machine | None, progress: Callable[[int, int], None] | None) -> Analysis:
@@ -93,11 +120,18 @@ def analyze(
             model, read, origin=origin, load=load, step=step, force=force_N, partial=partial, progress=progress
         )
 
+    analysis = on(first, second, counter(progress, f"{part.name}: samples"))
+    cut_of = None
+    if setup is not None:
+        at = (analysis.program, analysis.origin, setup, analysis.step)
+        cut_of = evaluate_cut(analysis.model, *at, progress)
     return replace(
-        on(first, second, counter(progress, f"{part.name}: samples")),
+        analysis,
+        cut=cut_of,
+        tolerance=None if tolerance_um is None else m_from_um(tolerance_um),
         on_other=None if second is None else on(second, first, None),
         required=None if require_N_per_mm is None else n_per_m_from_n_per_mm(require_N_per_mm),
-        inputs=(*part.inputs, *first.inputs, *(second.inputs if second else ())),
+        inputs=(*part.inputs, *first.inputs, *(second.inputs if second else ()), *(setup.inputs if setup else ())),
     )
 
 

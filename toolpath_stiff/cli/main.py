@@ -26,6 +26,10 @@ GROUPS = {
         "place": "where the work should sit: Pareto front and one recommended placement",
         "case-study": "the paper's four regions: one path at two heights, displaced and turned",
     },
+    "cutting": {
+        "cut": "what a cut is computed from: setup files, materials",
+        "compensate": "a program shifted against the deflection of its final walls",
+    },
     "machine": {
         "pose": "stiffness, softest and stiffest direction, strut lengths at single poses",
         "map": "stiffness over planes of the workspace: picture, table, 3-D page",
@@ -36,6 +40,7 @@ GROUPS = {
         "compare": "where the model fails: errors, structure in the residuals, pictures, page",
         "diagnose": "which physical effect the model lacks, if any: verdict, candidates, confounding",
         "update": "fit effects to measurements, see how far the error falls, write the machine file",
+        "forces": "coefficients of the cutting force from dynamometer records of slots",
         "plan": "what to measure next to tell explanations apart, or a first campaign",
     },
     "effects": {"effects": "physical effects that a machine can carry; write your own"},

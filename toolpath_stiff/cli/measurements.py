@@ -8,6 +8,7 @@ from typing import Annotated
 import toolpath_stiff as tps
 from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import DATA, FILES, FOLDER, JSON, NO_PLOTS, REPLACE, command
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import Option
 from toolpath_stiff.workbooks import split_name
 
@@ -58,7 +59,7 @@ def reduce(
     return run.show(args, reduction, f"\nwrote {' and '.join(written)}", document=lambda: document)
 
 
-@command("compare", DATA, "Machine.load", "compare", *FOLDER)
+@command("compare", DATA, "Machine.load", "compare", "compare_walls", "Program.read", *FOLDER)
 def compare(args: Namespace) -> int:
     """Where the model fails: errors, structure in the residuals, pictures, page.
 
@@ -66,12 +67,17 @@ def compare(args: Namespace) -> int:
       tps compare nist-table1
       tps compare measurements.csv --machine my_machine.toml
       tps compare first.csv second.csv --noise 2,1 --out reports/again
+      tps compare points.csv --program part.nc --cut cut.toml        measured walls of a part
 
     The machine file is compared as it stands; `tps diagnose` asks which effect it lacks. A finding is a pattern in the
     residuals that fewer than 5 % of campaigns of mere scatter would show anywhere among all patterns looked for.
     Files written to --out: compare.json, residuals.csv, report.html, measured_modelled.png, machine.png,
-    variables.png.
+    variables.png. With --cut DATA are points of a part's walls, and compare.json and residuals.csv are written.
     """
+    if args.cut or args.material or args.stock_mm:
+        if len(args.data) != 1:
+            raise InputError("several files of measured walls", expected="a file")
+        return run.to_folder(args, tps.compare_walls, tps.WallComparison, args.data, data=args.data[0])
     return run.to_folder(args, tps.compare, tps.Comparison, args.data)
 
 
@@ -141,3 +147,27 @@ def plan(
     Files written to --out: plan.csv (a measurement file with the stiffness left empty), plan.json and plan.png.
     """
     return run.to_folder(args, tps.plan, tps.Plan, data or [args.machine], minutes=dict(args.minutes or ()))
+
+
+@command("forces", "forces", *FOLDER)
+def forces(args: Namespace, records: Annotated[Sequence[str], Option("RECORDS", count="+")]) -> int:
+    """Coefficients of the cutting force from dynamometer records of slots.
+
+    columns of RECORDS, a row a moment:
+      time_s, fx_N, fy_N, fz_N     what the dynamometer reads: forces on the work; fx and fz may lack
+      feed_per_tooth_mm            or feed_mm_per_min; the same in all rows of a record, as are
+      spindle_rpm, depth_mm        speed and depth of the slot
+      record                       tells several records of a file apart
+    Other names and units are said by a mapping, also kept as RECORDS.columns.toml; "==" is one value for all rows:
+      tps forces s1.csv s2.csv s3.csv --cut cut.toml --columns "fx=Kraft X:kN, spindle_rpm==6000, depth==3"
+
+    Slots of full width at three feeds or more, best five, with air before and after the cut. Whole turns are averaged,
+    so that run-out cancels; the zero is a line through the air. What comes out goes into a setup file as
+    [coefficients] with file = "forces.json". Files written to --out: forces.json, forces.csv, forces.png.
+
+    Parameters
+    ----------
+    records
+        Records: files, FILE.xlsx[#SHEET].
+    """
+    return run.to_folder(args, tps.forces, tps.CoefficientFit, records, records=records)

@@ -13,7 +13,7 @@ from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FOLDER, JSON, PROGRAM, REPLACE, command
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import Option, numbers
-from toolpath_stiff.report.analysis import other_samples
+from toolpath_stiff.report.analysis import unwritten
 from toolpath_stiff.report.batch.programs import find_programs
 
 BELOW_REQUIRED = 3  # exit code
@@ -37,6 +37,7 @@ def analyze(
     for example:
       tps analyze programs/pocket.nc --origin 100,-50,800 --load normal --require 40000
       tps analyze programs more/part.nc --jobs 4    all programs of a folder and one more, four at a time
+      tps analyze programs/pocket.nc --cut programs/pocket_cut.toml --tolerance 20    the error of the surface, um
 
     plunges:
       With the tangential load, cuts along the tool axis (within 5 degrees of it) are left out of mean, range, weakest
@@ -49,6 +50,11 @@ def analyze(
       path.png      three views of the path coloured by stiffness
       profile.png   stiffness along the path
       report.html   the path in 3-D, linked to profile and program text; one file, no network
+      with --cut also
+      cut.csv       every sample: engagement, forces, deflection, error of left wall, right wall and floor
+      cut_lines.csv the same by line
+      surface.vtk   the finished part with its error in um, for ParaView and the like
+      cut.png       the finished part, coloured by its error
 
     several programs, or a folder:
       a folder stands for the programs in it and below it: .nc .ngc .tap .cnc .gcode .gc .eia .mpf .min, and the
@@ -60,7 +66,8 @@ def analyze(
       A program that fails does not stop the others and is named at the end.
 
     exit code
-      one program: 0 done; 1 --partial left samples out; 2 the input is wrong; 3 a cutting move is below --require
+      one program: 0 done; 1 --partial left samples out; 2 the input is wrong; 3 a cutting move is below --require, or
+      a surface leaves --tolerance
       several: 0 done; 1 a program failed, or --partial left samples out; 2 the arguments are wrong, nothing was
       started;
       3 a cutting move is below --require and no program failed
@@ -96,10 +103,11 @@ def analyze(
         code = (BELOW_REQUIRED if analyses.below_required else 0) if analyses.complete else INCOMPLETE
         return run.show(args, analyses, run.written_text(analyses.written), code=code)
     file = files[0].file
-    folder, rules = run.destination(args, tps.Analysis, [file], other_samples(table))
+    folder, rules = run.destination(args, tps.Analysis, [file], unwritten(table, bool(args.cut or args.material)))
     analysis = run.call(args, tps.analyze, program=tps.Program.read(file, **run.given(args, tps.Program.read)))
     written = analysis.save(folder, plots=plots, rules=rules, table=table, show_plunges=show_plunges)
-    code = BELOW_REQUIRED if analysis.below_required else 0 if analysis.complete else INCOMPLETE
+    missed = analysis.below_required or analysis.beyond_tolerance
+    code = BELOW_REQUIRED if missed else 0 if analysis.complete else INCOMPLETE
     return run.show(args, analysis, run.written_text(written), code=code)
 
 

@@ -48,7 +48,7 @@ def call(args: Namespace, function: Callable[..., Made], **more: Any) -> Made:
     values = given(args, function) | more
     if "program" in parameters and "program" not in more:
         values["program"] = tps.Program.read(args.program, **given(args, tps.Program.read)) if args.program else None
-    if "data" in parameters:
+    if "data" in parameters and "data" not in more:
         values["data"] = tps.Measurements(args.data, args.columns) if args.data else None
     if "machine" in parameters and "machine" not in more:
         values["machine"] = machine_for(args)

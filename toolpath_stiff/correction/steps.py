@@ -143,6 +143,8 @@ class Support:
         Fall of the error at left-out points over its standard error; None where nothing can be left out.
     likelihood_gain, threshold
         Twice the log likelihood gained, in units of the scatter that remains; what chance alone reaches.
+    instruments
+        Of an effect of the machine: errors of the instrument that foretell left-out poses as well.
     """
 
     effect: str
@@ -153,6 +155,7 @@ class Support:
     held_out_gain_in_se: float | None
     likelihood_gain: float | None
     threshold: float | None
+    instruments: tuple[str, ...] = ()
 
 
 def dispersion(fit: Fit) -> float:

@@ -13,6 +13,7 @@ from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings
 
+MACHINE = "machine"
 LIKELIHOOD, MEAN_ERROR = "likelihood", "mean-error"
 
 
@@ -34,6 +35,8 @@ class UpdateTask:
         Go on adding effects while the data support them.
     force
         Keep what the data do not support, or readings hardly of this machine; never what fits worse than `machine`.
+    believe
+        `MACHINE`: what an error of the instrument would show as well is taken for the machine's; None: it is refused.
     objective
         `LIKELIHOOD`; or `MEAN_ERROR`, the paper's own estimation, of the strut law alone.
     noise, strut_spread, effect_files, seed, progress
@@ -53,6 +56,7 @@ class UpdateTask:
     keep_strut_law: bool = False
     auto: bool = False
     force: bool = False
+    believe: str | None = None
     objective: str = LIKELIHOOD
     noise: float | tuple[float, float] | None = None
     strut_spread: float = STRUT_SPREAD

@@ -8,6 +8,8 @@ An effect is supported if
 
 - the error at left-out points falls by more than one standard error of that fall, paired by point;
 - no parameter ends at its upper bound, and not all end at zero;
+- of an effect of the machine, no error of the instrument foretells left-out poses as well (`inference.votes`), unless
+  the user believes that it is the machine;
 - its gain in likelihood, the strut law refitted with and without it, is more than the best of all candidates reaches
   by chance in one campaign of twenty: the relative gate of the diagnosis. The gain is counted in units of the scatter
   that remains, so that data which no effect explains do not lend every effect significance.
@@ -27,7 +29,7 @@ from toolpath_stiff.correction.machines import data_hash, fitted_machine
 from toolpath_stiff.correction.result import NEEDED, Update
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.strut_law import bar_curve, leave_points_out, minimise_mean_error, resampled_covariance
-from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
+from toolpath_stiff.correction.task import MACHINE, MEAN_ERROR, UpdateTask
 from toolpath_stiff.diagnosis.diagnose import check_measured
 from toolpath_stiff.diagnosis.examination import percent_of
 from toolpath_stiff.documents import json_number
@@ -42,7 +44,10 @@ from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import score_families, signatures, tables_of
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.votes import outvoted, votes
+from toolpath_stiff.planning.plan import telling
 from toolpath_stiff.stiffness.model import build_model
+from toolpath_stiff.stiffness.sizes import joined
 
 TRIED = 4  # candidates a step of `--auto`, the most likely first
 MOST_EFFECTS = 4  # that `--auto` adds
@@ -80,7 +85,8 @@ def update(task: UpdateTask) -> Update:
     # Where its results go does not matter to the command that repeats the fit.
     words = options(
         add=list(task.add), strut_law=task.strut_law, keep_strut_law=task.keep_strut_law, auto=task.auto,
-        force=task.force, objective=task.objective if task.objective == MEAN_ERROR else None, seed=task.seed or None,
+        force=task.force, believe=task.believe, objective=task.objective if task.objective == MEAN_ERROR else None,
+        seed=task.seed or None,
     )  # fmt: skip
     # No date: the same data and command give the same bytes.
     provenance = {
@@ -235,10 +241,28 @@ def _support(
             f"twice the log likelihood rises by {gained:.1f}: the best of all candidates gains {others.threshold:.1f} "
             "by chance once in twenty campaigns"
         )
+    instruments = _instruments(others.problem, none, alone)
+    if instruments and task.believe != MACHINE:
+        tells = joined([f"{tells} would tell {name}" for name, tells in instruments.items()])
+        reasons.append(
+            f"an error of the instrument foretells left-out poses as well: {joined(list(instruments))}; {tells}; "
+            "--believe machine (believe='machine') takes it for the machine's"
+        )
     return Support(
         fit.names[j], not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
-        json_number(in_se, 3), json_number(gained), json_number(others.threshold),
+        json_number(in_se, 3), json_number(gained), json_number(others.threshold), tuple(instruments),
     )  # fmt: skip
+
+
+def _instruments(problem: Problem, none: Fit, alone: Fit) -> dict[str, str]:
+    """Errors of the instrument that an effect of the machine has not outvoted -> the reading that would tell."""
+    if alone.candidates[0].effect.is_instrument:
+        return {}
+    effects = [effect for effect in testable_effects(problem.predictor)[0] if effect.is_instrument]
+    bests = {family.name: family.best for family in score_families(problem, effects, none) if family.best is not None}
+    against = votes(problem, alone, bests)
+    told_by = {effect.name: telling(effect).removeprefix("none: ") for effect in effects}
+    return {name: told_by[name] for name, differences in against.items() if not outvoted(differences)}
 
 
 def _next_effect(task: UpdateTask, before: LadderStep) -> tuple[LadderStep | None, list[Support]]:

@@ -196,6 +196,8 @@ def _covariance(table: Document, values: FloatArray, fault: Fault) -> FloatArray
     rows = table.get("covariance")
     if rows is None:
         return None
+    if "spread_percent" in table:
+        raise fault("spread_percent", "spread_percent beside a covariance", "one of them")
     try:
         covariance = np.array(rows, dtype=float)
     except (TypeError, ValueError):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
@@ -14,9 +15,11 @@ from toolpath_stiff.cutting.final_surface import final_strip, final_walls
 from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.patches import Patches
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
+from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import floor_error, shares, wall_error
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
+from toolpath_stiff.cutting.workpiece import Workpiece, workpiece_of
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.poses import Pose
@@ -26,6 +29,7 @@ from toolpath_stiff.units import per_min_from_rad_per_s
 
 BLOCK = 16_384  # stations at a time
 MOST_NAMED = 5  # lines in a warning
+ROUNDED = 1e-12  # of a cosine
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -39,8 +43,8 @@ class Cut:
     ----------
     samples
         In the set-up frame, row for row those of the analysis.
-    cutters, stock, coefficients
-        By tool number; in the set-up frame; of the cutting force.
+    cutters, work, coefficients
+        By tool number; the stock and what is taken from it, set-up frame; of the cutting force.
     feed_per_tooth
         (n,) m.
     ap, ae, entry, exit, removed
@@ -52,8 +56,10 @@ class Cut:
         (n, 3) m of tip and tool under the mean force.
     wall_heights
         (n, 2, 2) m above the tip: of the left and right wall that stays, lowest and highest point.
+    wall_force
+        (n, 2, 3) N, force when the left and right wall is made, mean over its height: the one behind its mean error.
     errors, lowest, highest
-        (n, 3) m, error of left wall, right wall, and the floor or a ball's contact: mean over height or width, extremes.
+        (n, 3) m, error of left wall, right wall, and the floor or a ball's contact: mean over it, extremes.
     deviation
         (n, 3) m, standard deviation of `errors`, from the coefficients and the machine.
     assumptions, warnings
@@ -62,7 +68,7 @@ class Cut:
 
     samples: Samples
     cutters: Mapping[int, Cutter]
-    stock: Stock
+    work: Workpiece
     coefficients: Coefficients
     feed_per_tooth: FloatArray
     ap: FloatArray
@@ -74,12 +80,18 @@ class Cut:
     peak_force: FloatArray
     deflection: FloatArray
     wall_heights: FloatArray
+    wall_force: FloatArray
     errors: FloatArray
     lowest: FloatArray
     highest: FloatArray
     deviation: FloatArray
-    assumptions: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    assumptions: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def stock(self) -> Stock:
+        """The stock before the first cut."""
+        return self.work.stock
 
     @property
     def wall_mean(self) -> FloatArray:
@@ -127,15 +139,19 @@ def evaluate_cut(
         Something is missing (which, and where to write it), or a tool is tilted.
     """
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
-    spindle, stock = spindle_of(setup, program, samples), stock_of(setup, program.moves, cutters)
-    cut = _nothing_cut(samples, cutters, stock, setup.coefficients, spindle)
-    parts, removed = [], np.zeros(len(samples))
-    for rows, some, volume in engage(stock, program.moves, samples, cutters, progress):
-        removed[rows] = volume
+    spindle = spindle_of(setup, program, samples)
+    work = workpiece_of(stock_of(setup, program.moves, cutters), program.moves, cutters)
+    cut = _nothing_cut(samples, cutters, work, setup.coefficients, spindle)
+    given, parts, removed = (work, program.moves, samples, cutters), [], np.zeros(len(samples))
+    for block, some, volume in engage(*given, progress):
+        removed[block] = volume
         parts.append(some)
     patches = Patches.joined(parts)
-    walls, strips = final_walls(stock, program.moves, samples, cutters), final_strip(stock, program.moves, samples, cutters)
+    walls, strips = final_walls(*given), final_strip(*given)
     cut = replace(cut, removed=removed, wall_heights=walls)
+    made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
+    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
+        values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
     _note_engagement(cut, patches)
     for number, cutter in cutters.items():
         engaged = np.zeros(len(samples), dtype=bool)
@@ -147,7 +163,7 @@ def evaluate_cut(
 
 
 def _nothing_cut(
-    samples: Samples, cutters: Mapping[int, Cutter], stock: Stock, coefficients: Coefficients, spindle: FloatArray
+    samples: Samples, cutters: Mapping[int, Cutter], work: Workpiece, coefficients: Coefficients, spindle: FloatArray
 ) -> Cut:
     """A cut to be filled in."""
     n = len(samples)
@@ -156,11 +172,20 @@ def _nothing_cut(
         teeth[samples.tool == number] = cutter.flutes
     turning = samples.cutting & (np.abs(spindle) > 0.0)
     per_second = np.where(turning, teeth * np.abs(spindle) / (2.0 * np.pi), 1.0)
-    zeros, nan = np.zeros((6, n)), np.full((4, n, 3), np.nan)
     return Cut(
-        samples, cutters, stock, coefficients, np.where(turning, samples.feed / per_second, np.nan), *zeros[:5],
-        *np.zeros((3, n, 3)), np.full((n, 2, 2), np.nan), *nan,
-    )  # fmt: skip
+        samples=samples,
+        cutters=cutters,
+        work=work,
+        coefficients=coefficients,
+        feed_per_tooth=np.where(turning, samples.feed / per_second, np.nan),
+        **{name: np.zeros(n) for name in ("ap", "ae", "entry", "exit", "removed")},
+        **{name: np.zeros((n, 3)) for name in ("mean_force", "peak_force", "deflection")},
+        wall_heights=np.full((n, 2, 2), np.nan),
+        wall_force=np.full((n, 2, 3), np.nan),
+        **{name: np.full((n, 3), np.nan) for name in ("errors", "lowest", "highest", "deviation")},
+        assumptions=(),
+        warnings=(),
+    )
 
 
 def _note_engagement(cut: Cut, patches: Patches) -> None:
@@ -203,11 +228,11 @@ def _evaluate(
     given = (kept, cutter, cut.coefficients, feed, turning)
     mean = mean_force(*given)
     cut.mean_force[rows], cut.peak_force[rows] = mean, peak_force(*given)
-    axes = station_axes(np.arctan2(samples.tangent[:, 1], samples.tangent[:, 0]), origin)
+    axes = station_axes(headings(samples), origin)
     machine = tip_compliances(model, samples, origin, axes, mean)
     whole = with_tools(machine, samples, cut.cutters)
     cut.deflection[rows] = product(whole, mean[:, :, None])[..., 0]
-    walls, of_walls = wall_error(*given, whole, cut.wall_heights[rows])
+    walls, of_walls, cut.wall_force[rows] = wall_error(*given, whole, cut.wall_heights[rows])
     floors, of_floors = floor_error(*given, whole, strips[rows])
     _enter(cut, rows, slice(0, 2), walls @ shares()[1], walls)
     _enter(cut, rows, slice(2, 3), floors.mean(axis=1)[:, None], floors[:, None])
@@ -226,12 +251,16 @@ def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: 
 
 def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str, ...]:
     """All that was assumed, a sentence each."""
-    sentences = [f"stock: {cut.stock.origin}", f"coefficients of {cut.coefficients.material}: {cut.coefficients.origin}"]
+    sentences = [
+        f"stock: {cut.stock.origin}",
+        f"coefficients of {cut.coefficients.material}: {cut.coefficients.origin}",
+    ]
     sentences += [sentence for cutter in cut.cutters.values() for sentence in cutter.origin]
     sentences += [
-        "the errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; the chip "
+        "errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; the chip "
         "is not thinner for them",
-        "a spring pass cuts the stock as programmed, not what the pass before left by its error",
+        "a spring pass meets the part as programmed, not what the pass before left by its error: where it takes "
+        "nothing off, its error counts as 0",
     ]
     if model.load_dependent:
         sentences.append("effects that depend on the load act as under the mean force of a turn")
@@ -247,12 +276,14 @@ def _warnings(cut: Cut) -> tuple[str, ...]:
     if cut.machine_only:
         numbers = [f"T{number}" for number, cutter in cut.cutters.items() if np.isnan(cutter.lateral_compliance)]
         warnings.append(
-            f"machine only: the compliance of {', '.join(numbers)} is not known, and a slim tool gives way more than the "
-            "machine (stick_out_mm in [[tool]] of cut.toml)"
+            f"machine only: the compliance of {', '.join(numbers)} is not known, and a slim tool gives way more than "
+            "the machine (stick_out_mm in [[tool]] of cut.toml)"
         )
     engaged = cut.ap > 0.0
-    plunges = samples.cutting & ~engaged & (cut.removed > 0.0)
-    warnings += _lines_warning(samples, plunges, "plunges: cutting with the end is not modelled, no force is known there")
+    plunges = (cut.removed > 0.0) & (np.abs(samples.tangent[:, 2]) >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
+    warnings += _lines_warning(
+        samples, plunges, "plunges: cutting with the end is not modelled, no force is known there"
+    )
     chip = np.where(engaged, cut.feed_per_tooth, np.nan)
     thin, thick = cut.coefficients.thinnest, cut.coefficients.thickest
     for beyond, words in ((chip < thin, "thinner"), (chip > thick, "thicker")):

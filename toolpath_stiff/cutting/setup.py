@@ -16,7 +16,7 @@ from toolpath_stiff.cutting.cutters import Cutter, cutter_of, merged_tool
 from toolpath_stiff.cutting.stock import Stock, box_stock, stock_from_stl, stock_of_extents
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.courses import extents
+from toolpath_stiff.nc.courses import Extents, extents
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.nc.tables import ToolEntry, tool_of, tools_of
 from toolpath_stiff.path.sampling import Samples
@@ -64,6 +64,11 @@ class CutSetup:
     spindle: float = math.nan
     file: str = ""
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The files that it was read from."""
+        return tuple(name for name in (self.file, self.body) if name)
+
 
 def read_setup(file: str | Path) -> CutSetup:
     """The setup of a file. Raises `InputError` with line and key."""
@@ -109,7 +114,8 @@ def _stock_in(
     toml.only("stock", table, ("box_mm", "corner_mm", "extents", "stl"))
     kinds = [key for key in ("box_mm", "extents", "stl") if key in table]
     if len(kinds) != 1:
-        raise toml.error(f"[stock] with {' and '.join(kinds) or 'nothing'}", "one of box_mm, extents, stl", where="stock")
+        kind = " and ".join(kinds) or "nothing"
+        raise toml.error(f"[stock] with {kind}", "one of box_mm, extents, stl", where="stock")
     if "corner_mm" in table and kinds != ["box_mm"]:
         raise toml.error("stock.corner_mm without box_mm", "the box that it is of", where="stock.corner_mm")
     size = corner = None
@@ -180,17 +186,22 @@ def stock_of(setup: CutSetup, moves: Moves, cutters: Mapping[int, Cutter]) -> St
         return stock_of_extents(moves, cutters)
     low, origin = setup.corner, "given"
     if low is None:
-        cuts = extents(moves.take(moves.motion != RAPID))
-        places = []
-        for axis, size in zip("xy", setup.size, strict=False):
-            middle = m_from_mm(0.5 * (cuts[axis][0] + cuts[axis][1]))
-            places.append(min((-0.5 * size, 0.0, -size), key=lambda low, size=size, m=middle: abs(low + 0.5 * size - m)))
-        above = cuts["z"][1] > 0.0 and cuts["z"][0] >= 0.0
-        low = (*places, 0.0 if above else -setup.size[2])
+        low = _usual_corner(setup.size, extents(moves.take(moves.motion != RAPID)))
         corner = ", ".join(f"{mm_from_m(value) + 0.0:g}" for value in low)
         origin = f"its place is assumed: lowest corner at {corner} mm (corner_mm in [stock] of cut.toml says otherwise)"
-    x, y, z = (edge + size for edge, size in zip(low, setup.size, strict=True))
-    return box_stock((low[0], low[1], low[2]), (x, y, z), origin)
+    (x, y, z), (width, depth, height) = low, setup.size
+    return box_stock(low, (x + width, y + depth, z + height), origin)
+
+
+def _usual_corner(size: tuple[float, float, float], cuts: Extents) -> tuple[float, float, float]:
+    """The lowest corner of a box around program zero, m; `cuts` in mm."""
+
+    def nearest(axis: str, edge: float) -> float:
+        middle = m_from_mm(0.5 * (cuts[axis][0] + cuts[axis][1]))
+        return min((-0.5 * edge, 0.0, -edge), key=lambda low: abs(low + 0.5 * edge - middle))
+
+    above = cuts["z"][1] > 0.0 and cuts["z"][0] >= 0.0
+    return nearest("x", size[0]), nearest("y", size[1]), 0.0 if above else -size[2]
 
 
 def spindle_of(setup: CutSetup, program: ReadProgram, samples: Samples) -> FloatArray:

@@ -1,6 +1,6 @@
 """Stations: places along the cutting path with the cutter there, one record each; SI, set-up frame."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from toolpath_stiff.nc.courses import move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.path.sampling import Samples
 
+BLOCK = 2048  # stations at a time
 # The front of the cutter would touch what the pieces just before have left: these are taken for smaller by SLACK. It is
 # above the rounding of coordinates (4 decimals of a mm); a turn of the tool moves it on by much more.
 RECENT, SLACK = 0.05, 5e-7  # radii of the cutter along the path; m
@@ -22,6 +23,8 @@ STATION = np.dtype([
     *((name, np.float64) for name in ("ahead_x", "ahead_y")),  # unit vector of the motion in the plane
     *((name, np.float64) for name in ("level", "down")),  # parts of the motion in the plane and down the axis
     *((name, np.float64) for name in ("reach", "flat", "longest")),  # cutter: radius, of its flat end, cutting length
+    ("move", np.int64),
+    ("share", np.float64),  # of the move
     ("piece", np.int64),  # the station's own
     ("recent", np.int64),  # first piece of those just before
     ("path", np.float64),  # from the program's start
@@ -48,33 +51,47 @@ def stations_along(
         stations["longest"][rows] = np.nan_to_num(cutter.cutting_length, nan=np.inf)
     counts = np.diff(work.first)[move]
     stations["piece"] = work.first[move] + np.minimum((share * counts + 1e-9).astype(np.int64), counts - 1)
+    stations["move"], stations["share"] = move, share
     stations["path"] = (np.cumsum(length) - length)[move] + share * length[move]
     stations["recent"] = np.searchsorted(work.pieces["after"], stations["path"] - RECENT * stations["reach"], "right")
     return stations
 
 
-def cutting_samples(moves: Moves, samples: Samples) -> tuple[IntArray, FloatArray]:
-    """Rows of the samples that lie on cutting moves of some length, and their shares of these."""
+def blocks_of_stations(
+    work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]
+) -> Iterator[tuple[IntArray, AnyArray]]:
+    """Rows of samples that lie on cutting moves of some length, and their records, in blocks."""
     length = move_lengths(moves)
+    before = np.cumsum(length) - length
     rows = np.flatnonzero((moves.motion[samples.move] != RAPID) & (length[samples.move] > 0.0))
-    move = samples.move[rows]
-    return rows, np.clip((samples.s[rows] - (np.cumsum(length) - length)[move]) / length[move], 0.0, 1.0)
+    for first in range(0, len(rows), BLOCK):
+        some = rows[first : first + BLOCK]
+        move = samples.move[some]
+        share = np.clip((samples.s[some] - before[move]) / length[move], 0.0, 1.0)
+        yield some, stations_along(work, moves, cutters, move, share)
+
+
+def headings(samples: Samples) -> FloatArray:
+    """(n,) rad from x to y, the direction in the plane that the angles of each sample's contact start from."""
+    return np.asarray(np.arctan2(samples.tangent[:, 1], samples.tangent[:, 0]))
+
+
+def points_around(stations: AnyArray, radius: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """x, y, m, of points around the axis, end to end; radius and angle (from the left, clockwise) are (n, ...)."""
+    radius, angle = np.broadcast_arrays(radius, angle)
+    each = stations[np.repeat(np.arange(len(stations)), radius[0].size if len(stations) else 0)]
+    across, ahead = (radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel()
+    x = each["x"] + ahead * each["ahead_x"] - across * each["ahead_y"]
+    return x, each["y"] + ahead * each["ahead_y"] + across * each["ahead_x"]
 
 
 def heights_around(
     work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Top of the material before each station, and underside of the stock, m above the tip, at points around the axis.
-
-    `radius`, m, and `angle`, rad from the left of the feed, clockwise, have the stations (n,) first.
-    """
-    radius, angle = np.broadcast_arrays(radius, angle)
-    each = np.repeat(np.arange(len(stations)), radius[0].size if len(stations) else 0)
-    at_each = stations[each]
-    across, ahead = (radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel()
-    x = at_each["x"] + ahead * at_each["ahead_x"] - across * at_each["ahead_y"]
-    y = at_each["y"] + ahead * at_each["ahead_y"] + across * at_each["ahead_x"]
-    before = np.zeros(len(x), dtype=np.int64), at_each["piece"]
-    top = work.tops(x, y, before, at_each["recent"], SLACK)[0]
+    """Top of the material before each station, underside of the stock, m above the tip; points as `points_around`."""
+    shape = np.broadcast_shapes(radius.shape, angle.shape)
+    x, y = points_around(stations, radius, angle)
+    each = stations[np.repeat(np.arange(len(stations)), len(x) // max(len(stations), 1))]
+    top = work.tops(x, y, (np.zeros(len(x), dtype=np.int64), each["piece"]), each["recent"], SLACK)[0]
     bottom = work.stock.heights(x, y)[1]
-    return (top - at_each["z"]).reshape(radius.shape), (bottom - at_each["z"]).reshape(radius.shape)
+    return (top - each["z"]).reshape(shape), (bottom - each["z"]).reshape(shape)

@@ -24,7 +24,7 @@ from toolpath_stiff.cutting.patches import Patches
 
 HEIGHTS = 9  # of a wall at which its error is computed, both ends among them
 STRIPS = 5  # of a floor
-Surface = tuple[FloatArray, FloatArray]  # error (n, ...) m, and the standard deviation (n, ...) m of its mean
+Passes = tuple[FloatArray, ...]  # errors (n, h) m, their slopes (n, h, 6) over the coefficients, forces (n, h, 3) N
 
 
 def shares() -> tuple[FloatArray, FloatArray]:
@@ -46,7 +46,7 @@ def wall_error(
     turning: FloatArray,
     compliance: FloatArray,
     walls: FloatArray,
-) -> Surface:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(n, 2, HEIGHTS) m, error of the walls to the left and right of n stations, from lower to upper end.
 
     Parameters
@@ -62,9 +62,10 @@ def wall_error(
     -------
     tuple of FloatArray
         Errors, nan where there is no wall; (n, 2) m, standard deviation of their mean over the height that comes from
-        the coefficients.
+        the coefficients; (n, 2, 3) N, force on the tool while the wall is made, mean over its height.
     """
     error, deviation = np.full((len(feed), 2, HEIGHTS), np.nan), np.full((len(feed), 2), np.nan)
+    force = np.full((len(feed), 2, 3), np.nan)
     nodes, weights = shares()
     for side, (angle, outward) in enumerate(((0.0, -1.0), (np.pi, 1.0))):
         cut = np.asarray(np.isfinite(walls[:, side]).all(axis=1))
@@ -73,9 +74,11 @@ def wall_error(
         normal = np.broadcast_to([0.0, outward, 0.0], (*heights.shape, 3))
         pull = _pull(normal, compliance[cut], turning[cut])
         tip = _tip_angle(cutter, np.full_like(heights, angle), heights, turning[cut])
-        error[cut, side], slope = _errors(_of(patches, cut), cutter, coefficients, feed[cut], turning[cut], tip, pull)
+        chosen = (_of(patches, cut), cutter, coefficients, feed[cut], turning[cut])
+        error[cut, side], slope, acting = _errors(*chosen, tip, pull)
         deviation[cut, side] = _deviation((slope * weights[:, None]).sum(axis=1), coefficients)
-    return error, deviation
+        force[cut, side] = (acting * weights[:, None]).sum(axis=1)
+    return error, deviation, force
 
 
 def floor_error(
@@ -86,7 +89,7 @@ def floor_error(
     turning: FloatArray,
     compliance: FloatArray,
     strip: FloatArray,
-) -> Surface:
+) -> tuple[FloatArray, FloatArray]:
     """(n, STRIPS) m, error of the surface below n stations, from the right to the left end of each strip.
 
     Parameters
@@ -119,7 +122,7 @@ def floor_error(
     passes = [
         _errors(*chosen, _tip_angle(cutter, angle, height, turning[cut]), pull) for angle in (ahead, TURN - ahead)
     ]
-    error[cut], slopes = _lowest(passes)
+    error[cut], slopes, _ = _lowest(passes)
     deviation[cut] = _deviation(slopes.mean(axis=1), coefficients)
     return error, deviation
 
@@ -153,29 +156,34 @@ def _errors(
     turning: FloatArray,
     tip: FloatArray,
     pull: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """(n, h) m of the lowest of the flutes' passes, and (n, h, 6) its slope over the coefficients."""
+) -> Passes:
+    """The lowest of the flutes' passes."""
     radii = flute_radii(cutter) if cutter.run_out else np.zeros(1)
-    error, slope = np.zeros(tip.shape), np.zeros((*tip.shape, 6))
+    lowest = np.zeros(tip.shape), np.zeros((*tip.shape, 6)), np.zeros((*tip.shape, 3))
     for block, part in blocks(patches, len(tip)):
-        passes = []
+        passes: list[Passes] = []
         for flute, short in enumerate(radii.max() - radii):
             angle = tip[block] + TURN * flute / cutter.flutes
             response = responses(part, cutter, feed[block], turning[block], angle, coefficients.taper)
-            per_coefficient = product(pull[block][..., None, :], response)[..., 0, :]
-            moved = product(per_coefficient[..., None, :], coefficients.values[:, None])[..., 0, 0]
-            passes.append((moved + short, per_coefficient))
-        error[block], slope[block] = _lowest(passes)
-    return error, slope
+            slope = product(pull[block][..., None, :], response)[..., 0, :]
+            force = product(response, coefficients.values[:, None])[..., 0]
+            passes.append(((pull[block] * force).sum(axis=-1) + short, slope, force))
+        for whole, values in zip(lowest, _lowest(passes), strict=True):
+            whole[block] = values
+    lowest[2][..., 1] *= turning[:, None]
+    return lowest
 
 
-def _lowest(passes: list[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
-    """The lowest of several errors (n, h), and its slope (n, h, 6)."""
-    error, slope = passes[0]
-    for other, other_slope in passes[1:]:
-        lower = other < error
-        error, slope = np.where(lower, other, error), np.where(lower[..., None], other_slope, slope)
-    return error, slope
+def _lowest(passes: list[Passes]) -> Passes:
+    """Of several passes the one with the lowest error at each place."""
+    lowest = passes[0]
+    for other in passes[1:]:
+        lower = other[0] < lowest[0]
+        lowest = tuple(
+            np.where(lower if values.ndim == 2 else lower[..., None], values, old)
+            for values, old in zip(other, lowest, strict=True)
+        )
+    return lowest
 
 
 def _deviation(slope: FloatArray, coefficients: Coefficients) -> FloatArray:

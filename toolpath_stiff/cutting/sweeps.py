@@ -19,28 +19,28 @@ from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves
 
 SAGITTA = 2e-7  # m, of chords in place of an arc that is not level in the plane
-STRAIGHT, ARC_TURN = 4.0, 0.5 * np.pi  # longest pieces: radii of the cutter; rad (of narrow arcs a ninth)
+STRAIGHT, ARC_TURN, NARROW_TURN = 4.0, 0.5 * np.pi, np.pi / 60.0  # longest pieces: radii of the cutter; rad
 
 
 # A piece of the cutting path; SI. Pieces stand in the order of time.
-PIECE = np.dtype([
-    ("move", np.int64),  # row of the move
-    ("before", np.float64),  # path from the program's start to where the piece begins, rapids included
-    ("after", np.float64),  # ... and to where it ends
-    ("x", np.float64),  # start of a line, or centre of an arc ...
-    ("y", np.float64),
-    ("z", np.float64),  # ... at the height of its start
-    ("turn", np.float64),  # 0: line; 1, -1: arc counter-clockwise, clockwise
-    ("heading", np.float64),  # direction of a line, or where on its circle an arc begins
-    ("cos", np.float64),  # of the heading
-    ("sin", np.float64),
-    ("extent", np.float64),  # length in the plane, m, or turn, rad
-    ("slope", np.float64),  # climb per unit of it
-    ("radius", np.float64),  # of an arc at its start
-    ("growth", np.float64),  # of the radius per rad
-    ("reach", np.float64),  # radius of the cutter
-    ("flat", np.float64),  # radius of the flat part of its end
-])  # fmt: skip
+FIELDS = (
+    "before",  # path from the program's start to where the piece begins, rapids included
+    "after",  # ... and to where it ends
+    "x",  # start of a line, or centre of an arc ...
+    "y",
+    "z",  # ... at the height of its start
+    "turn",  # 0: line; 1, -1: arc counter-clockwise, clockwise
+    "heading",  # direction of a line, or where on its circle an arc begins
+    "cos",  # of the heading
+    "sin",
+    "extent",  # length in the plane, m, or turn, rad
+    "slope",  # climb per unit of it
+    "radius",  # of an arc at its start
+    "growth",  # of the radius per rad
+    "reach",  # radius of the cutter
+    "flat",  # radius of the flat part of its end
+)
+PIECE = np.dtype([(name, np.float64) for name in FIELDS])
 
 
 def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, IntArray]:
@@ -61,7 +61,7 @@ def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, In
     arcs = np.flatnonzero(cuts & (moves.arc_sweep != 0.0))
     if len(arcs):
         frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
-        turn = np.where(frame.radius_start < radius[arcs], ARC_TURN / 9.0, ARC_TURN)
+        turn = np.where(frame.radius_start < radius[arcs], NARROW_TURN, ARC_TURN)
         turn = np.where(bent[arcs], np.sqrt(8.0 * SAGITTA / frame.radius_start), turn)
         counts[arcs] = np.ceil(sweep / turn - 1e-9)
     first = np.append(0, np.cumsum(counts.astype(np.int64)))
@@ -72,7 +72,7 @@ def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, In
     level = np.hypot(along[:, 0], along[:, 1])
     plunge = level < 1e-9
     pieces = np.zeros(len(move), dtype=PIECE)
-    pieces["move"], pieces["reach"], pieces["flat"] = move, radius[move], flat[move]
+    pieces["reach"], pieces["flat"] = radius[move], flat[move]
     pieces["before"] = (np.cumsum(length) - length)[move] + share * length[move]
     pieces["after"] = pieces["before"] + length[move] / counts[move]
     pieces["x"], pieces["y"] = start[:, 0], start[:, 1]
@@ -108,8 +108,9 @@ def _refuse(moves: Moves, cuts: BoolArray, cutters: Mapping[int, Cutter]) -> Non
 
 
 def foot(sweeps: AnyArray, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Where each point lies beside its piece (a row each): place of the nearest point of the whole line or circle
-    along it, distance from there, a unit of the place in m there, and the distance of point and centre of an arc.
+    """(e,) place along the line or circle of a piece that is nearest to a point, the distance, and two more.
+
+    These are the unit of the place, m, at the point, and for arcs its square, else 0.
     """
     dx, dy = x - sweeps["x"], y - sweeps["y"]
     along = dx * sweeps["cos"] + dy * sweeps["sin"]

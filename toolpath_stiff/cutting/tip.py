@@ -19,7 +19,7 @@ STEP = 0.01  # of a standard deviation, for the slope by a parameter
 
 
 def station_axes(heading: FloatArray, origin: ArrayLike) -> FloatArray:
-    """(n, 3, 3) in machine coordinates, columns x (feed), y (left), z (up), of headings (n,) rad in the set-up frame."""
+    """(n, 3, 3) in machine coordinates, columns x (feed), y (left), z (up); `heading` (n,) rad in the set-up frame."""
     axes = rotation_matrices(np.stack([np.zeros_like(heading), np.zeros_like(heading), heading], axis=1))
     return product(rotation_matrices(np.asarray(origin, dtype=float)[3:])[None], axes)
 

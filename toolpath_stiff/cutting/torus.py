@@ -25,7 +25,7 @@ def torus_responses(
     `feed` (p, 2) m per tooth along x and z, `lag` (p,) rad/m, `taper` m.
     """
     total = np.zeros((*angle.shape, 3, 6))
-    low, high, entry, leave = (values[:, None] for values in (patches.low, patches.high, patches.entry, patches.exit))
+    low, high, (entry, leave) = patches.low[:, None], patches.high[:, None], _arc(patches, feed)
     slope, radius = lag[:, None], cutter.corner_radius
     largest = np.where(slope > 0.0, low, high)  # the height where the angle of the edge is largest
     nodes, weights = np.polynomial.legendre.leggauss(FINE if cutter.run_out or feed[:, 1].any() else SLICES)
@@ -50,8 +50,9 @@ def mean_torus_responses(patches: Patches, cutter: Cutter, feed: FloatArray, tap
     """(p, 3, 6) mean forces over a turn per coefficient of each patch; arguments as `torus_responses`."""
     first, last = (np.arccos(1.0 - height / cutter.corner_radius) for height in (patches.low, patches.high))
     nodes, weights = np.polynomial.legendre.leggauss(ANGLES)
-    phi = 0.5 * (patches.entry + patches.exit)[:, None] + 0.5 * (patches.exit - patches.entry)[:, None] * nodes
-    share = 0.5 * (patches.exit - patches.entry)[:, None] * weights / TURN
+    entry, leave = _arc(patches, feed)
+    phi = 0.5 * (entry + leave) + 0.5 * (leave - entry) * nodes
+    share = 0.5 * (leave - entry) * weights / TURN
     total = np.zeros((*phi.shape, 3, 6))
     for node, weight in zip(*np.polynomial.legendre.leggauss(SLICES), strict=True):
         kappa = np.broadcast_to((0.5 * (first + last) + 0.5 * (last - first) * node)[:, None], phi.shape)
@@ -59,6 +60,12 @@ def mean_torus_responses(patches: Patches, cutter: Cutter, feed: FloatArray, tap
         for gaps, count in flute_laws(cutter):
             _add_slices(total, phi, kappa, count * length, _chip(phi, kappa, feed, gaps), taper)
     return np.asarray(total.sum(axis=1))
+
+
+def _arc(patches: Patches, feed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(p, 1) rad, where edges may cut from and to: on the level only ahead of the axis."""
+    end = np.where(feed[:, 1] == 0.0, np.pi, TURN)
+    return np.minimum(patches.entry, end)[:, None], np.minimum(patches.exit, end)[:, None]
 
 
 def _chip(phi: FloatArray, kappa: FloatArray, feed: FloatArray, gaps: FloatArray) -> FloatArray:

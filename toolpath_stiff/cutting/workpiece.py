@@ -1,25 +1,27 @@
 """The stock and what the program takes from it: heights of the part at any point and any time, by an index of cells.
 
-A cell of the index lists the pieces that pass over it, in the order of time. A piece that lies nowhere in the cell below
-what an earlier one left all over it is not listed; a query begins at the first piece that still counts at its time. So
-neither the number of levels nor of passes lengthens a query, and there is no grid on which heights would be rounded.
+A cell of the index lists the pieces that pass over it, in the order of time. A piece that lies nowhere in the cell
+below what an earlier one left all over it is not listed; a query begins at the first piece that still counts at its
+time. So neither levels nor passes lengthen a query, and there is no grid on which heights would be rounded.
 """
 
+import importlib.util
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
+from toolpath_stiff.cutting.cells import cells_of_boxes, portions
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.stock import Stock
-from toolpath_stiff.cutting.sweeps import heights_above, nearest, rise, sweeps_of
+from toolpath_stiff.cutting.sweeps import FIELDS, PIECE, heights_above, nearest, rise, sweeps_of
 from toolpath_stiff.nc.moves import Moves
 
 CELL = 0.3  # radii of the smallest cutter, size of a cell of the index
+MANY = 5_000  # pieces from where on it pays to import numba: half a second
 CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
 MOST_ENTRIES = 60_000_000  # of the index; larger cells beyond
-SHARE = 1_000_000  # entries at a time
 OFFSET = np.array([0.3819e-3, 0.2764e-3])  # m: walls at round coordinates shall not run along borders of cells
 
 
@@ -37,6 +39,8 @@ class Workpiece:
         (2,) m of the lowest cell; m; number of cells along y.
     key, counts_from
         (e,) cell * m + piece of each entry, ascending; (e,) the first entry of its cell that counts after it.
+    below, compiled
+        (e,) m, no less than the piece leaves anywhere in the cell; whether numba looks up.
     """
 
     stock: Stock
@@ -47,6 +51,13 @@ class Workpiece:
     columns: int
     key: IntArray
     counts_from: IntArray
+    below: FloatArray
+    compiled: bool
+
+    @property
+    def table(self) -> FloatArray:
+        """(m, fields) of the pieces as numbers."""
+        return np.asarray(self.pieces.view(np.float64).reshape(len(self.pieces), len(FIELDS)))
 
     def tops(
         self,
@@ -56,24 +67,28 @@ class Workpiece:
         slack_from: IntArray | None = None,
         slack: float = 0.0,
     ) -> tuple[FloatArray, IntArray]:
-        """(n,) m, height of what stands at points after the pieces first <= piece < last of `window`, each (n,), and
-        the piece that left it, the last of several; -1: none, the stock.
+        """(n,) m, height of what some pieces leave at points, and (n,) the last piece that left it; -1: the stock.
 
-        Of the pieces from `slack_from` (n,) on the cutter is taken for smaller and higher by `slack`, m.
+        The pieces are first <= piece < last of `window`, (n,) each. Of those from `slack_from` (n,) on the cutter is
+        taken for smaller and higher by `slack`, m.
         """
         top, owner = self.stock.heights(x, y)[0], np.full(len(x), -1)
         low, high = self._entries(x, y, window)
+        if self.compiled:
+            from toolpath_stiff.cutting.compiled_sweeps import lowest
+
+            late = every(len(x), len(self.pieces)) if slack_from is None else slack_from
+            lowest(self.table, self.key, self.below, x, y, low, high, late, slack, CLEAR, top, owner)
+            return top, owner
         counts = high - low
-        ends = np.cumsum(counts)
-        for rows in _portions(ends):
+        for rows in portions(counts):
             some = counts[rows]
             point = np.repeat(np.arange(rows.start, rows.stop), some)
-            entry = np.arange(len(point)) + np.repeat(
-                low[rows] - (ends[rows] - some - (ends[rows.start] - some[0])), some
-            )
+            entry = np.arange(len(point)) + np.repeat(low[rows] - np.cumsum(some) + some, some)
             piece = self.key[entry] % len(self.pieces)
             late = np.zeros(len(point)) if slack_from is None else np.where(piece >= slack_from[point], slack, 0.0)
-            height = heights_above(self.pieces[piece], x[point], y[point], late)
+            part = np.take(self.table, piece, axis=0).view(PIECE)[:, 0]
+            height = heights_above(part, x[point], y[point], late)
             hit = np.flatnonzero(some)
             if not len(hit):
                 continue
@@ -100,13 +115,9 @@ class Workpiece:
         return low, np.maximum(high, low)
 
 
-def _portions(ends: IntArray) -> Iterator[slice]:
-    """Slices of rows with some entries each: at least a row, and no more entries than a portion."""
-    first, before = 0, 0
-    while first < len(ends):
-        end = max(int(np.searchsorted(ends, before + SHARE, side="right")), first + 1)
-        yield slice(first, end)
-        first, before = end, int(ends[end - 1])
+def every(n: int, value: int) -> IntArray:
+    """(n,) of a number."""
+    return np.full(n, value, dtype=np.int64)
 
 
 def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> Workpiece:
@@ -114,7 +125,8 @@ def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> W
     pieces, first = sweeps_of(moves, cutters)
     if not len(pieces):
         none = np.zeros(0, dtype=np.int64)
-        return Workpiece(stock, np.zeros(1, pieces.dtype), first, np.zeros(2), 1.0, 0, none, none)
+        return Workpiece(stock, np.zeros(1, PIECE), first, np.zeros(2), 1.0, 0, none, none, np.zeros(0), False)
+    compiled = len(pieces) >= MANY and importlib.util.find_spec("numba") is not None
     low, high = _boxes(pieces)
     size = CELL * float(pieces["reach"].min())
     while float((np.ceil((high - low) / size) + 1.0).prod(axis=1).sum()) > MOST_ENTRIES:
@@ -126,9 +138,10 @@ def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> W
     cell, piece, below, above = (np.concatenate([part[k] for part in parts]) for k in range(4))
     cell = cell[:, 0] * columns + cell[:, 1]
     order = np.argsort(cell, kind="stable")
-    cell, piece, outdone = _without_outdone(cell[order], piece[order], below[order], above[order])
+    cell, piece, below, outdone = _without_outdone(cell[order], piece[order], below[order], above[order])
     counts_from = np.searchsorted(np.maximum.accumulate(outdone), np.arange(len(cell)), side="right")
-    return Workpiece(stock, pieces, first, corner, size, columns, cell * len(pieces) + piece, counts_from)
+    key = cell * len(pieces) + piece
+    return Workpiece(stock, pieces, first, corner, size, columns, key, counts_from, below, compiled)
 
 
 def _boxes(pieces: AnyArray) -> tuple[FloatArray, FloatArray]:
@@ -150,17 +163,9 @@ def _along(pieces: AnyArray, share: float) -> tuple[FloatArray, FloatArray]:
 def _rasters(
     pieces: AnyArray, low: IntArray, high: IntArray, corner: FloatArray, size: float
 ) -> Iterator[tuple[IntArray, IntArray, FloatArray, FloatArray]]:
-    """(k, 2) cells that pieces pass, in portions, (k,) piece, and m, bounds of the height it leaves all over the cell."""
-    wide = high - low + 1
-    counts = wide.prod(axis=1)
-    ends = np.cumsum(counts)
+    """(k, 2) cells that pieces pass, in portions, (k,) the piece, and m, bounds of the height that it leaves there."""
     half = size / np.sqrt(2.0) + 1e-6
-    for rows in _portions(ends):
-        piece = np.repeat(np.arange(rows.start, rows.stop), counts[rows])
-        index = np.arange(len(piece)) - np.repeat(
-            ends[rows] - counts[rows] - (ends[rows.start] - counts[rows.start]), counts[rows]
-        )
-        cell = low[piece] + np.stack([index // wide[piece, 1], index % wide[piece, 1]], axis=1)
+    for piece, cell in cells_of_boxes(low, high):
         part, middle = pieces[piece], corner + (cell + 0.5) * size
         place, distance = nearest(part, middle[:, 0], middle[:, 1])
         near = np.flatnonzero(distance <= part["reach"] + half)
@@ -174,8 +179,8 @@ def _rasters(
 
 def _without_outdone(
     cell: IntArray, piece: IntArray, below: FloatArray, above: FloatArray
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Cell and piece of the entries that are lowest somewhere in their time, and where they cease to be.
+) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
+    """Cell, piece and lower bound of the entries that are lowest somewhere in their time, and where they cease to be.
 
     By the lowest bound so far in each cell: a running minimum over all entries, the cells set apart by a large step.
     """
@@ -186,4 +191,4 @@ def _without_outdone(
     outdone = np.minimum(outdone, np.searchsorted(cell, cell, side="right"))
     kept = outdone > np.arange(len(cell))
     before = np.append(0, np.cumsum(kept))
-    return cell[kept], piece[kept], before[outdone[kept]]
+    return cell[kept], piece[kept], below[kept], before[outdone[kept]]

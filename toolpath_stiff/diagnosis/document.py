@@ -9,6 +9,7 @@ from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.judgement import Judgement
 from toolpath_stiff.inference.unexcluded import Unexcluded
+from toolpath_stiff.inference.votes import vote_document
 from toolpath_stiff.portrait.words import alike_entry, portrait_entry
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
@@ -20,7 +21,7 @@ ERRORS = (
 
 def document_of(diagnosis: Examination) -> Document:
     """Everything that `diagnose.json` holds."""
-    main, alike, noise, rows = diagnosis.main, diagnosis.alike, diagnosis.noise, diagnosis.rows
+    main, noise, rows = diagnosis.main, diagnosis.noise, diagnosis.rows
     drawn = diagnosis.unconfirmed or main.drawn
     links = {family.name: family.effect.link for family in main.families}
     return {
@@ -29,8 +30,10 @@ def document_of(diagnosis: Examination) -> Document:
         "question": main.question,
         "draft_status": None if drawn is None else drawn.document,
         "baseline": _baseline(diagnosis),
-        "candidates": [_candidate(row, links[row.name]) for row in rows.candidates],
-        "pairs": [_pair(row) for row in rows.pairs],
+        "candidates": [{**_candidate(row, links[row.name]), **_vote(main, row.name)} for row in rows.candidates],
+        "pairs": [{**_pair(row), **_vote(main, row.name)} for row in rows.pairs],
+        "votes": [vote_document(rival, differences) for rival, differences in main.votes.items()],
+        "nuisances": diagnosis.nuisances,
         "plausible": diagnosis.plausible,
         "explanations": list(diagnosis.explanations),
         "best": diagnosis.best,
@@ -58,7 +61,7 @@ def document_of(diagnosis: Examination) -> Document:
         },
         "path": diagnosis.path,
         "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
-        "looks_the_same": None if alike is None else alike_entry(diagnosis.explanations[0], alike),
+        "looks_the_same": alike_entry(diagnosis.alike),
         "not_excluded": [_not_excluded(hidden) for hidden in diagnosis.unexcluded],
         "not_excluded_text": beside_text(diagnosis.unexcluded),
         "assumptions": assumptions(diagnosis),
@@ -119,6 +122,12 @@ def _candidate(row: HypothesisRow, link: str) -> Document:
     }
 
 
+def _vote(judgement: Judgement, name: str) -> Document:
+    """The vote for the first explanation against a rival; None of that itself and of its own part."""
+    votes = judgement.votes
+    return {"vote": vote_document(name, votes[name]) if name in votes else None}
+
+
 def _pair(row: HypothesisRow) -> Document:
     """Several effects; parameters by effect, with what it acts on."""
     return {
@@ -152,7 +161,7 @@ def _not_excluded(hidden: Unexcluded) -> Document:
         "up_to": json_number(hidden.value / hidden.parameter.si, 2),
         "rms_percent": percent_of(hidden.rms, 2),
         "probability": json_number(hidden.probability, 2),
-        "would_tell": would_tell(hidden),
+        "would_tell": would_tell(hidden.effect),
     }
 
 

@@ -21,9 +21,11 @@ from toolpath_stiff.inference.hypotheses import Family, averaged_interval
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.inference.nuisances import fitted_nuisances
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.slips import SuspectEntry
 from toolpath_stiff.inference.unexcluded import Unexcluded
+from toolpath_stiff.inference.votes import lowers_error
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.result import PlanRow
 from toolpath_stiff.portrait.alike import Alike
@@ -137,7 +139,7 @@ class Examination:
     portrait
         What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
     alike
-        What else would look the same as the effect that is named (`alike_of`); None where nothing would, or none is.
+        Named effect -> what else would look the same in its place (`alike_of`).
     unexcluded
         Effects that the readings neither show nor exclude beside the likeliest explanation, at a size that matters.
     suspects
@@ -169,7 +171,7 @@ class Examination:
     remarks: tuple[str, ...] = ()
     path: Document | None = None
     portrait: Portrait | None = None
-    alike: Alike | None = None
+    alike: Mapping[str, Alike] = field(default_factory=dict)
     unexcluded: tuple[Unexcluded, ...] = ()
     suspects: tuple[SuspectEntry, ...] = ()
     loops: tuple[LoopMean, ...] = ()
@@ -199,11 +201,26 @@ class Examination:
     def best(self) -> str | None:
         """Name of the best explanation by an effect or a pair; None where there is none.
 
-        The likeliest, of equals the one with more evidence.
+        The likeliest, of equals the one with more evidence; what lowers no error at left-out points is none. Those that
+        are left standing come first.
         """
-        names = [name for name, weight in self.main.likely if weight > 0.0]
+        names = [*self.explanations, *(name for name, weight in self.main.likely if weight > 0.0)]
         names += [family.name for family in self.main.families]
-        return next((n for n in names if n in self.fits and any(size.any() for size in self.fits[n].sizes)), None)
+        return next((name for name in names if name in self.fits and self._answers(name)), None)
+
+    def _answers(self, name: str) -> bool:
+        """Whether an explanation is there at all, and lowers the error at left-out points."""
+        there = any(size.any() for size in self.fits[name].sizes)
+        return there and lowers_error(self.held_out_base, self.held_out[name])
+
+    @cached_property
+    def nuisances(self) -> list[Document]:
+        """The struts' and joints' deviations that the likeliest explanation fits, the one that stands out most first.
+
+        Of the model alone where nothing is missing.
+        """
+        fit = self.main.base if self.verdict == "adequate" else self.main.likeliest
+        return fitted_nuisances(fit, self.main.noise)
 
     @property
     def likeliest(self) -> Fit:

@@ -7,19 +7,23 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.examination import NAMING, Examination
+from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Examination
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
-from toolpath_stiff.inference.evidence import LAW_PRIOR
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
+from toolpath_stiff.inference.noise import REST
+from toolpath_stiff.inference.nuisances import findings, nuisance_words
 from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
-from toolpath_stiff.planning.plan import INDICATORS
+from toolpath_stiff.inference.votes import CHANCE, SMALL, outvoted, vote_words
+from toolpath_stiff.planning.plan import INDICATORS, telling
 from toolpath_stiff.portrait.words import alike_text
+from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
 
@@ -28,14 +32,15 @@ MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has
 
 def verdict_text(diagnosis: Examination) -> str:
     """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
-    same = [] if diagnosis.alike is None else [alike_text(diagnosis.explanations[0], diagnosis.alike)]
+    same = [alike_text(name, alike) for name, alike in diagnosis.alike.items()]
     return " ".join([_verdict_text(diagnosis), *same, *(f"{_capital(doubt)}." for doubt in doubts(diagnosis))])
 
 
 def doubts(diagnosis: Examination) -> list[str]:
     """What may be wrong with the data instead of the machine: the stated noise, single rows."""
     noise = dict.fromkeys(judgement.doubt for judgement in diagnosis.judgements.values() if judgement.doubt)
-    return [*noise, *(suspect.words for suspect in diagnosis.suspects)]
+    nuisances = [f"{nuisance_words(entry)}, more than is assumed of any" for entry in findings(diagnosis.nuisances)]
+    return [*noise, *([] if diagnosis.main.question else nuisances), *(suspect.words for suspect in diagnosis.suspects)]
 
 
 def _verdict_text(diagnosis: Examination) -> str:
@@ -47,7 +52,7 @@ def _verdict_text(diagnosis: Examination) -> str:
     if diagnosis.verdict in NAMING:
         best, drawn = diagnosis.explanations[0], diagnosis.unconfirmed
         only = "" if drawn is None else f"This describes the readings, and does not explain them yet: {drawn.reason}. "
-        return f"{_capital(_cause(diagnosis, best))}. {only}{_errors(diagnosis, best)}."
+        return f"{_capital(_cause(diagnosis, best))}. {only}{_errors(diagnosis, best)}.{_outvoted(diagnosis)}"
     if diagnosis.verdict == "ambiguous":
         if len({(judgement.verdict, judgement.explanations) for judgement in judgements}) == 1:
             return _rivals(diagnosis)
@@ -80,8 +85,26 @@ def _cause(diagnosis: Examination, name: str) -> str:
     chance = _percent(diagnosis.main.probability.get(name, 0.0))
     if name == NONE:
         return f"nothing is missing (probability {chance})"
-    finding = f"{joined(diagnosis.fits[name].findings)} " if name in diagnosis.fits else ""
-    return f"{finding}({name}, probability {chance})"
+    if name not in diagnosis.fits:
+        return f"({name}, probability {chance})"
+    fit = diagnosis.fits[name]
+    if diagnosis.main.probability.get(name, 0.0) < SHOWN and name in diagnosis.main.votes:
+        titles = joined([candidate.effect.title for candidate in fit.candidates])
+        return f"{titles} ({name}: less likely than {100 * SHOWN:g} %, but foretells left-out poses as well)"
+    unusual = f", more than is usual ({joined(sizes)}) " if (sizes := _unusual(fit)) else " "
+    return f"{joined(fit.findings)}{unusual}({name}, probability {chance})"
+
+
+def _unusual(fit: Fit) -> list[str]:
+    """Usual sizes of the parameters whose fitted ones are beyond them."""
+    beyond = [component.parameter for component, size in fit.parts if abs(size) > component.typical()[1]]
+    return [f"{p.name.replace('_', ' ')} {p.typical[0]:g} to {p.typical[1]:g} {p.unit}".rstrip() for p in beyond]
+
+
+def _outvoted(diagnosis: Examination) -> str:
+    """The closest rival that a name has outvoted, a sentence with the space before it; "" without votes."""
+    rival, differences = next(iter(diagnosis.main.votes.items()), ("", np.zeros(0)))
+    return f" Of all rivals of another part {vote_words(rival, differences)} (log probability)." if rival else ""
 
 
 def _percent(chance: float) -> str:
@@ -97,6 +120,8 @@ def _rivals(diagnosis: Examination) -> str:
     causes = [_cause(diagnosis, name) for name in diagnosis.explanations]
     if len(causes) < 2:
         return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
+    if diagnosis.explanations[0] not in (NONE, diagnosis.best):
+        return f"What is likeliest lowers no error at points that are left out: {'; '.join(causes)}."
     first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
     if first < POSITIVE * second:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
@@ -168,6 +193,10 @@ def _not_told_apart(diagnosis: Examination) -> list[str]:
     pairs = combinations([names.index(name) for name in diagnosis.plausible if name in names], 2)
     same = "have the same signature on these poses, loads and directions: correlation"
     reasons = [f"{names[i]} and {names[j]} {same} {matrix[i, j]:.3f}" for i, j in pairs if matrix[i, j] > CONFOUNDED]
+    rivals = [name for name, votes in diagnosis.main.votes.items() if not outvoted(votes) and name != NONE]
+    for name in rivals[:MOST_BESIDE]:
+        reasons.append(f"{vote_words(name, diagnosis.main.votes[name])} (log probability): not beyond chance")
+    reasons += [f"{tells} would tell {name}" for name, tells in _telling(diagnosis).items()]
     if NONE in diagnosis.plausible:
         reasons.append("chance alone is not excluded either")
     for effect in (family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible):
@@ -175,6 +204,12 @@ def _not_told_apart(diagnosis: Examination) -> list[str]:
             seen = f"was read off {count} of these {len(data)} readings: its probability is too high"
             reasons.append(f"the form of {effect.name} {seen}")
     return reasons
+
+
+def _telling(diagnosis: Examination) -> dict[str, str]:
+    """Plausible effect -> the reading that tells it from what looks the same at the tip."""
+    effects = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
+    return {effect.name: would_tell(effect) for effect in effects}
 
 
 def next_steps(diagnosis: Examination, request: Asked | None = None) -> list[str]:
@@ -220,6 +255,8 @@ def assumptions(diagnosis: Examination) -> list[str]:
         f"noise: {noise.origin}",
         f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
         f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
+        f"frame, table, platform and tool give a little more or less than in the model: {100 * REST:.1g} % (sd) of the "
+        "tip's stiffness along each of their axes: assumed",
         f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: "
         + ("assumed" if noise.outliers == OUTLIERS else "as the repeats have it"),
         f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "
@@ -228,6 +265,8 @@ def assumptions(diagnosis: Examination) -> list[str]:
         "stiffness, as far as these data could show them; typical sizes rank, bounds alone exclude: assumed",
         f"gates: {100 * FALSE_ALARM:g} % false alarms, explanations are dropped below {100 * ADEQUATE:g} %; "
         f"the plausible set holds {100 * HELD:g} %",
+        f"a name has foretold left-out poses better than every rival of another part by {SMALL:g} of log probability "
+        f"and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, else it is one of several",
         f"a further effect matters from {100 * MATTERS:g} % of the tip's stiffness on",
     ]
     if "force_N" in diagnosis.data.missing:
@@ -254,7 +293,7 @@ def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
     return f"{words}; an indicator {tells} would tell" if tells else words
 
 
-def would_tell(hidden: Unexcluded) -> str:
+def would_tell(effect: Effect) -> str:
     """Where an indicator would show an effect, or what else to measure."""
-    place = INDICATORS[hidden.effect.link]
+    place = telling(effect)
     return place.removeprefix("none: ") if place.startswith("none: ") else f"an indicator {place}"

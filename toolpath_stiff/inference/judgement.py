@@ -35,15 +35,27 @@ from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.doubts import noise_doubt, question
 from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fair_forms import fair_rivals
 from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.inference.nuisances import findings, fitted_nuisances
 from toolpath_stiff.inference.several import search_pairs, search_triples
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
-from toolpath_stiff.inference.votes import NONE, Votes, lowers_error, outvoted, rivals_of, votes
+from toolpath_stiff.inference.votes import (
+    Votes,
+    closest,
+    left_open,
+    left_out_of,
+    lowers_error,
+    outvoted,
+    rivals_of,
+    votes,
+)
 from toolpath_stiff.stiffness.contract import Effect
 
+NONE = "none"
 OUTSIDE = "outside the catalogue"
 # What is expected before anything is measured; assumed. Whoever measures has a reason, but most machines are sound.
 PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_TRIPLES, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.03, 0.10
@@ -58,7 +70,7 @@ SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alo
 # Odds below which a second effect is not considered where one suffices: "positive" evidence begins at 3 (Kass and
 # Raftery 1995, Bayes factors).
 POSITIVE = 3.0
-MOST_BESIDE = 3  # explanations of a verdict that the votes leave open; all votes are in the document
+TAKEN_UP = ("joint_offset", "weak_strut")  # effects that the nuisances take up
 Evidence = dict[tuple[str, ...], float]  # of effects, pairs and triples by their names
 
 
@@ -157,7 +169,7 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     probability, form = weigh(problem, noise, candidates, gates)
     doubtful = question(problem.predictor)
     verdict, explanations = ("unexplained", ()) if doubtful else decide(gates, probability)
-    verdict, explanations, ballots = put_to_vote(problem, candidates, gates, verdict, explanations)
+    verdict, explanations, ballots = put_to_vote(problem, noise, candidates, gates, verdict, explanations)
     doubt, factor = ("", 1.0) if doubtful else noise_doubt(problem, noise, gates.base, verdict, seed)
     described = None
     if verdict == "identified":
@@ -393,30 +405,35 @@ def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str
 
 
 def put_to_vote(
-    problem: Problem, candidates: Candidates, gates: Gates, verdict: str, explanations: tuple[str, ...]
+    problem: Problem, noise: Noise, candidates: Candidates, gates: Gates, verdict: str, explanations: tuple[str, ...]
 ) -> tuple[str, tuple[str, ...], Votes]:
     """Verdict and explanations after the votes of left-out poses, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer. A name that has not outvoted every rival of another part is
-    one of several; the closest of these stand beside it.
+    one of several; the closest of these stand beside it. A model that passes because its nuisances have taken up more
+    than they may is not the only explanation.
     """
+    base, fits = candidates.base, {family.name: best for family, best in candidates.offered} | gates.fits
+    if verdict == "adequate":
+        taken = [name for name in TAKEN_UP if name in fits] if findings(fitted_nuisances(base, noise)) else []
+        return (
+            ("ambiguous", tuple(dict.fromkeys([*explanations, *taken])), {}) if taken else (verdict, explanations, {})
+        )
     if verdict not in ("identified", "ambiguous"):
         return verdict, explanations, {}
-    fits, base, data = (
-        {family.name: best for family, best in candidates.offered} | gates.fits,
-        candidates.base,
-        problem.predictor.data,
-    )
-    standing = tuple(name for name in explanations if name not in fits or lowers_error(fits[name], base, data))
+    data = problem.predictor.data
+    before = left_out_of(base, data)
+    standing = [
+        name for name in explanations if name not in fits or lowers_error(before, left_out_of(fits[name], data))
+    ]
     top = next((name for name in standing if name in fits), None)
     if top is None:
-        return ("adequate", (NONE,), {}) if gates.none_stands else ("unexplained", (), {})
-    ballots = votes(problem, fits[top], rivals_of(fits[top], base, fits))
+        beside = tuple(dict.fromkeys([*explanations, NONE]))
+        return ("ambiguous", beside, {}) if gates.none_stands else ("unexplained", (), {})
+    ballots = votes(problem, fits[top], {NONE: base} | rivals_of(fits[top], fits))
+    ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
     open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
-    if not open_rivals:
-        return verdict, standing, ballots
-    beside = dict.fromkeys([*standing, *open_rivals])
-    return "ambiguous", tuple(beside)[: max(len(standing), MOST_BESIDE)], ballots
+    return ("ambiguous" if open_rivals else verdict), left_open(top, standing, open_rivals, ballots), ballots
 
 
 def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:

@@ -6,8 +6,9 @@ The logarithm of a reading carries, beside what the machine does,
     clamping          common to the readings of one clamping,
     strut spread      six struts are never quite alike: a nuisance with one column a strut,
     joint positions   never quite where the machine file has them: one column a coordinate,
+    the rest          frame, table, platform, tool are never quite as the model has them: one column an axis,
 
-the last two the same for all readings of a machine. Now and then a reading is wild. Who takes all of this for
+the last three the same for all readings of a machine. Now and then a reading is wild. Who takes all of this for
 independent scatter finds effects that are not there: in dense data, in every second campaign.
 
 Repeat noise and clamping are estimated from repeats where there are any (restricted maximum likelihood of the
@@ -29,6 +30,10 @@ from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, copied, from_repeats, scatter_apart
 from toolpath_stiff.readings.measurements import Readings
 
+# Sd of what the links that the model takes for rigid change ln stiffness by, rms; assumed: along each axis 1 % in all,
+# as much as struts differ, of which the work's side and the head's side, which look alike at the tip, have half each.
+REST = 0.01 / np.sqrt(2.0)
+REST_COLUMNS = 7
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
 # Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
@@ -269,6 +274,7 @@ def _percent(repeat: float, clamping: float) -> str:
 def covariance(noise: Noise, predictor: Predictor) -> Covariance:
     """Of ln readings."""
     shared = [noise.strut_spread * predictor.strut_columns(), noise.joint_error * predictor.joint_columns]
+    shared.append(REST * predictor.rest_columns())
     rows = np.ascontiguousarray(np.concatenate(shared, axis=1).T)
     clamps = Groups.by(predictor.data.clamp)
     common: float | FloatArray = noise.clamping**2

@@ -57,7 +57,7 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     _check(task)
     path = work_path(task.program, task.step, task.load)
     search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, np.array(task.present))
-    search.report = progress or search.report
+    search.report, search.errors = progress or search.report, task.errors
     found = search_placements(search)
     front = numbered_rows(task, path, found)
     before, reason = _analyzed(task, task.program, task.present)
@@ -67,6 +67,7 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     if best is None:
         raise UnreachableError(f"placement {row.number} of the front: {beyond}", hint="search again")
     rewritten, written = _rewritten(task, best) if task.write else (None, None)
+    places = {"chosen": row.origin, **({"before": task.present} if before else {})}
     return Placement(
         task=task,
         front=front,
@@ -80,6 +81,8 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
         before=before,
         rewritten=rewritten,
         written=written,
+        surface_error_um=task.errors
+        and {name: float(um_from_m(task.errors(np.array([place])))[0]) for name, place in places.items()},
     )
 
 

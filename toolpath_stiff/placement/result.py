@@ -17,6 +17,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.goals import Bounds, SearchRules
+from toolpath_stiff.placement.surface_error import Errors
 from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm, pose_in_si
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
@@ -57,6 +58,8 @@ class PlacementTask:
         Of its numbers; within so much of arcs its chords, m.
     control
         What the program was read with.
+    errors
+        Surface error of placements; None unless that is the objective.
     """
 
     model: StiffnessModel
@@ -72,6 +75,7 @@ class PlacementTask:
     decimals: int | None = None
     linearise: float | None = None
     control: Controller = UNKNOWN_CONTROL
+    errors: Errors | None = None
 
 
 @dataclass(frozen=True)
@@ -142,6 +146,8 @@ class Placement(FolderResult):
         Analyses at the chosen and at the present placement.
     rewritten, written
         Bytes of the program written for the placement, and what `placement.json` says of it; None unless asked for.
+    surface_error_um
+        With the objective "error": what 95 % of the final walls stay below, at the chosen and the present placement.
     inputs
         Files that were read.
 
@@ -181,6 +187,7 @@ class Placement(FolderResult):
     before: Analysis | None
     rewritten: bytes | None
     written: Written | None
+    surface_error_um: Mapping[str, float] | None = None
     inputs: tuple[str, ...] = ()
 
     @property
@@ -315,6 +322,7 @@ class Placement(FolderResult):
                 "before": self.present,
                 "before_reason": self.present_reason or None,
                 "trade_offs": self.trade_offs,
+                **({} if self.surface_error_um is None else {"surface_error_um": self.surface_error_um}),
                 "front": self.front,
                 "offset_blocks": {name: text or None for name, text in vars(self.offsets).items()},
                 "written": self.written,

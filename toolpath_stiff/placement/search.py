@@ -19,6 +19,7 @@ from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.goals import Goal
 from toolpath_stiff.placement.paths import placed_path, with_rows
+from toolpath_stiff.placement.surface_error import Errors
 from toolpath_stiff.placement.working import ENDS, NO_FLOORS, Search
 from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.rotations import rotation_matrices
@@ -40,6 +41,7 @@ FINAL_REGION = 0.01  # of each range, about where the climb on fewer samples end
 SHORT = 3000  # samples of a path that is climbed on as a whole; of a longer one, on what stands for it
 ROUNDS, STRETCHES = 2, 120  # of that: how often it is told anew, and stretches whose extremes join it
 EXCHANGES = 4  # at most, until the samples that stand for the path miss nothing at the finalists
+PARENTS = 6  # placements of least surface error, around which the next are tried
 MISSED = 1e-3  # of the mean: a figure that they put so much too high is missed
 
 
@@ -122,7 +124,9 @@ def _result(search: Search, candidates: FloatArray) -> PlacementResult:
     figures = search.whole.figures(candidates)
     if not search.kept(figures).any():
         raise _infeasible(search, candidates[int(np.argmin(search.rules.violation(figures)))])
-    best = _recommended(search, figures)
+    if search.errors is not None:
+        candidates, figures = _with_least_errors(search, candidates, figures, search.errors)
+    best = _recommended(search, figures, candidates)
     rows = front_rows(_rounded(figures), search.kept(figures))
     if best not in rows:  # equal to another in all three
         rows = np.append(rows, best)
@@ -217,14 +221,38 @@ def _survivors(
     return placements[rows], figures.take(rows)
 
 
-def _recommended(search: Search, figures: PlacementFigures) -> int:
-    """Row of the recommendation: the best of those that are no worse in anything, else the least worse."""
-    goal, now = Goal(defaults.OBJECTIVES[search.rules.objective], NO_FLOORS), search.now
-    possible = np.flatnonzero(search.kept(figures))
-    if now is not None and search.present is not None:
+def _with_least_errors(
+    search: Search, candidates: FloatArray, figures: PlacementFigures, errors: Errors
+) -> tuple[FloatArray, PlacementFigures]:
+    """The candidates and some more, ever nearer to the least surface error that keeps the rules and what is now."""
+    rng, bounds = np.random.default_rng(search.rules.seed), search.bounds
+    pool, known = candidates, figures
+    for spread in np.geomspace(WIDE, NARROW, GENERATIONS) if len(bounds.free) else ():
+        rows = _allowed(search, known)
+        rows = rows[np.argsort(errors(pool[rows]), kind="stable")[:PARENTS]]
+        unit = np.repeat(bounds.unit(pool[rows]), CHILDREN // len(rows), axis=0)
+        children = bounds.placements(unit + spread * rng.normal(size=unit.shape))
+        pool = np.vstack([pool[rows], children[search.kept(search.few.figures(children))]])
+        known = search.whole.figures(pool)
+    return np.vstack([candidates, pool]), PlacementFigures.joined([figures, known])
+
+
+def _allowed(search: Search, figures: PlacementFigures) -> IntArray:
+    """Rows that keep the rules and are no worse in anything than what is now, else the least worse."""
+    now, possible = search.now, np.flatnonzero(search.kept(figures))
+    if now is not None and search.present is not None and len(possible):
         fall = (now.objectives[0] - figures.objectives[possible]).max(axis=1)
         slack = NO_WORSE * float(now.mean[0])
         possible = possible[fall <= slack if (fall <= slack).any() else fall <= fall.min() + slack]
+    return possible
+
+
+def _recommended(search: Search, figures: PlacementFigures, candidates: FloatArray) -> int:
+    """Row of the recommendation: the best of those that are no worse in anything, else the least worse."""
+    possible = _allowed(search, figures)
+    if search.errors is not None:
+        return int(possible[np.argmin(search.errors(candidates[possible]))])
+    goal = Goal(defaults.OBJECTIVES[search.rules.objective], NO_FLOORS)
     equal = _rounded(figures.take(possible))
     return int(possible[np.lexsort((*(-equal.objectives.T), -goal.value(equal)))[0]])
 

@@ -12,6 +12,7 @@ from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import Evaluator, PlacementFigures
 from toolpath_stiff.placement.goals import Bounds, Goal, SearchRules
 from toolpath_stiff.placement.paths import WorkPath, representative_path, with_rows
+from toolpath_stiff.placement.surface_error import Errors
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 SCOUT_SAMPLES, POLISH_SAMPLES = 120, 400
@@ -37,6 +38,8 @@ class Search:
         Called with (stages done, stages in all).
     start, now
         The present placement where it lies within the bounds, (0, 6) or (1, 6); its figures, within them or not.
+    errors
+        Surface error of placements, where that is the objective.
     """
 
     model: StiffnessModel
@@ -49,6 +52,7 @@ class Search:
     report: Callable[[int, int], None] = lambda done, total: None
     start: FloatArray = field(init=False)
     now: PlacementFigures | None = None
+    errors: Errors | None = None
     evaluators: dict[str, Evaluator] = field(default_factory=dict)
     made: list[Evaluator] = field(default_factory=list)
     heeded: IntArray = field(init=False)

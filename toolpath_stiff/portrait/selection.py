@@ -6,8 +6,10 @@ series.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -96,6 +98,13 @@ class Selection:
         self.rest = self.compliance - problem.predictor.strut_part(base.law)
         self.ground = Ground(problem.predictor, self.compliance, base.law)
         self.dictionary = dictionary_of(self.ground)
+
+    def beside(self, base: Fit) -> Self:
+        """The same dictionary beside another fit to the same readings; before anything is searched."""
+        other = copy(self)
+        compliance = np.exp(base.residual - self.problem.observed)
+        other.base, other.rest = base, compliance - self.problem.predictor.strut_part(base.law)
+        return other
 
     @property
     def start(self) -> Description:

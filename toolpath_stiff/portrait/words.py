@@ -1,6 +1,6 @@
 """A portrait in an engineer's words, and as parts of diagnose.json in shop units."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -204,14 +204,19 @@ def portrait_entry(portrait: Portrait) -> Document:
     }
 
 
-def alike_entry(name: str, alike: Alike) -> Document:
-    """What else would look the same as a named effect, as diagnose.json has it."""
+def alike_entry(alike: Mapping[str, Alike]) -> Document | None:
+    """What else would look the same as the named effects, as diagnose.json has it; None where nothing would."""
+    if not alike:
+        return None
+    each = alike.values()
     return {
-        "text": alike_text(name, alike),
-        "links": _shares("link", alike.links),
-        "variables": _shares("variable", alike.variables),
+        "text": " ".join(alike_text(name, same) for name, same in alike.items()),
+        "links": _shares("link", [share for same in each for share in same.links]),
+        "variables": _shares("variable", [share for same in each for share in same.variables]),
         "terms": [
-            {**_term(term), "share": json_number(share, 3), "words": term_words(term)} for term, share in alike.terms
+            {**_term(term), "effect": name, "share": json_number(share, 3), "words": term_words(term)}
+            for name, same in alike.items()
+            for term, share in same.terms
         ],
     }
 

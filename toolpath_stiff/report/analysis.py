@@ -9,7 +9,7 @@ from toolpath_stiff.analysis.statistics import sample_columns
 from toolpath_stiff.column_files import check_parquet, csv_pieces, parquet_pieces
 from toolpath_stiff.documents import Document
 from toolpath_stiff.path.table import PATH_COLUMNS
-from toolpath_stiff.report import analysis_page
+from toolpath_stiff.report import analysis_page, cut, cut_files
 from toolpath_stiff.report.analysis_tables import (
     TITLES,
     and_more,
@@ -36,11 +36,12 @@ COLUMNS: dict[str, int | None] = {
 MOST_OPERATIONS = 12  # on the terminal; all are in summary.json
 
 
-def other_samples(table: str) -> tuple[str, ...]:
-    """The file of samples that is not written. Raises `InputError` where the format is unknown or not installed."""
+def unwritten(table: str, cut: bool) -> tuple[str, ...]:
+    """The files that are not written. Raises `InputError` where the format is unknown or not installed."""
     if one_of("table", table, ("csv", "parquet")) == "parquet":
         check_parquet()
-    return tuple(name for name in ("samples.csv", "samples.parquet") if not name.endswith(table))
+    others = tuple(name for name in ("samples.csv", "samples.parquet") if not name.endswith(table))
+    return others if cut else (*others, *OF_CUT)
 
 
 def samples_csv(analysis: Analysis) -> Iterator[bytes]:
@@ -53,7 +54,15 @@ def samples_parquet(analysis: Analysis) -> Iterator[bytes]:
     return parquet_pieces(partial(sample_columns, analysis), len(analysis.samples))
 
 
-DATA = {"samples.csv": samples_csv, "samples.parquet": samples_parquet, "summary.json": Analysis.to_json}
+DATA = {
+    "samples.csv": samples_csv,
+    "samples.parquet": samples_parquet,
+    "summary.json": Analysis.to_json,
+    "cut.csv": cut_files.stations_csv,
+    "cut_lines.csv": cut_files.lines_csv,
+    "surface.vtk": cut_files.surface_vtk,
+}
+OF_CUT = ("cut.csv", "cut_lines.csv", "surface.vtk", "cut.png")
 PAGE, page = "report.html", analysis_page.page
 
 
@@ -66,6 +75,8 @@ def text(analysis: Analysis) -> str:
     if "required" in summary and summary["required"]["below"]:
         sentence, below = required(analysis)
         lines += [sentence, *below.lines(2, 0)[1:]]
+    if analysis.cut is not None:
+        lines += cut.text(analysis)
     return "\n".join(lines)
 
 

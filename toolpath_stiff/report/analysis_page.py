@@ -16,15 +16,18 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report import analysis_tables as words
-from toolpath_stiff.report.colours import page_colours
+from toolpath_stiff.report.colours import error_colours, page_colours
 from toolpath_stiff.report.curves import beyond_scale, cutting_box, extremes_by_column, profile_curve, scale_limits
+from toolpath_stiff.report.cut import cut_tables
 from toolpath_stiff.report.pages import Part, markup, part, render
+from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 SCRIPTS = ("stage.js", "viewer.js", "profile.js", "analysis.js")
 
@@ -36,7 +39,8 @@ def page(analysis: Analysis, drawn: Mapping[str, bytes], *, show_plunges: bool =
     return render(
         "analysis.html",
         styles=["viewer.css", "analysis.css"],
-        scripts=SCRIPTS,
+        scripts=SCRIPTS if analysis.cut is None else (*SCRIPTS, "part.js"),
+        cut=analysis.cut is not None,
         data=data,
         title=f"{summary['program']}: stiffness along the path",
         program=summary["program"],
@@ -44,7 +48,7 @@ def page(analysis: Analysis, drawn: Mapping[str, bytes], *, show_plunges: bool =
         plunges_shown=show_plunges,
         warnings=summary["warnings"],
         note=_thinned_note(data["count"], len(analysis.samples)),
-        tables=_tables(analysis, data["weakest"]),
+        tables=_tables(analysis, data["weakest"], page_rows(analysis)),
     )
 
 
@@ -57,8 +61,8 @@ def _thinned_note(shown: int, samples: int) -> str:
     )
 
 
-def _tables(analysis: Analysis, weakest: Sequence[int]) -> list[tuple[str, Markup, bool]]:
-    """Title, content and whether it is wide, of each table; `weakest`: the page's rows of the weakest places."""
+def _tables(analysis: Analysis, weakest: Sequence[int], rows: IntArray) -> list[tuple[str, Markup, bool]]:
+    """Title, content and whether it is wide, of each table; `weakest` of the page's `rows`: the weakest places."""
     summary, other = analysis.to_dict(), analysis.on_other
     operations, unsupported = summary["per_operation"], summary["unsupported"]
     more = words.and_more(operations, words.MOST_ROWS, "operations")
@@ -69,7 +73,7 @@ def _tables(analysis: Analysis, weakest: Sequence[int]) -> list[tuple[str, Marku
     ]
     figures = [
         *words.facts(summary),
-        ("deflection", f"mean {number(summary['mean_deflection_um'], 2)} um"),
+        ("deflection", f"mean {number(summary['mean_deflection_um'], 2)} um along the load, under the force assumed"),
         ("effects", ", ".join(summary["effects"]) or "none acts"),
     ]
     tables: list[tuple[str, Sequence[Part], bool]] = [
@@ -78,6 +82,7 @@ def _tables(analysis: Analysis, weakest: Sequence[int]) -> list[tuple[str, Marku
         ("Figures", [ShownTable((), figures)], False),
         ("Weakest places", [_places(summary["weakest_places"], weakest)], False),
         ("Required stiffness", [*words.required(analysis)] if "required" in summary else [], False),
+        *cut_tables(analysis, rows),
         ("Comparison", [words.comparison(summary, other.to_dict())] if other is not None else [], False),
         ("Assumptions", [summary["assumptions"]], False),
         ("Read, but not acted upon", [ShownTable(("line:column", "word", "why"), ignored), *more_words], False),
@@ -100,6 +105,7 @@ def _places(places: Sequence[Document], weakest: Sequence[int]) -> ShownTable:
     return ShownTable(("", ">N/mm", "position mm", "program"), rows)
 
 
+MOST_QUADS = 8_000  # of walls and of floors on the page
 MOST_SAMPLES = 200_000  # on the page: some 5 MB; the tables are always of all samples
 OTHER_COLUMNS = 4000  # columns of pixels that the other machine's curve is thinned to
 NONE = 65535  # a value that does not exist
@@ -146,6 +152,25 @@ def page_data(analysis: Analysis) -> Document:
         "mean": stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"],
         "required": None if analysis.required is None else n_per_mm_from_n_per_m(analysis.required),
         "other": None if analysis.on_other is None else _other_curve(analysis.on_other),
+        **({} if analysis.cut is None else {"part": _part(analysis, analysis.cut, rows)}),
+    }
+
+
+def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
+    """The finished part in machine coordinates, its error in um, the page's row of the sample that made each place."""
+    quads, error, sample = surface_of(cut, MOST_QUADS)
+    corners = mm_from_m(in_machine(quads.reshape(-1, 3), analysis.origin))
+    frame = np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)
+    fractions, ends = _fractions(um_from_m(error))
+    nearest = np.clip(np.searchsorted(rows, np.maximum(sample, 0)), 0, len(rows) - 1)
+    return {
+        "corners": _base64(_quantised(corners, frame[:, 0], frame[:, 1], 65535)),
+        "frame": frame.tolist(),
+        "error": fractions,
+        "error_range": ends,
+        "limit": um_from_m(error_limit(cut)),
+        "sample": _base64(np.where(sample < 0, -1, nearest).astype("<i4")),
+        "colours": error_colours(),
     }
 
 

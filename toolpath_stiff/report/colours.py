@@ -8,8 +8,17 @@ BLUE, LIGHT_BLUE, GREEN, PURPLE, PALE_RED = "#2457a6", "#7ea6d8", "#2f855a", "#7
 CHOSEN, WITHIN, FAINT = "#e3edfa", "#e9edf2", "#b8c1cc"  # behind what is chosen; within bounds; lines that only guide
 NOWHERE = "#eceff3"  # out of reach, on a map
 STIFFNESS, RESIDUAL = "viridis", "RdBu"  # scales; red: measured softer than modelled, blue: stiffer
+ERROR = "RdYlBu_r"  # of a surface; red: material left, blue: cut too deep
 DIRECTIONS = {"X": BLUE, "Y": ORANGE, "Z": GREEN, "oblique": PURPLE}  # of a reading
 CLASSES = 32  # colours; more cannot be told apart along a line, and each costs a drawing call
+
+
+def error_colours() -> list[str]:
+    """The classes' colours of an error of the surface, from cut too deep to material left."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return [to_hex(c) for c in colormaps[ERROR](np.linspace(0.06, 0.94, CLASSES))]
 
 
 def page_colours() -> dict[str, list[str]]:

@@ -11,6 +11,7 @@ from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why
 from toolpath_stiff.documents import json_number, number
 from toolpath_stiff.inference.errors import deviation_percent
+from toolpath_stiff.inference.votes import chance_of_losing, outvoted, standard_error
 from toolpath_stiff.portrait.portrait import Portrait, Sized
 from toolpath_stiff.portrait.words import portrait_text, term_words
 from toolpath_stiff.report import explanations as words
@@ -63,6 +64,7 @@ def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
         ("What the missing thing looks like", *_portrait(diagnosis.portrait)),
         "portrait.png",
         ("What the fits say", _candidates(diagnosis)),
+        ("How left-out poses vote", *_votes(diagnosis)),
         "before_after.png",
         ("What can these data not tell apart?", *_alike(diagnosis)),
         ("What could be there unseen?", *_unseen(diagnosis)),
@@ -112,6 +114,20 @@ def _candidates(diagnosis: Diagnosis) -> ShownTable:
     head = ("effect", "size (95 % interval)", ">probability", ">mean error", ">at points left out",
             ">fall in standard errors", "leaves scatter only", "remark")  # fmt: skip
     return ShownTable(head, rows, kinds)
+
+
+def _votes(diagnosis: Diagnosis) -> list[Part]:
+    rows = []
+    for rival, votes in diagnosis.main.votes.items():
+        chance = words.probability_text(chance_of_losing(votes))
+        gain = f"{votes.sum():.1f} +- {standard_error(votes):.1f}"
+        rows.append((rival, gain, chance, "outvoted" if outvoted(votes) else "not beyond chance"))
+    first = next((name for name in diagnosis.explanations if name in diagnosis.fits), "")
+    remark = (
+        f"By how much {plain(first)} foretells left-out poses better than each rival of another part: log probability, "
+        "summed over the poses; and how often not, in draws of the poses. A name needs all of these."
+    )
+    return [remark if rows else "", ShownTable(("rival", ">gain", ">chance of none", ""), rows)]
 
 
 def _portrait(portrait: Portrait | None) -> list[Part]:

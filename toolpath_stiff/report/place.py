@@ -47,11 +47,17 @@ def facts(placed: Placement) -> list[tuple[str, str]]:
         ("  before", _figures_words(present) if present else f"out of reach: {placed.present_reason}"),
         *([("  plunges", f"mean {number(mean)}{now} N/mm, along the tool axis, not counted above")] if mean else []),
         *costs,
+        *([("  surface error", _error_words(placed.surface_error_um))] if placed.surface_error_um else []),
         ("  margin", f"{100.0 * margin:.1f} % of a limit's span at least, rapids included"),
         ("LinuxCNC", blocks.linuxcnc or blocks.linuxcnc_reason),
         ("Fanuc-style", blocks.fanuc or blocks.fanuc_reason),
         ("front", f"{len(placed.front)} placements, {number(placed.pose_evaluations)} poses evaluated"),
     ]
+
+
+def _error_words(errors: Mapping[str, float]) -> str:
+    before = f", before {errors['before']:.2f} um" if "before" in errors else ""
+    return f"95 % of the final walls within {errors['chosen']:.2f} um{before} (mean over the height)"
 
 
 def _figures_words(row: PlacementRow) -> str:

@@ -24,13 +24,14 @@ Shifts = Mapping[int, tuple[FloatArray, FloatArray]]
 Stretch = tuple[list[float], list[float], Arc | None]  # start and end (6) in the set-up frame, a part of a shifted move
 Course = list[Stretch]
 
-TOLERANCE = 1e-3  # mm, of a shift that varies along a move: straight pieces and arcs of constant radius stay within it
+TOLERANCE = 5e-4  # mm, of a shift that varies along a move: straight pieces and arcs of constant radius stay within it
 SHORTEST = 0.2  # mm, the shortest piece into which a move is cut
 RAMP = 1.0  # mm, over which a shift comes and goes
 LARGEST_MITRE = 3.0  # of the shift: neighbours that would meet further out ramp instead
 STEEPEST = 5.0  # lengths of a shift over which it may come and go at least
 SHALLOW = 0.1  # of singular values: neighbours within some 11 degrees of one line meet at the mean of their shifts
 LARGEST_PIECE = math.pi / 8.0  # of an arc whose shift varies: circles through three points are within 0.3 um of that
+NOTHING = 1e-6  # mm
 STRAIGHT = 1e5  # mm: an arc of more is straight
 
 
@@ -53,7 +54,7 @@ class SideShift:
     moves
         Of the untouched program.
     shifts
-        Of the moves that have one; a move that may not be shifted takes none.
+        Of the moves that have one; a move that may not be shifted takes none, one with a shift of 0 stays.
 
     Attributes
     ----------
@@ -72,7 +73,7 @@ class SideShift:
         ]
         self._start, self._end = (ends[:, 0] + 1j * ends[:, 1] for ends in self._ends)
         center = mm_from_m(moves.arc_center)
-        self._center, self._height = center[:, 0] + 1j * center[:, 1], center[:, 2]
+        self._center = center[:, 0] + 1j * center[:, 1]
         self._normal = np.where(moves.arc_normal[:, 2] < 0.0, -1.0, 1.0)
         self._sweep = moves.arc_sweep * self._normal  # counter-clockwise, seen from above
         self._length = mm_from_m(move_lengths(moves))
@@ -96,7 +97,8 @@ class SideShift:
             self.refused |= dict.fromkeys(near or self._shifts, "it, or its neighbour, is shorter than the shift")
 
     def _moves(self, row: int) -> bool:
-        return row in self._shifts or bool(self._joint.get(row) or self._joint.get(row + 1))
+        shifted = row in self._shifts and bool(self._shifts[row][1].any())
+        return shifted or bool(self._joint.get(row) or self._joint.get(row + 1))
 
     def _left(self, row: int, point: complex) -> complex:
         """Unit vector to the left of the feed of a move at a point of its plan."""
@@ -128,6 +130,9 @@ class SideShift:
                 missing = [shift - self._shift_at(row, point, moved) for row, shift in wanted]
                 step = np.linalg.lstsq(np.array([[n.real, n.imag] for n in left]), np.array(missing), rcond=SHALLOW)[0]
                 moved += complex(*step)
+            still = [row for row, _ in wanted if not self._shifts[row][1].any()]
+            if abs(moved) < NOTHING or any(abs(self._shift_at(row, point, moved)) > TOLERANCE for row in still):
+                moved = 0j  # a move that is to stay does
             joints[joint] = moved * min(1.0, most / abs(moved)) if moved else 0j
         return joints
 

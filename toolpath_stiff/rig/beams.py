@@ -23,7 +23,7 @@ def bar(diameter: float) -> Section:
     return area, 0.9 * area, second, 2.0 * second
 
 
-def block(side: float) -> Section:
+def square(side: float) -> Section:
     """Solid square; torsion constant 0.1406 a^4 (Saint-Venant)."""
     return side**2, SHEAR_SHARE * side**2, side**4 / 12.0, 0.1406 * side**4
 

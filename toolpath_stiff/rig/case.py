@@ -5,7 +5,7 @@ effect alone.
 """
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,10 +18,9 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE, with_effect
-from toolpath_stiff.rig.fem import FemMachine
-from toolpath_stiff.rig.fem_case import draw_machine, fault_names, path_truth, scattered
-from toolpath_stiff.rig.fem_faults import FAULTS
-from toolpath_stiff.rig.fem_solution import readings as readings_of_elements
+from toolpath_stiff.rig.fem import FemMachine, sound_machine
+from toolpath_stiff.rig.fem_faults import FAULTS, faults
+from toolpath_stiff.rig.fem_path import path_truth
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, disturb_machine, disturb_readings, readings
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
@@ -35,7 +34,6 @@ BUILT = ("springs", "fem")  # ways to build a machine, the first by default
 # How often a blind draw hides what, where nothing is said (assumed).
 BLIND = {"none": 0.2, "one": 0.45, "two": 0.15, "outside": 0.2}
 
-KINDS = ("none", "one", "two", "three")  # by how many effects of the catalogue are hidden
 # One stream of random numbers for each purpose, so that a change in one leaves the others as they were.
 _STREAMS = ("kind", "campaign", "machine", "noise")
 
@@ -86,7 +84,7 @@ class DrawnCase:
         What was hidden: `hidden` (names; empty if nothing), `kind`, `effects` with parameters in shop units,
         their `size` (rms change of ln stiffness) and `detectability` (see `sizes.DETECTABLE`); of an unknown also
         `links` and `variables`, what a description may name. Of a machine of finite elements `links` and `names`, what
-        the catalogue calls it, and `path`: poses and directions with the true stiffness there.
+        the catalogue calls it, and `path`, the true stiffness at poses (`path_truth`).
     nominal, machine, nuisances
         To measure the same machine again.
     seed, layout
@@ -96,24 +94,21 @@ class DrawnCase:
     rows: Table
     truth: Document
     nominal: Nominal
-    machine: HiddenMachine | FemMachine
+    machine: HiddenMachine
     nuisances: Nuisances
     seed: int = 0
     layout: str = ""
 
     def measure(self, table: Table, rows: Rows, rng: Generator, stated_sd: bool = False) -> Table:
         """A table with the column `stiffness_N_per_mm`, and `sd_N_per_mm` if it is to be stated; `rows` in SI."""
-        machine, nuisances = self.machine, self.nuisances
-        if isinstance(machine, FemMachine):
-            shown, apart = readings_of_elements(self.nominal, machine, rows), machine.clamping * rows.direction**2
-        else:
-            shown, apart = readings(self.nominal, machine, rows), None
+        shown, nuisances = readings(self.nominal, self.machine, rows), self.nuisances
         bad = np.flatnonzero(~(np.isfinite(shown) & (shown > 0.0)))
         if len(bad):
             raise InputError(
                 f"row {bad[0] + 1}: the indicator would run backwards on the hidden machine",
                 hint="use a larger load or zero the indicator later (time_min)",
             )
+        apart = self.machine.clamping_axes * rows.direction**2 if isinstance(self.machine, FemMachine) else None
         stiffness = n_per_mm_from_n_per_m(disturb_readings(shown, clamp_of(table), nuisances, rng, apart))
         measured: Table = {}
         for name, values in table.items():
@@ -187,13 +182,12 @@ def draw_case(
     nominal = load_nominal(machine) if isinstance(machine, str) else machine
     streams = {name: np.random.default_rng([seed, i]) for i, name in enumerate(_STREAMS)}
     table = campaign(layout, nominal, plan, streams["campaign"])
+    names = _names(hidden, layout, table, streams["kind"], fem=built == "fem")
     rows = rows_of(table)
-    if built == "fem":
-        return _elements(seed, layout, hidden, size, nuisances, nominal, table, rows, streams)
-    names = _names(hidden, layout, table, streams["kind"])
-    true, effects = HiddenMachine(), []
+    true: HiddenMachine = sound_machine(nominal) if built == "fem" else HiddenMachine()
+    effects = []
     if names:
-        scale = Scale(nominal, rows, clamp_of(table), nuisances)
+        scale = Scale(nominal, rows, clamp_of(table), nuisances, true)
         for name, wanted in zip(names, _sizes(size, len(names)), strict=True):
             # A stream of its own for each effect: sizes of different effects of one seed have nothing in common.
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
@@ -201,43 +195,22 @@ def draw_case(
             true = with_effect(true, name, parameters)
             kind = UNKNOWNS.get(name)  # what a description may name
             words = {} if kind is None else {"links": sorted(kind.links), "variables": sorted(kind.variables)}
+            if name in FAULTS:
+                words = {"links": sorted(FAULTS[name].links), "names": sorted(FAULTS[name].names)}
             effects.append({"effect": name, "parameters": parameters, **strength, **words})
     true = disturb_machine(true, nuisances, streams["machine"])
-    truth = {
+    beyond = {*OUTSIDE, *faults(in_catalogue=False)}
+    truth: dict[str, object] = {
         "hidden": list(names),
-        "kind": "outside" if {*names} & {*OUTSIDE} else KINDS[min(len(names), 3)],
+        "kind": "outside" if {*names} & beyond else ("none", "one", "two", "three")[min(len(names), 3)],
         "effects": effects,
     }
+    if isinstance(true, FemMachine):
+        if nuisances.joint_error > 0.0:  # no machine is quite like its drawing, unless none of it shall be
+            true = true.scattered(streams["machine"])
+        truth["path"] = path_truth(nominal, true, rows, np.random.default_rng([seed, len(_STREAMS)]))
     case = DrawnCase(table, truth, nominal, true, nuisances, seed, layout)
     return replace(case, rows=case.measure(table, rows, streams["noise"], stated_sd=layout == "paper"))
-
-
-def _elements(
-    seed: int,
-    layout: str,
-    hidden: str | Sequence[str] | None,
-    size: float | Sequence[float] | None,
-    nuisances: Nuisances,
-    nominal: Nominal,
-    table: Table,
-    rows: Rows,
-    streams: dict[str, Generator],
-) -> DrawnCase:
-    """The same of a machine of finite elements."""
-    wanted = hidden if isinstance(hidden, str) else tuple(hidden) if hidden is not None else _blind(streams["kind"])
-    names = fault_names(wanted, table, streams["kind"])
-    true, effects = draw_machine(seed, names, _sizes(size, len(names)), nominal, rows, clamp_of(table), nuisances)
-    true = scattered(true, nuisances, streams["machine"])
-    kind = KINDS[min(len(names), 3)] if all(FAULTS[name].names for name in names) else "outside"
-    path = path_truth(nominal, true, rows, np.random.default_rng([seed, len(_STREAMS)]))
-    truth = {"hidden": list(names), "kind": kind, "effects": effects, "path": path}
-    case = DrawnCase(table, truth, nominal, true, nuisances, seed, layout)
-    return replace(case, rows=case.measure(table, rows, streams["noise"], stated_sd=layout == "paper"))
-
-
-def _blind(rng: Generator) -> str:
-    """What is hidden where nothing is said."""
-    return str(rng.choice(list(BLIND), p=list(BLIND.values())))
 
 
 def _sizes(size: float | Sequence[float] | None, count: int) -> Sequence[float | None]:
@@ -248,31 +221,38 @@ def _sizes(size: float | Sequence[float] | None, count: int) -> Sequence[float |
     return sizes
 
 
-def _names(hidden: str | Sequence[str] | None, layout: str, table: Table, rng: Generator) -> tuple[str, ...]:
-    """Names of what is hidden."""
+def _names(
+    hidden: str | Sequence[str] | None, layout: str, table: Table, rng: Generator, *, fem: bool
+) -> tuple[str, ...]:
+    """Names of what is hidden, in a machine of finite elements or of springs."""
     if hidden is None:
-        hidden = _blind(rng)
-    known = effects_of_layout(layout)
+        hidden = str(rng.choice(list(BLIND), p=list(BLIND.values())))
+    outside: Sequence[str] = (*ODDITIES, *(() if layout == "paper" else ODDITIES_IN_TIME))
+    unknown: Sequence[str] = [name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)]
+    known: Sequence[str] = effects_of_layout(layout)
+    if fem:
+        known, outside = (
+            [name for name in faults(in_catalogue=inside) if all(c in table for c in FAULTS[name].columns)]
+            for inside in (True, False)
+        )
+        unknown = outside
     if hidden in ("two", "three"):
         return tuple(known[i] for i in rng.choice(len(known), size=2 if hidden == "two" else 3, replace=False))
-    drawn: dict[str, Callable[[], Sequence[str]]] = {
-        "one": lambda: known,
-        "unknown": lambda: [name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)],
-        "outside": lambda: [*ODDITIES, *(() if layout == "paper" else ODDITIES_IN_TIME)],
-    }
+    drawn = {"one": known, "unknown": unknown, "outside": outside}
     if isinstance(hidden, str) and hidden in drawn:
-        return (str(rng.choice(drawn[hidden]())),)
+        return (str(rng.choice(drawn[hidden])),)
     if hidden == "none":
         return ()
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
-    everything = (*CATALOGUE, *OUTSIDE)
-    if unknown := [name for name in names if name not in everything]:
+    everything = FAULTS if fem else (*CATALOGUE, *OUTSIDE)
+    if strange := [name for name in names if name not in everything]:
         expected = f"none, one, two, three, outside, unknown, or of {', '.join(everything)}"
-        raise InputError(f"nothing called {unknown[0]!r} to hide", expected=expected)
+        raise InputError(f"nothing called {strange[0]!r} to hide", expected=expected)
     if len(set(names)) < len(names) or sum(name in OUTSIDE for name in names) > 1:
         raise InputError(f"hidden effects {', '.join(names)}", expected="each once, at most one outside the catalogue")
     for name in names:
-        needed = ("time_min",) if name == "thermal_drift" else OUTSIDE[name].columns if name in OUTSIDE else ()
+        kinds = FAULTS if fem else OUTSIDE
+        needed = ("time_min",) if name == "thermal_drift" else kinds[name].columns if name in kinds else ()
         for column in needed:
             if column not in table:
                 raise InputError(f"{name} needs the column {column}", expected="layout tilted, or a plan with it")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff.rig.draws import Shape
+from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.hidden import HiddenMachine
 from toolpath_stiff.rig.unknown import Unknown
 from toolpath_stiff.rig.unknowns import OUTSIDE
@@ -149,18 +150,23 @@ CATALOGUE: dict[str, Hideable] = {
 
 def draw_shape(name: str, rng: Generator, vertices: int, setups: list[str]) -> Shape:
     """What is drawn of anything that can be hidden, beside its strength."""
-    return CATALOGUE[name].draw(rng, vertices, setups) if name in CATALOGUE else OUTSIDE[name].shape(rng)
+    if name in CATALOGUE:
+        return CATALOGUE[name].draw(rng, vertices, setups)
+    return (FAULTS[name] if name in FAULTS else OUTSIDE[name]).shape(rng)
 
 
 def at_strength(name: str, shape: Shape, strength: float) -> Shape:
     """Shape in shop units, by the catalogue's names, for a strength in (0, 1]."""
     if name in CATALOGUE:
         return CATALOGUE[name].grow(strength, shape)
-    return _scaled("size", OUTSIDE[name].limit, *(key for key in shape if key != "sign"))(strength, shape)
+    limit = (FAULTS[name] if name in FAULTS else OUTSIDE[name]).limit
+    return _scaled("size", limit, *(key for key in shape if key != "sign"))(strength, shape)
 
 
 def with_effect(hidden: HiddenMachine, name: str, parameters: Shape) -> HiddenMachine:
     """The machine with one more effect; parameters in shop units by the catalogue's names."""
     if name in CATALOGUE:
         return dataclasses.replace(hidden, **CATALOGUE[name].change(hidden, parameters))
+    if name in FAULTS:
+        return dataclasses.replace(hidden, **FAULTS[name].change(hidden, parameters))
     return dataclasses.replace(hidden, unknown=Unknown(name, parameters["size"], dict(parameters)))

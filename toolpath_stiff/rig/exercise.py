@@ -26,7 +26,7 @@ from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, POSE, Table
 from toolpath_stiff.rig.case import BUILT, DrawnCase, clamp_of, draw_case, rows_of
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.fem import FemMachine
-from toolpath_stiff.rig.fem_faults import FAULTS
+from toolpath_stiff.rig.fem_faults import FAULTS, faults
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
 from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable
@@ -90,12 +90,9 @@ def unseal(file: str | Path) -> tuple[DrawnCase, Document]:
     machine: Table = {
         name: np.array(value) if isinstance(value, list) else value for name, value in sealed["machine"].items()
     }
+    machine["unknown"] = machine["unknown"] and Unknown(**machine["unknown"])
     nominal = parse_nominal(sealed["nominal"]["text"], sealed["nominal"]["name"])
-    if sealed.get("built") == "fem":
-        true: HiddenMachine | FemMachine = FemMachine(**machine)
-    else:
-        machine["unknown"] = machine["unknown"] and Unknown(**machine["unknown"])
-        true = HiddenMachine(**machine)
+    true = (FemMachine if sealed.get("built") == "fem" else HiddenMachine)(**machine)
     return DrawnCase({}, sealed["truth"], nominal, true, Nuisances(**sealed["nuisances"])), sealed
 
 
@@ -106,7 +103,7 @@ def score(hidden: list[str], claim: list[str]) -> str:
     """
     claimed, truth = set(claim) - set(SOUND), set(hidden)
     if claimed & set(OTHER):
-        beyond = {*OUTSIDE, *(name for name, fault in FAULTS.items() if not fault.names)}
+        beyond = {*OUTSIDE, *faults(in_catalogue=False)}
         claimed = (claimed - set(OTHER)) | ((truth & beyond) or {"outside"})
     if claimed == truth:
         return "right" if truth else "correctly none"
@@ -246,9 +243,9 @@ def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
         raise InputError(f"a claim {claim!r}", expected=f"none, or one or several of {', '.join(known)}")
     case, sealed = unseal(Path(folder) / SEALED)
     # A fault of elements that the catalogue has a name for is claimed by that.
-    right = [
+    hidden = [
         next((name for name in claims if name in effect.get("names", ())), effect["effect"])
         for effect in case.truth["effects"]
     ]
-    verdict = {"verdict": score(right, claims), "claim": claims}
+    verdict = {"verdict": score(hidden, claims), "claim": claims}
     return {**verdict, **case.truth, "seed": sealed["seed"], "layout": sealed["layout"]}

@@ -1,89 +1,73 @@
 """A machine of finite elements: frame of beams on feet, struts with joints, platform, spindle, tool, table on mounts.
 
-Its second purpose beside `structure`: nothing in it is built as the catalogue's effects are. Frame, platform with
-spindle, and table are condensed to where something acts on them; the struts join the first two, pose by pose. Struts
-lengthen by what their forces make joints give, so a nonlinear joint is an initial strain: the forces follow from
-equilibrium almost alone, and a few steps settle them. Loads are +F and -F beside the platform's weight; what is read is
-half the difference, the secant. The weight's geometric stiffness (5e-5 of a strut's) is left out.
-
-Every size is assumed, in proportion to the frame's and the platform's radius; `calibration` sets the struts so that
-the nominal machine describes the sound one.
+Nothing in it is built as the catalogue's effects are. The parts (`fem_parts`) are condensed to where something acts;
+the struts join frame and platform, pose by pose. Struts lengthen by what their forces make joints give, so a nonlinear
+joint is an initial strain: the forces follow from equilibrium almost alone, and a few steps settle them. Loads are +F
+and -F beside the platform's weight; half the difference is read, the secant. The weight's geometric stiffness (5e-5 of
+a strut's) is left out. `sound_machine` sets the struts so that the nominal machine describes the sound one.
 """
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Self
 
 import numpy as np
+from numpy.random import Generator
 
-from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig import beams
-from toolpath_stiff.rig.beams import NODE, add, arm
-from toolpath_stiff.rig.hidden import HERTZ_LOAD
-from toolpath_stiff.rig.nominal import (
-    Nominal,
-    commanded_lengths,
-    neutral_directions,
-    platform_points,
-    rotations,
-    true_poses,
-)  # fmt: skip
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.rig import beams, fem_parts
+from toolpath_stiff.rig.beams import NODE, STEEL, arm
+from toolpath_stiff.rig.fem_parts import frame_corners, mean_radius, table_top
+from toolpath_stiff.rig.fem_path import reference_rows
+from toolpath_stiff.rig.hidden import HERTZ_LOAD, HiddenMachine, readings, strut_stiffness, true_geometry
+from toolpath_stiff.rig.nominal import Nominal, commanded_lengths, parse_nominal, rotations
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.unknown import opened
+from toolpath_stiff.rig.unknown import CommandedRows, opened
 
 JOINT_SHARE = 0.02  # of a strut's nominal compliance that sits in each of its two joints
-SEAT_WIDTH = 20.0  # N over which a loose joint goes from one seat to the other
-GRAVITY = 9.81  # m/s^2
-DENSITY = 7850.0  # kg/m^3, steel
-FEET = 2e10  # N/m, a foot of the frame in each direction
-BEARINGS = (1.5e10, 1.5e10, 2e10, 1.5e9, 1.5e9, 1.5e9)  # N/m and N m/rad of the spindle in the platform
-MOUNTS = 2e10  # N/m, each of four mounts of the table in each direction
-SLAB = (1e11, 1e11)  # N/m and N m/rad, the floor under the table
-GRID = 5  # nodes along each side of the table's grillage
 JOINT_TURNING = 2e3  # N m/rad, what a sound joint resists
-HUB, NOSE, SHAFT, TIP = 6, 7, 8, 9  # nodes of the platform after its six joints
+STRUT = 0.10  # m, diameter of a strut in bending
+WORN = 0.3  # of the travel between the law's two lengths, a worn stretch
+SEAT_WIDTH = 20.0  # N over which a loose joint goes from one seat to the other
+WEIGHT = 9810.0  # N, platform with spindle and half the struts, of 0.305 m radius; others with its cube
+CURVED_AT = 4000.0  # N, load at which the error of a load cell is quoted
+# Standard deviations of ln stiffness from machine to machine, and of the scatter of clamping by direction; assumed.
+SPREAD = {"members": 0.1, "feet": 0.15, "rim": 0.1, "spokes": 0.1, "mounts": 0.15, "plate": 0.15}
+CLAMPING_SPREAD = 0.4
+SETTLED, STEPS = 1e-10, 300  # of the largest strut force
 
 
 @dataclass(frozen=True)
-class FemMachine:
+class FemMachine(HiddenMachine):
     """What the elements are; SI. The defaults are the sound machine without spread.
+
+    Of `HiddenMachine` it has geometry, struts, `joint`, `hertz`, `clearance`, gauge and drift; nothing else acts.
 
     Attributes
     ----------
     law
-        Factors on the struts' nominal compliance at the two ends of the law (`calibration`).
-    frame_errors, platform_errors, tip_error, radius_error
-        m, as in `HiddenMachine`.
-    strut_factors, curvature, worn
-        Stiffness of each strut; its curve over the length; strut, from and to which length (m), m/N: a worn stretch.
-    beams, feet, brackets
-        Factors on the frame's beams (upper ring, lower ring, diagonals) and feet; m/N radial and vertical at vertices.
-    rim, spokes, bearings, flange
-        Factors on the platform's beams; m/N at the spindle in platform axes; rotation vector, root of rad/(N m).
-    tool
-        Factor on the tool's diameter.
-    mounts, plate, floor
-        Factors on the table's mounts and plate; rotation vector of the floor, root of rad/(N m).
-    riser, riser_setup
-        N m^2, bending stiffness of the column under the work in one set-up.
-    joints, seat, seat_strut, swing, opening, clearance, contact, turning
-        m/N along each strut; directed at one strut's platform joint (platform axes, root of m/N); m/N per squared sine
-        of swing; m/N in tension; m; m/N at 500 N, Hertz; N m/rad.
+        Factors on the struts' nominal compliance at the two ends of the law (`sound_machine`).
+    members, feet, brackets, rim, spokes, tool, mounts, plate, floor
+        As of `fem_parts`.
+    bearings, flange
+        m/N at the spindle in platform axes; rotation vector, root of rad/(N m).
+    riser
+        m/N sideways of the block under the work in the set-up `riser`, broader than high: in shear.
+    seat, seat_strut
+        Give of one strut's platform joint in one direction: platform axes, root of m/N.
+    swing, opening, turning, worn
+        m/N per squared sine of a joint's swing; m/N in tension; N m/rad of each strut's ends; strut, where its worn
+        stretch begins (share between the law's lengths) and m/N there.
     hose
-        N/m and the place (m) of the far end of a spring that pulls at the platform's hub.
-    gauge, gauge_setup, drift, touches_above, cell_curve, stand, clamping
-        Factors on readings along X, Y, Z, where a set-up is named in this alone; m/s; m above the tip; of a load of
-        4000 N; m/N per m^3; on the scatter of clamping along X, Y, Z.
+        N/m and azimuth of a spring that pulls the platform's hub towards the frame.
+    touches_above, cell_curve, stand
+        m above the tip; of a load of 4000 N; m/N per m^3 of height.
+    clamping_axes
+        Factors on the scatter of clamping along X, Y, Z.
     """
 
     law: FloatArray = field(default_factory=lambda: np.ones(2))
-    frame_errors: FloatArray = field(default_factory=lambda: np.zeros((6, 3)))
-    platform_errors: FloatArray = field(default_factory=lambda: np.zeros((6, 3)))
-    tip_error: float = 0.0
-    radius_error: float = 0.0
-    strut_factors: FloatArray = field(default_factory=lambda: np.ones(6))
-    curvature: float = 0.0
-    worn: FloatArray = field(default_factory=lambda: np.zeros(4))
-    beams: FloatArray = field(default_factory=lambda: np.ones(24))
+    members: FloatArray = field(default_factory=lambda: np.ones(24))
     feet: FloatArray = field(default_factory=lambda: np.ones(6))
     brackets: FloatArray = field(default_factory=lambda: np.zeros((6, 2)))
     rim: FloatArray = field(default_factory=lambda: np.ones(6))
@@ -94,177 +78,238 @@ class FemMachine:
     mounts: FloatArray = field(default_factory=lambda: np.ones(4))
     plate: float = 1.0
     floor: FloatArray = field(default_factory=lambda: np.zeros(3))
-    riser: float = np.inf
-    riser_setup: str = ""
-    joints: float = 0.0
+    riser: float = 0.0
     seat: FloatArray = field(default_factory=lambda: np.zeros(3))
     seat_strut: int = 0
     swing: float = 0.0
     opening: float = 0.0
-    clearance: float = 0.0
-    contact: float = 0.0
     turning: FloatArray = field(default_factory=lambda: np.full(6, JOINT_TURNING))
-    hose: FloatArray = field(default_factory=lambda: np.zeros(4))
-    gauge: FloatArray = field(default_factory=lambda: np.ones(3))
-    gauge_setup: str = ""
-    drift: float = 0.0
+    worn: FloatArray = field(default_factory=lambda: np.zeros(3))
+    hose: FloatArray = field(default_factory=lambda: np.zeros(2))
     touches_above: float = 0.0
     cell_curve: float = 0.0
     stand: float = 0.0
-    clamping: FloatArray = field(default_factory=lambda: np.ones(3))
+    clamping_axes: FloatArray = field(default_factory=lambda: np.ones(3))
+
+    def stiffness(self, nominal: Nominal, rows: Rows) -> FloatArray:
+        """(n,) N/m, secant stiffness between tool and workpiece along the load."""
+        return np.asarray(rows.force / between(nominal, self, rows, 0.0))
+
+    def displacement(self, nominal: Nominal, rows: Rows) -> FloatArray:
+        """(n,) m that the indicator shows for what the load cell shows as the load."""
+        tall = np.maximum(rows.position[:, 2] - table_top(nominal), 0.0)
+        stand = rows.force * self.stand * tall**3 * (1.0 - rows.direction[:, 2] ** 2)
+        moved = between(nominal, self, rows, self.touches_above) + stand + self.drift * rows.time
+        return np.asarray(moved / (1.0 + self.cell_curve * rows.force / CURVED_AT))
+
+    def scattered(self, rng: Generator) -> Self:
+        """As one of many: no section is quite that of the drawing; clamping scatters otherwise in each direction."""
+        factors = {
+            name: before * np.exp(width * (rng.standard_normal() + 0.3 * rng.standard_normal(np.shape(before))))
+            for name, width in SPREAD.items()
+            for before in [getattr(self, name)]
+        }
+        return replace(self, **factors, clamping_axes=np.exp(CLAMPING_SPREAD * rng.standard_normal(3)))
 
 
-class Places(NamedTuple):
-    """Where n poses put things, base axes, m: (n, 3), (n, 3, 3), ends of the struts (n, 6, 3), their lengths (n, 6)."""
-
-    tip: FloatArray
-    rotation: FloatArray
-    frame: FloatArray
-    platform: FloatArray
-    lengths: FloatArray
-
-
-def places(nominal: Nominal, machine: FemMachine, rows: Rows) -> Places:
-    """Where everything stands when the control commands the rows' poses."""
-    turned = rotations(rows.angles)
-    lengths = commanded_lengths(nominal, rows.position, turned, rows.extension)
-    start = rows.position + rows.extension[:, None] * turned[:, :, 2]
-    frame, platform = nominal.frame_joints + machine.frame_errors, platform_joints(nominal, machine)
-    origin, rotation = true_poses(lengths, frame, platform, start, turned)
-    tip = origin - (rows.extension + machine.tip_error)[:, None] * rotation[:, :, 2]
-    ends = platform_points(platform, origin, rotation, np.zeros(len(origin)))
-    return Places(tip, rotation, np.broadcast_to(frame, ends.shape), ends, lengths)
-
-
-def platform_joints(nominal: Nominal, machine: FemMachine) -> FloatArray:
-    """(6, 3) m where they are."""
-    joints = nominal.platform_joints + machine.platform_errors
-    radius = np.linalg.norm(nominal.platform_joints[:, :2], axis=1, keepdims=True)
-    joints[:, :2] *= 1.0 + machine.radius_error / radius
-    return np.asarray(joints)
-
-
-def vertex_nodes(nominal: Nominal) -> FloatArray:
-    """(v, 3) m, corners of the frame's upper ring: amid the joints that each holds."""
-    count = int(nominal.vertices.max()) + 1
-    return np.array([nominal.frame_joints[nominal.vertices == k].mean(axis=0) for k in range(count)])
-
-
-def table_top(nominal: Nominal) -> float:
-    """m, height of the table: an assumed third of the frame's radius below the neutral pose."""
-    return float(nominal.neutral_pose[2] - 0.355 * _radius(nominal.frame_joints))
-
-
-def scale(nominal: Nominal) -> float:
-    """Factor on the stiffness of all but the struts: 1 on `nist`; smaller machines are as stiff beside their struts."""
-    return float(nominal.law_stiffnesses.mean()) / 39.5e6 * 2.25 / _radius(nominal.frame_joints)
-
-
-def _radius(points: FloatArray) -> float:
-    return float(np.linalg.norm(points[:, :2], axis=1).mean())
-
-
-def frame_stiffness(nominal: Nominal, machine: FemMachine) -> FloatArray:
-    """(6 v, 6 v) of an octahedron of square tubes on feet, seen at the vertices that hold the struts."""
-    upper = vertex_nodes(nominal)
-    order, count, size = np.argsort(np.arctan2(upper[:, 1], upper[:, 0])), len(upper), _radius(upper)
-    upper = upper[order]
-    between = upper + np.roll(upper, -1, axis=0)
-    lower = between / np.linalg.norm(between[:, :2], axis=1, keepdims=True) * size
-    lower[:, 2] = min(table_top(nominal), upper[:, 2].min()) - 0.3 * size
-    after = [(k + 1) % count for k in range(count)]
-    pairs = [(k, after[k]) for k in range(count)] + [(count + k, count + after[k]) for k in range(count)]
-    pairs += [pair for k in range(count) for pair in ((k, count + k), (after[k], count + k))]
-    total = beams.beams(np.concatenate([upper, lower]), pairs, beams.block(0.18 * size), machine.beams[: len(pairs)])
-    for k in range(count):
-        foot = NODE * (count + k) + np.arange(3)
-        total[foot, foot] += FEET * machine.feet[k]
-    give = np.linalg.inv(beams.condensed(scale(nominal) * total, range(count)))
-    outward = upper[:, :2] / np.linalg.norm(upper[:, :2], axis=1, keepdims=True)
-    for k, (radial, vertical) in enumerate(machine.brackets[order]):
-        give[NODE * k : NODE * k + 2, NODE * k : NODE * k + 2] += radial * np.outer(outward[k], outward[k])
-        give[NODE * k + 2, NODE * k + 2] += vertical
-    back = (NODE * np.argsort(order)[:, None] + np.arange(NODE)).ravel()
-    return np.asarray(np.linalg.inv(give)[np.ix_(back, back)])
-
-
-def platform_stiffness(nominal: Nominal, machine: FemMachine, extension: float) -> FloatArray:
-    """(48, 48) of rim, spokes, spindle and tool, seen at the joints, the hub and the tip; platform axes."""
-    joints = platform_joints(nominal, machine)
-    size, axis = _radius(joints), np.array([0.0, 0.0, 1.0])
-    hub = max(float(joints[:, 2].mean()), 0.5 * size)
-    nose = nominal.tool_length if 0.0 < nominal.tool_length < 0.9 * hub else 0.5 * hub
-    tip = -(extension + machine.tip_error)
-    nodes = np.concatenate([joints, np.array([hub, nose, nose, min(tip, 0.8 * nose)])[:, None] * axis])
-    around = np.argsort(np.arctan2(joints[:, 1], joints[:, 0]))
-    solid = beams.block(size)
-    total = beams.beams(nodes, list(zip(around, np.roll(around, -1), strict=True)), solid, machine.rim)
-    total += beams.beams(nodes, [(k, HUB) for k in range(6)], solid, machine.spokes)
-    total += beams.beams(nodes, [(HUB, NOSE)], beams.bar(1.1 * size))
-    total += beams.beams(nodes, [(SHAFT, TIP)], beams.bar(0.9 * size * machine.tool))
-    give = np.diag(1.0 / np.array(BEARINGS)) / scale(nominal)
-    give[range(3), range(3)] += machine.bearings
-    give[3:, 3:] += np.outer(machine.flange, machine.flange)
-    total *= scale(nominal)
-    add(total, (NOSE, SHAFT), beams.springs(np.asarray(np.linalg.inv(give)), np.zeros(3)))
-    return beams.condensed(total, (*range(6), HUB, TIP))
-
-
-def table_give(nominal: Nominal, machine: FemMachine, points: FloatArray) -> FloatArray:
-    """(n, 3, 3) m/N of the table at points (n, 3) above it, where a stiff fixture leads load and indicator."""
-    half, top = 0.3 * _radius(nominal.frame_joints), table_top(nominal)
-    ticks = np.linspace(-half, half, GRID)
-    nodes = np.array([(x, y, top) for x in ticks for y in ticks] + [(0.0, 0.0, top)])
-    grid = np.arange(GRID**2).reshape(GRID, GRID)
-    pairs = [*zip(grid[:-1].ravel(), grid[1:].ravel(), strict=True)]
-    pairs += zip(grid[:, :-1].ravel(), grid[:, 1:].ravel(), strict=True)
-    total = beams.beams(nodes, pairs, beams.block(half), machine.plate)
-    slab = np.diag(1.0 / np.repeat(SLAB, 3)) / scale(nominal)
-    slab[3:, 3:] += np.outer(machine.floor, machine.floor)
-    for corner, factor in zip(grid[[0, 0, -1, -1], [0, -1, 0, -1]], machine.mounts, strict=True):
-        mount = np.diag([MOUNTS * factor] * 3 + [0.0] * 3)
-        add(total, (GRID**2, corner), beams.springs(mount, nodes[corner] - nodes[-1]))
-    total *= scale(nominal)
-    total[-NODE:, -NODE:] += np.linalg.inv(slab)
-    reach = np.zeros((len(points), 3, len(total)))
-    cell = np.clip((points[:, :2] + half) / (ticks[1] - ticks[0]), 0.0, GRID - 1.0)
-    first = np.minimum(cell.astype(int), GRID - 2)
-    share, every = cell - first, np.arange(len(points))
-    for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        node = grid[first[:, 0] + i, first[:, 1] + j]
-        weight = np.prod(np.where([i, j], share, 1.0 - share), axis=1)
-        moved = weight[:, None, None] * arm(points - nodes[node])[:, :3]
-        for k in range(NODE):
-            reach[every, :, NODE * node + k] += moved[:, :, k]
-    return np.asarray(reach @ np.linalg.inv(total) @ np.swapaxes(reach, 1, 2))
-
-
-def strut_give(nominal: Nominal, machine: FemMachine, place: Places) -> tuple[FloatArray, FloatArray]:
+def strut_give(machine: FemMachine, state: CommandedRows) -> tuple[FloatArray, FloatArray]:
     """(n, 6) m/N along the struts, and of both their joints, all that is linear."""
+    nominal, every = state.nominal, range(6)
     first, last = nominal.law_ends
-    share = (place.lengths - first) / (last - first)
-    law = 1.0 / np.interp(place.lengths, nominal.law_lengths, nominal.law_stiffnesses)
-    if len(nominal.law_lengths) > 1:  # along the first and the last two points outside
-        slope = np.diff(nominal.law_stiffnesses)[[0, -1]] / np.diff(nominal.law_lengths)[[0, -1]]
-        beyond = np.minimum(place.lengths - first, 0.0) * slope[0] + np.maximum(place.lengths - last, 0.0) * slope[1]
-        law = 1.0 / (1.0 / law + beyond)
-    law = law * (machine.law[0] * (1.0 - share) + machine.law[1] * share)
+    share = (state.lengths - first) / (last - first)
     joint = JOINT_SHARE / float(nominal.law_stiffnesses.mean())
-    proper = (law - 2.0 * joint) * np.exp(-machine.curvature * 4.0 * share * (1.0 - share)) / machine.strut_factors
-    strut = place.platform - place.frame
-    unit = strut / np.linalg.norm(strut, axis=2, keepdims=True)
-    held = unit @ place.rotation
-    rest = np.broadcast_to(neutral_directions(nominal)[1], held.shape)
-    swung = 1.0 - np.minimum(np.einsum("nki,nki->nk", rest, held) ** 2, 1.0)
-    give = 2.0 * joint + machine.joints + machine.swing * swung
-    give[:, machine.seat_strut] += (held[:, machine.seat_strut] @ machine.seat) ** 2
-    number, start, end, worn = machine.worn
-    inside = (place.lengths >= start) & (place.lengths <= end) & (np.arange(6) == number)
-    return np.asarray(proper + np.where(inside, worn, 0.0)), np.asarray(give)
+    law = (1.0 - share) * machine.law[0] + share * machine.law[1]
+    proper = law / strut_stiffness(nominal, machine, state.lengths)[:, every, every] - 2.0 * joint
+    number, start, worn = machine.worn
+    proper = proper + worn * ((share >= start) & (share <= start + WORN) & (np.arange(6) == number))
+    give = 2.0 * joint + machine.joint + machine.swing * state.swing
+    held = state.units[:, machine.seat_strut, None] @ state.place.rotation
+    give[:, machine.seat_strut] += (held[:, 0] @ machine.seat) ** 2
+    return np.asarray(proper), np.asarray(give)
 
 
 def extra_give(machine: FemMachine, forces: FloatArray) -> FloatArray:
     """(n, 6) m by which the joints give beside what is linear, at strut forces (n, 6) N, tension positive."""
-    size = HERTZ_LOAD * np.cbrt(np.abs(forces) / HERTZ_LOAD) ** 2
+    contact = machine.hertz * HERTZ_LOAD * np.sign(forces) * np.cbrt(np.abs(forces) / HERTZ_LOAD) ** 2
     loose = 0.5 * machine.clearance * np.tanh(forces / SEAT_WIDTH)
-    return np.asarray(machine.contact * np.sign(forces) * size + loose + machine.opening * forces * opened(forces))
+    return np.asarray(contact + loose + machine.opening * forces * opened(forces))
+
+
+def solved(nominal: Nominal, machine: FemMachine, rows: Rows) -> tuple[CommandedRows, IntArray, FloatArray, FloatArray]:
+    """Every different pose of the rows, assembled and condensed.
+
+    Returns
+    -------
+    state
+        The p poses.
+    pose
+        (n,) which of them each row has.
+    struts
+        (p, 6, 2) m/N of struts and joints, linear.
+    give
+        (p, q, q) m/N between columns: elongations of 6 struts, tip (6), hub (6), weight (N), frame's corners (6 v).
+    """
+    key = np.column_stack([rows.position, rows.angles, rows.extension])
+    _, first, pose = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    one = rows.take(first)
+    turned = rotations(one.angles)
+    lengths = commanded_lengths(nominal, one.position, turned, one.extension)
+    state = CommandedRows(nominal, one, lengths, true_geometry(nominal, machine, one, turned, lengths))
+    struts = np.stack(strut_give(machine, state), axis=-1)
+    stiffness, columns = assembled(machine, state, struts.sum(axis=-1))
+    return state, pose.ravel(), struts, np.swapaxes(columns, 1, 2) @ np.linalg.solve(stiffness, columns)
+
+
+def assembled(machine: FemMachine, state: CommandedRows, strut: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Stiffness (p, N, N) of frame, struts and platform, and the columns (p, N, q) of `solved`."""
+    nominal, place, count = state.nominal, state.place, len(strut)
+    frame = fem_parts.frame_stiffness(nominal, machine.members, machine.feet, machine.brackets)
+    upper, corners = len(frame), frame_corners(nominal)
+    hub = upper + 6 * NODE
+    total = np.zeros((count, hub + 2 * NODE, hub + 2 * NODE))
+    total[:, :upper, :upper] = frame
+    turn = np.einsum("ab,nij->naibj", np.eye(16), place.rotation).reshape(count, 48, 48)
+    total[:, upper:, upper:] = turn @ _platforms(machine, state) @ np.swapaxes(turn, 1, 2)
+    if machine.hose[0] > 0.0:
+        side, azimuth = mean_radius(nominal.frame_joints), machine.hose[1]
+        far = [side * np.cos(azimuth), side * np.sin(azimuth), 0.5 * side + table_top(nominal)]
+        away = far - place.platform_joints.mean(axis=1)
+        away = away / np.linalg.norm(away, axis=1, keepdims=True)
+        total[:, hub : hub + 3, hub : hub + 3] += machine.hose[0] * away[:, :, None] * away[:, None, :]
+    columns = np.zeros((count, hub + 2 * NODE, 19 + upper))
+    columns[:, hub + NODE :, 6:12] = columns[:, hub : hub + NODE, 12:18] = np.eye(NODE)
+    columns[:, upper + 2 : hub : NODE, 18] = -WEIGHT * (mean_radius(nominal.platform_joints) / 0.305) ** 3 / 6.0
+    columns[:, :upper, 19:] = np.eye(upper)
+    length = np.linalg.norm(place.platform_joints - place.frame_joints, axis=2)
+    elements = beams.spread(state.units, 1.0 / strut, 0.0 * strut, _bending(length, machine.turning))
+    reach, pull = np.tile(np.eye(12), (count, 1, 1)), np.zeros((count, 12))
+    for k, corner in enumerate(nominal.vertices):
+        where = np.concatenate([NODE * corner + np.arange(NODE), upper + NODE * k + np.arange(NODE)])
+        reach[:, :6, :6] = arm(place.frame_joints[:, k] - corners[corner])
+        total[:, where[:, None], where] += np.swapaxes(reach, 1, 2) @ elements[:, k] @ reach
+        pull[:, :3], pull[:, 6:9] = -state.units[:, k], state.units[:, k]
+        columns[:, where, k] = np.einsum("nji,nj->ni", reach, pull)
+    return total, columns
+
+
+def _platforms(machine: FemMachine, state: CommandedRows) -> FloatArray:
+    """(p, 48, 48) platform with its tool, in platform axes."""
+    nominal, place, extension = state.nominal, state.place, state.rows.extension
+    joints = (place.platform_joints - place.work_point[:, None]) @ place.rotation
+    give = np.diag([*machine.bearings, 0.0, 0.0, 0.0])
+    give[3:, 3:] += np.outer(machine.flange, machine.flange)
+    lengths, first, which = np.unique(extension, return_index=True, return_inverse=True)
+    made = []
+    for length, pose in zip(lengths.tolist(), first, strict=True):
+        below = -(length + machine.tip_error)
+        there = joints[pose] + [0.0, 0.0, below]
+        made.append(fem_parts.platform_stiffness(
+            nominal, there, below, machine.rim, machine.spokes, give, machine.tool
+        ))  # fmt: skip
+    return np.array(made)[which.ravel()]
+
+
+def _bending(length: FloatArray, turning: FloatArray) -> FloatArray:
+    """(n, 6, 4, 4) bending of struts whose ends turn against springs (6,) N m/rad; the struts' slopes condensed."""
+    strut = beams.bending(np.full(length.shape, STEEL[0] * beams.bar(STRUT)[2]), length, np.zeros_like(length))
+    spring = np.broadcast_to(turning, length.shape)[..., None, None] * np.eye(2)
+    moves, slopes = np.ix_([0, 2], [0, 2]), np.ix_([1, 3], [1, 3])
+    coupled = np.zeros((*length.shape, 4, 2))  # displacement and slope of both nodes, with the strut's own slopes
+    coupled[..., 0::2, :] = strut[..., 0::2, 1::2]
+    coupled[..., 1::2, :] = -spring
+    total = np.zeros((*length.shape, 4, 4))
+    total[..., moves[0], moves[1]], total[..., slopes[0], slopes[1]] = strut[..., 0::2, 0::2], spring
+    return np.asarray(total - coupled @ np.linalg.solve(strut[..., 1::2, 1::2] + spring, np.swapaxes(coupled, -1, -2)))
+
+
+def moved(
+    machine: FemMachine, rows: Rows, struts: FloatArray, give: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The columns of `solved` (n, q) m, the struts' forces (n, 6) N and `extra_give` (n, 6) m: half of +F less -F.
+
+    `struts` (n, 6, 2) and `give` (n, q, q) of the rows.
+    """
+    compliance = struts.sum(axis=-1)
+    pushed = np.einsum("nij,nj->ni", give[:, :, 6:9], rows.force[:, None] * rows.direction)
+    sides = []
+    for side in (1.0, -1.0):
+        free = side * pushed + give[:, :, 18]
+        extra, pull = np.zeros_like(compliance), free[:, :6] / compliance
+        for _ in range(STEPS):
+            before, extra = extra, extra_give(machine, pull)
+            if np.abs(extra - before).max() <= SETTLED * np.abs(free[:, :6]).max():
+                break
+            strained = free + np.einsum("nij,nj->ni", give[:, :, :6], extra / compliance)
+            pull = (strained[:, :6] - extra) / compliance
+        else:
+            raise RuntimeError("the forces of the struts did not settle")
+        sides.append((free + np.einsum("nij,nj->ni", give[:, :, :6], extra / compliance), pull, extra))
+    halves = [0.5 * (plus - minus) for plus, minus in zip(*sides, strict=True)]
+    return halves[0], halves[1], halves[2]
+
+
+def between(nominal: Nominal, machine: FemMachine, rows: Rows, above: float) -> FloatArray:
+    """(n,) m by which a point `above` m over the tip and the work move apart along the load."""
+    state, pose, struts, give = solved(nominal, machine, rows)
+    columns = moved(machine, rows, struts[pose], give[pose])[0]
+    touched = columns[:, 6:9] + np.cross(columns[:, 9:12], above * state.place.rotation[pose, :, 2])
+    return np.asarray(np.einsum("ni,ni->n", rows.direction, touched) + _work(machine, rows, state, pose))
+
+
+def _work(machine: FemMachine, rows: Rows, state: CommandedRows, pose: IntArray) -> FloatArray:
+    """(n,) m by which table and riser give along the load."""
+    tips = state.place.work_point
+    table = fem_parts.table_give(state.nominal, tips, machine.mounts, machine.plate, machine.floor)[pose]
+    along = np.einsum("ni,nij,nj->n", rows.direction, table, rows.direction)
+    riser = machine.riser * (rows.setup == "riser") * (1.0 - rows.direction[:, 2] ** 2)
+    return np.asarray(rows.force * (along + riser))
+
+
+def displacements(
+    nominal: Nominal, machine: FemMachine, rows: Rows, loops: list[str], lengths: FloatArray
+) -> FloatArray:
+    """(n,) m per N at the tip that indicators beside it read, of a strut alone per N in it (`loops`)."""
+    state, pose, struts, give = solved(nominal, machine, rows)
+    columns, pull, extra = moved(machine, rows, struts[pose], give[pose])
+    down = (state.place.work_point - state.place.platform_joints.mean(axis=1))[pose]
+    body = columns[:, 12:15] + np.cross(columns[:, 15:18], down)  # the platform carried on to the tip
+    work, corners, read = _work(machine, rows, state, pose), frame_corners(nominal), np.empty(len(loops))
+    for k, loop in enumerate(loops):
+        kind, *rest = loop.split()
+        number, load = int(rest[0]) - 1 if rest else 0, rows.direction[k]
+        tip, platform = load @ columns[k, 6:9], load @ body[k]
+        proper, joint = struts[pose[k], number]
+        corner = columns[k, 19 + NODE * number : 22 + NODE * number]
+        outward = corners[number, :2] / np.linalg.norm(corners[number, :2])
+        way = {"radial": np.array([*outward, 0.0]), "vertical": np.eye(3)[2]}.get("".join(rest[1:]), load)
+        shown = {
+            "tip": tip + work[k], "spindle": tip - platform, "platform": platform + work[k], "table": work[k],
+            "strut": proper * pull[k, number], "frame": way @ corner,
+            "joint": (joint * pull[k, number] + extra[k, number]) * (0.5 if rest[1:] else 1.0),
+        }  # fmt: skip
+        read[k] = shown[kind or "tip"] / rows.force[k]
+        if kind == "strut" and rest[1:]:
+            given = np.full((1, 6), lengths[k]) if lengths[k] > 0.0 else state.lengths[pose[k], None]
+            read[k] = 1.0 / strut_stiffness(nominal, machine, given)[0, number, number]
+    return read
+
+
+def sound_machine(nominal: Nominal) -> FemMachine:
+    """The machine without fault or spread, whose struts make up for what the other parts give (least squares)."""
+    return FemMachine(law=np.array(_calibrated(nominal.text, nominal.name)))
+
+
+@lru_cache(maxsize=4)
+def _calibrated(text: str, name: str) -> tuple[float, ...]:
+    nominal, law = parse_nominal(text, name), np.ones(2)
+    rows = reference_rows(nominal)
+    wanted = np.log(readings(nominal, HiddenMachine(), rows))
+
+    def missed(law: FloatArray) -> FloatArray:
+        return np.asarray(np.log(readings(nominal, FemMachine(law=law), rows)) - wanted)
+
+    for _ in range(4):  # Gauss and Newton; the third step changes nothing in eight digits
+        now = missed(law)
+        slopes = np.column_stack([(missed(law + 1e-4 * way) - now) / 1e-4 for way in np.eye(2)])
+        law = law - np.linalg.lstsq(slopes, now, rcond=None)[0]
+    return tuple(law.round(8).tolist())

@@ -89,19 +89,21 @@ class HiddenMachine:
     drift: float = 0.0
     unknown: Unknown | None = None
 
+    def stiffness(self, nominal: Nominal, rows: Rows) -> FloatArray:
+        """(n,) N/m, secant stiffness between tool and workpiece along the load."""
+        return np.asarray(1.0 / solved(*assembled(nominal, self, rows), rows.direction, rows.force)[0])
+
+    def displacement(self, nominal: Nominal, rows: Rows) -> FloatArray:
+        """(n,) m that the indicator shows."""
+        return np.asarray(rows.force / self.stiffness(nominal, rows) + self.drift * rows.time)
+
 
 def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m that the gauge and the indicator show, before noise: k = factor F / (F / k_true + drift t)."""
-    shown = rows.force / (rows.force / true_stiffness(nominal, hidden, rows) + hidden.drift * rows.time)
-    shown = shown * _gauge(hidden, rows)
+    shown = rows.force / hidden.displacement(nominal, rows) * gauge(hidden, rows)
     if hidden.unknown is not None and (read := OUTSIDE[hidden.unknown.kind].read) is not None:
         shown = shown * read(rows, hidden.unknown)
     return np.asarray(shown)
-
-
-def true_stiffness(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
-    """(n,) N/m, secant stiffness between tool and workpiece along the load."""
-    return np.asarray(1.0 / solved(*assembled(nominal, hidden, rows), rows.direction, rows.force)[0])
 
 
 def assembled(
@@ -110,9 +112,9 @@ def assembled(
     """Where everything is, and how it gives way; `struts` (n, 6) m where they are not as long as the pose has them."""
     turned = rotations(rows.angles)
     lengths = commanded_lengths(nominal, rows.position, turned, rows.extension)
-    place = _true_geometry(nominal, hidden, rows, turned, lengths)
+    place = true_geometry(nominal, hidden, rows, turned, lengths)
     links = Links(
-        struts=_struts(nominal, hidden, lengths if struts is None else np.where(struts > 0.0, struts, lengths)),
+        struts=strut_stiffness(nominal, hidden, lengths if struts is None else np.where(struts > 0.0, struts, lengths)),
         joints=_joint_law(hidden),
         moment=hidden.moment,
         bars=hidden.bars,
@@ -124,7 +126,7 @@ def assembled(
     return place, links
 
 
-def _true_geometry(
+def true_geometry(
     nominal: Nominal, hidden: HiddenMachine, rows: Rows, turned: FloatArray, lengths: FloatArray
 ) -> Geometry:
     """Where joints and tip are when struts of the commanded lengths carry the true platform on the true frame."""
@@ -147,7 +149,7 @@ def _true_geometry(
     )
 
 
-def _struts(nominal: Nominal, hidden: HiddenMachine, lengths: FloatArray) -> FloatArray:
+def strut_stiffness(nominal: Nominal, hidden: HiddenMachine, lengths: FloatArray) -> FloatArray:
     """(n, 6, 6) N/m: the paper's law, linear in length (its equation 5), with curvature and spread."""
     first, last = nominal.law_ends
     share = (lengths - first) / (last - first)
@@ -192,7 +194,7 @@ def _ends(nominal: Nominal, hidden: HiddenMachine, rows: Rows, place: Geometry) 
     return tuple(End(link, np.broadcast_to(lever, (n, 3)), np.broadcast_to(c, (n,))) for link, lever, c in ends)
 
 
-def _gauge(hidden: HiddenMachine, rows: Rows) -> FloatArray:
+def gauge(hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) factor on the readings of one direction or one set-up."""
     if not hidden.gauge_target:
         return np.ones(len(rows.force))

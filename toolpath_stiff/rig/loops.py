@@ -12,8 +12,7 @@ from numpy.random import Generator
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.campaigns import Table
-from toolpath_stiff.rig.fem import FemMachine
-from toolpath_stiff.rig.fem_solution import true_displacements as displacements_of_elements
+from toolpath_stiff.rig.fem import FemMachine, displacements
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, assembled
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
@@ -77,12 +76,7 @@ def _vertex(k: int, number: int, way: str, place: Geometry, direction: FloatArra
 
 
 def with_loops(
-    nominal: Nominal,
-    hidden: HiddenMachine | FemMachine,
-    measured: Table,
-    rows: Rows,
-    nuisances: Nuisances,
-    rng: Generator,
+    nominal: Nominal, hidden: HiddenMachine, measured: Table, rows: Rows, nuisances: Nuisances, rng: Generator
 ) -> Table:
     """A measured table whose rows of loops beside the tip hold what their indicators read, in um, for a stiffness."""
     loops = list(measured.get("loop", ()))
@@ -91,12 +85,11 @@ def with_loops(
         return {name: values for name, values in measured.items() if name != "loop"}
     lengths = m_from_mm(np.asarray(measured.get("length_mm", np.full(len(loops), np.nan)), dtype=float))
     where = np.flatnonzero(beside)
-    words, given = [loops[k] for k in where], lengths[where]
+    words, some = [loops[k] for k in where], rows.take(where)
     if isinstance(hidden, FemMachine):
-        moved = displacements_of_elements(nominal, hidden, rows.take(where), words, given)
+        moved = displacements(nominal, hidden, some, words, lengths[where]) * some.force
     else:
-        moved = true_displacements(nominal, hidden, rows.take(where), words, given)
-    moved = moved * rows.force[where]
+        moved = true_displacements(nominal, hidden, some, words, lengths[where]) * some.force
     if nuisances.repeat > 0.0:
         moved = moved * np.exp(SLANT * rng.standard_normal(len(where))) + INDICATOR * rng.standard_normal(len(where))
     shown = np.zeros(len(loops))

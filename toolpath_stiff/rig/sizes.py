@@ -14,6 +14,7 @@ from numpy.random import Generator
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig.draws import Shape
 from toolpath_stiff.rig.effects import at_strength, draw_shape, with_effect
+from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
@@ -21,6 +22,7 @@ from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 LARGEST = 0.30  # rms change of ln stiffness
 UNKNOWN_SIZES = (0.04, 0.15)  # rms change of ln stiffness that an unknown is drawn with, log-uniform
+FAULT_SIZES = (0.04, 0.20)  # that of a fault of elements, as far as its limit allows
 LARGEST_SINGLE = 1.0  # change of one reading: whoever reads nearly three times the others throws it away (assumed)
 # Whitened length of an effect's signature, beside strut law and nuisances, that is found with 80 % power at 5 %
 # among some twenty candidates: z(1 - 0.0025/2) + z(0.8) = 3.02 + 0.84 (normal quantiles, Bonferroni).
@@ -29,13 +31,15 @@ FREE_LAW = 1.0  # prior sd of the logarithms of the two strut stiffnesses: free,
 
 
 class Scale:
-    """How large an effect shows on one campaign, and its strength for a wanted size."""
+    """How large an effect shows on one campaign, and its strength for a wanted size; `start` is the sound machine."""
 
-    def __init__(self, nominal: Nominal, rows: Rows, clamps: IntArray, nuisances: Nuisances) -> None:
-        self.nominal, self.rows = nominal, rows
+    def __init__(
+        self, nominal: Nominal, rows: Rows, clamps: IntArray, nuisances: Nuisances, start: HiddenMachine
+    ) -> None:
+        self.nominal, self.rows, self.start = nominal, rows, start
         self.vertices = int(nominal.vertices.max()) + 1
         self.setups = sorted(set(rows.setup.tolist()))
-        self.base = np.log(readings(nominal, HiddenMachine(), rows))
+        self.base = np.log(readings(nominal, start, rows))
         self.whitened_length = whitened_length(clamps, _spread(self, nuisances), nuisances)
 
     def change(self, machine: HiddenMachine) -> FloatArray:
@@ -55,8 +59,8 @@ class Scale:
         if size is None:
             # To first order both grow in proportion to the strength.
             smallest, largest = min(max(rms * DETECTABLE / max(seen, 1e-12), 1e-4), LARGEST), LARGEST
-            if name in UNKNOWNS:
-                smallest, largest = UNKNOWN_SIZES
+            if name in UNKNOWNS or name in FAULTS:
+                smallest, largest = UNKNOWN_SIZES if name in UNKNOWNS else FAULT_SIZES
             size = smallest * (largest / smallest) ** fraction
         strength, change = self._reach(name, shape, size, start=strength)
         parameters = {
@@ -75,7 +79,7 @@ class Scale:
         low, high, strength = 0.0, math.inf, start
         change = np.zeros(len(self.base))
         for _ in range(25):
-            change = self.change(with_effect(HiddenMachine(), name, at_strength(name, shape, strength)))
+            change = self.change(with_effect(self.start, name, at_strength(name, shape, strength)))
             rms = _rms(change)
             if abs(rms - size) <= 0.02 * size or (rms < size and strength == 1.0):
                 break
@@ -129,9 +133,13 @@ def _spread(scale: Scale, nuisances: Nuisances) -> FloatArray:
     toward = (lengths - first) / (last - first)
     columns = []
     for strut in np.eye(6):
-        columns.append(nuisances.strut_spread * scale.change(HiddenMachine(strut_factors=1.0 + step * strut)) / step)
+        columns.append(
+            nuisances.strut_spread
+            * scale.change(dataclasses.replace(scale.start, strut_factors=1.0 + step * strut))
+            / step
+        )
     for moved in [np.ones(1)] if len(lengths) == 1 else [1.0 - toward, toward]:
         stiffer = scale.nominal.law_stiffnesses * (1.0 + step * moved)
         other = dataclasses.replace(scale.nominal, law_stiffnesses=stiffer)
-        columns.append(FREE_LAW * (np.log(readings(other, HiddenMachine(), scale.rows)) - scale.base) / step)
+        columns.append(FREE_LAW * (np.log(readings(other, scale.start, scale.rows)) - scale.base) / step)
     return np.column_stack(columns)

@@ -89,7 +89,7 @@ def with_slip(case: DrawnCase, table: Table, rng: Generator, kind: str | None = 
         np.log(sheet["stiffness_N_per_mm"]) - np.log(readings(case.nominal, HiddenMachine(), rows_of(sheet)))
         for sheet in (table, written)
     )
-    scale = Scale(case.nominal, rows_of(table), clamp_of(table), case.nuisances)
+    scale = Scale(case.nominal, rows_of(table), clamp_of(table), case.nuisances, HiddenMachine())
     changed = [name for name in table if not np.array_equal(table[name], written[name])]
     return written, {
         "kind": kind,

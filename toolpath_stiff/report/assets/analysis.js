@@ -76,7 +76,7 @@ function lineColour(number) {
   return plungesBox.checked ? coloursNow()[classOf(lowestPlungeOf.get(number))] : ink.plunge;
 }
 // What is pointed at.
-let here = -1, chosenLine = 0;
+let here = -1, chosenLine = 0, part;
 const status = document.getElementById("status");
 function describe(i) {
   const [x, y, z] = xyz.map((axis) => axis[i].toFixed(2));
@@ -99,6 +99,7 @@ function point(i, stage) {
   }
   view.drawOverlay();
   profile.drawOverlay();
+  part?.drawOverlay();
 }
 function choose(number) {
   chosenLine = number;
@@ -277,6 +278,7 @@ const legendRamp = document.getElementById("legend-ramp");
 function retheme() {
   legendRamp.style.background = ramp(coloursNow());
   view.redraw();
+  part?.redraw();
   profile.redraw();
   drawListing();
 }

@@ -35,4 +35,4 @@ class IndicatorOffTip(Effect):
         stretches /= path.machine.strut_law.stiffness(path.struts.lengths)
         turned = np.linalg.solve(jacobian, stretches[..., None])[:, 3:, 0]
         moved = np.einsum("ni,ni->n", np.cross(turned, p["height"] * path.rotation[:, :, 2]), path.direction)
-        return stiffness / np.maximum(1.0 + moved * stiffness, LEAST_READ)
+        return np.asarray(stiffness / np.maximum(1.0 + moved * stiffness, LEAST_READ))

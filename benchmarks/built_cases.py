@@ -1,0 +1,212 @@
+"""Cases of `benchmarks.built`: a machine of springs or of elements, a small campaign, and what was made of it."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import toolpath_stiff as tps
+from benchmarks.bars import Record
+from benchmarks.case_loop import record_of
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.planning.result import plan_csv
+from toolpath_stiff.rig import case as rig
+from toolpath_stiff.rig.campaigns import Table, campaign
+from toolpath_stiff.rig.effects import CATALOGUE
+from toolpath_stiff.rig.exercise import csv_text, read_plan
+from toolpath_stiff.rig.fem_faults import faults
+from toolpath_stiff.rig.fem_path import path_truth
+from toolpath_stiff.rig.nominal import load_nominal
+from toolpath_stiff.rig.unknowns import UNKNOWNS
+
+GROUPS = ("sound", "single", "pair", "outside")
+BUILT = ("fem", "springs")
+POSES = (12, 28)  # fewest and most of a campaign
+PAIR_SIZES = (0.10, 0.05)  # rms change of ln k of the two, as in `benchmarks.several`
+SERIES = {"joints", "struts", "one strut"}  # all in series along a strut: the tip cannot tell them apart
+WORTH_A_LAW = 1.0  # points of mean error from which on the law of an adequate model is refitted
+PLANNED = 6  # visits of a plan
+
+
+@dataclass(frozen=True)
+class Job:
+    """One case; `hidden` are names of the rig, with commas, or `none`."""
+
+    built: str
+    group: str
+    seed: int
+    hidden: str
+
+
+def make_jobs(first_seed: int, counts: Mapping[str, int], built: Sequence[str]) -> list[Job]:
+    """So many cases of each group on each build, the kinds in turn; a case's seed is that of no other."""
+    jobs = []
+    for number, way in enumerate(built):
+        named, outside = kinds_of(way)
+        rng = np.random.default_rng([first_seed, number])
+        for place, group in enumerate(GROUPS):
+            kinds = rng.permutation(outside if group == "outside" else named).tolist()
+            for k in range(counts[group]):
+                pair = ",".join(rng.choice(named, size=2, replace=False))
+                hidden = {"sound": "none", "pair": pair}.get(group, kinds[k % len(kinds)])
+                jobs.append(Job(way, group, first_seed + 100_000 * number + 10_000 * place + k, hidden))
+    return jobs
+
+
+def kinds_of(built: str) -> tuple[list[str], list[str]]:
+    """What can be hidden in and outside the catalogue."""
+    if built == "fem":
+        return faults(in_catalogue=True), faults(in_catalogue=False)
+    return list(CATALOGUE), list(UNKNOWNS)
+
+
+def small_campaign(seed: int) -> Table:
+    """12 to 28 poses of two tilted campaigns, X, Y, Z; some visited twice, one or two loads."""
+    nominal, rng = load_nominal(), np.random.default_rng([seed, 77])
+    one, other = (campaign("tilted", nominal, None, rng) for _ in range(2))
+    other["point"], other["clamp"] = other["point"] + one["point"].max(), other["clamp"] + one["clamp"].max()
+    table = {name: [*one[name], *other[name]] for name in one}
+    points = rng.choice(np.unique(table["point"]), size=rng.integers(POSES[0], POSES[1] + 1), replace=False)
+    twice = points[: int(rng.integers(2, len(points) + 1))]  # at least two, that the noise can be told
+    kept = np.isin(table["point"], points) & ((np.array(table["repeat"]) == 1) | np.isin(table["point"], twice))
+    if rng.random() < 0.5:
+        kept &= np.array(table["force_N"]) > 1000.0
+    return {
+        name: [value for value, keep in zip(values, kept, strict=True) if keep]
+        if isinstance(values[0], str) else np.array(values)[kept]
+        for name, values in table.items()
+    }  # fmt: skip
+
+
+def run(job: Job) -> Record:
+    """The record of a case; with `error`, the traceback, where it failed."""
+    return record_of(asdict(job), partial(_judged, job))
+
+
+def _judged(job: Job, folder: Path) -> Record:
+    plan = small_campaign(job.seed)
+    size = PAIR_SIZES if job.group == "pair" else None
+    case = rig.draw_case(job.seed, "campaign", job.hidden, plan=plan, size=size, built=job.built)
+    file = folder / "measurements.csv"
+    file.write_text(csv_text(case.rows))
+    start = time.process_time()
+    diagnosis = tps.diagnose(file)
+    cpu = time.process_time() - start
+    after = {}
+    if diagnosis.verdict == "ambiguous" and job.group == "single":
+        after = {"planned": planned(diagnosis, file, case, np.random.default_rng([job.seed, 5]))}
+    truths = [truth_of(effect, job.built) for effect in case.truth["effects"]]
+    rows, rng = rig.rows_of(plan), np.random.default_rng(job.seed)
+    path = case.truth.get("path") or path_truth(case.nominal, case.machine, rows, rng)
+    return {
+        "truths": truths, "poses": len(np.unique(plan["point"])), "readings": len(plan["point"]), "cpu": round(cpu, 2),
+        **answer_of(diagnosis), **after, **along_path(diagnosis, file, path, folder),
+    }  # fmt: skip
+
+
+def planned(diagnosis: tps.Diagnosis, file: Path, case: rig.DrawnCase, rng: np.random.Generator) -> Record:
+    """What is said after a plan of a few visits was measured on the same machine; the same where nothing tells more."""
+    plan = tps.plan(file, n=PLANNED, indicators=True, diagnosis=diagnosis)
+    if not plan.rows:
+        return answer_of(diagnosis)
+    more = file.with_name("plan.csv")
+    more.write_text(plan_csv(plan.rows))
+    more.write_text(csv_text(case.again(read_plan(str(more), case.nominal), rng)))
+    return answer_of(tps.diagnose([file, more]))
+
+
+def truth_of(effect: Mapping[str, Any], built: str) -> dict[str, Any]:
+    """Names of the catalogue that are right, links that are, and size, of a hidden effect."""
+    name = effect["effect"]
+    right = list(effect["names"]) if built == "fem" else [name] if name in CATALOGUE else []
+    links = set(effect.get("links", ())) or {links_of_effects()[name]}
+    links |= SERIES if links & SERIES else set()
+    return {"hidden": name, "names": right, "links": sorted(links), "size": effect["size"]}
+
+
+@cache
+def links_of_effects() -> dict[str, str]:
+    """Effect of the catalogue -> its link."""
+    return {effect["name"]: effect["link"] for effect in tps.effects().to_dict()["effects"]}
+
+
+def answer_of(diagnosis: tps.Diagnosis) -> Record:
+    """What is said: verdict, effects of each explanation, links of the portrait, rows left out."""
+    said = diagnosis.to_dict()
+    portrait = said.get("portrait") or {"links": []}
+    return {
+        "verdict": said["verdict"],
+        "explanations": [words.split(" + ") for words in said["explanations"]],
+        "portrait": [entry["link"] for entry in portrait["links"]],
+        "left_out": sum(bool(row.get("left_out")) for row in said.get("suspect_rows", ())),
+    }
+
+
+def along_path(diagnosis: tps.Diagnosis, file: Path, path: Mapping[str, Any], folder: Path) -> Record:
+    """Mean error (%) along the path before and after what the verdict proposes, and how often bands hold."""
+    near = np.array(path["measured_near"])
+    true = np.column_stack([path[f"{axis}_N_per_mm"] for axis in "xyz"])
+    given = tps.Machine.load("nist")
+    before = stiffness_along(given, path)[0]
+    error = {"before": _percent(before, true, near)}
+    update = updated(diagnosis, file, folder)
+    if update is None or not update.accepted:
+        return {**error, "after": error["before"], "updated": ""}
+    there, sd = stiffness_along(update.machine, path)
+    held = {}
+    if np.isfinite(sd).all():
+        off = np.abs(true - there) / sd
+        weakest = np.argmin(np.where(near[:, None], there, np.inf))
+        held = {
+            "band_near": float((off < 1.96)[near].mean()), "band_weakest": bool(off.ravel()[weakest] < 1.96),
+            "band_beyond": float((off < 1.645)[~near].mean()) if not near.all() else None,
+        }  # fmt: skip
+    added = [step["name"] for step in update.to_dict()["steps"]]
+    return {**error, "after": _percent(there, true, near), "updated": ", ".join(added), **held}
+
+
+def _percent(model: FloatArray, true: FloatArray, rows: FloatArray) -> float:
+    return round(float(100.0 * np.mean(np.abs(model / true - 1.0)[rows])), 3)
+
+
+def updated(diagnosis: tps.Diagnosis, file: Path, folder: Path) -> tps.Update | None:
+    """The update that a verdict leads to: its first explanation, a draft, or the strut law; None for none."""
+    said = diagnosis.to_dict()
+    try:
+        if said["verdict"] == "unexplained":
+            draft = tps.draft_effect(file, file=folder / "missing.toml")
+            if not draft.text:
+                return None
+            (folder / "missing.toml").write_text(draft.text)
+            with_draft = tps.Machine.load("nist", effects=[folder / "missing.toml"])
+            return tps.update(file, with_draft, add=list(draft.effects))
+        first = next((words for words in said["explanations"] if words != "none"), "")
+        if said["verdict"] == "adequate":
+            law = tps.update(file, strut_law=True)
+            errors = law.to_frame()["mean_abs_error_percent"]
+            return law if errors.iloc[0] > errors.iloc[-1] + WORTH_A_LAW else None
+        return tps.update(file, add=first.split(" + "))
+    except tps.InputError:
+        return None
+
+
+def stiffness_along(machine: tps.Machine, path: Mapping[str, Any]) -> tuple[FloatArray, FloatArray]:
+    """(p, 3) N/mm along X, Y, Z at the poses of a path, and standard deviations there, nan where none is stated."""
+    poses = np.column_stack([path[name] for name in ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")])
+    words = [" ".join(f"{axis}{value:.6f}" for axis, value in zip("XYZABC", pose, strict=True)) for pose in poses]
+    blocks = ["G21 G90 G94", f"G0 {words[0]}", *(f"G1 {word} F1000" for word in words), "M30"]
+    program = tps.Program.from_text("\n".join(blocks), name="path.nc")
+    columns: list[tuple[FloatArray, FloatArray]] = []
+    for axis in "xyz":
+        analysis = tps.analyze(program, machine, origin_mm_deg=(0, 0, 0, 0, 0, 0), step_mm=1000, load=axis)
+        line = np.asarray(analysis.to_frame()["line"])
+        last = np.searchsorted(line, np.arange(len(poses)) + 3, side="right") - 1
+        stiffness = np.asarray(analysis.to_frame()["stiffness_N_per_mm"], dtype=float)
+        deviation = analysis.deviation_N_per_mm
+        columns.append((stiffness[last], np.full(len(poses), np.nan) if deviation is None else deviation[last]))
+    there, sd = (np.column_stack(part) for part in zip(*columns, strict=True))
+    return there, sd

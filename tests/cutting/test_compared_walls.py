@@ -1,0 +1,109 @@
+"""Measured walls: points made from known errors come back with their factor, their lines, their verdicts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import toolpath_stiff as tps
+from tests.cutting.test_compensated_cuts import HEAD, MODEL, ORIGIN, pocket, setup
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.cutting.cut import evaluate_cut
+from toolpath_stiff.errors import TpsError
+from toolpath_stiff.nc.reader import parse_program
+
+TEXT = HEAD + pocket(0.5, 6, False, 10) + "M2\n"
+GIVEN = setup(10, 30.0)
+HEADING = "x_mm,y_mm,z_mm,nx,ny,nz,deviation_um"
+
+
+def measured(factor=1.0, off_line=0, by_um=0.0, noise_um=0.3, own=False):
+    """Rows of a file: points of the true walls, `factor` times the foretold error, one line `by_um` further out."""
+    rng = np.random.default_rng(3)
+    program = parse_program(TEXT)
+    cut = evaluate_cut(MODEL, program, ORIGIN, GIVEN, 2e-3)
+    rows = []
+    for i, side in zip(*np.nonzero(np.isfinite(cut.wall_mean)), strict=True):
+        x, y, z = cut.samples.position[i] * 1e3
+        tx, ty, _ = cut.samples.tangent[i]
+        out = np.array([ty, -tx]) * (1 if side == 0 else -1)  # of the part, towards the tool
+        error = factor * cut.wall_mean[i, side] * 1e6 + rng.normal(0.0, noise_um)
+        error += by_um if cut.samples.line[i] == off_line else 0.0
+        low, high = cut.wall_heights[i, side] * 1e3
+        place = np.array([x, y]) - out * (5.0 - (error * 1e-3 if own else 0.0))
+        where = f"{place[0]:.6f},{place[1]:.6f},{z + rng.uniform(low, high):.3f}"
+        rows.append(f"{where},{out[0]:.6f},{out[1]:.6f},0" + ("" if own else f",{error:.4f}"))
+    return rows
+
+
+def compare(tmp_path, rows, heading=HEADING, **options):
+    file = tmp_path / "points.csv"
+    file.write_text("\n".join([heading, *rows, ""]))
+    program = tps.Program.from_text(TEXT, name="part.nc")
+    return tps.compare_walls(file, program=program, cut=GIVEN, step_mm=2.0, **options)
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_the_factor_comes_back(tmp_path, own):
+    rows = measured(1.3, own=own)
+    heading = HEADING.removesuffix(",deviation_um") if own else HEADING
+    compared = compare(tmp_path, [*rows, "0,0,5,0,0,1" + ("" if own else ",3")], heading)
+    factor, spread = compared.factor
+    assert abs(factor - 1.3) < 4.0 * spread + 0.01 and spread < 0.02
+    assert compared.others == 1 and len(compared.line) == len(rows)
+    document = compared.to_dict()
+    assert document["points"] == len(rows) and {row["line"] for row in document["lines"]} == set(compared.line.tolist())
+    assert len(compared.to_frame()) == len(rows) and "factor      1.3" in str(compared)
+
+
+def test_the_line_where_the_model_fails(tmp_path):
+    line = 23
+    compared = compare(tmp_path, measured(1.0, line, by_um=25.0))
+    failing = {row["line"] for row in compared.lines if row["fails"]}
+    assert failing == {line}
+    residual = next(row["residual_um"] for row in compared.lines if row["line"] == line)
+    assert 20.0 < residual < 26.0  # points at its ends may count to its neighbours, theirs to it
+    assert not any(row["fails"] for row in compare(tmp_path, measured()).lines)
+
+
+def test_a_file_with_other_names_and_units(tmp_path):
+    rows = [",".join([*row.split(",")[:6], f"{float(row.split(',')[6]) * 1e-3:.7f}"]) for row in measured(noise_um=0.0)]
+    compared = compare(tmp_path, rows, "x_mm,y_mm,z_mm,nx,ny,nz,dev", columns="deviation=dev:mm")
+    assert compared.factor[0] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("rows", "heading", "what"),
+    [
+        (["0,0,0,0,0,0,1"], HEADING, "a normal of no length"),
+        (["0,0,zero,0,0,1,1"], HEADING, "z_mm = 'zero'"),
+        (["0,0,0,1"], "x_mm,y_mm,z_mm,nx", "column ny is missing"),
+        (["100,100,0,1,0,0,1"], HEADING, "no measured point lies on a final wall"),
+        ([], HEADING, "no measured point"),
+    ],
+)
+def test_what_is_refused(tmp_path, rows, heading, what):
+    with pytest.raises(TpsError, match=what):
+        compare(tmp_path, rows, heading)
+    with pytest.raises(TpsError, match="without the program"):
+        tps.compare_walls(tmp_path / "points.csv", cut=GIVEN)
+
+
+def test_the_commands(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "part.nc").write_text(TEXT)
+    (tmp_path / "points.csv").write_text("\n".join([HEADING, *measured(), ""]))
+    (tmp_path / "cut.toml").write_text(
+        "[stock]\nbox_mm = [80, 40, 20]\ncorner_mm = [-40, -20, -20]\n[coefficients]\nmaterial = 'Al7075'\n[[tool]]\n"
+        "number = 1\ndiameter_mm = 10\nflutes = 3\nhelix_deg = 30\nstick_out_mm = 30\n"
+    )
+    cut = ["--cut", "cut.toml", "--step", "2"]
+    assert main(["compare", "points.csv", "--program", "part.nc", *cut, "--out", "out"]) == 0
+    assert {"compare.json", "residuals.csv"} <= {file.name for file in (tmp_path / "out").iterdir()}
+    assert main(["compensate", "part.nc", *cut]) == 0
+    shown = capsys.readouterr().out
+    assert "points on final walls" in shown and "part_comp.nc" in shown
+    same = tps.compensate("part.nc", cut="cut.toml", step_mm=2.0)
+    assert (tmp_path / "part_comp.nc").read_bytes() == same.rewritten.content
+    assert main(["compensate", "part.nc"]) == 2
+    assert main(["compensate", "part.nc", *cut, "-o", "part.nc"]) == 2

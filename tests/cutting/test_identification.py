@@ -1,0 +1,221 @@
+"""Coefficients from slots: known ones come back from forces with noise, by closed forms and by whole records."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+from scipy.stats import t as student
+
+import toolpath_stiff as tps
+from tests.cutting.test_forces import patch, sliced
+from toolpath_stiff.cli.main import main
+from toolpath_stiff.cutting.coefficients import (
+    SHOWN,
+    Coefficients,
+    coefficients_from,
+    material,
+    materials,
+    read_coefficients,
+)
+from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.identification import least_squares, left_out, slot_responses
+from toolpath_stiff.errors import InputError
+
+FLAT = Cutter(1, 0.010, 0.0, 3, np.radians(30.0))
+BULL = Cutter(1, 0.010, 0.001, 3, np.radians(30.0))
+KNOWN = np.array([800e6, 250e6, 150e6, 20e3, 25e3, 2e3])
+FEEDS = np.array([2e-5, 4e-5, 6e-5, 8e-5, 1e-4])
+SETS, NOISE = 200, 2.0  # N, standard deviation of a mean force
+
+
+def slot_means(feed, depth=0.003, flutes=3):
+    """(n, 3) N: Altintas, Manufacturing Automation, 2nd ed., equation 2.43, x along the feed, forces on the tool."""
+    t, r, a, te, re, ae = KNOWN
+    return flutes * depth * np.stack(
+        [-(r * feed / 4 + re / np.pi), t * feed / 4 + te / np.pi, -(a * feed / np.pi + ae / 2)], axis=1
+    )  # fmt: skip
+
+
+def test_intervals_hold_the_known_coefficients_95_times_in_100():
+    rng = np.random.default_rng(27)
+    response, depth = slot_responses(FLAT, FEEDS, np.full(5, 0.003)), 0.003
+    reach = student.ppf(0.975, 3)
+    outside, variances, mixed = np.zeros(6, dtype=int), [], []
+    for _ in range(SETS):
+        force = slot_means(FEEDS, depth) + rng.normal(0.0, NOISE, (5, 3))
+        values, covariance, told = least_squares(response, force)
+        assert told.all()
+        deviation = np.sqrt(np.diagonal(covariance))
+        outside += np.abs(values - KNOWN) > reach * deviation
+        variances.append(deviation**2)
+        mixed.append(covariance[0, 3] / deviation[0] / deviation[3])
+    # 4 standard deviations to either side of 5 % of 200 draws; of all six together, pairs hanging together, below.
+    assert outside.max() <= binom.mean(SETS, 0.05) + 4 * binom.std(SETS, 0.05)
+    assert outside.sum() >= 60 - 4 * np.sqrt(2) * binom.std(3 * SETS, 0.05)
+    # Closed form of the straight line: 14.1 N/mm2 and 0.73 N/mm, correlated by -0.905.
+    assert np.sqrt(np.mean(variances, axis=0))[[0, 3]] * SHOWN[[0, 3]] == pytest.approx([14.1, 0.73], rel=0.15)
+    assert np.mean(mixed) == pytest.approx(-0.905, abs=1e-3)
+
+
+@pytest.mark.parametrize("cutter", [FLAT, BULL])
+def test_exact_forces_give_exact_coefficients(cutter):
+    depth = np.array([0.002, 0.003, 0.003, 0.004, 0.002])
+    response = slot_responses(cutter, FEEDS, depth)
+    force = (response * KNOWN).sum(axis=-1)
+    values, _, _ = least_squares(response, force)
+    assert values == pytest.approx(KNOWN, rel=1e-6)
+    assert left_out(response, force, FEEDS) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_was_not_recorded_is_not_told():
+    force = slot_means(FEEDS)
+    force[:, 2] = np.nan
+    values, covariance, told = least_squares(slot_responses(FLAT, FEEDS, np.full(5, 0.003)), force)
+    assert told.tolist() == [True, True, False] * 2
+    assert values[[2, 5]].tolist() == [0.0, 0.0]
+    assert np.sqrt(covariance[2, 2]) == pytest.approx(0.3 * values[0])
+    with pytest.raises(InputError, match="do not tell the coefficients apart"):
+        least_squares(slot_responses(BULL, FEEDS, np.full(5, 0.003)), np.full((5, 3), [np.nan, 1.0, np.nan]))
+
+
+@cache
+def turn_of(fed, run_out):
+    """(120, 3) N on the tool around a turn of a slot 3 mm deep; mm, m."""
+    cutter = Cutter(1, 0.010, 0.0, 3, np.radians(30.0), run_out=run_out, run_out_angle=0.5)
+    angles = np.arange(0.0, 2 * np.pi, np.pi / 60)
+    return np.array([sliced(cutter, KNOWN, fed / 1e3, 0.0, patch(0.003, 0, np.pi), a, 1e-6, 250) for a in angles])
+
+
+def write_records(folder, feeds=(0.03, 0.05, 0.07, 0.09), run_out=6e-6, seed=1, **given):
+    """Files of records as a dynamometer writes them: forces on the work in kN, drift, noise, air, another speed."""
+    rng, files = np.random.default_rng(seed), []
+    for fed in feeds:
+        turn = turn_of(fed, run_out)
+        rate = 100.0 * 1.004  # turns a second; 6,000 a minute are said
+        time = np.arange(0.0, 0.5 + 3.0 * 5.0 / (fed * 3 * 100.0), 1 / 2917.0)
+        filled = np.clip((time - 0.2) / (5.0 / (fed * 3 * 100.0)), 0.0, 1.0) * (time < time[-1] - 0.2)
+        force = np.stack([np.interp(time * rate % 1, np.arange(120) / 120, f, period=1) for f in turn.T], axis=1)
+        read = -force * filled[:, None] + [3, -2, 1] + np.outer(time, [4, 3, -6]) + rng.normal(0, NOISE, force.shape)
+        rows = [f"{t:.6f};{x / 1e3:.6f};{y / 1e3:.6f};{z / 1e3:.6f}" for t, (x, y, z) in zip(time, read, strict=True)]
+        file = folder / f"slot{1000 * fed:.0f}.csv"
+        file.write_text("\n".join(["Zeit;Kraft X;Kraft Y;Kraft Z", *rows]))
+        mapping = {"time": "Zeit:s", "fx": "Kraft X:kN", "fy": "Kraft Y:kN", "fz": "Kraft Z:kN", "spindle_rpm": "=6000",
+                   "depth": "=3", "feed_per_tooth": f"={fed}", **given}  # fmt: skip
+        toml = "".join(f'{key} = "{value}"\n' for key, value in mapping.items() if value)
+        (folder / f"{file.name}.columns.toml").write_text(toml)
+        files.append(str(file))
+    (folder / "cut.toml").write_text("[[tool]]\nnumber = 4\ndiameter_mm = 10\nflutes = 3\nhelix_deg = 30\n")
+    return files, str(folder / "cut.toml")
+
+
+def test_records_give_coefficients_and_run_out(tmp_path, capsys):
+    files, cut = write_records(tmp_path)
+    assert main(["forces", *files, "--cut", cut, "--material", "a metal", "--out", str(tmp_path / "out")]) == 0
+    text = capsys.readouterr().out
+    assert "slots, coefficients with intervals of 95 %" in text
+    assert "thinner chips, as in finishing, are extrapolated" in text
+    document = json.loads((tmp_path / "out" / "forces.json").read_text())
+    for (symbol, (low, high)), known in zip(document["interval_95_percent"].items(), KNOWN * SHOWN, strict=True):
+        middle, half = (low + high) / 2, (high - low) / 2
+        assert abs(middle - known) < 2 * half + 0.005 * known, symbol  # 95 % of sets are within half of it
+        assert half < 0.15 * known, symbol
+    assert document["run_out_um"] == pytest.approx([6.0] * 4, abs=0.5)
+    read = read_coefficients(tmp_path / "out" / "forces.json")
+    assert read.values == pytest.approx(
+        np.array(document["coefficients"]["cutting_N_per_mm2"] + document["coefficients"]["edge_N_per_mm"]) / SHOWN
+    )
+    assert (read.thinnest, read.thickest, read.material) == (pytest.approx(3e-5), pytest.approx(9e-5), "a metal")
+    fit = tps.forces(files, cut, material="a metal")
+    assert json.loads(fit.to_json()) == document
+    assert len(fit.to_frame()) == 4
+    assert (tmp_path / "out" / "forces.png").read_bytes()[:4] == b"\x89PNG"
+
+
+BROKEN = {
+    "an axis points the other way": ({}, {"axes": "x,-y,z"}, "Ktc = -"),
+    "two axes are exchanged": ({}, {"axes": "-y,x,z"}, "Ktc = -"),
+    "no such axes": ({}, {"axes": "x,x,z"}, "axes x,x,z"),
+    "two feeds": ({"feeds": (0.03, 0.05)}, {}, "slots at 2 feeds"),
+    "a tool that is not there": ({}, {"tool": 7}, "tool 7 is not told"),
+    "no depth": ({"depth": ""}, {}, "column depth_mm is missing"),
+    "a depth below nothing": ({"depth": "=-3"}, {}, "depth_mm = -3"),
+    "no number": ({"depth": "=deep"}, {}, "depth_mm = 'deep'"),
+    "a speed far off": ({"spindle_rpm": "=60"}, {}, "whole turns of the full slot"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_records_that_are_refused(tmp_path, name):
+    given, options, message = BROKEN[name]
+    files, cut = write_records(tmp_path, **{"feeds": (0.06, 0.08, 0.1), "run_out": 0.0, **given})
+    with pytest.raises(InputError, match=message):
+        tps.forces(files, cut, **options)
+
+
+def test_feed_in_mm_a_minute_is_that_of_the_teeth(tmp_path):
+    files, cut = write_records(tmp_path, (0.06, 0.08, 0.1), 0.0)
+    first = tps.forces(files, cut)
+    for file, fed in zip(files, (0.06, 0.08, 0.1), strict=True):
+        mapping = tmp_path / f"{file}.columns.toml"
+        mapping.write_text(
+            mapping.read_text()
+            .replace("feed_per_tooth =", "feed_mm_per_min =")
+            .replace(f'"={fed}"', f'"={fed * 3 * 6000}"')
+        )
+    assert tps.forces(files, cut).coefficients.values == pytest.approx(first.coefficients.values, rel=1e-9)
+
+
+def test_materials_have_origins_and_bands():
+    assert {"Al7075", "Al6082", "C45", "Ti6Al4V"} <= set(materials())
+    for coefficients in materials().values():
+        assert "doi" in coefficients.origin or "ISCAR" in coefficients.origin
+        assert "standard deviation of 30 % assumed" in coefficients.origin
+        assert np.linalg.eigvalsh(coefficients.covariance * SHOWN * SHOWN[:, None])[0] > -1e-9
+    aluminium = material("al7075")
+    assert aluminium.values * SHOWN == pytest.approx([767, 169, 222, 27.7, 26.6, 0.7])
+    assert aluminium.deviation == pytest.approx(0.3 * aluminium.values)
+    assert "Kac, Kae not known: 0 +- 0.3 Ktc and 1 Kte assumed" in material("C45").origin
+    with pytest.raises(InputError, match="expected one of Al7075"):
+        material("cheese")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"cutting_N_per_mm2": [1, 2]}, "cutting_N_per_mm2"),
+        ({"cutting_N_per_mm2": [-5, 2, 3]}, "cutting_N_per_mm2"),
+        ({"edge_N_per_mm": "much"}, "edge_N_per_mm"),
+        ({"origin": ""}, "origin"),
+        ({"spread_percent": -1}, "spread_percent"),
+        ({"covariance": [[1, 2], [3, 4]]}, "covariance"),
+        ({"covariance": (-np.eye(6)).tolist()}, "covariance"),
+        ({"Ktc": 3}, "Ktc is not known"),
+    ],
+)
+def test_numbers_that_are_no_coefficients(tmp_path, change, message):
+    sound = Coefficients(KNOWN[:3], KNOWN[3:], np.diag(KNOWN) * 1e3, "a metal", "made up", 1e-5, 2e-5)
+    file = tmp_path / "forces.json"
+    file.write_text(json.dumps({"coefficients": sound.document()}))
+    again = read_coefficients(file)
+    assert again.values == pytest.approx(sound.values)
+    assert again.covariance == pytest.approx(sound.covariance)
+    file.write_text(json.dumps({"coefficients": {**sound.document(), **change}}))
+    with pytest.raises(InputError, match=message):
+        read_coefficients(file)
+    file.write_text('{"coefficients": 3}')
+    with pytest.raises(InputError, match="expected a table"):
+        read_coefficients(file)
+
+
+def test_a_stated_spread_is_the_same_for_all():
+    table = {
+        "cutting_N_per_mm2": [800, 200, float("nan")],
+        "edge_N_per_mm": [20, 20, 1],
+        "origin": "a guess",
+        "spread_percent": 10,
+    }
+    coefficients = coefficients_from(table, lambda key, mistake, expected: InputError(mistake))
+    assert coefficients.deviation * SHOWN == pytest.approx([80, 20, 240, 2, 2, 0.1])
+    assert coefficients.origin == "a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed"

@@ -1,0 +1,197 @@
+"""Measured walls against the errors that a cut foretells: where the model of cut and machine fails.
+
+A point is held against the final wall beside which it lies: its measured deviation along the normal, out of the part,
+against the foretold mean over the wall's height. The lines of the program are the places; a line fails where its mean
+residual is beyond twice what scatter, the foretold range over the height and the band of the model explain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.column_names import Mapped
+from toolpath_stiff.cutting.compensation import places_beside
+from toolpath_stiff.cutting.cut import Cut
+from toolpath_stiff.documents import certain, without_nan
+from toolpath_stiff.errors import InputErrors, MeasurementError
+from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.readings.mapping import check_needed, mapped_table
+from toolpath_stiff.readings.rows import number
+from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.tables import Columns
+from toolpath_stiff.units import m_from_mm, m_from_um, um_from_m
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+POINT, NORMAL = ("x_mm", "y_mm", "z_mm"), ("nx", "ny", "nz")
+COLUMNS = Columns((*POINT, *NORMAL, "deviation_um"))
+LAYOUT = (
+    "x_mm,y_mm,z_mm of a point in program coordinates, nx,ny,nz out of the part, deviation_um unless the point has it"
+)
+FARTHEST = 5e-4  # m from a final wall, and above or below it, at which a point still belongs to it
+ALONG = 0.9  # cosine between a point's normal and its wall's
+SURE = 2.0  # standard deviations
+
+
+def read_walls(file: str, columns: Mapped = None) -> tuple[FloatArray, FloatArray, FloatArray, tuple[str, ...]]:
+    """Points (n, 3) m, unit normals (n, 3), deviations (n,) m, nan where the points have them; notes.
+
+    Raises `InputError` with file and line.
+    """
+    table = mapped_table(file, "measured walls", COLUMNS, columns)
+    check_needed(table, (*POINT, *NORMAL), LAYOUT)
+    names = [name for name in COLUMNS.numbers if name in table.heading]
+    rows, errors = [], []
+    for line, cells in table.rows:
+        try:
+            record = table.record(cells)
+            rows.append([number(record, name) for name in names])
+            if not np.linalg.norm(rows[-1][3:6]) > 0.0:
+                raise MeasurementError("a normal of no length", expected="nx, ny, nz out of the part")
+        except MeasurementError as error:
+            errors.append(MeasurementError(error.found, expected=error.expected, file=table.file, line=line))
+    if errors:
+        raise InputErrors(errors)
+    values = np.array(rows, dtype=float).reshape(-1, len(names))
+    if not len(values):
+        raise MeasurementError("no measured point", expected=LAYOUT, file=table.file)
+    normal = values[:, 3:6] / np.linalg.norm(values[:, 3:6], axis=1, keepdims=True)
+    deviation = m_from_um(values[:, 6]) if values.shape[1] > 6 else np.full(len(values), np.nan)
+    return m_from_mm(values[:, :3]), normal, deviation, table.notes
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class WallComparison(FolderResult):
+    """Measured points of walls against the errors that a cut foretells; SI, n points that lie on a final wall.
+
+    Attributes
+    ----------
+    line, side
+        (n,) line of the program that makes the wall; 0 left, 1 right of its feed.
+    measured, foretold, low, high, deviation
+        (n,) m, + material left: measured, the mean over the height, its extremes, the model's standard deviation.
+    others
+        Points that lie on no final wall of the program.
+    notes
+        On how the file was read, and what the cut assumes.
+    inputs
+        Files that were read.
+    """
+
+    command: ClassVar[str] = "compare"
+    shown_by: ClassVar[str] = "walls"
+
+    line: IntArray
+    side: IntArray
+    measured: FloatArray
+    foretold: FloatArray
+    low: FloatArray
+    high: FloatArray
+    deviation: FloatArray
+    others: int
+    notes: tuple[str, ...]
+    inputs: tuple[str, ...] = ()
+
+    @property
+    def factor(self) -> tuple[float, float]:
+        """Measured errors over the foretold ones, by least squares, and its standard deviation from their scatter."""
+        square = float((self.foretold**2).sum())
+        if not square:
+            return float("nan"), float("nan")
+        factor = float((self.measured * self.foretold).sum()) / square
+        rest = self.measured - factor * self.foretold
+        return factor, float(np.sqrt((rest**2).sum() / max(len(rest) - 1, 1) / square))
+
+    @property
+    def lines(self) -> list[dict[str, Any]]:
+        """Of each line and side: points, measured and foretold error, residual, what is sure of it, and the verdict."""
+        keys, which = np.unique(np.stack([self.line, self.side]), axis=1, return_inverse=True)
+        rows = []
+        for number_of, (line, side) in enumerate(keys.T.tolist()):
+            some = which == number_of
+            residual, count = um_from_m((self.measured - self.foretold)[some]), int(some.sum())
+            uniform = um_from_m((self.high - self.low)[some]) ** 2 / 12.0  # a point's height is not looked at
+            scatter = max(float(residual.var(ddof=1)) if count > 1 else 0.0, float(uniform.mean())) / count
+            sure = SURE * float(np.sqrt(scatter + um_from_m(self.deviation[some].mean()) ** 2))
+            means = {name: float(um_from_m(getattr(self, name)[some].mean())) for name in ("measured", "foretold")}
+            rows.append(
+                {"line": line, "side": ("left", "right")[side], "points": count}
+                | {f"{name}_um": value for name, value in means.items()}
+                | {"residual_um": float(residual.mean()), "sure_um": sure, "fails": bool(abs(residual.mean()) > sure)}
+            )
+        return rows
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of compare.json."""
+        factor, spread = self.factor
+        sizes = {"measured": self.measured, "residual": self.measured - self.foretold}
+        means = {f"mean_{name}_um": float(um_from_m(np.abs(values).mean())) for name, values in sizes.items()}
+        document: dict[str, Any] = {
+            "points": len(self.line),
+            "on_no_final_wall": self.others,
+            **means,
+            "factor": factor,
+        }
+        document |= {"factor_sd": spread, "lines": self.lines, "notes": list(self.notes)}
+        return dict(certain(without_nan(document)))
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row a point: line, side, measured and foretold error, its extremes over the height, its deviation; um."""
+        names = ("measured", "foretold", "low", "high", "deviation")
+        columns = {f"{name}_um": um_from_m(getattr(self, name)) for name in names}
+        return frame_of({"line": self.line, "side": np.array(["left", "right"])[self.side], **columns})
+
+    def _short(self) -> str:
+        return f"{len(self.line)} points, measured {self.factor[0]:.2f} times the foretold"
+
+
+def compare_walls(
+    cut: Cut, moves: Moves, points: FloatArray, normal: FloatArray, deviation: FloatArray, notes: tuple[str, ...] = ()
+) -> WallComparison:
+    """Points (n, 3) m with normals (n, 3) and deviations (n,) m, nan: by the points, against the walls of a cut.
+
+    `moves` are the program's, in whose coordinates the points are. Raises `MeasurementError` where none lies on a wall.
+    """
+    station, side = np.nonzero(np.isfinite(cut.wall_mean))
+    samples, sign = cut.samples.take(station), 1.0 - 2.0 * side
+    radius = np.zeros(len(station))
+    for tool, cutter in cut.cutters.items():
+        radius[samples.tool == tool] = cutter.radius
+    flat = samples.tangent[:, :2] / np.linalg.norm(samples.tangent[:, :2], axis=1, keepdims=True)
+    left = np.stack([-flat[:, 1], flat[:, 0]], axis=1)
+    surface, outward = samples.position[:, :2] + (sign * radius)[:, None] * left, -sign[:, None] * left
+    height = samples.position[:, 2, None] + cut.wall_heights[station, side] + np.array([-FARTHEST, FARTHEST])
+    nearest = np.full(len(points), -1)
+    for i, (point, towards) in enumerate(zip(points, normal, strict=True)):
+        beside = (outward @ towards[:2] > ALONG) & (height[:, 0] <= point[2]) & (point[2] <= height[:, 1])
+        if beside.any():
+            away = np.where(beside, np.linalg.norm(surface - point[:2], axis=1), np.inf)
+            nearest[i] = int(np.argmin(away))
+    row = samples.move[nearest]
+    first = np.searchsorted(cut.samples.move, row)
+    last = np.searchsorted(cut.samples.move, row, side="right") - 1
+    length = cut.samples.s[last] - cut.samples.s[first]
+    _, aside = places_beside(moves, row, points, (samples.s[nearest] - cut.samples.s[first]) / length)
+    off = radius[nearest] - sign[nearest] * aside
+    on = (nearest >= 0) & (np.abs(off) <= FARTHEST)
+    if not on.any():
+        hint = "points are in program coordinates, mm, their normals point out of the part"
+        raise MeasurementError("no measured point lies on a final wall of the program", hint=hint)
+    at = nearest[on]
+    rows, sides = station[at], side[at]
+    return WallComparison(
+        line=samples.line[at],
+        side=sides,
+        measured=np.where(np.isnan(deviation), off, deviation)[on],
+        foretold=cut.wall_mean[rows, sides],
+        low=cut.wall_low[rows, sides],
+        high=cut.wall_high[rows, sides],
+        deviation=cut.deviation[rows, sides],
+        others=int((~on).sum()),
+        notes=notes,
+    )

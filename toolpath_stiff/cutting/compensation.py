@@ -1,0 +1,367 @@
+"""A program shifted against the deflection: the mirror method, iterated with the engagement of the shifted path.
+
+p' = p + e n, n into the work, e the mean over the wall's height of the error that the cut along p' makes (Law, Geddam,
+J. Mater. Process. Technol. 138 (2003) 379, "mirror" compensation). The error of the surface against the drawing is then
+that of the cut less the shift; what varies over the height no shift removes.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
+from toolpath_stiff.documents import Document, certain, to_dict, without_nan
+from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.courses import move_lengths, points_along
+from toolpath_stiff.nc.moves import Moves, ReadProgram
+from toolpath_stiff.poses import Pose
+from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.rewriting.program import RewrittenProgram, shift_program
+from toolpath_stiff.rewriting.side_shift import Shifts, SideShift, movable_rows
+from toolpath_stiff.units import m_from_mm, mm_from_m, um_from_m
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from toolpath_stiff.cutting.cut import Cut
+
+LARGEST = 1e-4  # m, and half of the width of cut: a line that would be shifted by more is left alone
+SETTLED = 2e-7  # m, largest change of a shift that is worth another turn
+MOST_TURNS = 6
+CONTRACTION = 0.3  # of a turn's change to that of the turn before; a warning beyond
+SAME = 1e-7  # m by which the error of a wall may grow: rounding of the numbers written, and of the stock's grid
+WORSE = "it would be worse"
+BETWEEN = "it lies between two walls: what a shift takes off one it adds to the other"
+
+
+@dataclass(frozen=True)
+class Walls(ArrayColumns):
+    """Where the final walls of a program are made, at n stations. SI.
+
+    Attributes
+    ----------
+    row, share
+        (n,) of the untouched program's moves: the row, how far along it.
+    shift
+        (n,) m, how far left of that the station is.
+    error
+        (n, 2) m of the walls on the left and on the right against the drawing, mean over the height, + material left;
+        nan where none is made there.
+    spread
+        (n, 2) m, the range of the error over the height.
+    width, weight
+        (n,) m: width of cut; length of path that the station stands for.
+    """
+
+    row: IntArray
+    share: FloatArray
+    shift: FloatArray
+    error: FloatArray
+    spread: FloatArray
+    width: FloatArray
+    weight: FloatArray
+
+    @property
+    def wanted(self) -> FloatArray:
+        """(n,) m, the shift to the left that takes the error out; between two walls it makes neither worse."""
+        both = np.stack([self.error[:, 0] + self.shift, self.shift - self.error[:, 1]], axis=1)
+        size, alike = np.abs(both), both.prod(axis=1) > 0.0
+        between = np.where(alike, np.minimum(size.mean(axis=1), 2.0 * size.min(axis=1)) * np.sign(both[:, 0]), 0.0)
+        return np.asarray(np.where(np.isfinite(both).all(axis=1), between, np.nansum(both, axis=1)))
+
+
+def walls_of(cut: Cut, written: Moves, row_of: IntArray, untouched: Moves) -> Walls:
+    """The walls that a program makes, whose moves stand in the place of rows `row_of` of the untouched ones."""
+    rows = np.flatnonzero(np.isfinite(cut.wall_mean).any(axis=1))
+    move, s = cut.samples.move[rows], cut.samples.s[rows]
+    length = move_lengths(written)
+    before = np.cumsum(length) - length
+    along = np.clip((s - before[move]) / np.where(length > 0.0, length, 1.0)[move], 0.0, 1.0)
+    first = np.unique(row_of, return_index=True)[1]  # rows ascend, so does where each begins
+    whole = np.bincount(row_of, length)[row_of[move]]
+    start = before[first][np.searchsorted(row_of[first], row_of[move])]
+    share, shift = places_beside(untouched, row_of[move], points_along(written, move, along)[0], (s - start) / whole)
+    sides = np.array([-1.0, 1.0])
+    return Walls(
+        row=row_of[move],
+        share=share,
+        shift=shift,
+        error=cut.wall_mean[rows] + sides * shift[:, None],
+        spread=(cut.wall_high - cut.wall_low)[rows],
+        width=cut.ae[rows],
+        weight=cut.samples.weight[rows],
+    )
+
+
+def places_beside(moves: Moves, row: IntArray, points: FloatArray, near: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n,) share of moves beside which points lie, and how far left of them, m; of a circle's turns the one `near`.
+
+    An arc that stands on edge is straight in plan; `near` is also the share of a move that is a point there.
+    """
+    start, end, center, point = (
+        place[:, 0] + 1j * place[:, 1] for place in (moves.start[row], moves.end[row], moves.arc_center[row], points)
+    )
+    chord = end - start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        on_chord = (point - start) * np.conj(chord) / np.abs(chord)
+        share, left = np.where(chord == 0.0, (near, 0.0 * near), (on_chord.real / np.abs(chord), on_chord.imag))
+        sweep = moves.arc_sweep[row] * np.round(moves.arc_normal[row, 2])
+        turned = np.angle((point - center) / (start - center))
+        turned += 2.0 * np.pi * np.round((near * sweep - turned) / (2.0 * np.pi))
+        share = np.where(sweep == 0.0, share, turned / sweep)
+    radius = np.abs(start - center) + np.clip(share, 0.0, 1.0) * (np.abs(end - center) - np.abs(start - center))
+    left = np.where(sweep == 0.0, left, np.sign(sweep) * (radius - np.abs(point - center)))
+    return np.clip(share, 0.0, 1.0), left
+
+
+def _by_row(walls: Walls) -> Iterator[tuple[int, IntArray]]:
+    """Rows, and the stations of each."""
+    order = np.argsort(walls.row, kind="stable")
+    rows, first = np.unique(walls.row[order], return_index=True)
+    yield from zip(rows.tolist(), np.split(order, first[1:]), strict=True)
+
+
+def _shifts(walls: Walls, alone: Collection[int]) -> Shifts:
+    """Shifts of moves, mm to the left, by the stations of their walls; 0 of those that are left alone."""
+    shifts, wanted = {}, mm_from_m(walls.wanted)
+    for row, some in _by_row(walls):
+        shares, which = np.unique(walls.share[some], return_inverse=True)
+        means = np.bincount(which, wanted[some]) / np.bincount(which)
+        knots = np.union1d(shares, [0.0, 1.0])
+        shifts[row] = (knots, np.interp(knots, shares, 0.0 * means if row in alone else means))
+    return shifts
+
+
+def _too_far(walls: Walls) -> dict[int, str]:
+    """Rows whose shift is beyond the limit, with the reason."""
+    rows, which = np.unique(walls.row, return_inverse=True)
+    most, width = np.zeros(len(rows)), np.zeros(len(rows))
+    np.maximum.at(most, which, np.abs(walls.wanted))
+    np.maximum.at(width, which, walls.width)
+    reasons = {}
+    for row, shift, ae in zip(rows.tolist(), um_from_m(most), um_from_m(width), strict=True):
+        limit = min(um_from_m(LARGEST), ae / 2.0)
+        if shift > limit:
+            what = "the limit" if limit < ae / 2.0 else "half of the width of cut"
+            reasons[row] = f"its shift of {shift:.1f} um is beyond {what}, {limit:.1f} um"
+    return reasons
+
+
+def figures_of_walls(walls: Walls, rows: int) -> dict[str, FloatArray]:
+    """Of each move and side, (rows, 2): length m, mean error, its mean size, rms and peak, mean range, shift; SI."""
+    station, side = np.nonzero(np.isfinite(walls.error))
+    key, size, error = walls.row[station] * 2 + side, 2 * rows, walls.error[station, side]
+    weight = np.maximum(walls.weight[station], 1e-12)
+    length = np.bincount(key, weight, size)
+    into = np.where(side == 0, 1.0, -1.0) * walls.shift[station]
+    values = {"error": error, "size": np.abs(error), "spread": walls.spread[station, side], "shift": into}
+    with np.errstate(invalid="ignore"):
+        means = {name: np.bincount(key, weight * column, size) / length for name, column in values.items()}
+    means["rms"] = np.sqrt(np.bincount(key, weight * error**2, size) / np.where(length > 0.0, length, np.nan))
+    peak = np.full(size, np.nan)
+    np.fmax.at(peak, key, np.abs(error))
+    return {name: column.reshape(rows, 2) for name, column in {**means, "peak": peak, "length": length}.items()}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Compensation(Result):
+    """A program shifted against the deflection of its final walls, and what that does to each of them.
+
+    Attributes
+    ----------
+    rewritten
+        The program as written; the untouched one where nothing could be shifted.
+    lines
+        A row a line of the program and side of its feed on which it makes a final wall, by columns: line, side,
+        length_mm, shift_um (mean, + into the work); of the mean over the wall's height, mean and mean size along the
+        line and the largest, before and after (error, size, peak; um, + material left); spread_um, the mean range over
+        the height, which no shift removes; left_alone, the reason or "".
+    before, after
+        Surface errors of the untouched and of the written program.
+    turns
+        Of the iteration, the programs that were written and cut.
+    contraction
+        Largest ratio of the change of a turn to that of the turn before; nan where the first turn settled it.
+    course_error_um
+        How far courses are from their shift where that varies along a move.
+    notes
+        What the user should know, one sentence each.
+    """
+
+    command: ClassVar[str] = "compensate"
+    shown_by: ClassVar[str] = "compensation"
+
+    rewritten: RewrittenProgram
+    lines: Mapping[str, list[Any]]
+    before: Cut
+    after: Cut
+    turns: int
+    contraction: float
+    course_error_um: float
+    notes: tuple[str, ...]
+
+    @property
+    def walls(self) -> Document:
+        """Of all walls together: length, mean size before and after, what is left of it, worst, range over the height.
+
+        Those left alone are included.
+        """
+        columns = {name: np.array(self.lines[name]) for name in self.lines if name.endswith(("_um", "_mm"))}
+        length = columns["length_mm"]
+        before, after, spread = (
+            float((columns[name] * length).sum() / length.sum())
+            for name in ("size_before_um", "size_after_um", "spread_um")
+        )
+        return {
+            "length_mm": float(length.sum()),
+            "mean_before_um": before,
+            "mean_after_um": after,
+            "left_percent": 100.0 * after / before if before else 0.0,
+            "worst_before_um": float(columns["peak_before_um"].max()),
+            "worst_after_um": float(columns["peak_after_um"].max()),
+            "mean_range_um": spread,
+        }
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything of the program was shifted."""
+        return bool(np.abs(self.lines["shift_um"]).max() > 1e-3)  # below: what is left of a difference
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+        names = ("turns", "contraction", "course_error_um", "notes")
+        rows = [dict(zip(self.lines, row, strict=True)) for row in zip(*self.lines.values(), strict=True)]
+        own = {"program": self.rewritten.name, "changed": self.changed, "walls": self.walls, "lines": rows}
+        return dict(certain(without_nan(to_dict(own | {name: getattr(self, name) for name in names}))))
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row a line and side, as `lines`."""
+        return frame_of(dict(self.lines))
+
+    def _short(self) -> str:
+        walls = self.walls
+        return f"{self.rewritten.name}, {walls['mean_before_um']:.2f} to {walls['mean_after_um']:.2f} um"
+
+    def save(self, file: str | Path) -> Path:
+        """Write the program, whole or not at all."""
+        return self.rewritten.save(file)
+
+
+def compensate_program(
+    program: ReadProgram,
+    origin: Pose,
+    evaluate: Callable[[ReadProgram], Cut],
+    reread: Callable[[str], ReadProgram],
+    *,
+    decimals: int | None = None,
+    control: Controller = UNKNOWN_CONTROL,
+) -> Compensation:
+    """A program shifted against the deflection of its final walls, with what that does to each of them.
+
+    Parameters
+    ----------
+    program, origin
+        As read, where its zero sits.
+    evaluate, reread
+        The surface errors of a program; a program that was written, read as this one was.
+    decimals, control
+        As of `rewriting.program.shift_program`.
+
+    Raises
+    ------
+    InputError
+        The program makes no final wall, or a block cannot be rewritten, with its line.
+    """
+    moves = program.moves
+    cut = before_cut = evaluate(program)
+    before = walls = walls_of(cut, moves, np.arange(len(moves)), moves)
+    if not len(before.row):
+        raise ProgramError("no pass makes a wall of the finished part", file=program.name)
+    alone = {int(row): "a plunge, or an arc on edge" for row in np.unique(before.row[~movable_rows(moves)[before.row]])}
+    alone |= _too_far(before)
+    was, changes, turn = figures_of_walls(before, len(moves)), [_quantile(before.wanted)], 0
+    while True:
+        turn += 1
+        shifts = _shifts(walls, alone)
+        side = SideShift(moves, shifts)
+        alone |= side.refused
+        rewritten, row_of = shift_program(program, origin, side.courses, decimals=decimals, control=control)
+        read = reread(rewritten.text)
+        cut = evaluate(read)
+        after = walls_of(cut, read.moves, np.array(row_of, dtype=np.int64), moves)
+        changes.append(_quantile((after.wanted - _intended(shifts, after))[~np.isin(after.row, list(alone))]))
+        if changes[-1] > SETTLED and turn < MOST_TURNS:
+            walls = after
+            alone |= _too_far(after)
+            continue
+        now = figures_of_walls(after, len(moves))
+        spoilt = set(np.flatnonzero(_worse(was, now).any(axis=1)).tolist())
+        if not spoilt or not side.courses:
+            break
+        # A wall that was not shifted is spoilt by its neighbours: then all stay.
+        alone |= dict.fromkeys(spoilt - alone.keys() or np.unique(before.row).tolist(), WORSE)
+    ratios = [later / sooner for sooner, later in itertools.pairwise(changes) if later > SETTLED]
+    contraction = max(ratios, default=float("nan"))
+    return Compensation(
+        rewritten, _lines(moves, was, now, alone), before_cut, cut, turn, contraction, um_from_m(m_from_mm(side.error)),
+        _notes(changes[-1], contraction, rewritten),
+    )  # fmt: skip
+
+
+def _quantile(values: FloatArray) -> float:
+    """Size below which 95 % of values lie; 0 of none."""
+    return float(np.quantile(np.abs(values), 0.95)) if len(values) else 0.0
+
+
+def _intended(shifts: Shifts, walls: Walls) -> FloatArray:
+    """(n,) m, the shift that was asked for at each station."""
+    intended = np.zeros(len(walls.row))
+    for row, some in _by_row(walls):
+        intended[some] = m_from_mm(np.interp(walls.share[some], *shifts[row])) if row in shifts else 0.0
+    return intended
+
+
+def _worse(was: Mapping[str, FloatArray], now: Mapping[str, FloatArray]) -> BoolArray:
+    """(rows, 2) walls whose error grew, in its mean size or its rms; one that is new, against the worst there was."""
+    grown = [now[name] - np.where(was["length"] > 0.0, was[name], np.nanmax(was[name])) for name in ("size", "rms")]
+    return np.asarray(np.fmax(*grown) > SAME)
+
+
+def _lines(
+    moves: Moves, was: Mapping[str, FloatArray], now: Mapping[str, FloatArray], alone: Mapping[int, str]
+) -> dict[str, list[Any]]:
+    """Columns of `Compensation.lines`."""
+    row, side = np.nonzero(was["length"] > 0.0)
+    columns: dict[str, list[Any]] = {
+        "line": moves.line[row].tolist(),
+        "side": np.array(["left", "right"])[side].tolist(),
+        "length_mm": mm_from_m(was["length"][row, side]).tolist(),
+        "shift_um": um_from_m(np.nan_to_num(now["shift"][row, side])).tolist(),
+    }
+    for name in ("error", "size", "peak"):
+        before, after = was[name][row, side], now[name][row, side]
+        columns[f"{name}_before_um"] = um_from_m(before).tolist()
+        columns[f"{name}_after_um"] = um_from_m(np.where(np.isnan(after), before, after)).tolist()
+    columns["spread_um"] = um_from_m(np.nan_to_num(now["spread"][row, side])).tolist()
+    between = (was["length"] > 0.0).all(axis=1) & (np.abs(now["shift"]).max(axis=1) < 0.05 * was["size"].max(axis=1))
+    columns["left_alone"] = [alone.get(r, BETWEEN if between[r] else "") for r in row.tolist()]
+    return columns
+
+
+def _notes(change: float, contraction: float, rewritten: RewrittenProgram) -> tuple[str, ...]:
+    notes = list(rewritten.notes)
+    if contraction > CONTRACTION:
+        notes.append(
+            f"the force depends on the shift: a turn of the iteration leaves {contraction:.2f} of the change before "
+            f"it, more than {CONTRACTION:g}; a wider cut or a stiffer tool would be surer"
+        )
+    if change > SETTLED:
+        notes.append(f"the iteration did not settle: the last turn still changed shifts by {um_from_m(change):.2f} um")
+    return (*notes, "floors are not compensated")

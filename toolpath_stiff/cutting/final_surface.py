@@ -1,0 +1,93 @@
+"""What stays in the finished part: which stations make its walls, its floors and scallops; its heights, with owners."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
+from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.stations import blocks_of_stations, points_around
+from toolpath_stiff.cutting.sweeps import nearest
+from toolpath_stiff.cutting.workpiece import Workpiece
+from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.path.sampling import Samples
+
+BESIDE = 2e-6  # m, outside of a wall, where it must stand; and how far above the finished surface still is that surface
+TOUCHED = 2e-7  # m, within which a later pass touches a surface, and makes it: less than any surface error
+LATER = 0.1  # radii of the cutter along the path from where on a pass is another one
+ACROSS = 41  # points across the cutter's end
+
+
+def final_walls(work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
+    """(n, 2, 2) m above the tip: lowest and highest point of the wall that a sample makes on its left and right.
+
+    nan where the finished part has no wall there, or a later pass has touched it (a spring pass makes it anew). A
+    corner's radius is below the wall.
+    """
+    walls = np.full((len(samples), 2, 2), np.nan)
+    for rows, stations in blocks_of_stations(work, moves, samples, cutters):
+        sides = np.array([[0.0, np.pi]])
+        wall, inner = (
+            points_around(stations, (stations["reach"] + offset)[:, None], sides) for offset in (BESIDE, -TOUCHED)
+        )
+        every = np.full(len(wall[0]), len(work.pieces))
+        other = stations["path"] + LATER * stations["reach"]
+        later = np.repeat(np.searchsorted(work.pieces["before"], other, "right"), 2)
+        tip = np.repeat(stations["z"], 2)
+        high = (
+            np.minimum(work.tops(*wall, (np.zeros_like(every), every))[0], work.tops(*inner, (later, every))[0]) - tip
+        )
+        high = np.minimum(high, np.repeat(stations["longest"], 2))
+        low = np.maximum(work.stock.heights(*wall)[1] - tip, np.repeat(stations["reach"] - stations["flat"], 2))
+        stands = (high - low > BESIDE) & ~np.repeat(stations["plunge"], 2)
+        walls[rows] = np.where(stands[:, None], np.stack([low, high], axis=1), np.nan).reshape(-1, 2, 2)
+    return walls
+
+
+def final_strip(work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
+    """(n, 2) m across the feed, + to the left: lowest and highest offset at which a sample makes the finished surface.
+
+    With the end of the cutter: of a flat end the strip of floor, of a ball the scallop around its point of contact
+    kappa = asin(|offset| / R). nan: none.
+    """
+    strips = np.full((len(samples), 2), np.nan)
+    for rows, stations in blocks_of_stations(work, moves, samples, cutters):
+        offset = stations["reach"][:, None] * np.sin(np.linspace(-0.5, 0.5, ACROSS) * np.pi)[None, :]
+        corner, flat = (stations["reach"] - stations["flat"])[:, None], stations["flat"][:, None]
+        inset = np.clip(np.abs(offset) - flat, 0.0, corner)
+        surface = (stations["z"][:, None] + corner - np.sqrt(corner**2 - inset**2)).ravel()
+        points = points_around(stations, np.abs(offset), np.where(offset < 0.0, np.pi, 0.0))
+        every = np.full(len(surface), len(work.pieces))
+        # A flat end passes a point of the floor twice, with its front and with its back.
+        other = stations["path"] + LATER * stations["reach"] + 2.0 * stations["flat"]
+        later = np.repeat(np.searchsorted(work.pieces["before"], other, "right"), ACROSS)
+        stays = np.abs(work.tops(*points, (np.zeros_like(every), every))[0] - surface) < BESIDE
+        stays &= work.tops(*points, (later, every))[0] > surface + TOUCHED
+        stays &= work.stock.heights(*points)[1] < surface
+        stays = stays.reshape(offset.shape) & ~stations["plunge"][:, None]
+        low, high = np.where(stays, offset, np.inf).min(axis=1), np.where(stays, offset, -np.inf).max(axis=1)
+        strips[rows] = np.where(stays.any(axis=1)[:, None], np.stack([low, high], axis=1), np.nan)
+    return strips
+
+
+def finished_surface(
+    work: Workpiece, samples: Samples, cell: float
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
+    """(nx,) and (ny,) m, the middles of cells; (nx, ny) m, height of the finished part there; the sample that made it.
+
+    -inf and -1: no material, nothing cut.
+    """
+    size = work.stock.cell * work.stock.top.shape
+    x, y = (
+        corner + (np.arange(count) + 0.5) * edge / count
+        for corner, edge, count in zip(work.stock.corner, size, np.ceil(size / cell).astype(np.int64), strict=True)
+    )
+    top, owner = np.empty((len(x), len(y))), np.empty((len(x), len(y)), dtype=np.int64)
+    for i in range(len(x)):
+        column = np.full(len(y), x[i])
+        top[i], piece = work.tops(column, y, (np.zeros(len(y), np.int64), np.full(len(y), len(work.pieces))))
+        part: AnyArray = work.pieces[piece]
+        share = nearest(part, column, y)[0] / np.where(part["extent"] > 0.0, part["extent"], 1.0)
+        path = part["before"] + share * (part["after"] - part["before"])
+        owner[i] = np.where(piece < 0, -1, np.searchsorted(0.5 * (samples.s[1:] + samples.s[:-1]), path))
+    return x, y, np.where(top <= work.stock.bottom.min(), -np.inf, top), owner

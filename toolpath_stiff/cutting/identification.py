@@ -1,0 +1,95 @@
+"""Coefficients of the cutting force from mean forces of slots at several feeds, by least squares.
+
+Mean forces are linear in the coefficients (`forces.mean_responses`; for a flat end mill the straight lines over the
+feed of Altintas, Manufacturing Automation, 2nd ed., section 2.8.1). Each direction of force has a scatter of its own.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from toolpath_stiff.arrays import BoolArray, FloatArray, product
+from toolpath_stiff.cutting.coefficients import TAPER, UNKNOWN
+from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.forces import mean_responses
+from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.errors import MeasurementError
+
+LEAST_SCATTER = 1e-6  # of the largest force: no dynamometer reads finer
+ONE = np.ones(1)
+SURE = 0.975  # quantile of Student's t: intervals of 95 %
+
+
+def slot_patches(depth: FloatArray) -> Patches:
+    """Slots (n,) of depths m."""
+    zero = np.zeros(len(depth))
+    return Patches(np.arange(len(depth)), zero, depth, zero, zero + np.pi)
+
+
+def slot_responses(cutter: Cutter, feed: FloatArray, depth: FloatArray, angle: FloatArray | None = None) -> FloatArray:
+    """(n, 3, 6) mean forces per coefficient in slots of depths (n,) m at feeds (n,) m per tooth.
+
+    Run-out points to angles (n,) rad, as each record begins elsewhere in the turn; unless given, as the cutter says.
+    """
+    across = np.stack([feed, np.zeros(len(feed))], axis=1)[:, None]
+    angles = np.full(len(feed), cutter.run_out_angle) if angle is None else angle
+    return np.concatenate(
+        [
+            mean_responses(slot_patches(row[None]), replace(cutter, run_out_angle=to), fed, ONE, TAPER)
+            for row, fed, to in zip(depth, across, angles.tolist(), strict=True)
+        ]
+    )
+
+
+def least_squares(response: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """(6,) coefficients, (6, 6) covariance, (6,) those that the forces tell; what they do not tell is 0 +- `UNKNOWN`.
+
+    Parameters
+    ----------
+    response
+        (n, 3, 6) mean forces per coefficient.
+    force
+        (n, 3) N on the tool; nan in a direction that was not recorded.
+
+    Raises
+    ------
+    MeasurementError
+        The forces do not tell the coefficients apart.
+    """
+    recorded = np.isfinite(force).all(axis=0)
+    design = response[:, recorded]
+    told = np.abs(design).max(axis=(0, 1)) > 0.0
+    design, measured = design[..., told], force[:, recorded]
+    freedom = len(force) - 2  # a straight line each
+    deviation = np.ones(measured.shape[1])
+    size = np.sqrt((design**2).sum(axis=(0, 1)))  # of columns: N per N/m2 beside N per N/m
+    for _ in range(2):  # the first fit gives the scatter of each direction, the second weighs by it
+        rows = (design / size / deviation[:, None]).reshape(-1, told.sum())
+        solved, _, rank, _ = np.linalg.lstsq(rows, (measured / deviation).ravel(), rcond=1e-12)
+        if rank < told.sum() or freedom < 1:
+            raise MeasurementError(
+                "these slots do not tell the coefficients apart",
+                expected="slots at 3 different feeds or more, forces along x, y and, of a corner radius, z",
+            )
+        values = np.asarray(solved / size, dtype=float)
+        residual = measured - product(design, values[:, None])[..., 0]
+        deviation = np.sqrt((residual**2).sum(axis=0) / freedom)
+        deviation = np.maximum(deviation, LEAST_SCATTER * np.abs(measured).max())
+    coefficients, covariance = np.zeros(6), np.zeros((6, 6))
+    coefficients[told] = values
+    rows = (design / size / deviation[:, None]).reshape(-1, told.sum())
+    covariance[np.ix_(told, told)] = np.linalg.inv(rows.T @ rows) / size / size[:, None]
+    unknown = np.repeat(coefficients[[0, 3]] * UNKNOWN, 3)
+    covariance[np.diag_indices(6)] += np.where(told, 0.0, unknown) ** 2
+    return coefficients, covariance, told
+
+
+def left_out(response: FloatArray, force: FloatArray, feed: FloatArray) -> FloatArray:
+    """(n, 3) N, measured force less what the slots of all other feeds predict; nan where these do not suffice."""
+    off = np.full(force.shape, np.nan)
+    for value in np.unique(feed):
+        chosen = feed == value
+        if len(np.unique(feed[~chosen])) > 2:
+            coefficients, _, _ = least_squares(response[~chosen], force[~chosen])
+            off[chosen] = force[chosen] - product(response[chosen], coefficients[:, None])[..., 0]
+    return off

@@ -1,0 +1,182 @@
+"""Records of a dynamometer in slots: mean force over whole turns, without drift, and what comes back turn by turn.
+
+A turn cuts where the force swings by half as much as in the strongest turns, and is air where it swings hardly more
+than in the quietest; over a radius of feed after entry and before exit the slot is not full. The zero is a straight
+line through the air before and after. The speed of the spindle is taken from the record itself, where its teeth are
+heard.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.column_names import Mapped
+from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.errors import MeasurementError
+from toolpath_stiff.readings.mapping import check_needed, mapped_table
+from toolpath_stiff.tables import Columns, Table
+from toolpath_stiff.units import m_from_mm, s_from_min
+
+FORCES = ("fx_N", "fy_N", "fz_N")
+FEEDS = ("feed_per_tooth_mm", "feed_mm_per_min")
+ComplexArray = NDArray[np.complex128]
+COLUMNS = Columns(numbers=("time_s", *FORCES, *FEEDS, "spindle_rpm", "depth_mm"), texts=("record",))
+LAYOUT = "time_s, fx_N, fy_N, fz_N, feed_per_tooth_mm or feed_mm_per_min, spindle_rpm, depth_mm; record, if several"
+CUTS, AIR = 0.5, 1.5  # swing of turns that cut, of the strongest ones'; of turns in air, of the quietest ones'
+STRONG = 90.0  # per cent of the turns that are weaker than the strongest, and stronger than the quietest
+LEAST_TURNS = 5  # of the full slot
+SPEED_RANGE = 0.03  # by which the spindle may turn faster or slower than is said
+FINER = 8  # times finer than the spectrum of the record its speed is looked for
+
+
+def read_records(
+    file: str, columns: Mapped, flutes: int
+) -> Iterator[tuple[str, tuple[float, float, float], FloatArray]]:
+    """Name, settings (feed m per tooth, depth m, turns a second), and rows (m, 4) s and N of each record of a file.
+
+    Raises
+    ------
+    InputError
+        A column is missing, a cell is no number, a setting changes within a record, time does not rise.
+    """
+    table = mapped_table(file, "records of forces", COLUMNS, columns)
+    feed = next((name for name in FEEDS if name in table.heading), FEEDS[0])
+    check_needed(table, ("time_s", "fy_N", "spindle_rpm", "depth_mm", feed), LAYOUT)
+    cells = [table.record(row) for _, row in table.rows]
+    names, lines = np.array([row.get("record", "") for row in cells]), np.array([line for line, _ in table.rows])
+    signal = np.stack([_numbers(table, cells, name) for name in ("time_s", *FORCES)], axis=1)
+    rate, depth, fed = (_numbers(table, cells, name) for name in ("spindle_rpm", "depth_mm", feed))
+    for name in dict.fromkeys(names.tolist()):
+        rows = np.flatnonzero(names == name)
+        for setting, column in (("spindle_rpm", rate), ("depth_mm", depth), (feed, fed)):
+            odd = (column[rows] != column[rows[0]]) | (column[rows] <= 0.0)
+            if odd.any():
+                row = int(rows[np.argmax(odd)])
+                found, line = f"{setting} = {column[row]:g}", int(lines[row])
+                expected = f"above 0 and the same in all rows of a record, {column[rows[0]]:g}"
+                raise MeasurementError(found, expected=expected, file=file, line=line)
+        back = np.diff(signal[rows, 0]) <= 0.0
+        if back.any():
+            line = int(lines[rows[1 + np.argmax(back)]])
+            expected = "a row for each moment of a record"
+            raise MeasurementError("time_s does not rise", expected=expected, file=file, line=line)
+        turns_a_second = float(rate[rows[0]]) / s_from_min(1.0)
+        per_tooth = float(fed[rows[0]]) / (s_from_min(1.0) * turns_a_second * flutes if feed == FEEDS[1] else 1.0)
+        settings = (m_from_mm(per_tooth), m_from_mm(float(depth[rows[0]])), turns_a_second)
+        yield f"{file} {name}".strip(), settings, signal[rows]
+
+
+def _numbers(table: Table, cells: list[dict[str, str]], name: str) -> FloatArray:
+    """A column; nan where the table has none. Raises `InputError`."""
+    if name not in table.heading:
+        return np.full(len(cells), np.nan)
+    numbers = np.empty(len(cells))
+    for place, row in enumerate(cells):
+        try:
+            numbers[place] = float(row[name])
+        except ValueError:
+            numbers[place] = np.nan
+    if not np.isfinite(numbers).all():
+        place = int(np.argmin(np.isfinite(numbers)))
+        mistake, line = f"{name} = {cells[place][name]!r}", table.rows[place][0]
+        raise MeasurementError(mistake, expected="a finite number", file=table.file, line=line)
+    return numbers
+
+
+def mean_force(
+    name: str, signal: FloatArray, rate: float, cutter: Cutter, feed: float, side: int
+) -> tuple[FloatArray, ComplexArray, list[str]]:
+    """(3,) N, mean force over the whole turns of the full slot; (2,) N, its `harmonics` to the side; and remarks.
+
+    Parameters
+    ----------
+    name
+        Of the record, for messages.
+    signal
+        (m, 4) s and N, as recorded.
+    rate
+        Turns a second.
+    cutter, feed
+        Of the record; m per tooth.
+    side
+        Which force is across the feed.
+
+    Raises
+    ------
+    MeasurementError
+        The record does not hold enough whole turns of a full slot.
+    """
+    time, force = signal[:, 0] - signal[0, 0], signal[:, 1:]
+    known = np.nan_to_num(force)
+    remarks = []
+    heard = _heard_rate(time, known, rate, cutter.flutes)
+    if abs(heard / rate - 1.0) > 0.01:
+        turning, said = (f"{s_from_min(1.0) * value:.0f}" for value in (heard, rate))
+        remarks.append(f"{name}: the teeth pass at {turning} turns a minute, not at {said}")
+    turn = np.floor(time * heard).astype(int)
+    cutting, air = _cut_and_air(turn, known, int(np.ceil(cutter.radius / (feed * cutter.flutes))))
+    if len(cutting) < LEAST_TURNS:
+        raise MeasurementError(
+            f"{name}: {len(cutting)} whole turns of the full slot",
+            expected=f"{LEAST_TURNS} or more",
+            hint="are spindle_rpm, feed and the cutter's diameter right?",
+        )
+    silent, zero = np.isin(turn, air), np.zeros(3)
+    if len(air):
+        order = 1 if air[0] < cutting[0] and air[-1] > cutting[-1] else 0
+        line = np.polynomial.polynomial.polyfit(time[silent], known[silent], order)
+        zero = np.polynomial.polynomial.polyval(time, line).T
+    else:
+        remarks.append(f"{name}: no air before or after the cut, the zero is as recorded")
+    full = (turn >= cutting[0]) & (turn <= cutting[-1])
+    cleared = (known - zero)[full]
+    waves = harmonics(time[full] * heard, cleared[:, side], cutter.flutes)
+    return np.where(np.isnan(force[0]), np.nan, cleared.mean(axis=0)), waves, remarks
+
+
+def _cut_and_air(turn: IntArray, force: FloatArray, filling: int) -> tuple[IntArray, IntArray]:
+    """Whole turns of the full slot, and turns in air; a slot is full `filling` turns after entry.
+
+    `turn` (m,) of the forces (m, 3).
+    """
+    first = np.searchsorted(turn, np.arange(turn[-1]))  # the last turn is not whole
+    ending = np.searchsorted(turn, turn[-1])
+    if len(first) < LEAST_TURNS:
+        return first[:0], first[:0]
+    high, low = (extreme.reduceat(force[:ending], first) for extreme in (np.maximum, np.minimum))
+    swing = (high - low).max(axis=1)
+    strongest, quiet = np.percentile(swing, [STRONG, 100.0 - STRONG])
+    runs = np.flatnonzero(swing >= CUTS * strongest)
+    cutting = max(np.split(runs, np.flatnonzero(np.diff(runs) > 1) + 1), key=len)
+    if AIR * quiet > CUTS * strongest:
+        return cutting, first[:0]
+    # Where the swing hardly differs from the air's, the first touch may already push.
+    reach = min(filling // 10 + 1, (len(swing) - 1) // 2)
+    touched = np.convolve(swing > AIR * quiet, np.ones(2 * reach + 1), "same") > 0.5
+    return cutting[filling : len(cutting) - filling], np.flatnonzero(~touched)
+
+
+def _heard_rate(time: FloatArray, force: FloatArray, rate: float, flutes: int) -> float:
+    """Turns a second at which the teeth pass, near the rate that is said; that one where none are heard."""
+    count = FINER * len(time)
+    even = np.linspace(time[0], time[-1], len(time))
+    power = np.zeros(count // 2 + 1)
+    for column in force.T:
+        power += np.abs(np.fft.rfft(np.interp(even, time, column - column.mean()), count)) ** 2
+    frequency = np.fft.rfftfreq(count, even[1] - even[0]) / flutes
+    near = np.flatnonzero(np.abs(frequency / rate - 1.0) <= SPEED_RANGE)
+    near = near[(near > 0) & (near < len(power) - 1)]
+    if not len(near) or power[near].max() < 10.0 * np.median(power):
+        return rate
+    peak = int(near[np.argmax(power[near])])
+    left, middle, right = np.sqrt(power[peak - 1 : peak + 2])
+    bend = left - 2.0 * middle + right
+    return float(frequency[peak] + (0.5 * (left - right) / bend if bend < 0.0 else 0.0) * frequency[1])
+
+
+def harmonics(turns: FloatArray, force: FloatArray, flutes: int) -> ComplexArray:
+    """(2,) N, of forces (m,) N after (m,) turns what comes back once a turn and once a tooth."""
+    waves = np.exp(-2j * np.pi * np.array([[1], [flutes]]) * turns)
+    return np.asarray((waves * force).mean(axis=1))

@@ -1,0 +1,42 @@
+"""Measured walls against foretold errors, in words and tables."""
+
+from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.comparison.walls import WallComparison
+from toolpath_stiff.report.tables import ShownTable
+
+COLUMNS = {
+    "line": "line", "side": "side", ">points": "points", ">measured um": "measured_um", ">foretold": "foretold_um",
+    ">residual": "residual_um", ">sure beyond": "sure_um", "verdict": "fails",
+}  # fmt: skip
+VERDICT = {True: "the model fails", False: "as foretold"}
+
+
+def text(comparison: WallComparison) -> str:
+    """What was measured and foretold together, each line with its verdict, notes; for the terminal."""
+    document, (factor, spread) = comparison.to_dict(), comparison.factor
+    rows = sorted(document["lines"], key=lambda row: -abs(row["residual_um"]))
+    cells = [[_cell(row[name]) for name in COLUMNS.values()] for row in rows]
+    others = f"; {comparison.others} lie on no final wall" if comparison.others else ""
+    return "\n".join(
+        [
+            f"{document['points']} points on final walls{others}",
+            f"  measured    {document['mean_measured_um']:.2f} um in the mean of sizes",
+            f"  residual    {document['mean_residual_um']:.2f} um, measured less foretold mean over the height",
+            f"  factor      {factor:.2f} +- {2.0 * spread:.2f}, measured over foretold",
+            "",
+            *ShownTable([*COLUMNS], cells).lines(least=4),
+            *(f"note: {note}" for note in comparison.notes),
+        ]
+    )
+
+
+def _cell(value: object) -> str:
+    return VERDICT[value] if isinstance(value, bool) else f"{value:.2f}" if isinstance(value, float) else str(value)
+
+
+def _residuals(comparison: WallComparison) -> str:
+    frame = comparison.to_frame()
+    return csv_text([*frame.columns], ([_cell(value) for value in row] for row in frame.itertuples(index=False)))
+
+
+DATA = {"compare.json": WallComparison.to_json, "residuals.csv": _residuals}
