@@ -159,10 +159,10 @@ def test_a_program_without_walls_is_refused():
         compensate(cut_by(lambda x, y, off: x * np.nan))
 
 
-def test_twenty_programs_are_never_worse():
-    """Random errors, of place and shift, with steps: no wall of any program is worse, most are a fifth or less."""
+def test_random_errors_never_get_worse():
+    """Errors of place and shift, with steps: no wall of any program is worse, most are a fifth or less."""
     shares = []
-    for seed in range(20):
+    for seed in range(8):
         rng = np.random.default_rng(seed)
         mean, wave, length, slope, step = rng.uniform([-0.03, 0.0, 3.0, -0.5, -0.01], [0.03, 0.01, 20.0, 0.5, 0.01])
 

@@ -1,4 +1,4 @@
-"""The placement of least surface error: foretold as the chain has it there, no worse than now, found by no other aim."""
+"""The placement of least surface error: foretold as the chain has it, better than now, and nothing else worse."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BOX = {"x_mm": (-250, 250), "y_mm": (-250, 250), "z_mm": (700, 1000)}
 
 def p95(origin):
     """What 95 % of the final walls stay below, um, by the chain at a placement."""
-    cut = tps.analyze(tps.Program.from_text(TEXT, name="part.nc"), origin_mm_deg=origin, cut=GIVEN, step_mm=2.0).cut
+    cut = tps.analyze(tps.Program.from_text(TEXT, name="part.nc"), origin_mm_deg=origin, cut=GIVEN, step_mm=4.0).cut
     row, side = np.nonzero(np.isfinite(cut.wall_mean))
     size, length = np.abs(cut.wall_mean[row, side]) * 1e6, cut.samples.weight[row]
     order = np.argsort(size)
@@ -26,19 +26,12 @@ def p95(origin):
 
 def test_the_least_error():
     program = tps.Program.from_text(TEXT, name="part.nc")
-    placed = {
-        aim: tps.place(
-            program, objective=aim, points=5, step_mm=2.0, **BOX, **({"cut": GIVEN} if aim == "error" else {})
-        )
-        for aim in ("balanced", "error")
-    }
-    best = placed["error"]
+    best = tps.place(program, objective="error", cut=GIVEN, points=5, step_mm=4.0, **BOX)
     told = best.to_dict()["surface_error_um"]
     assert told["chosen"] == pytest.approx(p95(best.origin_mm_deg), rel=0.02)
     assert told["chosen"] < told["before"] and not best.worse
-    assert told["chosen"] <= p95(placed["balanced"].origin_mm_deg) * 1.001
+    assert told["before"] == pytest.approx(p95(None), rel=0.02)
     assert f"within {told['chosen']:.2f} um" in str(best)
-    assert placed["balanced"].surface_error_um is None and "surface_error_um" not in placed["balanced"].to_dict()
 
 
 def test_what_is_refused():

@@ -95,6 +95,16 @@ def analyze(
     <Analysis: slot.nc on nist, mean 54 353 N/mm, min 53 875 N/mm>
     >>> found.to_frame()[["line", "x_mm", "stiffness_N_per_mm"]].tail(1).round(0).values.tolist()
     [[4.0, 40.0, 53875.0]]
+
+    The error of the surface, with the stock, tool and coefficients of a setup file:
+
+    >>> import pathlib, tempfile
+    >>> wall = "G21 G90 T1 M6 S9000 M3\nG0 X-70 Y44 Z5\nZ-5\nG1 X70 F900\nM2"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = tps.cut_template().save(pathlib.Path(folder, "cut.toml"))
+    ...     found = tps.analyze(tps.Program.from_text(wall), cut=file, tolerance_um=5)
+    >>> [line for line, error_um in found.beyond_tolerance], found.to_dict()["cut"]["walls"]["mean_um"] > 0.0
+    ([4], True)
     """
     first, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
     setup = cut_setup(cut, material, stock_mm)

@@ -8,7 +8,7 @@ that of the cut less the shift; what varies over the height no shift removes.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -38,6 +38,7 @@ MOST_TURNS = 6
 CONTRACTION = 0.3  # of a turn's change to that of the turn before; a warning beyond
 SAME = 1e-7  # m by which the error of a wall may grow: rounding of the numbers written, and of the stock's grid
 WORSE = "it would be worse"
+BETWEEN = "it lies between two walls: what a shift takes off one it adds to the other"
 
 
 @dataclass(frozen=True)
@@ -100,15 +101,18 @@ def walls_of(cut: Cut, written: Moves, row_of: IntArray, untouched: Moves) -> Wa
 
 
 def places_beside(moves: Moves, row: IntArray, points: FloatArray, near: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n,) share of moves beside which points lie, and how far left of them, m; of a circle's turns the one `near`."""
+    """(n,) share of moves beside which points lie, and how far left of them, m; of a circle's turns the one `near`.
+
+    An arc that stands on edge is straight in plan; `near` is also the share of a move that is a point there.
+    """
     start, end, center, point = (
         place[:, 0] + 1j * place[:, 1] for place in (moves.start[row], moves.end[row], moves.arc_center[row], points)
     )
     chord = end - start
     with np.errstate(divide="ignore", invalid="ignore"):
         on_chord = (point - start) * np.conj(chord) / np.abs(chord)
-        share, left = on_chord.real / np.abs(chord), on_chord.imag
-        sweep = moves.arc_sweep[row] * np.where(moves.arc_normal[row, 2] < 0.0, -1.0, 1.0)
+        share, left = np.where(chord == 0.0, (near, 0.0 * near), (on_chord.real / np.abs(chord), on_chord.imag))
+        sweep = moves.arc_sweep[row] * np.round(moves.arc_normal[row, 2])
         turned = np.angle((point - center) / (start - center))
         turned += 2.0 * np.pi * np.round((near * sweep - turned) / (2.0 * np.pi))
         share = np.where(sweep == 0.0, share, turned / sweep)
@@ -117,12 +121,17 @@ def places_beside(moves: Moves, row: IntArray, points: FloatArray, near: FloatAr
     return np.clip(share, 0.0, 1.0), left
 
 
+def _by_row(walls: Walls) -> Iterator[tuple[int, IntArray]]:
+    """Rows, and the stations of each."""
+    order = np.argsort(walls.row, kind="stable")
+    rows, first = np.unique(walls.row[order], return_index=True)
+    yield from zip(rows.tolist(), np.split(order, first[1:]), strict=True)
+
+
 def _shifts(walls: Walls, alone: Collection[int]) -> Shifts:
     """Shifts of moves, mm to the left, by the stations of their walls; 0 of those that are left alone."""
     shifts, wanted = {}, mm_from_m(walls.wanted)
-    order = np.lexsort((walls.share, walls.row))
-    rows, first = np.unique(walls.row[order], return_index=True)
-    for row, some in zip(rows.tolist(), np.split(order, first[1:]), strict=True):
+    for row, some in _by_row(walls):
         shares, which = np.unique(walls.share[some], return_inverse=True)
         means = np.bincount(which, wanted[some]) / np.bincount(which)
         knots = np.union1d(shares, [0.0, 1.0])
@@ -314,8 +323,7 @@ def _quantile(values: FloatArray) -> float:
 def _intended(shifts: Shifts, walls: Walls) -> FloatArray:
     """(n,) m, the shift that was asked for at each station."""
     intended = np.zeros(len(walls.row))
-    for row in np.unique(walls.row).tolist():
-        some = walls.row == row
+    for row, some in _by_row(walls):
         intended[some] = m_from_mm(np.interp(walls.share[some], *shifts[row])) if row in shifts else 0.0
     return intended
 
@@ -338,10 +346,12 @@ def _lines(
         "shift_um": um_from_m(np.nan_to_num(now["shift"][row, side])).tolist(),
     }
     for name in ("error", "size", "peak"):
-        for when, figures in (("before", was), ("after", now)):
-            columns[f"{name}_{when}_um"] = um_from_m(np.nan_to_num(figures[name][row, side])).tolist()
+        before, after = was[name][row, side], now[name][row, side]
+        columns[f"{name}_before_um"] = um_from_m(before).tolist()
+        columns[f"{name}_after_um"] = um_from_m(np.where(np.isnan(after), before, after)).tolist()
     columns["spread_um"] = um_from_m(np.nan_to_num(now["spread"][row, side])).tolist()
-    columns["left_alone"] = [alone.get(r, "") for r in row.tolist()]
+    between = (was["length"] > 0.0).all(axis=1) & (np.abs(now["shift"]).max(axis=1) < 0.05 * was["size"].max(axis=1))
+    columns["left_alone"] = [alone.get(r, BETWEEN if between[r] else "") for r in row.tolist()]
     return columns
 
 

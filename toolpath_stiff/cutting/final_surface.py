@@ -18,17 +18,20 @@ LATER = 0.1  # radii of the cutter along the path from where on a pass is anothe
 ACROSS = 41  # points across the cutter's end
 
 
-def final_walls(work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
+def final_walls(
+    work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter], shared: bool = False
+) -> FloatArray:
     """(n, 2, 2) m above the tip: lowest and highest point of the wall that a sample makes on its left and right.
 
-    nan where the finished part has no wall there, or a later pass has touched it (a spring pass makes it anew). A
-    corner's radius is below the wall.
+    nan where the finished part has no wall there, or a later pass has touched it (a spring pass makes it anew),
+    unless `shared`: then only one that came deeper. A corner's radius is below the wall.
     """
     walls = np.full((len(samples), 2, 2), np.nan)
     for rows, stations in blocks_of_stations(work, moves, samples, cutters):
         sides = np.array([[0.0, np.pi]])
         wall, inner = (
-            points_around(stations, (stations["reach"] + offset)[:, None], sides) for offset in (BESIDE, -TOUCHED)
+            points_around(stations, (stations["reach"] + offset)[:, None], sides)
+            for offset in (BESIDE, TOUCHED if shared else -TOUCHED)
         )
         every = np.full(len(wall[0]), len(work.pieces))
         other = stations["path"] + LATER * stations["reach"]

@@ -27,6 +27,7 @@ from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
+from toolpath_stiff.rewriting.plain_language import write_placed
 from toolpath_stiff.rewriting.side_shift import Course
 from toolpath_stiff.rewriting.turn import Turn
 from toolpath_stiff.units import mm_from_m
@@ -130,8 +131,13 @@ def rewrite_program(
     X100 Y40
     M30
     """
-    check_rewritable(program)
     placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
+    if program.dialect == "heidenhain" and not program.kinematics:
+        text, encoding = _text(program)
+        turn = Turn(placement, original)
+        written = text if placement == original else write_placed(program, text, turn, decimals, control)
+        return RewrittenProgram(program.name, written, encoding, [])
+    check_rewritable(program)
     if placement == original:
         return RewrittenProgram(program.name, *_text(program), [])
     controls = _controls(program, control, placement, original, decimals)
@@ -169,14 +175,8 @@ def shift_program(
     >>> import numpy as np
     >>> from toolpath_stiff.nc.reader import parse_program
     >>> from toolpath_stiff.rewriting.side_shift import SideShift
-    >>> program = parse_program("G21 G90 F600
-    G0 X0 Y0 Z0
-    G1 X10
-    G1 Y20 (wall)
-    G1 X0
-    M30
-    ", "slot.nc")
-    >>> shift = SideShift(program.moves, {2: (np.array([0.0, 1.0]), np.array([-0.02, -0.02]))})  # mm, left is +
+    >>> program = parse_program("G21 G90 F600\nG0 X0 Y0 Z0\nG1 X10\nG1 Y20 (wall)\nG1 X0\nM30\n", "slot.nc")
+    >>> shift = SideShift(program.moves, {1: (np.array([0.0, 1.0]), np.array([-0.02, -0.02]))})  # mm, left is +
     >>> shifted, rows = shift_program(program, (0.0,) * 6, shift.courses)
     >>> print(shifted, end="")
     G21 G90 F600
@@ -186,7 +186,7 @@ def shift_program(
     G1 X0
     M30
     >>> rows
-    [0, 1, 2, 3]
+    [0, 1, 2]
     """
     check_rewritable(program)
     place = pose_in_mm(origin)
