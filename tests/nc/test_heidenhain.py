@@ -21,6 +21,7 @@ from toolpath_stiff.nc.heidenhain import functions
 from toolpath_stiff.nc.heidenhain.vocabulary import REFUSED, STATEMENTS
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.rewriting.program import rewrite_program
 
 TOOLS = Controller(tools={1: ToolEntry(1, diameter=10.0, remark="MILL 10"), 2: ToolEntry(2, length=50.0, diameter=4.0)})
 START = "L X+0 Y+0 Z+0 R0 F200"
@@ -123,6 +124,12 @@ PATHS = {
     "shift in a tilted plane": (
         "PLANE SPATIAL SPA+0 SPB+0 SPC+90 STAY\nCYCL DEF 7.1 X+10\nL X+1 Y+1 Z+0 FMAX\nCC X+0 Y+0\nL X+5 Y+0 F100",
         "R -1 11 0; F 0 15 0",
+    ),
+    "reset of the shift before that of the plane": (
+        "CYCL DEF 7.1 X+9\nPLANE SPATIAL SPA+0 SPB+0 SPC+90 STAY SEQ- TABLE ROT\nL A+Q120 C+Q122 R0 FMAX M126\nCALL LBL 1\n"
+        "PLANE SPATIAL SPA0 SPB0 SPC0 STAY\nL A+Q120 C+Q122 R0 FMAX\nL X+1 Y+2 Z+3 FMAX\nL X+2 M30\n"
+        "/77 LBL 1 ; RESET\nCYCL DEF 7.0 D\nCYCL DEF 7.1 X0\nCYCL DEF 7.2 Y0\nPLANE RESET STAY\nLBL 0",
+        "R 1 2 3; F 2 2 3",
     ),
     "arc of ZX": ("TOOL CALL 2 Y S1000 F200\nL Z+10 X+0\nCC Z+0 X+0\nC Z+0 X+10 DR+\nCYCL DEF 7.1 X+0", "F 0 0 10; A 10 0 0@0 0 90"),
     "machine coordinates": ("L X+1 Y+2 Z-3 R0 FMAX M91\nL X+5 Y+5 Z+5 F100", "R 1 2 -3; F 5 5 5"),
@@ -306,6 +313,7 @@ REFUSALS = {
     "L X+200000": ("beyond 100 m", 3),
     "TOOL CALL 9 Z\nL X+1 RL": ("radius of tool 9.*--tools", 4),
     "L X+1 M92": ("machine builder", 3),
+    "L X+1 FMAX M92\nL X+2 Y+2": ("place is not known", 4),
     "L Z-5 RL": ("does not move in the plane", 3),
     "C X+1 Y+1 DR+": ("without a circle centre", 3),
     "CC X+0 Y+0\nL X+10\nC X+0 Y+10.1 DR+": ("0.1000 mm off its circle", 5),
@@ -323,8 +331,10 @@ REFUSALS = {
     "L X-20\nAPPR CT X+0 Y+10 CCA90 R+4 RL\nL Y+50": ("inside arc", 4),
     "CYCL DEF 10.1 ROT+10\nCYCL DEF 7.1 X+5\nL X+1": ("order decides", 5),
     "CYCL DEF 8.1 X\nCYCL DEF 10.1 ROT+10\nL X+1": ("order decides", 5),
-    "CYCL DEF 7.1 #3": ("no word of CYCL DEF 7.1", 3),
-    "L X+1\nCYCL DEF 247 D ~\n Q339=2": ("preset table", 4),
+    "L X+1\nCYCL DEF 7.1 #3": ("another datum than before", 4),
+    "CYCL DEF 7.1 X+9\nPLANE SPATIAL SPA+9 SPB+0 SPC+0 STAY\nCYCL DEF 7.1 X+0\nL X+1 Y+1 Z+1 FMAX": ("order decides", 6),
+    "CYCL DEF 7.1 X+9\nPLANE SPATIAL SPA+9 SPB+0 SPC+0 STAY\nCYCL DEF 7.1 Y+3": ("before the tilting", 5),
+    "L X+1\nCYCL DEF 247 D ~\n Q339=2": ("table of the control", 4),
     "CC X+0 Y+0\nCYCL DEF 7.1 X+5\nLP PR+5 PA+0": ("after a change of the coordinates", 5),
     "PLANE SPATIAL SPA+0 SPB+9 SPC+0 STAY\nL X+1": ("tool's place is not known", 4),
     "M140 MB MAX\nL X+1": ("tool's place is not known", 4),
@@ -363,8 +373,8 @@ def test_every_statement_and_function_has_its_source_and_meaning():
     bodies = "\n".join(body for body, _ in PATHS.values())
     silent = (functions.nothing, functions.listed)
     unproved = [name for name, row in STATEMENTS.items() if row.act not in silent and name not in bodies]
-    assert unproved == ["BEGIN PGM", "BLK FORM 0.1", "BLK FORM 0.2", *[f"CYCL DEF 7.{n}" for n in (3, 4, 5, 6)], "CYCL DEF 247",
-                        "FUNCTION TCPM", "FUNCTION RESET TCPM", "CYCL DEF 240", "CYCL CALL POS", "STOP"]  # fmt: skip
+    other = {"BEGIN PGM", "BLK FORM 0.1", "BLK FORM 0.2", "CYCL DEF 247", "CYCL DEF 240", "CYCL CALL POS", "STOP"}
+    assert {*unproved} == other | {f"CYCL DEF 7.{n}" for n in (3, 4, 5, 6)} | {"FUNCTION TCPM", "FUNCTION RESET TCPM"}
 
 
 def test_inch_programs_count_feeds_in_tenths():
@@ -381,7 +391,7 @@ def test_blank_tools_and_what_is_said():
     assert program.dialect == "heidenhain" and [tool.number for tool in program.tools] == [1, 2]
     assert program.moves.tool_length[-1] == 0.05 and ("M8", 9) in [(u.word, u.line) for u in program.unsupported]
     assert program.moves.end[-1, 2] == pytest.approx(0.002 - 0.05)  # the numbers of the tip change with the length
-    assert any("preset table" in text for text in program.assumptions)
+    assert any("cycle 247" in text for text in program.assumptions)
 
 
 def test_programs_that_are_called(tmp_path):
@@ -404,3 +414,56 @@ def test_check_says_the_language_why_and_what_it_needs(capsys, tmp_path):
     assert "language: G code (no sign of another language)" in said and "extents" in said
     assert main(["check", str(file), "--dialect", "heidenhain"]) == 1
     assert "as asked for: --dialect heidenhain" in capsys.readouterr().out
+
+
+WRITTEN = """0 BEGIN PGM P MM
+1 TOOL CALL 1 Z S1000 F200
+2 L X+10 Y+0 R0 FMAX M3 ; start
+3 L Z-2 F100
+4 CC X+0 Y+0
+5 C X+0 Y+10 DR+
+6 L X+5
+7 RND R1
+8 L IX+2 IY-3
+9 CR X+20 Y+20 R+30 DR-
+10 CT X+30 Y+35
+11 LP PR+10 PA+20
+12 L X+60 Y+60 RL
+13 L IX+30
+14 L X+99 Y+0 R0
+15 L X+0 Y+0 Z+50 R0 FMAX M91
+16 END PGM P MM
+"""
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "z", "degrees"), [(100, 20, 3, 0), (0, 0, 0, 90), (12.5, -7, 0.125, 33.3), (5, 5, 0, -150)]
+)
+def test_a_program_is_written_for_another_placement(x, y, z, degrees):
+    program, turn = parse_program(WRITTEN, "p.h", controller=TOOLS), math.radians(degrees)
+    placement = (x / 1e3, y / 1e3, z / 1e3, 0.0, 0.0, turn)
+    text = rewrite_program(program, placement, (0.0,) * 6, control=TOOLS).text
+    assert text.count("\n") == WRITTEN.count("\n") and "; start" in text and "15 L X+0 Y+0 Z+50 R0 FMAX M91" in text
+    again, cuts = parse_program(text, "p.h", controller=TOOLS).moves, program.moves.motion > 0
+    a, b = program.moves.end[cuts, 0] * 1e3, program.moves.end[cuts, 1] * 1e3
+    there = np.column_stack([a * math.cos(turn) - b * math.sin(turn) + x, a * math.sin(turn) + b * math.cos(turn) + y])
+    assert again.end[cuts, :2] * 1e3 == pytest.approx(there, abs=2e-3)
+    assert again.end[cuts, 2] * 1e3 == pytest.approx(program.moves.end[cuts, 2] * 1e3 + z, abs=1e-3)
+    assert again.arc_sweep == pytest.approx(program.moves.arc_sweep, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("body", "placement", "line"),
+    [
+        ("LBL 1\nL X+1 F9\nCALL LBL 1 REP 1", (0, 0, 0, 0, 0, 0.5), 4),
+        ("CYCL DEF 7.1 X+5\nL X+1 Y+1 F9", (0.1, 0, 0, 0, 0, 0), 3),
+        ("Q1 = 5\nL X+Q1 F9", (0.1, 0, 0, 0, 0, 0), 4),
+        (DRILL.format(depth=4, far=9) + "L X+1 Y+1 F9 M99", (0, 0, 0.1, 0, 0, 0), 3),
+        ("L X+1 Y+1 F9", (0, 0, 0, 0.1, 0, 0), 1),
+        ("LBL 1\nL IX+1 F9\nL Y+3\nCALL LBL 1 REP 1", (0.1, 0, 0, 0, 0, 0.5), 5),
+    ],
+)
+def test_what_cannot_be_written_is_refused_by_line(body, placement, line):
+    with pytest.raises(InputError) as caught:
+        rewrite_program(read(body), placement, (0.0,) * 6, control=TOOLS)
+    assert caught.value.line == line and "--write" in str(caught.value)

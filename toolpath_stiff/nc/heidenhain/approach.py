@@ -11,7 +11,8 @@ from functools import partial
 
 from toolpath_stiff.nc.codes.cutter import switch_off
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import SIDES, begin_compensation, feed, go, in_plane, named, present
+from toolpath_stiff.nc.heidenhain.contour import SIDES, begin_compensation, go
+from toolpath_stiff.nc.heidenhain.points import feed, in_plane, named, present
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 

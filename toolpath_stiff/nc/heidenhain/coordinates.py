@@ -2,8 +2,8 @@
 
 HEIDENHAIN, user's manual "Cycles" of the iTNC 530, "Coordinate transformation cycles"; user's manual of the iTNC 530,
 "The PLANE function". Whatever is in force becomes the frames' linear part and shift: first cycle 7, then the tilting,
-cycle 7 in the tilted plane, then mirror image or rotation, and the scale. Where the order of programming is another one,
-moves are refused. mm, degrees.
+cycle 7 in the tilted plane, then mirror image or rotation, and the scale. Where the order of programming is another
+one, moves are refused. mm, degrees.
 """
 
 import math
@@ -11,7 +11,7 @@ import math
 from toolpath_stiff.nc.codes import tools
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.geometry import PLANES, roll_pitch_of_axis
-from toolpath_stiff.nc.heidenhain.contour import inch_tenths
+from toolpath_stiff.nc.heidenhain.points import inch_tenths
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import ToolEntry, tool_of
@@ -59,26 +59,33 @@ def apply(state: State, block: CurrentBlock) -> None:
     frames.linear = None if inner == unit else inner
     frames.g92 = [*(a + b for a, b in zip(plain.outer, shift, strict=True)), 0.0, 0.0, 0.0]
     plain.pole = plain.heading = None
-    plain.doubt = plain.doubt if plain.angle or plain.mirrored or plain.scale != 1.0 else ""
+    settled = not plain.angle and not plain.mirrored and plain.scale == 1.0 and plain.tilt is None
+    plain.doubt = "" if settled else plain.doubt
 
 
 def shift(state: State, block: CurrentBlock, code: str) -> None:
     """CYCL DEF 7.1 and on: the datum, absolute or by a step; in a tilted plane along its axes."""
-    plain, values = state.plain, list(state.plain.shift)
+    plain = state.plain
+    values, outer = list(plain.shift), list(plain.outer)
+    if block.has("TABLE"):
+        datum(state, block, code)
     for axis, letter in enumerate(AXES[:3]):
         value, step = block.take(letter), block.take(f"I{letter}")
         if value is not None:
-            values[axis] = value * state.length_scale
+            values[axis], outer[axis] = value * state.length_scale, outer[axis] if value else 0.0
         if step is not None:
             values[axis] += step * state.length_scale
-    for letter in "ABC":
-        block.refuse_if(block.take(letter), letter, "shifts a rotary axis", "X, Y, Z")
+    turned = next((letter for letter in "ABC" if block.take(letter)), None)
+    block.refuse_if(turned, turned, "shifts a rotary axis", "X, Y, Z")
+    above = plain.tilt is not None and any(plain.outer)
     block.refuse_if(
-        plain.tilt is not None and any(plain.outer), None, "shifts a datum that was shifted before the tilting"
+        above and any(values), None, "shifts a datum that was shifted before the tilting", "PLANE RESET first"
     )
-    if values != plain.shift and (plain.angle or plain.mirrored or plain.scale != 1.0):
-        plain.doubt = f"after {code} under cycle 8, 10 or 11: their order decides where the datum is"
-    plain.shift = values
+    if above or (values != plain.shift and (plain.angle or plain.mirrored or plain.scale != 1.0)):
+        plain.doubt = (
+            f"after {code} in a tilted plane, or under cycle 8, 10 or 11: the order decides where the datum is"
+        )
+    plain.shift, plain.outer = values, outer if above else plain.outer
     apply(state, block)
 
 
@@ -155,15 +162,15 @@ def tilt(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def datum(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCL DEF 247: the datum of the preset table; the program's first is its zero."""
-    number, plain = block.take("Q339"), state.plain
+    """CYCL DEF 247 and 7.1 #: the datum of a table; the program's first is its zero."""
+    number, plain = block.take("TABLE" if block.has("TABLE") else "Q339"), state.plain
     other = plain.preset not in (None, number) or (plain.preset is None and len(state.recorder) > 0)
-    problem = "another datum than before: where it is stands in the control's preset table"
+    problem = "another datum than before: where it is stands in a table of the control"
     block.refuse_if(
         other or any(plain.shift) or plain.tilt is not None, None, problem, "one datum, and cycle 7 for others"
     )
     plain.preset = number
-    state.assume("the datum of the preset table that the program calls (cycle 247) is program zero (G54)")
+    state.assume("the datum of the control's table that the program calls (cycle 247, 7.1 #) is program zero (G54)")
 
 
 def tool_call(state: State, block: CurrentBlock, code: str) -> None:

@@ -1,8 +1,8 @@
 """Q parameters: formulas (`Q5 = 3 * (SIN Q1 - 2)`) and the functions FN 0 to FN 13, worked out by one grammar.
 
 HEIDENHAIN, user's manual of the iTNC 530, "Programming: Q parameters" ("Basic arithmetic", "Trigonometric functions",
-"Entering formulas directly"). Functions bind tightest, then ^, * and / (DIV), + and -; LEN is the root of the sum of two
-squares, ANG the angle of two sides from 0 to 360 degrees; angles are in degrees.
+"Entering formulas directly"). Functions bind tightest, then ^, * and / (DIV), + and -; LEN is the root of the sum of
+two squares, ANG the angle of two sides from 0 to 360 degrees; angles are in degrees.
 """
 
 import math
@@ -31,7 +31,8 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
     "TAN": lambda v: math.tan(math.radians(v)), "ASIN": lambda v: _trimmed(math.degrees(math.asin(v))),
     "ACOS": lambda v: _trimmed(math.degrees(math.acos(v))), "ATAN": lambda v: _trimmed(math.degrees(math.atan(v))),
     "SQRT": math.sqrt, "SQ": lambda v: v * v, "LN": math.log, "LOG": math.log10, "EXP": math.exp,
-    "NEG": lambda v: -v, "ABS": abs, "INT": _whole, "FRAC": lambda v: v - _whole(v), "SGN": lambda v: float((v > 0) - (v < 0)),
+    "NEG": lambda v: -v, "ABS": abs, "INT": _whole, "FRAC": lambda v: v - _whole(v),
+    "SGN": lambda v: float((v > 0) - (v < 0)),
 }  # fmt: skip
 OPERATORS: dict[str, Callable[[float, float], float]] = {
     "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "/": lambda a, b: a / b,

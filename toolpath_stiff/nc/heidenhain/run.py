@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.heidenhain.contour import ON_CIRCLE_MM, WORDS_OF_AXES
 from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX, call
 from toolpath_stiff.nc.heidenhain.expressions import work_out
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
+from toolpath_stiff.nc.heidenhain.plain_statements import EMPTY, as_g_code, corner_follows
+from toolpath_stiff.nc.heidenhain.points import WORDS_OF_AXES
 from toolpath_stiff.nc.heidenhain.statements import Statement, code_text, read_statement
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up, meaning_of, refusal_of
 from toolpath_stiff.nc.lines import read_lines
@@ -28,19 +29,7 @@ from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 
 MOST_STEPS = 1_000_000  # statements that run, all repeats counted
 MOST_IDLE = 100_000  # of them without a move between
-_NUMBER = r"[+-]?\d{1,6}(?:\.\d{0,6})?"
-PLAIN = re.compile(
-    rf"\s*\d*\s*(?P<head>L|C)(?P<axes>(?:\s*I?[XYZ]{_NUMBER})+)(?:\s*DR(?P<turn>[+-]))?(?:\s*R0)?"
-    r"(?:\s*F\s*(?:(?P<max>MAX)|(?P<feed>\d{1,6}(?:\.\d*)?)))?(?P<m>(?:\s*M0?(?:[345789]|1[34]))*)\s*",
-    re.IGNORECASE,
-)
-CENTER = re.compile(rf"\s*\d*\s*CC\s*X\s*({_NUMBER})\s*Y\s*({_NUMBER})\s*", re.IGNORECASE)
-AXIS = re.compile(rf"(I?)([XYZ])({_NUMBER})", re.IGNORECASE)
-HEAD = re.compile(r"\s*\d*\s*([A-Z]+)", re.IGNORECASE)
-EMPTY = re.compile(r"\s*\d*\s*(?:[;*].*)?")
-CORNER = re.compile(r"\s*/?\s*(?:N?\d+\s)?\s*(?:RND|CHF)\b", re.IGNORECASE)
-INCH = re.compile(r"\s*(?:N?\d+\s+)?BEGIN\s+PGM\b.*\bINCH\s*(?:;.*)?$", re.IGNORECASE)
-LABEL = re.compile(r"\s*(?:N?\d+\s+)?LBL\s*(?:(\d+)|\"([^\"]*)\")\s*$", re.IGNORECASE)
+LABEL = re.compile(r"\s*/?\s*(?:N?\d+\s+)?LBL\s*(?:(\d+)|\"([^\"]*)\")\s*$", re.IGNORECASE)
 CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*\d+)?)?\s*$')
 JUMP = re.compile(r'\s*IF\s*(.+?)\s*(EQU|NE|GT|LT)\s*(.+?)\s*GOTO\s*LBL\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*$')
 ASSIGNED = re.compile(r"\s*(Q[LR]?\d+)?\s*=\s*(.+)$")
@@ -48,27 +37,6 @@ SPECIAL = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
 KINDS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
 EQUAL = 1e-9
 TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control works out for a tilted plane
-SUFFIXES = (".h", ".H", "")
-
-
-def _followed(here: dict[str, float], axes: str) -> tuple[dict[str, float], str]:
-    """Where axis words lead as far as that is known, and the words as they name that point; none where it is not."""
-    there, words = dict(here), dict[str, str]()
-    for step, letter, digits in AXIS.findall(axes):
-        if letter in words or (step and letter not in here):
-            return {key: value for key, value in there.items() if key not in axes}, ""
-        there[letter] = round(here[letter] + float(digits), 6) if step else float(digits)
-        words[letter] = f"{there[letter]:.6f}" if step else digits
-    return there, "".join(letter + words[letter] for letter in "XYZ" if letter in words)
-
-
-def _center_words(here: dict[str, float], there: dict[str, float], center: tuple[float, float] | None) -> str:
-    """I and J of an arc in the plane whose start and centre are known; "" where they are not, or do not fit."""
-    if center is None or not here.keys() >= {"X", "Y"} or here.get("Z") != there.get("Z"):
-        return ""
-    (x, y), start, end = center, math.dist(center, (here["X"], here["Y"])), math.dist(center, (there["X"], there["Y"]))
-    fits = min(start, end) > ON_CIRCLE_MM and abs(start - end) < ON_CIRCLE_MM / 2.0
-    return f"I{x - here['X']:.9f}J{y - here['Y']:.9f}" if fits else ""
 
 
 class HeidenhainRun(ProgramRun):
@@ -80,77 +48,42 @@ class HeidenhainRun(ProgramRun):
     def __init__(self, request: Request, tally: Tally | None = None) -> None:
         super().__init__(request, tally, fast=False)
         self.folder = request.controller.subprograms
-        self._poles: dict[int, tuple[float, float]] = {}  # centres of CC by line, of plain statements
-        self._inch = any(INCH.match(line) for line in self.lines[:100])
-        self._lexer: PlainRun | None = PlainRun(self.state, self._as_g_code(), self.name)
-        self._plain = self._lexer
+        self._lex()
         self._main_lines = len(self.lines)
         self._statements: dict[int, Statement] = {}
         self._labels: dict[tuple[int, str], int] | None = None
         self._files: list[tuple[int, int, str]] = []  # first line, line after the last, name
-        self._returns: list[
-            tuple[int, int]
-        ] = []  # calls that run: the line after, and the label's line (-1: a program)
+        self._returns: list[tuple[int, int]] = []  # of calls: the line after, and the label's line (-1: a program)
         self._repeats: dict[tuple[int, int], int] = {}
         self._locals: list[dict[str, float]] = [{}]
         self._steps = 0
         self._moved = (0, 0)
         self._row = 0
 
-    def _as_g_code(self) -> list[str]:
-        """Plain statements as G0 to G3; "?", which no run of plain lines takes, for all others.
-
-        Where the tool stands is followed as far as plain statements say: arcs get their centre from it.
-        """
-        lines, self._poles = list[str](), dict[int, tuple[float, float]]()
-        self._to_corner = [self._corner_follows(row + 1) for row in range(len(self.lines))]
-        here, center = dict[str, float](), None
-        for row, line in enumerate(self.lines):
-            if EMPTY.fullmatch(line):
-                lines.append("")
-                continue
-            text, plain, pole = "?", PLAIN.fullmatch(line), CENTER.fullmatch(line)
-            if pole is not None:
-                center = self._poles[row] = (float(pole[1]), float(pole[2]))
-                text = ""
-            elif plain is not None and (plain["head"] in "cC") == (plain["turn"] is not None):
-                there, axes = _followed(here, plain["axes"].upper())
-                code, middle = "G0" if plain["max"] else "G1", ""
-                if plain["turn"]:
-                    code, middle = "G3" if plain["turn"] == "+" else "G2", _center_words(here, there, center)
-                feed = plain["feed"] or ""
-                slow = plain["m"] or (feed and (self._inch or not feed.strip("0."))) or (plain["turn"] and not middle)
-                text, here = f"{code}{axes}{middle}{'F' if feed else ''}{feed}" if axes and not slow else "?", there
-            else:
-                here, center = {}, None
-            lines.append("?" if self._to_corner[row] else text)
-        return lines
+    def _lex(self) -> None:
+        """Write plain statements as G code."""
+        self._to_corner = [corner_follows(self.lines, row + 1) for row in range(len(self.lines))]
+        texts, self._poles = as_g_code(self.lines, self._to_corner)
+        self._plain = self._lexer = PlainRun(self.state, texts, self.name)
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
         """Count plain statements; circle centre and direction as the last ones left them."""
-        plain, last, unit = self.state.plain, len(words.code) - 1, self.state.length_scale
-        centers = [row for row in range(first, first + last + 1) if row in self._poles]
+        plain, rows, unit = self.state.plain, words.count.nonzero()[0] + first, self.state.length_scale
+        centers = [row for row in range(first, first + len(words.code)) if row in self._poles]
         if centers:
             x, y = self._poles[centers[-1]]
             plain.pole = (x * unit, y * unit)
-        moves = self.state.recorder.parts[-1] if self.state.recorder.parts else None
-        if moves is not None and first < moves.line[-1] <= first + last + 1:
-            plain.fast = bool(moves.motion[-1] == 0)
-            ahead = moves.end[-1] - moves.start[-1]
-            flat = not ahead[2] and not self.lines[moves.line[-1] : first + last + 1].count("L")
-            if moves.arc_sweep[-1]:
-                out = (moves.end[-1, :3] - moves.arc_center[-1]) * np.sign(
-                    moves.arc_sweep[-1] * moves.arc_normal[-1, 2]
-                )
-                ahead = np.array([-out[1], out[0]])
-            plain.heading = (float(ahead[0]), float(ahead[1])) if flat and (ahead[0] or ahead[1]) else None
-        if self.tally is not None:
-            for row in range(first, first + last + 1):
-                if self.lines[row] and not EMPTY.fullmatch(self.lines[row]):
-                    head = HEAD.match(self.lines[row])
-                    name = head[1].upper() if head else ""
-                    self.tally.first.setdefault(name, (row + 1, (head.start(1) if head else 0) + 1))
-                    self.tally.count[name] += 1
+        if len(rows):
+            plain.heading, last = None, self.state.recorder.parts[-1] if self.state.recorder.parts else None
+            plain.fast = bool(words.code[rows[-1] - first] == 0)
+            if last is not None and last.line[-1] == rows[-1] + 1 and last.end[-1, 2] == last.start[-1, 2]:
+                ahead = last.end[-1] - last.start[-1]
+                if last.arc_sweep[-1]:
+                    ahead = np.cross(last.arc_sweep[-1] * last.arc_normal[-1], last.end[-1, :3] - last.arc_center[-1])
+                plain.heading = (float(ahead[0]), float(ahead[1])) if ahead[0] or ahead[1] else None
+        for row in [*rows.tolist(), *centers] if self.tally is not None else ():
+            statement = self._statement(row)
+            self._count(statement)
 
     def _place_name(self, row: int) -> tuple[str, int]:
         for first, stop, name in self._files:
@@ -263,11 +196,6 @@ class HeidenhainRun(ProgramRun):
         flow = self._flow(row, statement)
         return len(self.lines) if block.flow is Flow.END or flow is None else flow
 
-    def _corner_follows(self, row: int) -> bool:
-        while row < len(self.lines) and EMPTY.fullmatch(self.lines[row]):
-            row += 1
-        return row < len(self.lines) and CORNER.match(self.lines[row]) is not None
-
     def _dwell(self, row: int, rest: str) -> float:
         number = re.search(r"(\d+(?:[.,]\d+)?|Q[LR]?\d+)\s*$", rest)
         if number is None:
@@ -275,9 +203,9 @@ class HeidenhainRun(ProgramRun):
         return self._value(row, number[1].replace(",", "."), 1)
 
     def _word_value(self, row: int, key: str, text: str, column: int) -> float:
-        """The number of a word; of rotary axes in a tilted plane, which the control works out, none that counts."""
-        tilted = self.state.plain.tilt is not None and key in ("A", "B", "C")
-        return 0.0 if tilted and text.lstrip("+-") in TILTING else self._value(row, text, column)
+        """The number of a word; of axes that the control turns to a plane 0, which counts in an untilted one alone."""
+        turns = key in ("A", "B", "C") and text.lstrip("+-") in TILTING
+        return 0.0 if turns else self._value(row, text, column)
 
     def _value(self, row: int, text: str, column: int) -> float:
         """The number of a word: as written, or of a Q parameter."""
@@ -296,7 +224,7 @@ class HeidenhainRun(ProgramRun):
         if name in values:
             return values[name]
         known = {"Q108": self.state.plain.radius, "Q113": float(self.state.inch)}.get(name)
-        if known is None or known != known:
+        if known is None or math.isnan(known):
             reason = "a control keeps it from earlier programs, or works it out itself"
             raise self._fail(self._row, f"{name} is read before it is set: {reason}", f"FN 0: {name} = ... before")
         return known
@@ -430,7 +358,8 @@ class HeidenhainRun(ProgramRun):
             known = len(self.lines) + 1
             self.lines = (*self.lines, "END PGM", *read_lines(file))  # which ends what has no END PGM before it
             self._files.append((known, len(self.lines), file.name))
-            self._labels, self._lexer = None, PlainRun(self.state, self._as_g_code(), self.name)
+            self._labels = None
+            self._lex()
         self._enter_call(row, statement.after, -1)
         return known
 

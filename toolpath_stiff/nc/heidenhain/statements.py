@@ -1,8 +1,8 @@
 """Lines of the plain language to statements: a head, and words with their columns.
 
-A statement is a line, `~` at its end continues it; `;` begins a comment, `*` a heading, `/` a statement that may be left
-out. Cycles from 200 on have their parameters in lines that follow (HEIDENHAIN, user's manuals of the iTNC 530 and the
-TNC 640, "Programming fundamentals", "Structuring programs", "Fixed cycles").
+A statement is a line, `~` at its end continues it; `;` begins a comment, `*` a heading, `/` a statement that may be
+left out. Cycles from 200 on have their parameters in lines that follow (HEIDENHAIN, user's manuals of the iTNC 530 and
+the TNC 640, "Programming fundamentals", "Structuring programs", "Fixed cycles").
 """
 
 import re
@@ -28,12 +28,12 @@ _WORD = re.compile(
     rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
     rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
     r"|([XYZABCUVW])(?![A-Z])"
-    rf"|({VALUE})|\"([^\"]*)\"",
+    rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"",
 )
 PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
 # Heads whose rest has another form, or does not matter.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\.|TCH|FUNCTION MODE"
+    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 
 
@@ -109,9 +109,13 @@ def _words(text: str, position: int, place: Place, head: str) -> list[tuple[str,
         match = _WORD.match(text, position)
         if match is None:
             raise place.fail(f"{text[position : position + 12]!r} is no word of {head}", "", "", position + 1)
-        flag, key, value, parameter, given, axis, bare, quoted = match.groups()
-        key = "".join(flag.split()) if flag else key or parameter or (f"{axis}!" if axis else "#" if bare else '"')
-        written = "".join((value or given or bare or "").split()).replace(",", ".")
+        flag, key, value, parameter, given, axis, table, bare, quoted = match.groups()
+        key = (
+            "".join(flag.split())
+            if flag
+            else key or parameter or (f"{axis}!" if axis else "TABLE" if table else "#" if bare else '"')
+        )
+        written = "".join((value or given or bare or (table or "")[1:]).split()).replace(",", ".")
         if sum(map(str.isdigit, written)) > 2 * MOST_DIGITS:
             raise place.fail(f"a number of {len(written)} characters", "", "", position + 1)
         if key == "M":
