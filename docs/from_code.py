@@ -23,6 +23,7 @@ from toolpath_stiff.nc.codes.code import EVERYWHERE, Code, holds_anyway
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.cutter_location.vocabulary import DOUBTFUL, LISTED, READ, WORDS
 from toolpath_stiff.nc.cutter_location.vocabulary import REFUSED as REFUSED_WORD
+from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.stiffness.catalogue import packaged_effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect, Parameter
@@ -173,6 +174,16 @@ def unknowns_table() -> str:
     return "\n".join(rows(("unknown", "physics", "links", "varies with", "needs"), *found))
 
 
+def faults_table() -> str:
+    """One row for each fault of the machine of finite elements."""
+    cells = [
+        (", ".join(sorted(part)) for part in (fault.links, fault.names, (f"`{column}`" for column in fault.columns)))
+        for fault in FAULTS.values()
+    ]
+    table = ((f"`{name}`", *words) for name, words in zip(FAULTS, cells, strict=True))
+    return "\n".join(rows(("fault", "links", "in the catalogue", "needs"), *table))
+
+
 # Commands
 
 
@@ -281,6 +292,7 @@ COMMITTED: dict[str, Callable[[], str]] = {
     "table of effects": effects_table,
     "effects": effects_in_full,
     "unknowns": unknowns_table,
+    "faults": faults_table,
 }
 MADE = {**COMMITTED, "commands": commands, "api": api}
 

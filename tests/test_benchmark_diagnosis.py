@@ -15,7 +15,8 @@ from benchmarks.diagnosis import FIRST_SEED, report
 from benchmarks.diagnosis_bars import floor_ratio
 from benchmarks.diagnosis_cases import Job, choice_is_right, interval_checks, make_jobs, run
 from toolpath_stiff.rig import case as rig
-from toolpath_stiff.rig.effects import at_strength, draw_shape
+from toolpath_stiff.rig.effects import CATALOGUE, at_strength, draw_shape
+from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.stiffness.catalogue import known_effects
 
 
@@ -102,7 +103,11 @@ def test_more_cases_of_one_group_leave_the_others_as_they_were() -> None:
     assert set(few) <= set(many)
 
 
-@pytest.mark.parametrize("name", sorted(known_effects()))
+def test_the_rig_can_hide_every_effect_built_in_one_way_or_the_other() -> None:
+    assert set(known_effects()) <= {*CATALOGUE, *(name for fault in FAULTS.values() for name in fault.names)}
+
+
+@pytest.mark.parametrize("name", sorted(CATALOGUE))
 def test_every_hidden_parameter_is_found_in_the_document(name: str) -> None:
     rng = np.random.default_rng(1)
     true = at_strength(name, draw_shape(name, rng, 3, ["riser", "table"]), 0.1)

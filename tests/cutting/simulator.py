@@ -2,8 +2,8 @@
 
 mm, N, degrees as written; right-hand cutter, spindle clockwise. At each step every slice of every tooth stands at its
 angle; what it cuts reaches from its edge inwards to what the teeth before it left, exact circles about where the
-deflected cutter then stood. It cuts only where the stock stood one turn before. Tip and cutter yield as the springs
-that they are given, at once, and the chip is as thick as the yielding cutter makes it.
+deflected cutter then stood. It cuts only where the stock stood when the tooth before passed, or a turn before. Tip and
+cutter yield as the springs that they are given, at once, and the chip is as thick as the yielding cutter makes it.
 """
 
 from dataclasses import dataclass, field
@@ -27,8 +27,8 @@ class Mill:
     ball: bool = False
     run_out: float = 0.0
     run_out_angle: float = 0.0
-    slices: int = 60
-    steps: int = 720  # a turn; a multiple of the teeth
+    slices: int = 40
+    steps: int = 360  # a turn; a multiple of the teeth
     turns: int = 3
     centre: np.ndarray = field(init=False)
 
@@ -45,8 +45,7 @@ class Mill:
     def run(self) -> None:
         """Step through the turns."""
         total, pitch = self.steps * (self.turns + 1), self.steps // self.teeth
-        self.centre = np.zeros((total, 3))
-        self.centre[:, 0] = np.arange(total) * self.feed / pitch
+        self.centre = self.path(np.arange(total) * self.feed / pitch)
         nominal = self.centre.copy()
         self.force = np.zeros((total, 3))
         for step in range(self.steps, total):
@@ -65,6 +64,15 @@ class Mill:
             self.force[step] = self.force_at(self.centre[step])
         self.deflection = self.centre - nominal
 
+    def path(self, travel: np.ndarray) -> np.ndarray:
+        """Where the rigid cutter's tip is after so many mm."""
+        return np.stack([travel, 0 * travel, 0 * travel], axis=-1)
+
+    def stock_at(self, step: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Whether points are in the stock, `memory` steps before a step."""
+        wide = self.radius - self.width
+        return {"left": y > wide, "right": y < -wide, "both": np.full(y.shape, True)}[self.side]
+
     def look_back(self, step: int, pitch: int) -> None:
         """Where the teeth are at a step, and what the teeth before them left."""
         teeth = np.arange(self.teeth)
@@ -75,10 +83,10 @@ class Mill:
         circle = self.slice_radius + self.tooth_radius[(teeth - back) % self.teeth][..., None] * self.out
         self.circle = circle  # (teeth before, tooth, slice)
         self.reach = self.slice_radius + self.tooth_radius[:, None] * self.out
-        turn_before = self.centre[step - self.steps][1] + self.reach * self.cosine
-        wide = self.radius - self.width
-        inside = {"left": turn_before > wide, "right": turn_before < -wide, "both": True}
-        self.stock = inside[self.side] & (self.sine > 0.0)
+        # With run-out the tooth before may not have cut.
+        self.memory = self.steps if self.run_out else pitch
+        before = self.centre[step - self.memory]
+        self.stock = self.stock_at(step, before[0] + self.reach * self.sine, before[1] + self.reach * self.cosine)
 
     def force_at(self, now: np.ndarray) -> np.ndarray:
         """N on the cutter if its centre is here."""
@@ -133,3 +141,42 @@ class Mill:
             for tooth in range(self.teeth)
         ]
         return 1e3 * np.min(passes, axis=0)
+
+
+class Corner(Mill):
+    """A cutter that finishes an inner corner: along x with its wall to the right, then left, along y.
+
+    The corner is at the origin of its centre's path; before, a path `width` nearer to the middle was taken.
+    """
+
+    def path(self, travel: np.ndarray) -> np.ndarray:
+        """To the origin after `before` mm, and on."""
+        self.before = 0.62 * travel[-1]
+        past = travel - self.before
+        return np.stack([np.minimum(past, 0.0), np.maximum(past, 0.0), 0 * past], axis=-1)
+
+    def stock_at(self, step: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """What neither the path before nor this one, `memory` steps ago and earlier, has taken."""
+        moved = self.centre[step - 1] - self.centre[step - self.memory]  # the path before cut long ago
+        u, v = x + moved[0] + self.width, y + moved[1] - self.width
+        inner = np.minimum(np.hypot(np.maximum(u, 0.0), v), np.hypot(u, np.minimum(v, 0.0)))  # from its legs
+        pitch = self.steps // self.teeth
+        older = self.centre[step % pitch : step - self.memory : pitch]  # when teeth stood at these angles
+        taken = (np.hypot(x - older[:, 0, None, None], y - older[:, 1, None, None]) < self.radius).any(axis=0)
+        return (inner > self.radius) & ~taken
+
+    def walls(self) -> list[tuple[float, float, float]]:
+        """For each pass of a tooth over a wall: mm along the path from the corner; um left, mean and range of the wall.
+
+        Of both walls, by the deflection of each slice when the tooth stands square to it.
+        """
+        rows, travel = [], self.feed * self.teeth / self.steps
+        for angle, axis, sign in ((np.pi, 1, 1.0), (0.5 * np.pi, 0, -1.0)):
+            for turn in range(2, self.turns):
+                for tooth in range(self.teeth):
+                    step = ((angle + self.lag + 2 * np.pi * tooth / self.teeth) / (2 * np.pi) + turn) * self.steps
+                    past = step.mean() * travel - self.before
+                    if (past < -0.1) == (axis == 1) and (past > 0.1) == (axis == 0):
+                        left = 1e3 * sign * np.interp(step, np.arange(len(self.deflection)), self.deflection[:, axis])
+                        rows.append((past, left.mean(), np.ptp(left)))
+        return rows

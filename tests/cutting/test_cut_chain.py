@@ -1,4 +1,4 @@
-"""The chain of a cut: setup files, spindle and tools, forces and errors in the station's frame, files and exit codes."""
+"""The chain of a cut: setup files, spindle, tools, forces and errors in the station's frame, files and exit codes."""
 
 from __future__ import annotations
 
@@ -96,13 +96,29 @@ def test_a_wall_has_the_published_forces_and_the_error_of_all_that_gives_way(tmp
     assert rate == pytest.approx(1e-9 * 3.0 * 100.0 * (10.0 if side == "Y10" else 1.0), rel=2e-3)
 
 
+def test_of_two_levels_the_deeper_cut_stays(tmp_path):
+    """A slot in two levels: the second passes the walls of the first; its left wall is cut too deep by both."""
+    lines = ["G21 G90", "T1 M6 S6000 M3", *(f"G0 X-10 Y10 Z20\nG0 Z{z}\nG1 X110 F900" for z in (-3, -6)), "M30"]
+    both = cut_of(parse_program("\n".join(lines), "slot.nc"), tmp_path)
+    alone = [cut_of(program("Y10"), tmp_path)]
+    deep = SETUP.replace("box_mm = [100, 20, 10]", "box_mm = [100, 20, 7]")  # its top where the first level was
+    lines[2:4] = lines[3:4]
+    alone.append(cut_of(parse_program("\n".join(lines), "slot.nc"), tmp_path, deep))
+    first, second = (middle(cut) for cut in alone)
+    row = max(i for i in np.flatnonzero(both.ap > 0) if abs(both.samples.position[i, 0] - 0.05) < 1e-3)
+    assert both.wall_heights[row] == pytest.approx(np.array([[0.0, 6e-3]] * 2), abs=1e-6)
+    assert np.isnan(both.wall_mean[first]).all()  # the last pass owns the walls
+    parts = [(cut.wall_mean[at], cut.wall_low[at]) for cut, at in zip(alone, (first, second), strict=True)]
+    means, lows = np.transpose(parts, (1, 0, 2)).min(axis=1)
+    np.testing.assert_allclose(both.wall_low[row], lows, rtol=0.01)  # a profile is known at nine heights
+    assert (both.wall_mean[row] <= means + 2e-8).all()
+
+
 def test_where_the_work_sits_and_how_it_is_turned_changes_nothing_but_the_machine(tmp_path):
     """The same cut along Y of a turned program on a machine turned against it: row for row the same errors."""
     first = cut_of(program(), tmp_path, origin=(0.1, 0.05, 0.8, 0.0, 0.0, 0.0))
     text = SETUP.replace("box_mm = [100, 20, 10]", "box_mm = [20, 100, 10]").replace("[0, 0, -10]", "[-20, 0, -10]")
-    turned = parse_program(
-        "G21 G90\nT1 M6 S6000 M3\nG0 X-24 Y-10 Z20\nG0 Z-3\nG1 Y110 F900\nM30", "wall.nc"
-    )
+    turned = parse_program("G21 G90\nT1 M6 S6000 M3\nG0 X-24 Y-10 Z20\nG0 Z-3\nG1 Y110 F900\nM30", "wall.nc")
     second = cut_of(turned, tmp_path, text, origin=(0.1, 0.05, 0.8, 0.0, 0.0, -np.pi / 2))
     np.testing.assert_allclose(first.wall_mean, second.wall_mean, rtol=1e-4)
     np.testing.assert_allclose(first.errors[:, 2], second.errors[:, 2], atol=3e-9)  # the strip of floor has 41 places
@@ -142,7 +158,7 @@ BROKEN = {
     "stock.box_mm": ("box_mm = [100, 20, 10]", "box_mm = [100, 20]", 3, "[X, Y, Z] in mm"),
     "size": ("box_mm = [100, 20, 10]", "box_mm = [100, 0, 10]", 3, "0.001 mm or more"),
     "two kinds": ("box_mm = [100, 20, 10]", 'box_mm = [100, 20, 10]\nstl = "a.stl"', 2, "one of box_mm"),
-    "coefficients": ("origin = \"made up\"", "", 5, "where the coefficients come from"),
+    "coefficients": ('origin = "made up"', "", 5, "where the coefficients come from"),
     "material": (SETUP[SETUP.index("cutting_N") : SETUP.index("[[tool]]")], 'material = "Al"\n', 6, "one of"),
     "flutes": ("flutes = 3", "flutes = 2.5", 9, "a whole number"),
     "helix": ("helix_deg = 30", "helix_deg = 95", 9, "from -80 to 80"),
@@ -206,7 +222,9 @@ def test_tools_of_the_table_and_of_the_setup(tmp_path, monkeypatch, capsys):
     cut = json.loads(capsys.readouterr().out)["cut"]
     assert cut["tools"][0]["lateral_nm_per_N"] == pytest.approx(BEAM * 1e9)
     assert "lowest corner at 0, 0, -10 mm" in cut["stock"]
-    Path("cut.toml").write_text('[stock]\nextents = true\n[coefficients]\nmaterial = "Al7075"\n[[tool]]\nnumber = 1\nflutes = 2\n')
+    Path("cut.toml").write_text(
+        '[stock]\nextents = true\n[coefficients]\nmaterial = "Al7075"\n[[tool]]\nnumber = 1\nflutes = 2\n'
+    )
     assert main(["analyze", "wall.nc", *given, "--cut", "cut.toml"]) == 0
     cut = json.loads(capsys.readouterr().out)["cut"]
     assert (cut["tools"][0]["flutes"], cut["tools"][0]["diameter_mm"]) == (2, 10.0)
@@ -232,7 +250,9 @@ def test_the_command_writes_the_cut_and_says_what_leaves_the_tolerance(tmp_path,
     assert Path("with/samples.csv").read_bytes() == Path("without/samples.csv").read_bytes()
     assert main([*plain, "wide", "--cut", str(POCKET_CUT), "--tolerance", "60"]) == 0
     rows = Path("with/cut_lines.csv").read_text().splitlines()
-    assert rows[0].startswith("line,tool,largest_ap_mm") and len(rows) == 1 + len(set(pocket.samples.line[pocket.samples.cutting]))
+    assert rows[0].startswith("line,tool,largest_ap_mm") and len(rows) == 1 + len(
+        set(pocket.samples.line[pocket.samples.cutting])
+    )
     document = json.loads(Path("with/summary.json").read_text())["cut"]
     assert [row["line"] for row in document["tolerance"]["beyond"]] == [line for line, _ in pocket.beyond_tolerance]
     assert document["walls"]["least_um"] <= document["walls"]["mean_um"] <= document["walls"]["most_um"]
@@ -258,7 +278,7 @@ def test_words_that_do_not_fit_are_refused(tmp_path, monkeypatch, capsys, words,
 
 def test_the_surface_to_take_away_is_the_part(tmp_path, pocket):
     """Read back: quadrangles of walls that stand, floors that lie, at the places and depths of the program."""
-    text = (tmp_path / "surface.vtk")
+    text = tmp_path / "surface.vtk"
     pocket.save(tmp_path, plots=False)
     lines = text.read_text().splitlines()
     count = int(lines[4].split()[1])

@@ -80,7 +80,7 @@ MIXED = (
 
 
 def simulated(milling, station, angle, height):
-    """Whether points of the cutter lie in what its bodies every 4 um of path have left, up to a tenth of a mm before."""
+    """Whether points of the cutter lie in what its bodies every 20 um of path have left, up to a tenth of a mm before."""
     moves, samples, cutter = milling.moves, milling.samples, milling.cutter
     lengths = move_lengths(moves)
     row = samples.move[station]
@@ -93,7 +93,7 @@ def simulated(milling, station, angle, height):
     top = np.zeros(len(angle))
     for move in np.flatnonzero(moves.motion[: row + 1] != 0):
         end = share - 1e-4 / lengths[row] if move == row else 1.0
-        count = int(lengths[move] * max(end, 0.0) / 4e-6) + 2
+        count = int(lengths[move] * max(end, 0.0) / 2e-5) + 2
         for x0, y0, z0 in points_along(moves, np.full(count, move), np.linspace(0.0, max(end, 0.0), count))[0]:
             distance = np.hypot(x - x0, y - y0)
             covered = np.maximum(distance - flat, 0.0)
@@ -107,7 +107,8 @@ def test_contact_along_lines_arcs_ramps_and_helices_is_that_of_simulated_discs(c
     milling = Milling(MIXED, corner=corner, step=2.0)
     patches = milling.engaged()[0]
     rng = np.random.default_rng(1)
-    stations = np.flatnonzero(np.bincount(patches.station, minlength=len(milling.samples)))
+    within = np.diff(milling.samples.move, prepend=-1) == 0  # a move
+    stations = np.flatnonzero((np.bincount(patches.station, minlength=len(within)) > 0) & within)
     wrong = points = 0
     for station in stations[:: max(len(stations) // 12, 1)]:
         some = patches.take(patches.station == station)
@@ -121,8 +122,8 @@ def test_contact_along_lines_arcs_ramps_and_helices_is_that_of_simulated_discs(c
         inside &= (some.entry <= angle[:, None]) & (angle[:, None] <= some.exit)
         wrong += np.sum(simulated(milling, station, angle, height) != inside.any(axis=1))
         points += len(angle)
-    assert points > 1000
-    assert wrong <= 0.005 * points
+    assert points > 800
+    assert wrong <= 0.002 * points
 
 
 def test_neither_the_index_nor_the_compiled_loops_change_the_contact(monkeypatch):
@@ -166,7 +167,7 @@ def test_an_inner_corner_is_the_peak():
     np.testing.assert_allclose(last, [[0.0, 3.0, 90.0 - angle_of(0.5), 180.0]], atol=5e-3)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     points=st.lists(st.tuples(st.integers(-20, 20), st.integers(-12, 12), st.integers(1, 8)), min_size=2, max_size=6),
     corner=st.sampled_from([0.0, 5.0, 2.0]),
@@ -194,4 +195,3 @@ def test_what_cannot_be_engaged_is_refused_with_its_line(text, line, message):
     with pytest.raises(ProgramError, match=message) as error:
         Milling(text)
     assert error.value.line == line
-

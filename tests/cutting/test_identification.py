@@ -1,6 +1,7 @@
 """Coefficients from slots: known ones come back from forces with noise, by closed forms and by whole records."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -79,15 +80,21 @@ def test_what_was_not_recorded_is_not_told():
         least_squares(slot_responses(BULL, FEEDS, np.full(5, 0.003)), np.full((5, 3), [np.nan, 1.0, np.nan]))
 
 
+@cache
+def turn_of(fed, run_out):
+    """(120, 3) N on the tool around a turn of a slot 3 mm deep; mm, m."""
+    cutter = Cutter(1, 0.010, 0.0, 3, np.radians(30.0), run_out=run_out, run_out_angle=0.5)
+    angles = np.arange(0.0, 2 * np.pi, np.pi / 60)
+    return np.array([sliced(cutter, KNOWN, fed / 1e3, 0.0, patch(0.003, 0, np.pi), a, 1e-6, 250) for a in angles])
+
+
 def write_records(folder, feeds=(0.03, 0.05, 0.07, 0.09), run_out=6e-6, seed=1, **given):
     """Files of records as a dynamometer writes them: forces on the work in kN, drift, noise, air, another speed."""
     rng, files = np.random.default_rng(seed), []
-    cutter = Cutter(1, 0.010, 0.0, 3, np.radians(30.0), run_out=run_out, run_out_angle=0.5)
     for fed in feeds:
-        angles = np.arange(0.0, 2 * np.pi, np.pi / 60)
-        turn = np.array([sliced(cutter, KNOWN, fed / 1e3, 0.0, patch(0.003, 0, np.pi), a, 1e-6, 250) for a in angles])
+        turn = turn_of(fed, run_out)
         rate = 100.0 * 1.004  # turns a second; 6,000 a minute are said
-        time = np.arange(0.0, 1.0 + 3.4 * 5.0 / (fed * 3 * 100.0), 1 / 3117.0)
+        time = np.arange(0.0, 0.5 + 3.0 * 5.0 / (fed * 3 * 100.0), 1 / 2917.0)
         filled = np.clip((time - 0.2) / (5.0 / (fed * 3 * 100.0)), 0.0, 1.0) * (time < time[-1] - 0.2)
         force = np.stack([np.interp(time * rate % 1, np.arange(120) / 120, f, period=1) for f in turn.T], axis=1)
         read = -force * filled[:, None] + [3, -2, 1] + np.outer(time, [4, 3, -6]) + rng.normal(0, NOISE, force.shape)

@@ -1,20 +1,29 @@
 """Walls and floors against a cutter stepped through time, which shares nothing with the package."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from tests.cutting.simulator import Mill
+from tests.cutting.simulator import Corner, Mill
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.engagement import engage
+from toolpath_stiff.cutting.final_surface import final_walls
 from toolpath_stiff.cutting.forces import mean_force
 from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.stations import headings
+from toolpath_stiff.cutting.stock import box_stock
 from toolpath_stiff.cutting.surface_error import STRIPS, floor_error, shares, wall_error
+from toolpath_stiff.cutting.workpiece import workpiece_of
+from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.path.sampling import sample_moves
 
 ALUMINIUM = (767.0, 169.0, 222.0, 27.7, 26.6, 0.7)  # N/mm2, N/mm: 10.1186/s10033-021-00536-9, table 5
 STEEL = (2520.0, 756.0, 300.0, 41.0, 41.0, 5.0)
 STIFF = np.diag([20.0, 20.0, 8.0]) * 1e-6  # mm/N
 SLIM = np.array([[85.0, 14.0, 3.0], [14.0, 78.0, -5.0], [3.0, -5.0, 10.0]]) * 1e-6
-MEAN, RANGE, FLOOR = (0.06, 0.15), (0.08, 0.3), 0.3  # of the simulator's, or um
+MEAN, RANGE, FLOOR = (0.07, 0.15), (0.08, 0.3), 0.3  # of the simulator's, or um; 10 and 20 % are promised
 
 CASES = {
     "light, up": ("left", 1.0, 3.0, {}),
@@ -58,12 +67,13 @@ def test_surface_of_a_cutter_stepped_through_time(name):
     compliance = mill.compliance[None] / 1e3
     # What yields cuts a little otherwise than what is rigid.
     assert mean_force(*job)[0] == pytest.approx(mill.force[-mill.steps :].mean(axis=0), rel=0.02, abs=3.5)
-    reach = 1.5 if mill.ball else 4.0
-    strip = np.array([[-reach, reach]])
-    floor = 1e6 * floor_error(*job, compliance, strip / 1e3)[0][0]
-    aside = strip[0, 0] + 2 * reach * (np.arange(STRIPS) + 0.5) / STRIPS
-    aside[STRIPS // 2] += 1e-9
-    assert floor == pytest.approx(mill.below(aside), abs=FLOOR)
+    aside = (np.arange(STRIPS) + 0.5) / STRIPS * 8.0 - 4.0
+    strips = np.array([[-4.0, 4.0]])
+    if mill.ball:
+        aside = np.array([-1.5, -0.3, 1e-6, 0.8, 1.9])
+        strips = np.stack([aside, aside], axis=1)
+    floors = [1e6 * floor_error(*job, compliance, strip[None] / 1e3)[0][0] for strip in strips]
+    assert np.concatenate(floors) == pytest.approx(mill.below(aside), abs=FLOOR)
     for which in () if mill.ball else ("left", "right") if side == "both" else (side,):
         walls = np.full((1, 2, 2), np.nan)
         walls[0, int(which == "right")] = 0.0, depth / 1e3
@@ -78,3 +88,57 @@ def test_the_mean_force_would_not_do():
     mill = Mill(5.0, 3, 30.0, 3.0, 0.05, ALUMINIUM, STIFF, 1.0)
     by_mean = -1e3 * (STIFF @ mill.force[-mill.steps :].mean(axis=0))[1]
     assert abs(by_mean - mill.wall("left").mean()) > 2 * max(MEAN[0] * mill.wall("left").mean(), MEAN[1])
+
+
+POCKET = """G21 G90 G17
+T1 M6
+S6000 M3
+G0 X{near} Y{aside} Z5
+G1 Z-4 F300
+G1 X{rough} F1440
+G1 Y20
+G0 Z5
+G0 X-25 Y0
+G1 Z-4 F300
+G1 X0 F1440
+G1 Y20
+G0 Z5
+M30
+"""
+
+
+def test_an_inner_corner_of_a_program():
+    """The whole way: a program's stock and engagement, which walls stay, their error; against the simulated corner."""
+    corner = Corner(5.0, 3, 30.0, 4.0, 0.08, ALUMINIUM, SLIM, 0.5, "right", slices=24, steps=180, turns=44)
+    text = POCKET.format(near=-25.5, aside=0.5, rough=-0.5)
+    program = parse_program(text, "corner.nc")
+    samples = sample_moves(program.moves, 0.1e-3)
+    cutter = Cutter(1, 0.010, 0.0, 3, np.radians(30.0))
+    stock = box_stock((-0.040, -0.010, -0.010), (0.010, 0.040, 0.0), "")
+    work = workpiece_of(stock, program.moves, {1: cutter})
+    walls = final_walls(work, program.moves, samples, {1: cutter})
+    values = np.array(ALUMINIUM) * [1e6, 1e6, 1e6, 1e3, 1e3, 1e3]
+    known = Coefficients(values[:3], values[3:], np.zeros((6, 6)))
+    heading, count = headings(samples), len(samples)
+    turned = np.zeros((count, 3, 3))  # rows: the axes of the stations
+    turned[:, 0, 0] = turned[:, 1, 1] = np.cos(heading)
+    turned[:, 0, 1], turned[:, 1, 0], turned[:, 2, 2] = np.sin(heading), -np.sin(heading), 1.0
+    compliance = turned @ (SLIM / 1e3) @ turned.swapaxes(1, 2)
+    mean, spread = np.full((2, count), np.nan)
+    for rows, patches, _ in engage(work, program.moves, samples, {1: cutter}):
+        part = replace(patches, station=patches.station - rows.start)
+        feed = np.tile([[8e-5, 0.0]], (rows.stop - rows.start, 1))
+        error, _, _ = wall_error(part, cutter, known, feed, np.ones(len(feed)), compliance[rows], walls[rows])
+        mean[rows], spread[rows] = 1e6 * error[:, 1] @ shares()[1], 1e6 * np.ptp(error[:, 1], axis=1)
+    x, y, _ = 1e3 * samples.position.T
+    compared = 0
+    for past, left, reach in corner.walls():
+        if not -4.5 < past < 3.5:
+            continue
+        at_hand = (np.hypot(x - min(past, 0.0), y - max(past, 0.0)) < 0.06) & np.isfinite(mean)
+        at_hand &= (np.abs(heading) < 0.1) == (past < 0.0)
+        if at_hand.any():
+            compared += 1
+            assert mean[at_hand].mean() == pytest.approx(left, rel=0.10, abs=0.5), past
+            assert spread[at_hand].mean() == pytest.approx(reach, rel=0.20, abs=1.0), past
+    assert compared > 60

@@ -247,9 +247,7 @@ def test_the_options_of_the_command_line(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("text", "language", "line"),
     [
-        ("0 BEGIN PGM TEIL MM\n1 BLK FORM 0.1 Z X+0 Y+0 Z-20\n5 L X+10 Y+5 R0 FMAX\n", "Heidenhain", 1),
-        ("L X+10 Y+5 R0 FMAX M3\n", "Heidenhain", 1),
-        ("TOOL CALL 5 Z S3000\n", "Heidenhain", 1),
+        ("G0 X1\n" * 60 + "5 L X+10 Y+5 R0 FMAX\n", "Heidenhain", 61),
         ("%_N_TEIL_MPF\n;$PATH=/_N_WKS_DIR\nG0 X10\n", "Siemens", 1),
         (";$PATH=/_N_WKS_DIR\nG0 X10\nG1 F100 X2", "Siemens", 1),
         ("DEF REAL LAENGE\n", "Siemens", 1),

@@ -67,6 +67,8 @@ class ProgramCheck(Result):
         Its name, who read it, as what, and for which machine it was posted, "" for this one.
     complete
         Whether it was read to its end.
+    language, needs
+        What it is written in, with the sign that says so; the options without which it is refused, with a line each.
     used, unsupported, findings
         Codes; words not acted upon; errors, warnings and notes, in the order of lines.
     extents_mm, extents_deg
@@ -98,6 +100,8 @@ class ProgramCheck(Result):
     dialect: str
     kinematics: str
     complete: bool
+    language: str
+    needs: tuple[str, ...]
     used: tuple[UsedCode, ...]
     unsupported: tuple[Finding, ...]
     findings: tuple[Finding, ...]
@@ -166,6 +170,8 @@ def check_program(request: Request, machine: Hexapod | None, step: float = defau
         dialect=program.dialect,
         kinematics=program.kinematics,
         complete=checked.complete,
+        language=checked.language,
+        needs=checked.needs,
         used=checked.used,
         unsupported=checked.unsupported,
         findings=in_order(findings),

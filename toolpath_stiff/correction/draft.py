@@ -187,7 +187,7 @@ def size_name(term: Term) -> str:
         parts = [strut, action]
     elif action in PINS:
         parts = [strut, action, term.direction]
-    elif action in ("rocking", "tilting", "reading shift"):
+    elif action in ("rocking", "tilting", "spring", "reading shift"):
         parts.append(action.removeprefix("reading "))
     name = " ".join(part for part in parts if part not in ("reading", "along the struts"))
     return re.sub(r"\W+", "_", name.lower()).strip("_")

@@ -189,12 +189,12 @@ def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portra
     return portrait if portrait.terms or unexplained else None
 
 
-def alike_of(diagnosis: Diagnosis) -> Alike | None:
-    """What else would look the same as the one effect that is named: parts that the catalogue does not have."""
+def alike_of(diagnosis: Diagnosis) -> dict[str, Alike]:
+    """What else would look the same as each effect that is named: parts that the catalogue does not have."""
     main = diagnosis.main
     named = diagnosis.fits.get(diagnosis.best or "")
     if diagnosis.verdict not in NAMING or named is None or main.noise.tip is not None:
-        return None
+        return {}
     return looks_the_same(main.problem, diagnosis.base, named, diagnosis.noise, diagnosis.seed)
 
 

@@ -21,7 +21,7 @@ ERRORS = (
 
 def document_of(diagnosis: Examination) -> Document:
     """Everything that `diagnose.json` holds."""
-    main, alike, noise, rows = diagnosis.main, diagnosis.alike, diagnosis.noise, diagnosis.rows
+    main, noise, rows = diagnosis.main, diagnosis.noise, diagnosis.rows
     drawn = diagnosis.unconfirmed or main.drawn
     links = {family.name: family.effect.link for family in main.families}
     return {
@@ -61,7 +61,7 @@ def document_of(diagnosis: Examination) -> Document:
         },
         "path": diagnosis.path,
         "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
-        "looks_the_same": None if alike is None else alike_entry(diagnosis.explanations[0], alike),
+        "looks_the_same": alike_entry(diagnosis.alike),
         "not_excluded": [_not_excluded(hidden) for hidden in diagnosis.unexcluded],
         "not_excluded_text": beside_text(diagnosis.unexcluded),
         "assumptions": assumptions(diagnosis),
@@ -161,7 +161,7 @@ def _not_excluded(hidden: Unexcluded) -> Document:
         "up_to": json_number(hidden.value / hidden.parameter.si, 2),
         "rms_percent": percent_of(hidden.rms, 2),
         "probability": json_number(hidden.probability, 2),
-        "would_tell": would_tell(hidden),
+        "would_tell": would_tell(hidden.effect),
     }
 
 

@@ -139,7 +139,7 @@ class Examination:
     portrait
         What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
     alike
-        What else would look the same as the effect that is named (`alike_of`); None where nothing would, or none is.
+        Named effect -> what else would look the same in its place (`alike_of`).
     unexcluded
         Effects that the readings neither show nor exclude beside the likeliest explanation, at a size that matters.
     suspects
@@ -171,7 +171,7 @@ class Examination:
     remarks: tuple[str, ...] = ()
     path: Document | None = None
     portrait: Portrait | None = None
-    alike: Alike | None = None
+    alike: Mapping[str, Alike] = field(default_factory=dict)
     unexcluded: tuple[Unexcluded, ...] = ()
     suspects: tuple[SuspectEntry, ...] = ()
     loops: tuple[LoopMean, ...] = ()

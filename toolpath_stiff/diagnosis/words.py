@@ -7,7 +7,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.examination import NAMING, Examination
+from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Examination
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.confounding import CONFOUNDED
@@ -15,13 +15,15 @@ from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
 from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
+from toolpath_stiff.inference.noise import REST
 from toolpath_stiff.inference.nuisances import findings, nuisance_words
 from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
 from toolpath_stiff.inference.votes import CHANCE, SMALL, outvoted, vote_words
-from toolpath_stiff.planning.plan import INDICATORS
+from toolpath_stiff.planning.plan import INDICATORS, telling
 from toolpath_stiff.portrait.words import alike_text
+from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
 
@@ -30,7 +32,7 @@ MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has
 
 def verdict_text(diagnosis: Examination) -> str:
     """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
-    same = [] if diagnosis.alike is None else [alike_text(diagnosis.explanations[0], diagnosis.alike)]
+    same = [alike_text(name, alike) for name, alike in diagnosis.alike.items()]
     return " ".join([_verdict_text(diagnosis), *same, *(f"{_capital(doubt)}." for doubt in doubts(diagnosis))])
 
 
@@ -86,6 +88,9 @@ def _cause(diagnosis: Examination, name: str) -> str:
     if name not in diagnosis.fits:
         return f"({name}, probability {chance})"
     fit = diagnosis.fits[name]
+    if diagnosis.main.probability.get(name, 0.0) < SHOWN and name in diagnosis.main.votes:
+        titles = joined([candidate.effect.title for candidate in fit.candidates])
+        return f"{titles} ({name}: less likely than {100 * SHOWN:g} %, but foretells left-out poses as well)"
     unusual = f", more than is usual ({joined(sizes)}) " if (sizes := _unusual(fit)) else " "
     return f"{joined(fit.findings)}{unusual}({name}, probability {chance})"
 
@@ -115,6 +120,8 @@ def _rivals(diagnosis: Examination) -> str:
     causes = [_cause(diagnosis, name) for name in diagnosis.explanations]
     if len(causes) < 2:
         return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
+    if diagnosis.explanations[0] not in (NONE, diagnosis.best):
+        return f"What is likeliest lowers no error at points that are left out: {'; '.join(causes)}."
     first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
     if first < POSITIVE * second:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
@@ -200,9 +207,9 @@ def _not_told_apart(diagnosis: Examination) -> list[str]:
 
 
 def _telling(diagnosis: Examination) -> dict[str, str]:
-    """Plausible effect -> the reading that tells it from what looks the same at the tip, where the effect names one."""
+    """Plausible effect -> the reading that tells it from what looks the same at the tip."""
     effects = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
-    return {effect.name: effect.told_by for effect in effects if effect.told_by}
+    return {effect.name: would_tell(effect) for effect in effects}
 
 
 def next_steps(diagnosis: Examination, request: Asked | None = None) -> list[str]:
@@ -248,6 +255,8 @@ def assumptions(diagnosis: Examination) -> list[str]:
         f"noise: {noise.origin}",
         f"struts differ from each other by {100 * noise.strut_spread:g} % (sd), joints stand"
         f" {mm_from_m(noise.joint_error):g} mm (sd of each coordinate) from where the machine file has them: assumed",
+        f"frame, table, platform and tool give a little more or less than in the model: {100 * REST:.1g} % (sd) of the "
+        "tip's stiffness along each of their axes: assumed",
         f"one reading in {1 / noise.outliers:.0f} scatters {noise.outlier_width:g} times as widely: "
         + ("assumed" if noise.outliers == OUTLIERS else "as the repeats have it"),
         f"the strut law's two stiffnesses are refitted along with everything, expected within {100 * LAW_PRIOR:g} % "
@@ -284,7 +293,7 @@ def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
     return f"{words}; an indicator {tells} would tell" if tells else words
 
 
-def would_tell(hidden: Unexcluded) -> str:
+def would_tell(effect: Effect) -> str:
     """Where an indicator would show an effect, or what else to measure."""
-    place = INDICATORS[hidden.effect.link]
+    place = telling(effect)
     return place.removeprefix("none: ") if place.startswith("none: ") else f"an indicator {place}"

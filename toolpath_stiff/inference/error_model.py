@@ -51,9 +51,10 @@ def error_model(fit: Fit, data: Readings, noise: Noise) -> ErrorModel | None:
         return None
     rows = np.unique(np.linspace(0, len(data) - 1, min(len(data), MOST_READINGS)).round().astype(np.int64))
     jacobian, residual, covariance = fit.jacobian[rows], fit.residual[rows], fit.scatter.covariance
+    common = covariance.groups.spread(covariance.common)
     same = covariance.groups.of[rows, None] == covariance.groups.of[rows]
     parts = (
-        np.diag(covariance.own_variance[rows]) + covariance.common * same,
+        np.diag(covariance.own_variance[rows]) + common[rows] * same,
         covariance.shared[:, rows].T @ covariance.shared[:, rows],
         alike(place[rows], data.direction[rows]),
     )
@@ -71,7 +72,7 @@ def error_model(fit: Fit, data: Readings, noise: Noise) -> ErrorModel | None:
 
     by_reading = fit.covariance @ fit.scatter.precision.times(fit.jacobian.T)  # of each unknown
     taken_up = by_reading * covariance.own_variance
-    taken_up += covariance.common * covariance.groups.sums(by_reading)[:, covariance.groups.of]
+    taken_up += common * covariance.groups.sums(by_reading)[:, covariance.groups.of]
     own, geometry = _root(taken_up @ by_reading.T), by_reading @ covariance.shared.T
     left = np.eye(len(rows)) - jacobian @ _estimator(jacobian, parts[0] + parts[1], fit.law_free)
     near = float(np.diag(left @ parts[2] @ left.T).mean())

@@ -237,6 +237,19 @@ class Predictor:
                 columns.append((np.log(stiffness) - self._base_log)[prepared.which] / JOINT_STEP)
         return np.stack(columns, axis=1)
 
+    def rest_columns(self) -> FloatArray:
+        """(n, 7) d ln k to the links that the model takes for rigid, each of rms 1: what a little give of them changes.
+
+        Of work and frame along X, Y, Z and in rocking, of platform and tool along their own three axes. Readings of
+        loops beside the tip are left out.
+        """
+        data, path = self.data, self.full_path
+        moment = np.cross(data.position, data.direction)
+        along = np.einsum("nij,ni->nj", path.rotation, data.direction)
+        added = np.column_stack([data.direction**2, (moment[:, :2] ** 2).sum(axis=1), along**2])
+        columns = -added * np.exp(self._base_log[self.distinct])[:, None] * data.tip[:, None]
+        return np.asarray(columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300))
+
     @cached_property
     def _base_log(self) -> FloatArray:
         """(m,) ln k of the machine file's model at the distinct rows, before instruments."""

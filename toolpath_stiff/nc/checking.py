@@ -5,7 +5,7 @@ With `--interpreter linuxcnc`, what LinuxCNC's interpreter says of the program, 
 
 import copy
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -14,19 +14,20 @@ from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
-from toolpath_stiff.nc.languages import foreign_program, looks_like_cutter_location, refused_program
+from toolpath_stiff.nc.languages import CUTTER_LOCATION_FILE, foreign_program, recognise, refused_program
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun, Tally
-from toolpath_stiff.nc.reader import INTERPRETERS, on_the_part, program_of, read
+from toolpath_stiff.nc.reader import INTERPRETERS, LANGUAGE_RUNS, in_language, on_the_part, program_of, read
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import WORK_OFFSETS
 
 CODE = re.compile(r"([GM])(\d+\.?\d*)")
 ERROR, WARNING, NOTE = "error", "warning", "note"
+NEEDED = re.compile(r"--(?:dialect|controller|offsets|tools|subprograms|feed|interpreter)\b")
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,8 @@ class Checked:
         In the order of lines.
     start, end
         Modal state before the first block and after the last one, names to words.
+    language
+        What the program is written in, and the sign by which that is recognised.
     """
 
     program: ReadProgram
@@ -83,6 +86,16 @@ class Checked:
     findings: tuple[Finding, ...]
     start: dict[str, str] = field(default_factory=dict)
     end: dict[str, str] = field(default_factory=dict)
+    language: str = ""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The options without which the program is refused, each with the first line that needs it."""
+        needed = dict[str, int]()
+        for finding in self.findings:
+            for option in NEEDED.findall(finding.text) if finding.severity == ERROR else ():
+                needed.setdefault(option, finding.line)
+        return tuple(f"{option} (line {line})" if line else option for option, line in needed.items())
 
     @property
     def unsupported(self) -> tuple[Finding, ...]:
@@ -133,11 +146,19 @@ def check(request: Request) -> Checked:
         raise ProgramError(f"interpreter {request.interpreter!r}", expected=", ".join(INTERPRETERS))
     if not any(line.strip() for line in request.lines):
         raise ProgramError("the program is empty", expected="an NC program", file=request.name)
+    language, sign = recognise(request.lines, request.name, request.controller.dialect)
+    return replace(_checked(request, language), language=f"{language} ({sign})")
+
+
+def _checked(request: Request, language: str) -> Checked:
     if request.interpreter == "linuxcnc":
         return _check_by_linuxcnc(request)
-    if looks_like_cutter_location(request.lines, request.name):
+    if language == CUTTER_LOCATION_FILE:
         return _check_cutter_location(request)
-    ours = _check_built_in(request)
+    if language in LANGUAGE_RUNS:
+        request = in_language(request, language)
+        return _check_built_in(request, LANGUAGE_RUNS[language](request, Tally()))
+    ours = _check_built_in(request, ProgramRun(request, Tally()))
     if request.interpreter == "builtin" or ours.complete or not request.controller.plain:
         return ours
     theirs = _check_by_linuxcnc(replace(request, interpreter="linuxcnc"), may_lack=True)
@@ -151,13 +172,12 @@ def check(request: Request) -> Checked:
     return replace(theirs, findings=in_order([*theirs.findings, note]))
 
 
-def _check_built_in(request: Request) -> Checked:
-    run = ProgramRun(request, Tally())
-    start = modal_state(run.state)
-    errors, ending = _run_to_the_end(run)
-    if errors and uses_variables(request.lines):  # once more with their values, from the start
+def _check_built_in(request: Request, run: ProgramRun) -> Checked:
+    start, g_code = modal_state(run.state), type(run) is ProgramRun
+    errors, ending = _run_to_the_end(run, g_code)
+    if errors and g_code and uses_variables(request.lines):  # once more with their values, from the start
         run = ParametricRun(request, Tally())
-        errors, ending = _run_to_the_end(run)
+        errors, ending = _run_to_the_end(run, g_code)
     state, tally = run.state, run.tally
     assert tally is not None
     program = program_of(run, request, ending)
@@ -173,25 +193,26 @@ def _check_built_in(request: Request) -> Checked:
     return Checked(
         program=program,
         complete=not errors,
-        used=_used_codes(tally),
+        used=_used_codes(tally, run.meaning),
         findings=findings_of(errors, program),
         start=start,
         end=modal_state(state),
     )
 
 
-def _run_to_the_end(run: ProgramRun) -> tuple[list[InputError], list[Remark]]:
+def _run_to_the_end(run: ProgramRun, g_code: bool) -> tuple[list[InputError], list[Remark]]:
     """Run a program; its errors, and the warnings of its end. A file in another language has that one error alone."""
     assert run.tally is not None
     lines, name, errors, warnings = run.lines, run.name, run.tally.errors, list[Remark]()
-    foreign = refused_program(lines, name, run.state.dialect)
+    foreign = refused_program(lines, name, run.state.dialect) if g_code else None
     if foreign is None:
         try:
             warnings = run.run()
         except InputError as error:
             if error not in errors:
                 errors.append(error)
-        foreign = next((f for e in errors if (f := foreign_program(lines, name, e.line)) is not None), None)
+        suspects = errors if g_code else ()
+        foreign = next((f for e in suspects if (f := foreign_program(lines, name, e.line)) is not None), None)
     if foreign is not None:
         return [foreign], warnings
     if not errors and not run.state.recorder.cuts:
@@ -199,10 +220,8 @@ def _run_to_the_end(run: ProgramRun) -> tuple[list[InputError], list[Remark]]:
     return errors, warnings
 
 
-def _used_codes(tally: Tally) -> tuple[UsedCode, ...]:
-    return tuple(
-        UsedCode(*tally.first[code], code, code_meaning(code), NOTE, tally.count[code]) for code in tally.first
-    )
+def _used_codes(tally: Tally, meaning: Callable[[str], str] = code_meaning) -> tuple[UsedCode, ...]:
+    return tuple(UsedCode(*tally.first[code], code, meaning(code), NOTE, tally.count[code]) for code in tally.first)
 
 
 def _check_cutter_location(request: Request) -> Checked:

@@ -11,6 +11,9 @@ Fanuc's operator's manuals, "Details of cutter or tool nose radius compensation"
 CCC = 0). The first move, straight, ends beside the beginning of the next one; inside a corner the tool goes to where
 both offset moves meet; outside, up to 90 degrees, to where the tangents of both meet, and beyond 90 degrees each of
 the two is longer by the tool's radius.
+
+Heidenhain's controls enter and leave as Fanuc's type A (the tool stands perpendicular to the first and the last contour
+element), and round outside corners by an arc as LinuxCNC does (user's manuals, "Tool radius compensation").
 """
 
 import math
@@ -85,6 +88,8 @@ class Cutter:
         Moves since the last corner, the one in the plane first.
     straight
         As Fanuc's and Haas' manuals have it (straight corners), not LinuxCNC's.
+    rounded
+        `straight`, but for outside corners, which are rounded (Heidenhain).
     entering
         The first move waits for the next one, which says where it ends.
     """
@@ -98,6 +103,7 @@ class Cutter:
     pending: list[Pending] = field(default_factory=list)
     straight: bool = False
     entering: bool = False
+    rounded: bool = False
 
     @property
     def center(self) -> Point2:
@@ -287,7 +293,7 @@ def go_on(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) 
     beside = _beside_contour(start, cutter, along)
     if cutter.entering:
         refuse_arc_if(
-            len(cutter.pending) > 1,
+            len(cutter.pending) > 1 and not cutter.rounded,
             "a move along the tool right after the first move of cutter compensation",
             "it before G41",
         )
@@ -298,14 +304,14 @@ def go_on(cutter: Cutter, start: Point2, target: Point2, arc: OffsetArc | None) 
     if abs(turn) <= TURNED:
         return CenterMove(_end(cutter, start, target, arc))
     refuse_arc_if(
-        len(cutter.pending) > 1,
+        len(cutter.pending) > 1 and not cutter.rounded,
         "a move along the tool in a corner of cutter compensation",
         "it where the contour is smooth",
     )
     refuse_arc_if(
         abs(turn) > math.pi - TURNED, "a contour under cutter compensation that turns back on itself", "another contour"
     )
-    if turn * cutter.side > 0.0:
+    if turn * cutter.side > 0.0 or cutter.rounded:
         return _go(cutter, start, target, arc, TURNED)  # an inside corner, as LinuxCNC has it
     return _outside(cutter, _end(cutter, start, target, arc), (before, turn), beside, arc)
 

@@ -128,8 +128,11 @@ DIALECTS = {
             feed_needs_point=("mm", "inch"),
             aliases={"G234": "G43.4"},
         ),
+        Dialect("heidenhain", retract="G98", repeats_in_p=False, additional=()),
     )
 }
+# Dialects that are languages of their own, with a reader each: what they are called.
+LANGUAGES = {"heidenhain": "Heidenhain's conversational language"}
 
 
 def dialect_named(name: str) -> Dialect:

@@ -48,6 +48,8 @@ class Frames:
         The machine that the program was posted for, whose coordinates these are; None: this one.
     tip_held
         Whether tool centre point control is on (G43.4): positions are then those of the tip on the part.
+    linear
+        Turn, mirror image and scale of the program's X, Y, Z ahead of all that (3, 3); None: they are as they are.
     """
 
     offsets: Offsets
@@ -64,6 +66,7 @@ class Frames:
     source: str = ""
     posted: PostedKinematics | None = None
     tip_held: bool = False
+    linear: list[list[float]] | None = None
 
     @property
     def bound(self) -> bool:
@@ -74,6 +77,8 @@ class Frames:
     def to_control(self, program: list[float]) -> list[float]:
         """Control coordinates of a point in program coordinates."""
         offset = self.offsets.at(self.active)
+        if self.linear is not None:
+            program = [*_rotate(self.linear, program[:3]), *program[3:]]
         if self.rotation is not None:
             program = _about(self.rotation, program, self.rotation[2])
         if not offset.rotation:
@@ -91,6 +96,9 @@ class Frames:
             moved = [c - o for c, o in zip(control, offset.axes, strict=True)]
             moved[0], moved[1] = _turned(moved[0], moved[1], -offset.rotation)
             program = [m - g for m, g in zip(moved, self.g92, strict=True)]
+        if self.linear is not None:
+            square = sum(row[0] ** 2 for row in self.linear)  # of the scale
+            program = [*(v / square for v in _rotate(_transposed(self.linear), program[:3])), *program[3:]]
         return program if self.rotation is None else _about(self.rotation, program, -self.rotation[2])
 
     def axis_to_control(self, axis: int, program: Numbers) -> Numbers:
@@ -104,7 +112,8 @@ class Frames:
     @property
     def rotated(self) -> bool:
         """Whether a work offset or G68 turns the program's X and Y."""
-        return self.rotation is not None or self.offsets.at(self.active).rotation != 0.0
+        turned = self.rotation is not None or self.linear is not None
+        return turned or self.offsets.at(self.active).rotation != 0.0
 
     @property
     def turned(self) -> float:
@@ -112,7 +121,14 @@ class Frames:
         return self.offsets.at(self.active).rotation + (self.rotation[2] if self.rotation else 0.0)
 
     def turn_direction(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
-        """A direction of the program's axes in control axes."""
+        """The normal of an arc in the program's axes in control axes: a mirror image turns it over."""
+        if self.linear is not None:
+            first, second, third = self.linear
+            x, y, z = (  # the cofactors, whose lengths are the square of the scale
+                sum(c * v for c, v in zip(_cross(a, b), vector, strict=True)) / sum(v * v for v in third)
+                for a, b in ((second, third), (third, first), (first, second))
+            )
+            vector = (x, y, z)
         rotation = self.turned
         if not rotation:
             return vector
@@ -154,14 +170,13 @@ class Frames:
         """Control coordinates of a point in machine coordinates."""
         origin = self.origin
         moved = [m - o for m, o in zip(machine[:3], origin[:3], strict=True)]
-        transposed = [list(column) for column in zip(*_matrix(origin), strict=True)]
-        control = self.from_setup([*_rotate(transposed, moved), *machine[3:]])
+        control = self.from_setup([*_rotate(_transposed(_matrix(origin)), moved), *machine[3:]])
         control[2] -= self.tool
         return control
 
     def set_tool(self, length: float) -> None:
         """Another tool length: the machine stands still, the controlled point's numbers change."""
-        self.position[2] += self.tool - length
+        self.position = [*self.position[:2], self.position[2] + (self.tool - length), *self.position[3:]]
         self.tool = length
 
 
@@ -201,6 +216,14 @@ def _matrix(origin: ShopPose) -> list[list[float]]:
         [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa],
         [-sb, cb * sa, cb * ca],
     ]
+
+
+def _transposed(matrix: list[list[float]]) -> list[list[float]]:
+    return [list(column) for column in zip(*matrix, strict=True)]
+
+
+def _cross(a: list[float], b: list[float]) -> list[float]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def _rotate(matrix: list[list[float]], vector: list[float]) -> list[float]:

@@ -1,6 +1,6 @@
-"""Files that are no G code of a mill, recognised by their lines.
+"""The language of a program, recognised by its lines.
 
-Cutter-location files have a reader of their own; other languages, and programs of lathes, are refused by name.
+Cutter-location files and the languages of `READ` have readers; others, and programs of lathes, are refused by name.
 """
 
 import re
@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.controller import Dialect
+from toolpath_stiff.nc.controller import LANGUAGES, Dialect
 from toolpath_stiff.nc.moves import Moves, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import LATHE_HINT
@@ -24,7 +24,8 @@ STATEMENT = re.compile(
     re.IGNORECASE,
 )
 
-_HEIDENHAIN = "Heidenhain's conversational language"
+G_CODE, CUTTER_LOCATION_FILE = "G code", "cutter-location file (APT)"
+_HEIDENHAIN = LANGUAGES["heidenhain"]
 _SIEMENS = "Siemens' own language (Sinumerik)"
 _ISG = "ISG's own language (Beckhoff TwinCAT CNC)"
 _ACRAMATIC = "the language of Acramatic controls (Cincinnati, Vickers)"
@@ -36,6 +37,7 @@ HINTS = {
     _ACRAMATIC: "post it as ISO G code of Fanuc's or LinuxCNC's kind",
     _SUB: "post it as ISO G code, or write its subprograms as LinuxCNC's O words",
 }
+READ = {language: dialect for dialect, language in LANGUAGES.items()}
 LONGEST_SIGN = 200  # characters of a line that are looked at
 # What no G code of the controls read here has at the beginning of a block, blanks and N words apart.
 _SIGNS = (
@@ -54,6 +56,7 @@ _SIGNS = (
 )
 _PATTERNS = [(what, re.compile(rf"\s*(?:N\d+\s+|\d+\s+)?(?:{sign})", re.IGNORECASE)) for what, sign in _SIGNS]
 
+PLAIN_LANGUAGE = re.compile(r"\s*(?:N?\d+\s+)?BEGIN\s+PGM\b", re.IGNORECASE)  # also behind a long heading
 LATHE_LINES = 2000  # lines: a lathe's program shows what it is at its beginning
 _NO_CODE = re.compile(r"\([^)]*\)?|;.*|<[^>]*>")  # comments, names
 _M6, _Y = r"M0*6(?![\d.])", r"(?<![A-Z])Y[-+]?[\d.#\[]"
@@ -84,6 +87,28 @@ def language_of(line: str) -> str | None:
     return next((what for what, pattern in _PATTERNS if pattern.match(head)), None)
 
 
+def recognise(lines: tuple[str, ...], name: str, dialect: Dialect) -> tuple[str, str]:
+    """The language of a program and by what it is recognised: its first lines, unless the dialect says so.
+
+    Examples
+    --------
+    >>> from toolpath_stiff.nc.controller import GENERIC
+    >>> recognise(("0 BEGIN PGM PLATE MM", "1 L X+10 FMAX"), "plate.h", GENERIC)
+    ("Heidenhain's conversational language", "line 1: '0 BEGIN PGM PLATE MM'")
+    >>> recognise(("G21", "G1 X1 F100"), "plate.nc", GENERIC)
+    ('G code', 'no sign of another language')
+    """
+    if dialect.name in LANGUAGES:
+        return LANGUAGES[dialect.name], f"as asked for: --dialect {dialect.name}"
+    if looks_like_cutter_location(lines, name):
+        return CUTTER_LOCATION_FILE, "its ending, or statements such as GOTO/"
+    for index, line in enumerate(lines[:LATHE_LINES]):
+        language = language_of(line) if index < HEAD_LINES else _HEIDENHAIN if PLAIN_LANGUAGE.match(line) else None
+        if language is not None:
+            return language, f"line {index + 1}: {line.strip()[:40]!r}"
+    return G_CODE, "no sign of another language"
+
+
 def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = None) -> InputError | None:
     """The error for a program in another language; `suspect` is a line (from 1) that could not be read as G code."""
     places = list(range(min(HEAD_LINES, len(lines))))
@@ -93,6 +118,7 @@ def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = Non
         language = language_of(lines[index])
         if language is not None:
             problem = f"{lines[index].strip()[:40]!r} is {language}, which is not read"
+            problem += " among G code" if language in READ else ""
             return Place(name, index + 1).fail(problem, "G code", HINTS[language])
     return None
 

@@ -26,6 +26,7 @@ from toolpath_stiff.units import (
 
 RAPID, FEED, ARC, CYCLE = 0, 1, 2, 3
 CUTTER_LOCATION = "cutter-location file"
+Blank = tuple[tuple[float, float, float], tuple[float, float, float]]
 MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
 HELD = ("tool", "tool_length", "spindle")  # columns that most programs have one value of
 
@@ -184,6 +185,8 @@ class ReadProgram:
         Where the run left the order of the lines, for a subprogram or back from it.
     parametric
         Whether variables, expressions or loops made the moves.
+    stock
+        (2, 3) m, smallest and largest corner of the blank in the set-up frame; None where the program says none.
 
     Examples
     --------
@@ -211,6 +214,7 @@ class ReadProgram:
     marks: tuple[tuple[int, str], ...] | None = None
     jumps: tuple[Jump, ...] = ()
     parametric: bool = False
+    stock: Blank | None = None
 
     def __repr__(self) -> str:
         return f"<ReadProgram {self.name}: {len(self.moves)} moves, read as {self.dialect}>"
@@ -252,9 +256,10 @@ class Recorder:
     recent: list[Move] = field(default_factory=list)
     parts: list[Moves] = field(default_factory=list)
     cuts: bool = False  # whether any move is a cutting one
+    packed: int = 0  # number of moves in `parts`
 
     def __len__(self) -> int:
-        return len(self.recent) + sum(len(part) for part in self.parts)
+        return len(self.recent) + self.packed
 
     def add(self, move: Move) -> bool:
         """Add a move. Returns whether it was one."""
@@ -281,12 +286,14 @@ class Recorder:
             return
         self.pack()
         self.parts.append(in_si(moves))
+        self.packed += len(moves)
         self.cuts = self.cuts or bool((moves.motion != RAPID).any())
 
     def pack(self) -> None:
         """The recent moves to arrays, which take a fifth of their memory."""
         if self.recent:
             self.parts.append(self._recent_in_si())
+            self.packed += len(self.recent)
             self.recent = []
 
     def add_dwell(self, seconds: float) -> None:
@@ -299,7 +306,7 @@ class Recorder:
     def moves(self) -> Moves:
         """The moves as arrays, SI; the recorder is empty afterwards."""
         parts = [*self.parts, self._recent_in_si()]
-        self.recent, self.parts = [], []
+        self.recent, self.parts, self.packed = [], [], 0
         return _joined(parts)
 
     def _recent_in_si(self) -> Moves:

@@ -10,6 +10,7 @@ that does not fit) ends the run before it: the interpreter then executes it and 
 """
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 
 import numpy as np
@@ -43,17 +44,15 @@ class PlainRun:
         self.state, self.lines, self.name = state, lines, name
         self._pause = 0  # the line before which another run is not worth trying
         self._start, self._words = -CHUNK, lex([""])[0]  # the chunk
-        self._others = [0]  # its lines that are not plain, and its end, in falling order
+        self._others = [0]  # its lines that are not plain, and its end
 
     def execute(self, first: int) -> PlainWords | None:
         """Execute plain lines from `first` (from 0); returns the words of those that were, None if there are none."""
         if not self._start <= first < self._start + CHUNK:
             words, others = lex(self.lines[first : first + CHUNK])
             self._start, self._words = first, words
-            self._others = [first + len(words.code), *(first + others[::-1]).tolist()]
-        while self._others[-1] < first:
-            self._others.pop()
-        end = self._others[-1]
+            self._others = [*(first + others).tolist(), first + len(words.code)]
+        end = self._others[bisect_left(self._others, first)]
         if end - first < FEWEST or first < self._pause or not _suits(self.state):
             return None
         words = self._words.part(first - self._start, end - self._start)

@@ -14,6 +14,7 @@ from typing import TypeVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.moves import Jump, Remark
 from toolpath_stiff.nc.place import Place
@@ -103,6 +104,11 @@ class ProgramRun:
         self._called: dict[int, Block] = {}  # blocks of subprograms by line, from 0: each is read once
         self._blocks = 0
         self.jumps: list[Jump] = []
+
+    @staticmethod
+    def meaning(code: str) -> str:
+        """What a code, or a word of the language, is taken for."""
+        return code_meaning(code)
 
     def run(self) -> list[Remark]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""

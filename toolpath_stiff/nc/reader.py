@@ -1,22 +1,26 @@
 """An NC program or a cutter-location file, from file or text, to `ReadProgram`."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.increments import point_warning
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.controller import DIALECTS, LANGUAGES, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
+from toolpath_stiff.nc.heidenhain.run import HeidenhainRun
 from toolpath_stiff.nc.languages import (
+    CUTTER_LOCATION_FILE,
+    READ,
     foreign_program,
     lathe_warning,
-    looks_like_cutter_location,
+    recognise,
     refused_program,
 )
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
-from toolpath_stiff.nc.moves import RAPID, ReadProgram, Remark
+from toolpath_stiff.nc.moves import RAPID, Blank, ReadProgram, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
@@ -25,9 +29,10 @@ from toolpath_stiff.nc.request import ORIGIN_WINS, ZERO, Request
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.poses import Pose, pose_in_si
-from toolpath_stiff.units import mm_per_min_from_m_per_s
+from toolpath_stiff.units import m_from_mm, mm_per_min_from_m_per_s
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
+LANGUAGE_RUNS: dict[str, type[ProgramRun]] = {LANGUAGES["heidenhain"]: HeidenhainRun}
 
 
 def read_program(
@@ -99,13 +104,15 @@ def read(request: Request) -> ReadProgram:
         raise ProgramError(f"interpreter {request.interpreter!r}", expected=", ".join(INTERPRETERS))
     if not any(line.strip() for line in lines):
         raise ProgramError("the program is empty", expected="an NC program", file=name)
-    native = request.interpreter == "linuxcnc"
-    if looks_like_cutter_location(lines, name):
-        if native:
-            raise ProgramError(
-                "LinuxCNC's interpreter reads no cutter-location files", expected="--interpreter builtin", file=name
-            )
+    native, (language, sign) = request.interpreter == "linuxcnc", recognise(lines, name, request.controller.dialect)
+    if native and (language == CUTTER_LOCATION_FILE or language in LANGUAGE_RUNS):
+        problem = f"LinuxCNC's interpreter does not read this: {language} ({sign})"
+        raise ProgramError(problem, expected="--interpreter builtin", file=name)
+    if language == CUTTER_LOCATION_FILE:
         return _with_feed(cutter_location.read(request), request)
+    if language in LANGUAGE_RUNS:
+        request = in_language(request, language)
+        return _finished(request, LANGUAGE_RUNS[language](request))
     refused = foreign_program(lines, name) if native else refused_program(lines, name, request.controller.dialect)
     if refused is not None:
         raise refused
@@ -131,6 +138,11 @@ def read(request: Request) -> ReadProgram:
                 line=error.line,
                 column=error.column,
             ) from None
+
+
+def in_language(request: Request, language: str) -> Request:
+    """The request with the dialect of the program's language, which has a reader."""
+    return replace(request, controller=replace(request.controller, dialect=DIALECTS[READ[language]]))
 
 
 def _read_built_in(request: Request) -> ReadProgram:
@@ -173,7 +185,17 @@ def program_of(run: ProgramRun, request: Request, ending: Sequence[Remark]) -> R
         tools=tuple(state.used_tools.values()),
         dialect=request.controller.label,
         jumps=tuple(run.jumps),
+        stock=blank_of(state.plain.stock),
     )
+
+
+def blank_of(stock: Mapping[str, Sequence[float]]) -> Blank | None:
+    """The corners of BLK FORM in m, where both are whole."""
+    corners = [[m_from_mm(v) for v in corner] for corner in stock.values()]
+    if len(corners) != 2 or any(map(math.isnan, [*corners[0], *corners[1]])):
+        return None
+    (a, b, c), (d, e, f) = corners
+    return (a, b, c), (d, e, f)
 
 
 def on_the_part(program: ReadProgram, request: Request, state: State | None = None) -> ReadProgram:

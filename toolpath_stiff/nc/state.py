@@ -4,6 +4,7 @@ mm, degrees, mm/min.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal, get_args
@@ -11,6 +12,7 @@ from typing import Literal, get_args
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.controller import GENERIC, Dialect
+from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
@@ -155,6 +157,64 @@ START = "before its first move the tool stands at 0, 0, 0 of the control, as Lin
 
 
 @dataclass
+class Conversational:
+    """What a control of Heidenhain's keeps besides, in its plain language; mm and degrees, points in program axes.
+
+    Attributes
+    ----------
+    pole, heading
+        Circle centre (CC) and the direction in which the last contour element ended, in the plane; None: not known.
+    held, corner
+        A contour element that waits for the corner behind it, with its feed, and that corner's statement (CHF, RND).
+    approach
+        The contour point of an APPR, and what it does once the direction of the first element is known.
+    fast
+        Whether the last positioning was a rapid.
+    to_corner
+        Whether the next statement is a corner.
+    cycle, modal
+        The cycle defined last with its parameters, and whether M89 calls it after each positioning.
+    shift, outer, angle, mirrored, scale, tilt
+        Cycle 7 (in the tilted plane; before the tilting), 10, 8 (axes), 11, and PLANE or cycle 19; None: not tilted.
+    doubt
+        Why the order of those is uncertain, until a reset settles it.
+    unknown
+        Axes of the plane whose position is not known until they are named.
+    tool_feed, radius, held_tip, shorter
+        F of TOOL CALL (mm/min), the tool's radius with its DR, M128 and M126 in force.
+    preset, names, stock, parameters
+        The datum of cycle 247; numbers given to tools of a name; the corners of BLK FORM; Q parameters.
+    """
+
+    pole: tuple[float, float] | None = None
+    heading: tuple[float, float] | None = None
+    held: tuple[CurrentBlock, Element, float | None] | None = None
+    corner: CurrentBlock | None = None
+    approach: tuple[dict[int, float], Callable[[complex], None]] | None = None
+    fast: bool = False
+    to_corner: bool = False
+    cycle: tuple[int, dict[str, float], int] | None = None
+    modal: bool = False
+    shift: list[float] = field(default_factory=lambda: [0.0] * 3)
+    outer: list[float] = field(default_factory=lambda: [0.0] * 3)
+    angle: float = 0.0
+    mirrored: frozenset[int] = frozenset()
+    scale: float = 1.0
+    tilt: list[list[float]] | None = None
+    doubt: str = ""
+    unknown: set[int] = field(default_factory=set)
+    tool_feed: float | None = None
+    radius: float = math.nan
+    held_tip: bool = False
+    shorter: bool = False
+    preset: float | None = None
+    names: dict[str, int] = field(default_factory=dict)
+    stock: dict[str, list[float]] = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict)
+    kept: tuple[tuple[object, ...], list[float]] = ((None, None, None), [])  # the present point, and what it was of
+
+
+@dataclass
 class State:
     """The state of a control, at its start as LinuxCNC's is unless the dialect says otherwise.
 
@@ -218,6 +278,8 @@ class State:
         H of a block without G43, which a later G43 without H may mean.
     turning
         What makes the program look like a lathe's, with its line.
+    plain
+        What Heidenhain's plain language keeps besides.
     """
 
     name: str
@@ -259,6 +321,7 @@ class State:
     beside: list[float] | None = None
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
+    plain: Conversational = field(default_factory=Conversational)
 
     def __post_init__(self) -> None:
         self.arc_absolute, self.retract = self.dialect.arc_absolute, self.dialect.retract

@@ -11,6 +11,7 @@ import numpy as np
 
 from toolpath_stiff.inference.candidates import candidates_of
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
+from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.portrait.choice import ROUGH, Leading, fewest, summed
 from toolpath_stiff.portrait.selection import Selection
@@ -21,6 +22,7 @@ from toolpath_stiff.stiffness.terms import Term
 # constants or places must fit better than the plainest ones by as much as its prior weight is smaller.
 AS_WELL = float(np.log(20.0))
 ITSELF = 0.99  # correlation from which a term of the same link is the named effect itself
+MOST_NAMED = 2  # effects that one is replaced of; a triple would take as long as the diagnosis
 MOST_TOLD, TOLD = 6, 0.03  # terms that are told, and the least share of one
 
 
@@ -41,21 +43,39 @@ class Alike:
     variables: tuple[tuple[str, float], ...]
 
 
-def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: int) -> Alike | None:
-    """Terms of the dictionary that fit the readings as well as a named effect does; None where there are none.
+def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: int) -> dict[str, Alike]:
+    """Named effect -> terms of the dictionary that fit the readings as well in its place; without those of none.
 
     Parameters
     ----------
     problem, noise
         Readings, model and scatter; the noise model behind the scatter.
     base, named
-        The model with its strut law refitted, without and with the named effect.
+        The model with its strut law refitted, without and with the named effects. Of several one is replaced at a time,
+        the others keeping their sizes.
     seed
         Of the selection.
     """
-    if len(named.candidates) != 1:  # no single term stands for two effects
-        return None
-    selection = Selection(problem, base, noise, seed)
+    count = len(named.candidates)
+    if count > MOST_NAMED:
+        return {}
+    bases = [base] if count == 1 else [_without(problem, named, k) for k in range(count)]
+    first = Selection(problem, bases[0], noise, seed)
+    selections = [first, *(first.beside(other) for other in bases[1:])]
+    found = {named.names[k]: _in_place(selection, named, k) for k, selection in enumerate(selections)}
+    return {name: alike for name, alike in found.items() if alike is not None}
+
+
+def _without(problem: Problem, named: Fit, k: int) -> Fit:
+    """The fit without effect k, the others at their sizes."""
+    others = [(c, s) for i, (c, s) in enumerate(zip(named.candidates, named.sizes, strict=True)) if i != k]
+    candidates, sizes = zip(*others, strict=True)
+    return fit_effects(problem, candidates, sizes, (), named.law, named.scatter)
+
+
+def _in_place(selection: Selection, named: Fit, k: int) -> Alike | None:
+    """Terms that fit as well as effect k of a fit; None where there are none."""
+    problem, candidate = selection.problem, named.candidates[k]
     if not selection.dictionary.terms:
         return None
     # Both under the scatter of the named fit, so that wild readings count alike.
@@ -70,15 +90,15 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
     squares = float(start.fit.scatter.precision.squares(named.residual))
     # Less what it gains by its further sizes (Schwarz 1978) and by a choice, which a term has not.
     data = problem.predictor.data
-    choices = len(candidates_of(named.candidates[0].effect, data))
-    freedom = 0.5 * (len(named.free) - 1) * float(np.log(len(data))) + float(np.log(max(choices, 1)))
+    choices, sizes_of_it = len(candidates_of(candidate.effect, data)), int(np.count_nonzero(named.sizes[k]))
+    freedom = 0.5 * (sizes_of_it - 1) * float(np.log(len(data))) + float(np.log(max(choices, 1)))
     reached = -0.5 * (squares + float(named.law @ named.law) / LAW_PRIOR**2) - freedom
     plainest = float(selection.dictionary.log_prior.max())
     same = (sizes.posterior + prior - plainest >= reached - AS_WELL) & (np.abs(sizes.size[:, -1]) > 0.0)
     # A term is the named effect itself where it does what that does, in its own link.
-    change = np.exp(named.residual - problem.observed) - problem.predictor.strut_part(named.law) - problem.rest
+    change = np.exp(named.residual - problem.observed) - problem.predictor.strut_part(named.law) - selection.rest
     alike = columns @ change > ITSELF * np.linalg.norm(columns, axis=1) * np.linalg.norm(change)
-    link = named.candidates[0].effect.link
+    link = candidate.effect.link
     same &= ~(alike & np.array([CATALOGUE_LINKS.get(term.link, term.link) == link for term in terms]))
     if not same.any():
         return None

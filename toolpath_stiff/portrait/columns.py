@@ -14,10 +14,19 @@ from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
-from toolpath_stiff.stiffness.term_effect import along_pins, carriers, coupled, pair_stiffness, reading_share
+from toolpath_stiff.stiffness.term_effect import (
+    along_pins,
+    carriers,
+    coupled,
+    pair_stiffness,
+    reading_share,
+    spring_rows,
+    spring_stiffness,
+)
 from toolpath_stiff.stiffness.terms import (
     AXES,
     IN_SERIES,
+    PARALLEL,
     PINS,
     PLACE,
     SWINGS,
@@ -64,6 +73,8 @@ def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "")
         shapes += [("threshold", (("beyond", force),)) for force in held]
         if variable == "strut force" and not signed:
             shapes += [("threshold", (("within", force),)) for force in held]
+    if variable == "tool length":  # a holder that tilts, a tool that bends (a cantilever: l^2, l^3 / 3 E I)
+        return [("slope", (("power", power), ("reference", low))) for power in (2.0, 3.0)]
     # Straight lines over the range, and from its middle on.
     bent = ([low, high] if signed else [high, low]) if many > 4 else []
     if signed:
@@ -173,7 +184,15 @@ class Ground:
 
     def known(self, variable: str) -> bool:
         """Whether the readings say what a variable is."""
-        needed = {"time": "time_min", "temperature": "temperature_C", "load": "force_N", "strut force": "force_N"}
+        if variable == "tool length" and self.predictor.machine.reference_tool_length <= 0.0:
+            return False
+        needed = {
+            "tool length": "tool_extension_mm",
+            "time": "time_min",
+            "temperature": "temperature_C",
+            "load": "force_N",
+            "strut force": "force_N",
+        }
         if variable in self.data.extra:
             return bool(np.isfinite(self.data.extra[variable]).all())
         return needed.get(variable, "") not in self.data.missing
@@ -208,6 +227,9 @@ class Ground:
             strut, axis = (term.where or 1) - 1, "XYZ".index(term.direction)
             index = 3 * (strut + 6 * (term.column == "platform")) + axis
             return np.asarray(-self.compliance * self.predictor.joint_columns[:, index])
+        if term.action == "spring":
+            moves = np.einsum("nki,nij,nj->nk", spring_rows(term, path), self._flexibility, self.forces[:, 6:])
+            return np.asarray(-(moves**2).sum(axis=1) * self._seen)
         if term.action in ("reading factor", "reading shift"):
             share = reading_share(replace(term, variable="constant", shape="offset", times=None), path)
             return np.asarray(share * (self.compliance if term.action == "reading factor" else 1.0 / self.data.force))
@@ -233,31 +255,35 @@ class Ground:
         wrench = self.forces[:, 6:]
         return np.asarray(self.compliance / np.einsum("ni,nij,nj->n", wrench, self._flexibility, wrench))
 
-    def _turned_by(self, weights: FloatArray, size: float) -> tuple[FloatArray, FloatArray]:
-        """(n,) m/N per unit of size that `turning` of weights (n, 6) adds at a size, and by which it grows there.
+    def _parallel(self, term: Term, shape: FloatArray, size: float) -> tuple[FloatArray, FloatArray]:
+        """(n,) m/N per unit of size that a term of `PARALLEL` adds at a size, and by which it grows there.
 
-        Springs K of the rotations B x of a twist x stand parallel to what bears the load: C + dC = (C^-1 + B^T K B)^-1.
+        Springs K of the motions B x of a twist x stand parallel to what bears the load: C + dC = (C^-1 + B^T K B)^-1.
         """
-        springs = np.einsum("nk,nkai,nkaj->nij", size * weights, self._rotations, self._rotations)
+        if term.action == "spring":
+            springs = spring_stiffness(term, self.path, size * shape)
+        else:
+            weights = size * _each(shape, term)
+            springs = np.einsum("nk,nkai,nkaj->nij", weights, self._rotations, self._rotations)
         wrench = self.forces[:, 6:, None]
         moved = np.linalg.solve(np.eye(6) + self._flexibility @ springs, self._flexibility @ wrench)
         change = ((moved - self._flexibility @ wrench) * wrench).sum(axis=(1, 2))
         slope = -(np.einsum("nij,njk->nik", springs, moved) * moved).sum(axis=(1, 2))
         return np.asarray(change * self._seen / size), np.asarray(slope * self._seen / size)
 
-    def _turned(self, term: Term, tangents: FloatArray, shapes: FloatArray) -> FloatArray:
-        """(s, n) of `turning`, at the term's size or, where it has none, at one as it is usually found."""
+    def _at_size(self, term: Term, tangents: FloatArray, shapes: FloatArray) -> FloatArray:
+        """(s, n) of a term of `PARALLEL`, at its size or, where it has none, at one as it is usually found."""
         rows = []
         for tangent, shape in zip(tangents, shapes, strict=True):
             size = term.size or TURNED / max(float(np.sqrt(np.mean((tangent / self.compliance) ** 2))), 1e-12)
-            rows.append(self._turned_by(_each(shape, term), min(size, term.bounds[1] * term.si))[0])
+            rows.append(self._parallel(term, shape, min(size, term.bounds[1] * term.si))[0])
         return np.array(rows).reshape(tangents.shape)
 
     def slope(self, term: Term) -> FloatArray:
         """(n,) m/N by which what a term adds grows with its size; its `column` unless it is not linear in it."""
-        if not term.size or term.action != "turning":
+        if not term.size or term.action not in PARALLEL:
             return self.column(term)
-        return self._turned_by(_each(self.shape(term), term), term.size)[1]
+        return self._parallel(term, self.shape(term), term.size)[1]
 
     def shape(self, term: Term) -> FloatArray:
         """(n,) or (n, 6) of what a term depends on."""
@@ -278,12 +304,14 @@ class Ground:
     def columns(self, term: Term, share: FloatArray, shapes: FloatArray) -> FloatArray:
         """(s, n) m/N per unit of size of a term's link, for shapes (s, n) or (s, n, 6); its `share` (n,) or (n, 6)."""
         if share.ndim == 1:
-            return np.asarray(share * shapes)
-        if shapes.ndim == 3:
+            columns = share * shapes
+        elif shapes.ndim == 3:
             columns = np.einsum("ni,sni->sn", share, shapes)
         else:
             columns = (share.sum(axis=1) if term.where is None else share[:, term.where - 1]) * shapes
-        return self._turned(term, columns, shapes) if term.action == "turning" else np.asarray(columns)
+        # Springs that are looked for are small beside the struts: their tangent will do.
+        straight = term.action not in PARALLEL or (term.action == "spring" and not term.size)
+        return np.asarray(columns) if straight else self._at_size(term, columns, shapes)
 
     def column(self, term: Term) -> FloatArray:
         """(n,) m/N per unit (SI) of a term's size."""

@@ -73,9 +73,13 @@ def locals_of(extra: Iterable[str]) -> list[Local]:
             Local("instrument", "reading shift", axis, None, ("constant", "time", "order", "temperature", "setup"))
             for axis in ("reading", "X", "Y", "Z")
         ),
-        *_of_head("tool", whole),
+        *_of_head("tool", (*whole, "tool length")),
         *_of_head("platform", whole),
         *_of_vertices("platform", ("radial", "tangential", "axial", "along the struts"), (*whole, "tilt")),
+        *(
+            Local("platform", "spring", axis, None, ("constant", *PLACE), crossed=(*whole, "tilt"))
+            for axis in ("X", "Y", "Z", "horizontal")
+        ),
         *_of_joints(whole),
         *_of_struts(whole),
         *_of_vertices("frame", ("radial", "tangential", "Z", "along the struts"), whole),

@@ -6,8 +6,10 @@ series.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -19,14 +21,14 @@ from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.noise import Noise, Scatter
 from toolpath_stiff.portrait.columns import Ground, shapes_near
 from toolpath_stiff.portrait.dictionary import crossed, dictionary_of, products
-from toolpath_stiff.stiffness.terms import Term
+from toolpath_stiff.stiffness.terms import PARALLEL, Term
 
 DRAWS = 200  # simulated campaigns
 JOINS = 0.02  # probability by chance below which a further term is taken for something
 TIE = 0.5  # of log likelihood: so near, the place with the larger prior is taken
 FINALISTS = 40  # terms that are fitted in full: the best of all; and the best of every link and variable
 STEPS, SETTLED = 5, 0.02  # Gauss-Newton; standard deviations
-NOT_LINEAR, AT_SIZE = ("turning",), 3  # actions that are not linear in their size, and fits at the size of the last
+AT_SIZE = 3  # fits of what is not linear in its size, each at the size of the last
 FINER = (1.0, 0.4)  # shares of a grid's spacing, for constants about those of a term
 ROUNDS = 2  # searches for wild readings
 
@@ -97,6 +99,13 @@ class Selection:
         self.ground = Ground(problem.predictor, self.compliance, base.law)
         self.dictionary = dictionary_of(self.ground)
 
+    def beside(self, base: Fit) -> Self:
+        """The same dictionary beside another fit to the same readings; before anything is searched."""
+        other = copy(self)
+        compliance = np.exp(base.residual - self.problem.observed)
+        other.base, other.rest = base, compliance - self.problem.predictor.strut_part(base.law)
+        return other
+
     @property
     def start(self) -> Description:
         """Nothing but the base fit."""
@@ -155,7 +164,7 @@ class Selection:
         sized = tuple(t.sized(float(u / s)) for t, u, s in zip(terms, sizes.size[0], scale, strict=True))
         residual, jacobian = sizes.residual[0], self._linearised(sizes.law, sizes.size, columns[None])[1][0]
         for k, term in enumerate(sized):
-            if term.action in NOT_LINEAR:
+            if term.action in PARALLEL:
                 jacobian[2 + k] = -self.ground.slope(term) / scale[k] * np.exp(self.problem.observed - residual)
         information = scatter.precision.times(jacobian) @ jacobian.T + law_prior(len(jacobian))
         covariance = np.asarray(scaled_inverse(information))
@@ -250,7 +259,7 @@ class Selection:
     def extended(self, before: Description, term: Term) -> Description:
         """A description with a term more, all refitted."""
         grown = self.refitted(before, (*before.terms, term))
-        for _ in range(AT_SIZE if any(sized.action in NOT_LINEAR for sized in grown.terms) else 0):
+        for _ in range(AT_SIZE if any(sized.action in PARALLEL for sized in grown.terms) else 0):
             grown = self.refitted(grown, grown.terms)
         return grown
 

@@ -1,6 +1,6 @@
 """A portrait in an engineer's words, and as parts of diagnose.json in shop units."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ SAID: dict[str, tuple[str, float, str]] = {
     "radius": ("the distance from the machine's axis", 1e-3, "mm"),
     "tilt": ("the tilt", RAD_PER_DEG, "deg"),
     "strut length": ("the strut's length", 1e-3, "mm"),
+    "tool length": ("the tool's length", 1e-3, "mm"),
     "strut force": ("the force in the strut", 1.0, "N"),
     "load": ("the load", 1.0, "N"),
     "time": ("the time since zeroing", 60.0, "min"),
@@ -45,6 +46,7 @@ CAUSES = {
     "strut factor": "{softer}",
     "strut": "the joints of {strut} give way",
     "turning": "the joints{of} resist turning",
+    "spring": "something holds the platform {way}, as a hose or a cover does",
     **dict.fromkeys(PINS, "the {pin} way along a pin that stands {pinned}"),
     "vertex": "{vertex}",
     "rocking": "the {link} {rocks}",
@@ -78,7 +80,7 @@ def _cause(term: Term) -> str:
     """Link, place and direction."""
     single, link, direction, more = term.where is not None, term.link, term.direction, term.size >= 0.0
     strut, joint, give = (f"strut {term.where}", "joint", "gives") if single else ("the struts", "joints", "give")
-    ways = {**GIVES, **OF_HEAD} if link in ("tool", "platform") else GIVES
+    ways = {**GIVES, **OF_HEAD} if link in ("tool", "platform") and term.action != "spring" else GIVES
     vertex = f"{link} vertex {term.where}" if single else f"the vertices of the {link}"
     words = {
         "link": link,
@@ -143,7 +145,14 @@ def portrait_text(portrait: Portrait) -> str:
             f"searched (p = {portrait.look_elsewhere:.2g})."
         )
     first, *others = portrait.terms
-    parts = [f"What is missing looks like this: {term_words(first.term)}; {size_words(first)}."]
+    stands = "What is missing looks like this"
+    if portrait.lacking:
+        stands = (
+            "The dictionary lacks what is missing: the terms stand for it, the error at points left out stays at "
+            f"{portrait.held_out_rms / portrait.noise_floor:.2g} times the noise, and link and variable may be wrong. "
+            "Nearest to it"
+        )
+    parts = [f"{stands}: {term_words(first.term)}; {size_words(first)}."]
     if others:
         parts.append(f"Beside it: {'; '.join(f'{term_words(sized.term)}, {size_words(sized)}' for sized in others)}.")
     parts.append(
@@ -189,19 +198,25 @@ def portrait_entry(portrait: Portrait) -> Document:
         "indistinguishable": [
             {**_sized(sized), "probability": json_number(sized.probability or 0.0, 3)} for sized in portrait.alike
         ],
+        "lacking": portrait.lacking,
         **{f"{name}_percent": json_number(100.0 * getattr(portrait, name), 4) for name in SHARES},
         "look_elsewhere": json_number(portrait.look_elsewhere, 3),
     }
 
 
-def alike_entry(name: str, alike: Alike) -> Document:
-    """What else would look the same as a named effect, as diagnose.json has it."""
+def alike_entry(alike: Mapping[str, Alike]) -> Document | None:
+    """What else would look the same as the named effects, as diagnose.json has it; None where nothing would."""
+    if not alike:
+        return None
+    each = alike.values()
     return {
-        "text": alike_text(name, alike),
-        "links": _shares("link", alike.links),
-        "variables": _shares("variable", alike.variables),
+        "text": " ".join(alike_text(name, same) for name, same in alike.items()),
+        "links": _shares("link", [share for same in each for share in same.links]),
+        "variables": _shares("variable", [share for same in each for share in same.variables]),
         "terms": [
-            {**_term(term), "share": json_number(share, 3), "words": term_words(term)} for term, share in alike.terms
+            {**_term(term), "effect": name, "share": json_number(share, 3), "words": term_words(term)}
+            for name, same in alike.items()
+            for term, share in same.terms
         ],
     }
 

@@ -12,6 +12,9 @@ def text(check: ProgramCheck) -> str:
         lines.append("read by LinuxCNC's interpreter: codes are counted where they stand, modal states are not known")
     if not check.complete:
         lines.append("NOT READ TO ITS END AS IT STANDS: figures are those of the blocks that could be read")
+    lines.append(f"language: {check.language}")
+    if check.needs:
+        lines.append(f"needs: {', '.join(check.needs)}")
     findings = []
     for finding in check.findings:
         place = f"{finding.line}:{finding.column}" if finding.column else f"{finding.line or '-'}"
@@ -33,7 +36,7 @@ def text(check: ProgramCheck) -> str:
         "codes used (times, first line)": [
             f"{code.code:<6} {code.count:>7}  {code.line:>7}  {code.text}" for code in check.used
         ],
-        "extents of cuts": extents,
+        "extents of cuts": extents if check.complete else [],
         "lengths and times": lengths,
         "modal state at the start, at the end": [
             f"{key:<18} {value:<10} {check.modal_end[key]}" for key, value in check.modal_start.items()

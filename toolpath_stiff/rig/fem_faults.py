@@ -2,7 +2,7 @@
 
 `links` are those whose give has this signature at the tip (words of `unknown.LINKS`), `names` the effects of the
 catalogue, by their titles, that are a right name of the fault; without one it lies outside the catalogue. Limits are
-assumed: beyond them a machine would be noticed without a diagnosis.
+assumed: beyond them a machine would be noticed without a diagnosis; they lie within what the catalogue admits.
 """
 
 from collections.abc import Callable
@@ -37,9 +37,9 @@ def _fault(
     return Fault(frozenset(links.split(",")), frozenset(names.split()), limit, change, shape, tuple(needs.split()))
 
 
-def _set(name: str, *pattern: float) -> Change:
-    """The field becomes the size, times a pattern."""
-    return lambda m, p: {name: p["size"] * np.array(pattern) if pattern else p["size"]}
+def _grown(name: str, *pattern: float) -> Change:
+    """The field grows by the size, times a pattern."""
+    return lambda m, p: {name: getattr(m, name) + (p["size"] * np.array(pattern) if pattern else p["size"])}
 
 
 def _softened(name: str, hit: Callable[[Shape], Any] = lambda p: True) -> Change:
@@ -75,35 +75,42 @@ ONE, ALL, WORK = "one strut,joints", "joints,struts", "table,frame"
 
 FAULTS: dict[str, Fault] = {
     # In the catalogue, by the titles of its effects.
-    "spindle_bearings_soft": _fault("tool", "spindle_compliance", SOFT, _set("bearings", 1, 1, 0)),
-    "spindle_thrust_bearing_soft": _fault("tool", "spindle_compliance", SOFT, _set("bearings", 0, 0, 1)),
-    "tool_slender": _fault("tool", "spindle_compliance", 3.0, _softened("tool")),
-    "platform_soft": _fault(
-        "platform", "platform_flexibility", CRACKED, _both(_softened("rim"), _softened("spokes"))
-    ),
-    "joints_soft": _fault(ALL, "joint_compliance strut_law", SOFT, _set("joint")),
-    "joints_in_contact": _fault(ALL, "contact_nonlinearity joint_compliance strut_law", SOFT, _set("hertz")),
-    "joints_turn_hard": _fault("joints", "joint_moment_stiffness", 2e6, _set("turning", *[1] * 6)),
-    "struts_curved": _fault(ALL, "strut_law", 0.4, _set("curvature"), signed),
-    "strut_weak": _fault(ONE, "weak_strut", 2.3, _softened("strut_factors", _strut), one_strut),
-    "frame_soft": _fault("frame", "frame_compliance", CRACKED, _softened("members")),
+    "spindle_bearings_soft": _fault("tool", "spindle_compliance", SOFT, _grown("bearings", 1, 1, 0)),
+    "spindle_thrust_bearing_soft": _fault("tool", "spindle_compliance", SOFT, _grown("bearings", 0, 0, 1)),
+    "platform_soft": _fault("platform", "platform_flexibility", CRACKED, _both(_softened("rim"), _softened("spokes"))),
+    "joints_soft": _fault(ALL, "joint_compliance strut_law", SOFT, _grown("joint")),
+    "joints_in_contact": _fault(ALL, "contact_nonlinearity joint_compliance strut_law", SOFT, _grown("hertz")),
+    "joints_turn_hard": _fault("joints", "joint_moment_stiffness", 1.2e6, _grown("turning", *[1] * 6)),
+    "struts_curved": _fault(ALL, "strut_law", 0.3, _grown("curvature"), signed),
+    "strut_weak": _fault(ONE, "weak_strut", 1.5, _softened("strut_factors", _strut), one_strut),
+    "frame_soft": _fault("frame", "frame_compliance frame_sway", CRACKED, _softened("members")),
     "frame_corner_soft": _fault(
         "frame", "frame_compliance", SOFT,
         lambda m, p: {"brackets": np.outer(_number("corner", 6)(p), [p["size"] * p["radial"], p["size"]])},
         drawn(whole("corner", 0, 3), uniform("radial", 0.2, 1.5)),
     ),
     "table_mounts_soft": _fault("table", "table_compliance", CRACKED, _softened("mounts")),
-    "riser_soft": _fault("table", "setup_compliance", SOFT, _set("riser"), needs="setup"),
-    "platform_wide": _fault("platform,joints,geometry", "platform_radius_error", 0.02, _set("radius_error"), signed),
-    "tool_entered_wrong": _fault("tool,geometry", "tool_length_error", 0.06, _set("tip_error"), signed),
+    "riser_soft": _fault("table", "setup_compliance", SOFT, _grown("riser"), needs="setup"),
+    "platform_wide": _fault("platform,joints,geometry", "platform_radius_error", 0.02, _grown("radius_error"), signed),
+    "tool_entered_wrong": _fault("tool,geometry", "tool_length_error", 0.04, _grown("tip_error"), signed),
     "cell_scaled": _fault(
-        "instrument", "gauge_scale", 0.2,
+        "instrument", "gauge_scale", 0.15,
         lambda m, p: {"gauge_target": "XYZ"[p["axis"]], "gauge_factor": 1.0 + p["size"]},
         drawn(whole("axis", 0, 3), signed),
     ),
-    "indicator_drifts": _fault("instrument", "thermal_drift", 3.3e-7, _set("drift"), signed, "time_min"),
+    "indicator_drifts": _fault("instrument", "thermal_drift", 2.5e-7, _grown("drift"), signed, "time_min"),
+    "tool_slender": _fault("tool", "tool_bending", 3.0, _softened("tool")),
+    "frame_feet_soft": _fault(WORK, "frame_sway", CRACKED, _softened("feet")),
+    "joint_off_its_place": _fault(
+        f"{ONE},platform,frame,geometry", "joint_offset", 0.012,
+        lambda m, p: {"platform_errors": m.platform_errors + p["size"] * np.outer(_strut(p), _unit(p))},
+        drawn(one_strut, _direction),
+    ),
+    "indicator_above_tip": _fault("instrument", "indicator_off_tip", 0.06, _grown("touches_above")),
+    "cell_curved": _fault("instrument", "load_cell_curvature", 0.3, _grown("cell_curve"), signed, "force_N"),
+    "stand_gives": _fault("instrument", "stand_compliance", SOFT, _grown("stand")),
     # Outside the catalogue.
-    "spindle_bearing_oval": _fault("tool", "", SOFT, _set("bearings", 1, 0, 0)),
+    "spindle_bearing_oval": _fault("tool", "", SOFT, _grown("bearings", 1, 0, 0)),
     "spindle_flange_loose": _fault("tool,platform", "", 4e-6, _about("flange"), _azimuth),
     "platform_plate_bends": _fault("platform", "", CRACKED, _softened("spokes")),
     "platform_cracked": _fault(  # around a joint: its spoke and the two pieces of the rim that meet there
@@ -114,12 +121,9 @@ FAULTS: dict[str, Fault] = {
         ),
         whole("corner", 0, 6),
     ),
-    "frame_beam_cracked": _fault(
-        "frame", "", CRACKED, _softened("members", _number("beam", 24)), whole("beam", 0, 12)
-    ),
+    "frame_beam_cracked": _fault("frame", "", CRACKED, _softened("members", _number("beam", 24)), whole("beam", 0, 12)),
     "frame_diagonals_soft": _fault("frame", "", CRACKED, _softened("members", lambda p: np.arange(24) >= 6)),
     "frame_foot_soft": _fault(WORK, "", CRACKED, _softened("feet", _number("foot", 6)), whole("foot", 0, 3)),
-    "frame_feet_soft": _fault(WORK, "", CRACKED, _softened("feet")),
     "table_side_soft": _fault(  # two neighbours of the four mounts
         WORK, "", CRACKED,
         _softened("mounts", lambda p: np.isin(np.arange(4), ((0, 1), (0, 2), (1, 3), (2, 3))[p["edge"]])),
@@ -131,15 +135,10 @@ FAULTS: dict[str, Fault] = {
         f"{ONE},platform", "", 4 * SOFT, _both(_about("seat"), lambda m, p: {"seat_strut": p["strut"]}),
         drawn(one_strut, _direction),
     ),
-    "joint_off_its_place": _fault(
-        f"{ONE},platform,frame,geometry", "", 0.03,
-        lambda m, p: {"platform_errors": m.platform_errors + p["size"] * np.outer(_strut(p), _unit(p))},
-        drawn(one_strut, _direction),
-    ),
-    "joints_soften_swinging": _fault(ALL, "", 8 * SOFT, _set("swing")),
+    "joints_soften_swinging": _fault(ALL, "", 8 * SOFT, _grown("swing")),
     # The weight closes a play until a load beyond it opens it: the catalogue's is there at any load.
-    "joints_loose": _fault(ALL, "", 8e-5, _set("clearance"), needs="force_N"),
-    "joints_open": _fault(ALL, "", SOFT, _set("opening")),
+    "joints_loose": _fault(ALL, "", 8e-5, _grown("clearance"), needs="force_N"),
+    "joints_open": _fault(ALL, "", SOFT, _grown("opening")),
     "nut_worn": _fault(
         ONE, "", SOFT, lambda m, p: {"worn": np.array([p["strut"], p["start"], p["size"]])},
         drawn(one_strut, uniform("start", 0.0, 0.8)),
@@ -150,9 +149,6 @@ FAULTS: dict[str, Fault] = {
     "hose_pulls": _fault(
         "platform,tool", "", 4e7, lambda m, p: {"hose": np.array([p["size"], p["azimuth"]])}, _azimuth
     ),
-    "indicator_above_tip": _fault("instrument", "", 0.06, _set("touches_above")),
-    "cell_curved": _fault("instrument", "", 0.3, _set("cell_curve"), signed, "force_N"),
-    "stand_gives": _fault("instrument", "", SOFT, _set("stand")),
 }  # fmt: skip
 
 

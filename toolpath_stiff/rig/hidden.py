@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
 from numpy.random import Generator
@@ -27,7 +26,6 @@ HERTZ_LOAD = 500.0  # N, load at which contact_nonlinearity's compliance is quot
 SLACK_LOAD = 0.1  # N, below which a joint's secant compliance is held: far below any load of a campaign
 PRINTED_N_PER_MM = 1.0  # resolution of what is printed: whole N/mm, as in the paper's Table 1 (published)
 AXES = np.eye(3)
-Machine = TypeVar("Machine", bound="HiddenMachine")
 
 
 @dataclass(frozen=True)
@@ -245,7 +243,7 @@ class Nuisances:
         return cls(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, rounded=False)
 
 
-def disturb_machine(hidden: Machine, nuisances: Nuisances, rng: Generator) -> Machine:
+def disturb_machine(hidden: HiddenMachine, nuisances: Nuisances, rng: Generator) -> HiddenMachine:
     """The machine with its struts spread and its joints displaced."""
     return dataclasses.replace(
         hidden,

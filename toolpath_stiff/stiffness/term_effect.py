@@ -113,13 +113,19 @@ class TermEffect(Effect):
         return np.sum(added, axis=0) if added else None
 
     def parallel_stiffness(self, path: LoadPath, p: Values) -> FloatArray | None:
-        """Rotational springs at both ends of each strut."""
+        """Rotational springs at both ends of each strut, and springs from the platform to the ground."""
+        springs = [
+            spring_stiffness(term, path, size * shaped_at(term, path))
+            for term, size in self._sizes(path, p, "spring")
+            if size
+        ]
         weights = [size * strut_share(term, path) for term, size in self._sizes(path, p, "turning") if size]
         if not weights:
-            return None
+            return np.sum(springs, axis=0) if springs else None
         rotations, flat = end_rotations(path), (len(path), 36, 6)
         weighted = np.sum(weights, axis=0)[:, :, None, None] * rotations
-        return np.asarray(np.swapaxes(rotations.reshape(flat), 1, 2) @ weighted.reshape(flat))
+        turning = np.swapaxes(rotations.reshape(flat), 1, 2) @ weighted.reshape(flat)
+        return np.asarray(np.sum([turning, *springs], axis=0))
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
         """With joints off their places."""
@@ -231,6 +237,19 @@ def strut_share(term: Term, path: LoadPath) -> FloatArray:
     if term.action == "strut factor":
         each = np.asarray(each / path.machine.strut_law.stiffness(path.struts.lengths))
     return np.asarray(each * along_pins(term, path) ** 2) if term.action in PINS else each
+
+
+def spring_rows(term: Term, path: LoadPath) -> FloatArray:
+    """(n, k, 6) by how much the middle of the platform joints moves along a `spring` for a twist of the tip."""
+    axes = np.eye(3)[{"all": [0, 1, 2], "horizontal": [0, 1]}.get(term.direction) or [AXES[term.direction]]]
+    lever = np.cross(path.struts.arms.mean(axis=1)[:, None], axes)
+    return np.concatenate([np.broadcast_to(axes, lever.shape), lever], axis=2)
+
+
+def spring_stiffness(term: Term, path: LoadPath, stiffness: FloatArray) -> FloatArray:
+    """(n, 6, 6) about the tip of springs of stiffness (n,) N/m."""
+    rows = spring_rows(term, path)
+    return np.asarray(stiffness[:, None, None] * (np.swapaxes(rows, 1, 2) @ rows))
 
 
 def coupled(term: Term) -> tuple[int, int]:

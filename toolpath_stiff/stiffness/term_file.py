@@ -32,7 +32,7 @@ from toolpath_stiff.units import RAD_PER_DEG
 
 # Variable -> unit of its constants in files and its SI value; the rest, and those named below, are plain numbers.
 CONSTANT_UNITS = {
-    **dict.fromkeys((*PLACE, "strut length"), ("mm", 1e-3)),
+    **dict.fromkeys((*PLACE, "strut length", "tool length"), ("mm", 1e-3)),
     **dict.fromkeys(("strut force", "load"), ("N", 1.0)),
     "tilt": ("deg", RAD_PER_DEG),
     "time": ("min", 60.0),

@@ -38,6 +38,7 @@ Constants = tuple[tuple[str, float], ...]
 #   frame pin,      a joint gives along one pin of its cross, which stands radially or tangentially about the machine's
 #   platform pin    axis, or about the platform's; in series with its strut; m/N
 #   turning         joints resist turning, at both ends of the strut; N m/rad, parallel to the struts
+#   spring          a spring from the middle of the platform joints to the ground; N/m, parallel to the struts
 #   strut factor    a share of the strut's own compliance by the strut law
 #   coupling        the force of one strut stretches another, by a share of the mean of both struts' compliances
 #   joint offset    a joint stands off its place, and the control does not know; m
@@ -49,6 +50,7 @@ SIZES: dict[Action, Parameter] = {  # what a machine that still mills can have
     "rocking": Parameter("size", "nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0), ASSUMED),
     "tilting": Parameter("size", "nrad/N/m", 1e-9, (0.0, 5000.0), (1.0, 300.0), ASSUMED),
     "turning": Parameter("size", "kN m/rad", 1e3, (0.0, 5000.0), (5.0, 550.0), ASSUMED),
+    "spring": Parameter("size", "N/um", 1e6, (0.0, 100.0), (0.1, 10.0), ASSUMED),
     "strut factor": Parameter("size", "%", 0.01, (-50.0, 400.0), (-20.0, 40.0), ASSUMED),
     "coupling": Parameter("size", "%", 0.01, (-50.0, 50.0), (-20.0, 20.0), ASSUMED),
     "joint offset": Parameter("size", "mm", 1e-3, (-30.0, 30.0), (-3.0, 3.0), ASSUMED),
@@ -63,6 +65,7 @@ EQUATIONS: dict[Action, str] = {  # {} is the size, s its share, h a load
     "strut": "c_i += {} s",
     **dict.fromkeys(("frame pin", "platform pin"), "c_i += {} s (u_i . pin)^2"),
     "turning": "K += sum over i of {} s B_i^T B_i",
+    "spring": "K += {} s h h^T, h = motion of the platform's middle",
     "strut factor": "c_i += {} s / k_i",
     "coupling": "c_ij += {} s / sqrt(k_i k_j)",
     "joint offset": "joint += {}",
@@ -71,6 +74,7 @@ EQUATIONS: dict[Action, str] = {  # {} is the size, s its share, h a load
 }
 PINS = ("frame pin", "platform pin")
 IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the compliance of each strut by itself
+PARALLEL = ("turning", "spring")  # actions that share the load with the struts; not linear in their size
 PAIR = ("first", "second")  # constants of a coupling
 # (action, link) -> directions along which it may act there.
 HEAD, BASE, STRUTS = ("tool", "platform"), ("frame", "table"), ("along the struts",)
@@ -85,6 +89,7 @@ ALONG: dict[tuple[str, str], tuple[str, ...]] = {
     **{("coupling", link): STRUTS for link in ("struts", "frame")},
     **{(pin, "joints"): ("radial", "tangential") for pin in ("frame pin", "platform pin")},
     ("turning", "joints"): ("all",),
+    ("spring", "platform"): ("X", "Y", "Z", "horizontal", "all"),
     ("joint offset", "joints"): ("X", "Y", "Z"),
     ("reading factor", "instrument"): ("reading", "X", "Y", "Z", "all"),
     ("reading shift", "instrument"): ("reading", "X", "Y", "Z", "all"),
@@ -108,6 +113,7 @@ SEEN: dict[str, Callable[[LoadPath, str], FloatArray | None]] = {
     "z": lambda path, column: path.position[:, 2],
     "radius": lambda path, column: np.hypot(path.position[:, 0], path.position[:, 1]),
     "tilt": _tilt,
+    "tool length": lambda path, column: path.machine.reference_tool_length + path.tool_extension,
     "strut length": lambda path, column: path.struts.lengths,
     "strut force": lambda path, column: None if path.strut_forces is None else np.abs(path.strut_forces),
     "force sign": lambda path, column: None if path.strut_forces is None else np.sign(path.strut_forces),

@@ -56,7 +56,7 @@ def tool_length(state: State, block: CurrentBlock, code: str) -> None:
     """
     frames, length = state.frames, math.nan
     block.refuse_if(code == HOLDS_TIP and frames.posted is None, code, "is tool centre point control", hint=HOLDS_HINT)
-    _hold_tip(state, block, code, False)
+    hold_tip(state, block, code, False)
     if code == "G43.1":
         value = block.take("Z")
         if value is None or any(block.has(axis) for axis in "XYABC"):
@@ -69,7 +69,7 @@ def tool_length(state: State, block: CurrentBlock, code: str) -> None:
     state.length_changed = state.length_changed or new != frames.tool
     frames.set_tool(new)
     if code == HOLDS_TIP:
-        _hold_tip(state, block, code, True)
+        hold_tip(state, block, code, True)
 
 
 def no_such_control(state: State, block: CurrentBlock, code: str) -> None:
@@ -77,7 +77,7 @@ def no_such_control(state: State, block: CurrentBlock, code: str) -> None:
     raise block.fail(code, "is tool centre point control of Haas' controls", hint="name the control with --dialect")
 
 
-def _hold_tip(state: State, block: CurrentBlock, code: str, hold: bool) -> None:
+def hold_tip(state: State, block: CurrentBlock, code: str, hold: bool) -> None:
     """Switch tool centre point control: the machine stands still, the numbers of the present point change."""
     frames = state.frames
     if frames.posted is None or (not frames.posted.tcp and frames.tip_held == hold):

@@ -1,0 +1,73 @@
+"""`python -m benchmarks.heidenhain [--programs N] [--seed S]`: random programs in Heidenhain's plain language.
+
+Each is read by the package and by an independent small reader (`tests.nc.plain_language`): kinds of moves, points along
+them, the tool's axis must agree within 0.0001 mm. Prints what differs; exit code 1 if anything does, or a program is
+refused.
+"""
+
+import argparse
+import math
+import sys
+
+import numpy as np
+
+from tests.nc.plain_language import SHARES, Reader, random_program
+from toolpath_stiff.errors import TpsError
+from toolpath_stiff.nc.moves import RAPID, Moves
+from toolpath_stiff.nc.reader import parse_program
+
+TOLERANCE_MM, TOLERANCE_AXIS = 1e-4, 1e-6
+
+
+def seen(moves: Moves) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Moves as the small reader has them: kind, points along the way in mm, tool axis."""
+    rows = []
+    for i in range(len(moves)):
+        start, end, normal = moves.start[i, :3] * 1e3, moves.end[i, :3] * 1e3, moves.arc_normal[i]
+        out, points = start - moves.arc_center[i] * 1e3, []
+        for share in SHARES:
+            turn, climb = moves.arc_sweep[i] * share, share * (end - start)
+            if turn:
+                along = normal * (normal @ out)
+                turned = along + math.cos(turn) * (out - along) + math.sin(turn) * np.cross(normal, out)
+                points.append(moves.arc_center[i] * 1e3 + turned + normal * (normal @ climb))
+            else:
+                points.append(start + climb)
+        roll, pitch = moves.end[i, 3:5]
+        axis = (math.sin(pitch) * math.cos(roll), -math.sin(roll), math.cos(pitch) * math.cos(roll))
+        rows.append(("R" if moves.motion[i] == RAPID else "F", np.array(points), np.array(axis)))
+    return rows
+
+
+def difference(text: str) -> str:
+    """What differs between both readings, or why one refuses; "" where they agree."""
+    witness = Reader(text).moves
+    try:
+        moves = seen(parse_program(text, "hunt.h").moves)
+    except TpsError as error:
+        return f"refused: {error}"
+    for number, (ours, theirs) in enumerate(zip(moves, witness, strict=False)):
+        apart, leaning = np.abs(ours[1] - theirs[1]).max(), np.abs(ours[2] - theirs[2]).max()
+        if ours[0] != theirs[0] or apart > TOLERANCE_MM or leaning > TOLERANCE_AXIS:
+            return f"move {number}: {ours} and {theirs}"
+    return "" if len(moves) == len(witness) else f"{len(moves)} moves and {len(witness)}"
+
+
+def main() -> int:
+    """Hunt; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--programs", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    differing = 0
+    for seed in range(arguments.seed, arguments.seed + arguments.programs):
+        text = random_program(seed)
+        if detail := difference(text):
+            differing += 1
+            sys.stdout.write(f"seed {seed}: {detail}\n{text}\n")
+    sys.stdout.write(f"{arguments.programs} programs, {differing} read otherwise\n")
+    return min(differing, 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,303 @@
+"""Contour statements: L, LP, LN, CC, C, CP, CR, CT, CTP, and the corners CHF and RND. mm and degrees, in program axes.
+
+HEIDENHAIN, user's manuals of the TNC 426, the iTNC 530 and the TNC 640, "Programming contours" ("Path contours:
+Cartesian coordinates", "Polar coordinates"), "Tool compensation". Moves are recorded as those of G0 to G3.
+"""
+
+import cmath
+import math
+
+from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.cutter import LEFT, RIGHT, switch_off
+from toolpath_stiff.nc.codes.motion import machine_move, record
+from toolpath_stiff.nc.codes.tools import HOLDS_HINT
+from toolpath_stiff.nc.compensation import Cutter
+from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
+from toolpath_stiff.nc.geometry import PLANES, ArcError
+from toolpath_stiff.nc.heidenhain.points import ON_CIRCLE_MM, feed, in_plane, inch_tenths, named, polar, present
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Remark
+from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.tables import LARGEST_MM
+from toolpath_stiff.nc.words import AXES, Word
+
+MANUAL = "HEIDENHAIN, user's manual of the iTNC 530"
+PATHS, POLAR = f"{MANUAL}, Path contours: Cartesian coordinates", f"{MANUAL}, Path contours: Polar coordinates"
+SIDES = {"RL": LEFT, "RR": RIGHT}
+
+
+def pole(state: State, block: CurrentBlock, code: str) -> None:
+    """CC: circle centre and pole; without coordinates the present point."""
+    first, second, _ = PLANES[state.plane]
+    here, point = present(state), named(state, block)
+    block.refuse_if(len(point.keys() & {first, second}) == 1, code, "with one coordinate", "both, or none")
+    state.plain.pole = (point.pop(first, here[first]), point.pop(second, here[second]))
+    block.refuse_if(point, code, f"with a coordinate off the plane {state.plane}", "two of it")
+
+
+def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:
+    """R0, RL, RR of a straight statement: the tool on the contour, left of it, right of it."""
+    side = next((word for word in ("R0", "RL", "RR") if block.take(word) is not None), None)
+    cutter = state.cutter
+    if state.plain.approach is not None:  # which says the side
+        block.refuse_if(side == "R0", side, "behind an APPR", "no R0")
+        return
+    if side is None or (side == "R0" and cutter is None) or (cutter and SIDES.get(side) == cutter.side):
+        return
+    first, second, _ = PLANES[state.plane]
+    moves = bool(there.keys() & {first, second})
+    block.refuse_if(not moves, side, "in a statement that does not move in the plane", "it beside X or Y")
+    block.refuse_if(state.plain.held, side, "right behind a corner (CHF, RND)", "a contour element between")
+    if cutter is None:
+        begin_compensation(state, block, side)
+        return
+    block.refuse_if(side != "R0", side, "while the tool is on the other side", "R0 in a statement before it")
+    switch_off(state, block, side)
+
+
+def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
+    """The tool beside the contour from the next move on, by its radius in the tool table or TOOL DEF and its DR."""
+    radius = state.plain.radius
+    hint = f"give it in a tool table (--tools FILE), or TOOL DEF {state.tool} L.. R.."
+    block.refuse_if(math.isnan(radius), side, f"needs the radius of tool {state.tool}", hint=hint)
+    scale = state.plain.scale
+    turned = SIDES[side] if radius >= 0.0 else -SIDES[side]
+    state.cutter = Cutter(
+        turned, abs(radius) / scale, PLANES[state.plane], state.length_scale, straight=True, rounded=True
+    )
+
+
+def go(
+    state: State,
+    block: CurrentBlock,
+    there: dict[int, float],
+    center: complex | None = None,
+    turn: int = 0,
+    turns: int = 1,
+    rapid: bool = False,
+) -> None:
+    """A contour element from the present point; `turn`: an arc, +1 counter-clockwise. Waits if a corner follows."""
+    plain, (first, second, _) = state.plain, PLANES[state.plane]
+    start = present(state)
+    begin, end = in_plane(state, start), complex(there.get(first, start[first]), there.get(second, start[second]))
+    if plain.approach is not None:
+        _approach(state, block, end - begin if center is None else turn * 1j * (begin - center))
+    check_known(state, block, there, rapid)
+    block.refuse_if(any(abs(v) > LARGEST_MM for v in there.values()), None, "leads beyond 100 m")
+    if center is not None:
+        off = abs(abs(begin - center) - abs(end - center))
+        block.refuse_if(off > ON_CIRCLE_MM, None, f"ends {off:.4f} mm off its circle", f"at most {ON_CIRCLE_MM} mm")
+    if plain.held is not None:
+        _cut_corner(state, block, (begin, end, center, turn), there, rapid)
+    ahead = end - begin if center is None else turn * 1j * (end - center)
+    flat = abs(ahead) > 0.0 and not there.keys() - {first, second}
+    plain.heading, plain.fast = ((ahead.real, ahead.imag) if flat else None), rapid
+    if plain.to_corner:
+        block.refuse_if(rapid or turns > 1 or there.keys() - {first, second}, None, *_NO_CORNER)
+        plain.held = (block, (begin, end, center, turn), state.feed)
+    else:
+        move(state, block, there, center, turn, turns, rapid)
+
+
+def move(
+    state: State,
+    block: CurrentBlock,
+    there: dict[int, float],
+    center: complex | None = None,
+    turn: int = 0,
+    turns: int = 1,
+    rapid: bool = False,
+) -> None:
+    """Record a straight move or an arc from where the tool stands, as G0 to G3 do."""
+    frames, plain = state.frames, state.plain
+    here = frames.to_program(frames.position) if plain.held or plain.approach else present(state)
+    control = frames.to_control([there.get(axis, value) for axis, value in enumerate(here)])
+    if not frames.rotated:  # an axis that is not named keeps its number to the last digit
+        control = [control[axis] if axis in there else value for axis, value in enumerate(frames.position)]
+    try:
+        if center is None:
+            record(state, block, RAPID if rapid else FEED, control, there)
+            return
+        block.refuse_if(state.beside, None, "is an arc right after R0", "a straight statement (L) between")
+        first, second, _ = PLANES[state.plane]
+        end = there.get(first, here[first]), there.get(second, here[second])
+        middle, start = (center.real, center.imag), (here[first], here[second])
+        sweep = geometry.sweep_about(middle, start, end, turn < 0, state.inch, turns)
+        here[first], here[second] = middle
+        x, y, z = frames.to_setup(frames.to_control(here))[:3]
+        normal = frames.turn_direction(geometry.normal_of(state.plane))
+        record(state, block, ARC, control, there, arc=Arc((x, y, z), normal, sweep))
+    except ArcError as error:
+        raise block.fail(None, error.found, error.expected) from None
+
+
+def _approach(state: State, block: CurrentBlock, ahead: complex) -> None:
+    plain = state.plain
+    block.refuse_if(not abs(ahead), None, "behind an APPR has no direction in the plane", "the first contour element")
+    assert plain.approach is not None
+    waits, plain.to_corner = plain.to_corner, False
+    plain.approach[1](ahead / abs(ahead))
+    plain.to_corner = waits
+
+
+_NO_CORNER = ("before a corner (CHF, RND) moves out of the plane, or at FMAX", "a contour element in the plane")
+
+
+def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapid: bool) -> None:
+    """Refuse a cut from a point that is not known, and moves in coordinates whose order is uncertain."""
+    plain = state.plain
+    problem = "is a cut from where the tool's place is not known (after PLANE, cycle 19, M140 or M92)"
+    axes = " ".join(AXES[axis] for axis in sorted(plain.unknown))
+    block.refuse_if(plain.unknown and not rapid, None, problem, f"{axes} in a statement with FMAX before it")
+    plain.unknown = plain.unknown - there.keys()
+    inner = plain.angle != 0.0, bool(plain.mirrored), plain.scale != 1.0
+    uncertain = plain.doubt and (any(inner) or plain.tilt is not None)
+    block.refuse_if(uncertain, None, plain.doubt, "cycle 7 first, then PLANE, then 8, 10 or 11")
+    plain.doubt = ""
+    block.refuse_if(all(inner[:2]), None, "under cycle 8 and cycle 10: their order decides the path", "one of them")
+    if plain.held_tip and state.frames.posted is None:
+        leans = any(state.frames.position[3:]) or any(there.get(axis) for axis in (3, 4, 5))
+        block.refuse_if(leans, None, "turns rotary axes under M128 (FUNCTION TCPM)", hint=HOLDS_HINT)
+
+
+def line(state: State, block: CurrentBlock, code: str) -> None:
+    """L, LP: straight to a point. In machine coordinates under M91."""
+    plain, there, rapid = state.plain, polar(state, block) if code == "LP" else named(state, block), feed(state, block)
+    if block.take("M92") is not None:
+        block.refuse_if(not rapid, "M92", "in a cut: the machine builder says where its points are", "FMAX")
+        state.warnings.append(
+            Remark("M92 goes to points that the machine builder sets: left out of the path", block.line)
+        )
+        plain.unknown |= there.keys() & {0, 1, 2}
+        block.take("R0")
+        return
+    if block.take("M91") is not None:
+        block.refuse_if(
+            state.cutter or plain.held or plain.to_corner, "M91", "beside a contour with compensation or a corner"
+        )
+        block.refuse_if(
+            code == "LP" or any(letter[0] == "I" for letter in block.values), "M91", "with polar words or steps"
+        )
+        block.take("R0")
+        unit = state.length_scale
+        values = {AXES[a]: Word(AXES[a], v / unit if a < 3 else v, 1, AXES[a]) for a, v in there.items()}
+        current = CurrentBlock(block.name, block.block, {"G53": block.values["M91"]}, {}, values, set(values))
+        state.motion, plain.heading, plain.pole = "G0" if rapid else "G1", None, None
+        plain.unknown -= there.keys()
+        machine_move(state, current, "G53")
+        return
+    if plain.tilt is not None and there.keys() & {3, 4, 5}:
+        block.refuse_if(
+            there.keys() & {0, 1, 2} and not rapid, None, "turns rotary axes in a tilted plane", "FMAX, or no A, B, C"
+        )
+        for axis in there.keys() & {3, 4, 5}:
+            word = block.values.get(AXES[axis]) or block.values[f"I{AXES[axis]}"]
+            state.note(block.line, word, "turns the machine's axes to the tilted plane, which gives the tool's axis")
+            del there[axis]
+    compensate(state, block, there)
+    if there:
+        go(state, block, there, rapid=rapid)
+
+
+def circle(state: State, block: CurrentBlock, code: str) -> None:
+    """C: about CC to a point; CP: about CC by or to a polar angle, with a height a helix."""
+    if state.plain.pole is None:
+        raise block.fail(None, "without a circle centre, or after a change of the coordinates", "CC before it")
+    center, here, turns = complex(*state.plain.pole), in_plane(state, present(state)), 1
+    step = block.values.get("IPA")
+    block.refuse_if(code == "CP" and not block.has("PA") and step is None, code, "without an angle", "PA or IPA")
+    block.refuse_if(block.has("PR") or block.has("IPR"), code, "with a radius", "the radius of its start")
+    turn = direction(block, step.value if step else 0.0)
+    if step is not None:
+        block.refuse_if(step.value * turn <= 0.0, step, "is against the direction of rotation DR", "the same sign")
+        turns = max(1, math.ceil(abs(step.value) / 360.0 - 1e-9))
+    there = polar(state, block) if code == "CP" else named(state, block)
+    block.refuse_if(abs(here - center) < ON_CIRCLE_MM, None, "begins at its circle centre", "another CC")
+    _round(state, block, there, center, turn, turns)
+
+
+def _round(
+    state: State, block: CurrentBlock, there: dict[int, float], center: complex, turn: int, turns: int = 1
+) -> None:
+    rapid = feed(state, block)
+    block.refuse_if(rapid, "FMAX", "on an arc", "F with a number")
+    side = next((word for word in ("R0", "RL", "RR") if block.take(word) is not None), None)
+    same = side is None or SIDES.get(side, 0) == (state.cutter.side if state.cutter else 0)
+    block.refuse_if(not same or state.beside, side, "changes on an arc", "a straight statement (L) for it")
+    go(state, block, there, center, turn, turns)
+
+
+def direction(block: CurrentBlock, step: float = 0.0) -> int:
+    """+1 or -1 of DR+ and DR-; without it of an angle's step."""
+    plus, minus = block.take("DR+"), block.take("DR-")
+    block.refuse_if(plus is None and minus is None and not step, None, "without its direction", "DR+ or DR-")
+    return 1 if plus is not None or (minus is None and step > 0.0) else -1
+
+
+def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
+    """CR: to a point by a radius; a negative one goes the longer way."""
+    turn, there, radius = direction(block), named(state, block), block.take("R")
+    if not radius:
+        raise block.fail(None, "without its radius", "R")
+    start = in_plane(state, present(state))
+    end = in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
+    size, chord = abs(radius) * state.length_scale, abs(end - start)
+    block.refuse_if(
+        not 0.0 < chord <= 2.0 * (size + ON_CIRCLE_MM), None, f"of radius {size:g} mm to a point {chord:.4f} mm away"
+    )
+    height = math.sqrt(max(size * size - chord * chord / 4.0, 0.0))
+    side = turn if radius > 0.0 else -turn
+    _round(state, block, there, (start + end) / 2.0 + side * height * 1j * (end - start) / chord, turn)
+
+
+def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
+    """CT, CTP: an arc to a point that goes on smoothly from the contour element before."""
+    there, heading = polar(state, block) if code == "CTP" else named(state, block), state.plain.heading
+    if heading is None:
+        raise block.fail(None, "without a contour element in the plane before it", "L, C, CR or CT before it")
+    start = in_plane(state, present(state))
+    end = in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
+    ahead = complex(*heading) / abs(complex(*heading))
+    chord = (end - start) / ahead  # seen along the path
+    block.refuse_if(abs(chord) < ON_CIRCLE_MM, None, "to its own start", "another point")
+    if abs(cmath.phase(chord)) < STRAIGHT_ON:
+        go(state, block, there, rapid=feed(state, block))
+        return
+    block.refuse_if(math.pi - abs(cmath.phase(chord)) < STRAIGHT_ON, None, "straight back", "another point")
+    radius = abs(chord) ** 2 / (2.0 * chord.imag)  # to the left where positive
+    _round(state, block, there, start + radius * 1j * ahead, 1 if radius > 0.0 else -1)
+
+
+def corner(state: State, block: CurrentBlock, code: str) -> None:
+    """CHF, RND: the corner between the contour elements before and behind it is cut off, or rounded."""
+    block.refuse_if(state.plain.held is None, None, "without a contour element before it", "L, C, CR or CT before it")
+    size = block.take("#") if code == "CHF" and block.has("#") else block.take("R")
+    own = block.take("F")
+    if own is not None:  # holds for the corner alone
+        block.values["own"] = Word("F", own * inch_tenths(state), 1, "F")
+    block.refuse_if(not size or size < 0.0, None, "without its size", "RND R5, CHF 2")
+    block.values["size"] = Word("R", (size or 0.0) * state.length_scale, 1, "R")
+    state.plain.corner = block
+
+
+def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict[int, float], rapid: bool) -> None:
+    """Carry out the element that waited, shortened, and its corner; the tool then stands where the next one begins."""
+    (block, held, rate), corner_block, modal = state.plain.held or (None, None, None), state.plain.corner, state.feed
+    state.plain.held = state.plain.corner = None
+    assert block is not None and held is not None and corner_block is not None
+    first, second, _ = PLANES[state.plane]
+    size, rounded = corner_block.values["size"].value, corner_block.block.words[0].text == "RND"
+    after.refuse_if(rapid or there.keys() - {first, second}, None, *_NO_CORNER)
+    lines = held[2] is None and element[2] is None
+    corner_block.refuse_if(not rounded and not lines, None, "beside an arc", "CHF between two lines")
+    try:
+        cut = cut_off(held, element, size, rounded)
+    except ArcError as error:
+        raise corner_block.fail(None, error.found, error.expected) from None
+    begin, end, center, turn = cut or (held[1], held[1], None, 0)
+    state.feed = rate
+    move(state, block, {first: begin.real, second: begin.imag}, held[2], held[3])
+    own = corner_block.values.get("own")
+    state.feed = own.value if own else rate
+    if cut is not None:
+        move(state, corner_block, {first: end.real, second: end.imag}, center, turn)
+    state.feed = modal

@@ -1,0 +1,153 @@
+"""Miscellaneous functions (M) of Heidenhain's controls, tool vectors (LN), and statements that change no path.
+
+HEIDENHAIN, user's manual of the iTNC 530, "Programming: miscellaneous functions", "Three-dimensional compensation".
+"""
+
+import math
+
+from toolpath_stiff.nc.codes.feeds import feed_mode
+from toolpath_stiff.nc.codes.registry import CODES
+from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle, unit_axis
+from toolpath_stiff.nc.geometry import PLANES, ArcError, Vector
+from toolpath_stiff.nc.heidenhain.contour import compensate, go
+from toolpath_stiff.nc.heidenhain.coordinates import hold_tip
+from toolpath_stiff.nc.heidenhain.points import feed, named, present
+from toolpath_stiff.nc.moves import Remark
+from toolpath_stiff.nc.state import CurrentBlock, Flow, State
+from toolpath_stiff.nc.words import AXES
+from toolpath_stiff.units import SECONDS_PER_DAY
+
+# M functions that are those of the one table of codes.
+SHARED = ("M0", "M1", "M2", "M3", "M4", "M5", "M7", "M8", "M9", "M19", "M30")
+# Others that leave the programmed path alone, and those that do not: by what they do.
+PASSIVE = {
+    name: what
+    for what, names in {
+        "tool change by hand: TOOL CALL is what counts": "M6",
+        "spindle and coolant on": "M13 M14",
+        "how the control plans ahead: the path is taken as programmed": "M90 M112 M113 M120 M124 M132 M133 M134 M135",
+        "replacement tools": "M101 M102 M107 M108",
+        "feeds in plunging, on arcs, of rotary axes": "M103 M109 M110 M111 M116 M117 M131",
+        "moves by the handwheel": "M118",
+        "which axes tilt": "M138",
+        "monitoring, data of the program, lift-off at a stop": "M141 M142 M145 M148 M149 M150",
+    }.items()
+    for name in names.split()
+}
+REFUSED = {
+    "M94": "other numbers of the rotary axes", "M97": "small contour steps", "M98": "open contour corners",
+    "M104": "the datum set last", "M114": "compensation for tilting axes", "M130": "points in the untilted system",
+    "M136": "feed per revolution", "M143": "a basic rotation deleted", "M144": "compensation of the kinematics",
+    "M197": "corner rounding",
+}  # fmt: skip
+RETRACT = (
+    "M140 MB MAX retracts the tool to the end of its travel, which the program does not say: it is left out of the path"
+)
+OF_M = ("F", "LA", "T", "E", "P")  # parameters of M103, M120, M112, M124
+
+
+def miscellaneous(state: State, block: CurrentBlock) -> None:
+    """The M functions of a statement that act at its beginning, or leave the path alone."""
+    for letter in [letter for letter in block.values if letter[0] == "M" and letter[1:].isdigit()]:
+        word = block.values[letter]
+        if letter in ("M89", "M91", "M92", "M99", "M140"):
+            continue
+        block.take(letter)
+        block.refuse_if(
+            letter in REFUSED and (letter not in ("M97", "M98") or state.cutter), word, f"is {REFUSED.get(letter)}"
+        )
+        if letter in ("M126", "M127"):
+            state.plain.shorter = letter == "M126"
+        elif letter in ("M128", "M129"):
+            hold_tip(state, block, letter)
+        elif letter in ("M2", "M30"):
+            block.flow = Flow.END
+        elif letter == "M137":
+            feed_mode(state, block, "G94")
+        elif letter in SHARED:
+            if CODES[letter].listed:
+                state.note(block.line, word, CODES[letter].listed)
+        elif letter in PASSIVE or letter in REFUSED:
+            state.note(block.line, word, PASSIVE.get(letter) or REFUSED[letter])
+            if letter in ("M103", "M112", "M118", "M120", "M124", "M101"):
+                for other in (*OF_M, *AXES) if letter == "M118" else OF_M:
+                    block.take(other)
+        else:
+            state.note(block.line, word, "an M function of one control, not acted upon")
+            state.warnings.append(Remark(f"what {word.text} does on its control is not known", block.line))
+
+
+def retract(state: State, block: CurrentBlock) -> None:
+    """M140 MB: away from the work along the tool, by a distance or to the end of the travel."""
+    block.take("M140")
+    axis = next((letter for letter in block.values if letter.lstrip("I") in AXES), None)
+    block.refuse_if(axis, axis, "beside M140", "a statement of its own for it")
+    feed_given, rapid = block.has("F"), feed(state, block)
+    normal, distance = PLANES[state.plane][2], block.take("MB")
+    if distance is None:
+        block.refuse_if(block.take("MBMAX") is None, "M140", "without its distance", "MB50 or MB MAX")
+        if RETRACT not in [remark.text for remark in state.warnings]:
+            state.warnings.append(Remark(RETRACT, block.line))
+        state.plain.unknown.add(normal)
+        return
+    there = present(state)[normal] + distance * state.length_scale
+    go(state, block, {normal: there}, rapid=rapid or not feed_given)
+
+
+def vectors(state: State, block: CurrentBlock, code: str) -> None:
+    """LN: straight to a point, with the tool's axis TX TY TZ; normals alone change nothing without compensation."""
+    there, rapid = named(state, block), feed(state, block)
+    normal, axis = ([block.take(f"{kind}{letter}") for letter in "XYZ"] for kind in "NT")
+    block.refuse_if(block.has("RL") or block.has("RR"), None, "LN with compensation by the radius", "R0")
+    compensate(state, block, there)
+    if all(component is None for component in axis):
+        turned = state.plain.held_tip and normal != [None] * 3 and state.frames.posted is None
+        block.refuse_if(turned, None, "LN with normals under M128, where the tool may follow them", "TX, TY, TZ")
+        go(state, block, there, rapid=rapid)
+        return
+    other = state.frames.posted is not None or state.plain.tilt is not None or there.keys() & {3, 4, 5} or None in axis
+    block.refuse_if(other, None, "LN with A, B, C, in a tilted plane, or beside [kinematics]", "TX, TY and TZ alone")
+    try:
+        target = unit_axis([component or 0.0 for component in axis])
+        start, here = _axis(state), present(state)
+        parts = division(start, target)
+    except ArcError as error:
+        raise block.fail(None, error.found, error.expected) from None
+    held, state.plain.held_tip = state.plain.held_tip, False  # the vectors say what M128 holds
+    for part in range(1, parts + 1):
+        share = part / parts
+        at_part = {i: here[i] + share * (there[i] - here[i]) for i in there} if part < parts else dict(there)
+        leaning = target if part == parts else on_great_circle(start, target, share)
+        roll, pitch = angles_near(leaning, (state.frames.position[3], state.frames.position[4]))
+        go(state, block, at_part | {3: roll, 4: pitch, 5: 0.0}, rapid=rapid)
+    state.plain.held_tip = held
+
+
+def _axis(state: State) -> Vector:
+    """The tool's axis, of roll and pitch."""
+    roll, pitch = (math.radians(v) for v in state.frames.position[3:5])
+    return (math.sin(pitch) * math.cos(roll), -math.sin(roll), math.cos(pitch) * math.cos(roll))
+
+
+def dwell(state: State, block: CurrentBlock, code: str) -> None:
+    """CYCL DEF 9.1: a pause in seconds."""
+    seconds = block.take("#")
+    if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
+        raise block.fail(None, "without its time", "CYCL DEF 9.1 DWELL 1.5")
+    state.recorder.add_dwell(seconds)
+
+
+def units(state: State, block: CurrentBlock, code: str) -> None:
+    """BEGIN PGM: mm or inch."""
+    state.inch = block.take("INCH") is not None
+
+
+def nothing(state: State, block: CurrentBlock, code: str) -> None:
+    """A heading or a label, or what `run` carries out."""
+    block.free.clear()
+
+
+def listed(state: State, block: CurrentBlock, code: str) -> None:
+    """A statement that leaves the path alone; its words go with it."""
+    block.free.clear()
+    state.note(block.line, block.block.words[0], "leaves the path as it is")

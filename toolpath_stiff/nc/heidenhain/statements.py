@@ -1,0 +1,125 @@
+"""Lines of the plain language to statements: a head, and words with their columns.
+
+A statement is a line, `~` at its end continues it; `;` begins a comment, `*` a heading, `/` a statement that may be
+left out. Cycles from 200 on have their parameters in lines that follow (HEIDENHAIN, user's manuals of the iTNC 530 and
+the TNC 640, "Programming fundamentals", "Structuring programs", "Fixed cycles").
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from toolpath_stiff.nc.heidenhain.vocabulary import look_up
+from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.words import LONGEST_BLOCK, MOST_DIGITS, Block, Word
+
+NUMBER = r"(?:\d+[.,]?\d*|[.,]\d+)"
+VALUE = rf"[+-]?\s*(?:{NUMBER}|Q[LR]?\d+)"
+_BEGIN = re.compile(r"\s*(/?)\s*(?:N?\d+(?![\d.,])\s*)?(/?)\s*", re.IGNORECASE)
+_COMMENT = re.compile(r'"[^"]*"|;.*')
+_HEAD = re.compile(
+    r"(?:BEGIN|END)\s+PGM|BLK\s+FORM(?:\s+(?:0[.,][12]|[A-Z]+))?|TOOL\s+(?:CALL|DEF)|CYCL\s+DEF\s+\d+(?:[.,]\d+)?"
+    r"|CYCL\s+CALL(?:\s+P[OA][ST]\b)?|CALL\s+(?:LBL|PGM)|FN\s*\d+\s*:|FUNCTION\s+(?:RESET\s+)?[A-Z]+|PLANE\s+[A-Z]+"
+    r"|(?:APPR|DEP)\s+[A-Z]+|TCH\s+PROBE(?:\s+\d+)?|(?:SEL|PATTERN|INIT)\s+[A-Z]+|Q[LRS]?\d+(?=\s*=)|[A-Z]+"
+)
+_WORD = re.compile(
+    r"(R0(?![\d.,])|R[LR]|DR[+-](?!\s*[\d.,Q])|F\s*MAX|F\s*AUTO|MB\s*MAX|SEQ[+-]|STAY|TURN|MOVE|SYM|(?:TABLE|COORD)\s+ROT"
+    r"|AXIS\s+(?:POS|SPAT)|PATHCTRL\s+(?:AXIS|VECTOR)|F\s+(?:TCP|CONT)|REFPNT\s+[A-Z-]+)"
+    rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
+    rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
+    r"|([XYZABCUVW])(?![A-Z])"
+    rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"",
+)
+PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
+# Heads whose rest has another form, or does not matter.
+_OTHERWISE = re.compile(
+    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
+)
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A statement: its head, the words (key, value as written, column, text), its rest as text, and the line after it.
+
+    A word of no value has "" as one; of a bare axis letter the key is "X!", of a bare number "#", of a name `"`.
+    """
+
+    line: int
+    head: str
+    column: int
+    words: tuple[tuple[str, str, int, str], ...]
+    rest: str
+    optional: bool
+    after: int
+
+    def block(self, value: Callable[[str, str, int], float]) -> Block:
+        """Its words with numbers, the head first; `value` works out what is written behind a key, in a column."""
+        words = (
+            Word(key, value(key, written, column) if written else 0.0, column, text)
+            for key, written, column, text in self.words
+        )
+        return Block(self.line, (Word("", 0.0, self.column, self.head), *words), optional=self.optional)
+
+
+def code_text(line: str) -> str:
+    """A line without its comment and the mark of continuation, in upper case; columns stay."""
+    text = _COMMENT.sub(lambda part: part[0] if part[0].startswith('"') else "", line) if ";" in line else line
+    return text.rstrip().rstrip("~").rstrip().upper()
+
+
+def read_statement(lines: Sequence[str], row: int, name: str) -> Statement:
+    """The statement that begins in a line (from 0), with what continues it. Raises `InputError`."""
+    text, after, place = code_text(lines[row]), row + 1, Place(name, row + 1)
+    begin = _BEGIN.match(text)
+    assert begin is not None
+    head = _HEAD.match(text, begin.end())
+    if begin.end() == len(text) or text[begin.end()] in "*(":
+        return Statement(row + 1, "", 1, (), "", False, after)
+    if head is None:
+        raise place.fail(
+            f"{text[begin.end() :][:20]!r} is no statement", "Heidenhain's plain language", "", begin.end() + 1
+        )
+    shown = " ".join(head[0].split()).replace(",", ".").replace("FN ", "FN").rstrip(": ")
+    if len(text) > LONGEST_BLOCK:
+        raise place.fail(f"a statement of {len(text)} characters", f"at most {LONGEST_BLOCK}")
+    end, optional = head.start() if shown == "M" else head.end(), bool(begin[1] or begin[2])
+    rest, words = text[end:], list[tuple[str, str, int, str]]()
+    if look_up(shown) is not None and not _OTHERWISE.match(shown):
+        words = _words(text, end, place, shown)
+        if shown.startswith("CYCL DEF") and "." not in shown:
+            while after < len(lines) and PARAMETER.match(lines[after]):
+                words += _words(code_text(lines[after]), 0, Place(name, after + 1), shown)
+                after += 1
+    return Statement(row + 1, shown, head.start() + 1, tuple(words), rest, optional, after)
+
+
+def _words(text: str, position: int, place: Place, head: str) -> list[tuple[str, str, int, str]]:
+    """Words of a text from a position on; of a cycle what stands before its first parameter is its name."""
+    words = list[tuple[str, str, int, str]]()
+    if head.startswith("CYCL DEF") and "." not in head:
+        first = PARAMETER.search(text, position)
+        position = first.start() if first else len(text)
+    while position < len(text):
+        if text[position].isspace():
+            position += 1
+            continue
+        if text[position] == "(":  # a remark, as simulators have it
+            position = (text.find(")", position) + 1) or len(text)
+            continue
+        match = _WORD.match(text, position)
+        if match is None:
+            raise place.fail(f"{text[position : position + 12]!r} is no word of {head}", "", "", position + 1)
+        flag, key, value, parameter, given, axis, table, bare, quoted = match.groups()
+        key = (
+            "".join(flag.split())
+            if flag
+            else key or parameter or (f"{axis}!" if axis else "TABLE" if table else "#" if bare else '"')
+        )
+        written = "".join((value or given or bare or (table or "")[1:]).split()).replace(",", ".")
+        if sum(map(str.isdigit, written)) > 2 * MOST_DIGITS:
+            raise place.fail(f"a number of {len(written)} characters", "", "", position + 1)
+        if key == "M":
+            key = f"M{written.lstrip('+0') or '0'}"
+        words.append((key, written, position + 1, quoted if quoted is not None else match[0]))
+        position = match.end()
+    return words
