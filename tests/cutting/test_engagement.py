@@ -195,4 +195,3 @@ def test_what_cannot_be_engaged_is_refused_with_its_line(text, line, message):
     with pytest.raises(ProgramError, match=message) as error:
         Milling(text)
     assert error.value.line == line
-
