@@ -271,9 +271,9 @@ def corner(state: State, block: CurrentBlock, code: str) -> None:
     """CHF, RND: the corner between the contour elements before and behind it is cut off, or rounded."""
     block.refuse_if(state.plain.held is None, None, "without a contour element before it", "L, C, CR or CT before it")
     size = block.take("#") if code == "CHF" and block.has("#") else block.take("R")
-    own = block.take("F")
-    if own is not None:  # holds for the corner alone
-        block.values["own"] = Word("F", own * inch_tenths(state), 1, "F")
+    rate = block.take("F")
+    if rate is not None:  # holds for the corner alone
+        block.values["F alone"] = Word("F", rate * inch_tenths(state), 1, "F")
     block.refuse_if(not size or size < 0.0, None, "without its size", "RND R5, CHF 2")
     block.values["size"] = Word("R", (size or 0.0) * state.length_scale, 1, "R")
     state.plain.corner = block
@@ -296,8 +296,8 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     begin, end, center, turn = cut or (held[1], held[1], None, 0)
     state.feed = rate
     move(state, block, {first: begin.real, second: begin.imag}, held[2], held[3])
-    own = corner_block.values.get("own")
-    state.feed = own.value if own else rate
+    alone = corner_block.values.get("F alone")
+    state.feed = alone.value if alone else rate
     if cut is not None:
         move(state, corner_block, {first: end.real, second: end.imag}, center, turn)
     state.feed = modal

@@ -30,10 +30,12 @@ _WORD = re.compile(
     r"|([XYZABCUVW])(?![A-Z])"
     rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"",
 )
+_LABEL = re.compile(r'\s*/?\s*(?:N?\d+\s+)?/?\s*LBL\s*(?:0*(\d+)|"([^"]*)")\s*$')
 PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
 # Heads whose rest has another form, or does not matter.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
+    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
+    r"|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 
 
@@ -65,6 +67,16 @@ def code_text(line: str) -> str:
     """A line without its comment and the mark of continuation, in upper case; columns stay."""
     text = _COMMENT.sub(lambda part: part[0] if part[0].startswith('"') else "", line) if ";" in line else line
     return text.rstrip().rstrip("~").rstrip().upper()
+
+
+def labels(lines: Sequence[str], first: int, stop: int) -> dict[str, list[int]]:
+    """Label -> the lines where it stands between two lines (from 0), LBL 0 apart."""
+    places = dict[str, list[int]]()
+    for row in range(first, stop):
+        label = _LABEL.match(code_text(lines[row])) if "LBL" in lines[row].upper() else None
+        if label is not None and label[1] != "0":
+            places.setdefault(label[1] or label[2], []).append(row)
+    return places
 
 
 def read_statement(lines: Sequence[str], row: int, name: str) -> Statement:
