@@ -388,7 +388,8 @@ def _run(chance: random.Random, steps: bool = False) -> list[str]:
             ]
         elif kind == 3:
             lines += [
-                f"CR IX{a:+.3f} IY{b / 9:+.3f} R{chance.choice('+-')}{math.hypot(a, b / 9) * chance.uniform(0.6, 3):.3f} DR{sign}"
+                f"CR IX{a:+.3f} IY{b / 9:+.3f} DR{sign}"
+                f" R{chance.choice('+-')}{math.hypot(a, b / 9) * chance.uniform(0.6, 3):.3f}"
             ]
         elif kind == 4:
             lines += [f"L IX{a:+.2f} IY{b / 7:+.2f}", f"CT IX{b / 8 + 0.1:+.3f} IY{a + 1:+.3f}"]

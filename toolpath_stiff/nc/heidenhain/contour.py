@@ -162,6 +162,14 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
 def line(state: State, block: CurrentBlock, code: str) -> None:
     """L, LP: straight to a point. In machine coordinates under M91."""
     plain, there, rapid = state.plain, polar(state, block) if code == "LP" else named(state, block), feed(state, block)
+    if plain.tilt is not None and there.keys() & {3, 4, 5}:
+        block.refuse_if(
+            there.keys() & {0, 1, 2} and not rapid, None, "turns rotary axes in a tilted plane", "FMAX, or no A, B, C"
+        )
+        for axis in there.keys() & {3, 4, 5}:
+            word = block.values.get(AXES[axis]) or block.values[f"I{AXES[axis]}"]
+            state.note(block.line, word, "turns the machine's axes to the tilted plane, which gives the tool's axis")
+            del there[axis]
     if block.take("M92") is not None:
         block.refuse_if(not rapid, "M92", "in a cut: the machine builder says where its points are", "FMAX")
         state.warnings.append(
@@ -182,17 +190,9 @@ def line(state: State, block: CurrentBlock, code: str) -> None:
         values = {AXES[a]: Word(AXES[a], v / unit if a < 3 else v, 1, AXES[a]) for a, v in there.items()}
         current = CurrentBlock(block.name, block.block, {"G53": block.values["M91"]}, {}, values, set(values))
         state.motion, plain.heading, plain.pole = "G0" if rapid else "G1", None, None
-        plain.unknown -= there.keys()
+        plain.unknown -= there.keys() if plain.tilt is None else set()
         machine_move(state, current, "G53")
         return
-    if plain.tilt is not None and there.keys() & {3, 4, 5}:
-        block.refuse_if(
-            there.keys() & {0, 1, 2} and not rapid, None, "turns rotary axes in a tilted plane", "FMAX, or no A, B, C"
-        )
-        for axis in there.keys() & {3, 4, 5}:
-            word = block.values.get(AXES[axis]) or block.values[f"I{AXES[axis]}"]
-            state.note(block.line, word, "turns the machine's axes to the tilted plane, which gives the tool's axis")
-            del there[axis]
     compensate(state, block, there)
     if there:
         go(state, block, there, rapid=rapid)

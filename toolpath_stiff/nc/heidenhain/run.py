@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX, call
 from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, assigned, condition
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
@@ -33,6 +33,7 @@ MOST_STEPS = 1_000_000  # statements that run, all repeats counted
 MOST_IDLE = 100_000  # of them without a move between
 CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*\d+)?)?\s*$')
 SPECIAL = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
+CONTOUR = frozenset(("RND", "CHF", "L", "LP", "C", "CP", "CR", "CT", "CTP", "LN"))
 FORMULAS = ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
 TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control works out for a tilted plane
 
@@ -55,6 +56,7 @@ class HeidenhainRun(ProgramRun):
         self._repeats: dict[tuple[int, int], int] = {}
         self._locals: list[dict[str, float]] = [{}]
         self._steps = 0
+        self._passes: dict[int, str] = {}  # what a condition found when it went back last
         self._moved = (0, 0)
         self._row = 0
 
@@ -147,38 +149,9 @@ class HeidenhainRun(ProgramRun):
         if code is None:
             problem, hint = refusal_of(head)
             raise self._fail(row, f"{head} {problem}", "", hint, statement.column)
-        words = statement.block(lambda *word: self._word_value(row, *word))
-        calls = [back for back, label in self._returns if label < 0]  # the first is of the main program
-        words = replace(words, line=calls[0]) if calls else words
-        block = CurrentBlock(self.name, words)
-        for word in block.block.words[1:]:
-            if word.letter in block.values:
-                raise block.fail(word, f"repeats the word {word.letter} of its statement", "each word once")
-            largest = LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD
-            block.refuse_if(
-                abs(word.value) > largest, word, "is beyond 100 m, or any number of a control", f"{largest:g}"
-            )
-            block.values[word.letter] = word
-        block.free = set(block.values)
+        block = self._block_of(row, statement)
         self.state.plain.to_corner = self._to_corner[statement.after - 1]
-        if head == "BEGIN PGM":
-            block.free = {"INCH"} if re.search(r"\bINCH\s*$", statement.rest) else set()
-            block.values |= {"INCH": block.block.words[0]}
-        elif head == "CYCL DEF 9.1":
-            block.values["#"] = block.block.words[0]._replace(value=self._dwell(row, statement.rest))
-            block.free = {"#"}
-        waits = self.state.plain.held is not None and head not in (
-            "RND",
-            "CHF",
-            "L",
-            "LP",
-            "C",
-            "CP",
-            "CR",
-            "CT",
-            "CTP",
-            "LN",
-        )
+        waits = self.state.plain.held is not None and head not in CONTOUR
         if waits and not head.startswith("DEP"):
             raise block.fail(None, "stands between a corner (CHF, RND) and the element behind it", "the element")
         miscellaneous(self.state, block)
@@ -191,12 +164,11 @@ class HeidenhainRun(ProgramRun):
         except InputError as error:
             if error.column != statement.column or str(error.found).startswith(head):
                 raise
-            where = {"file": error.file, "line": error.line, "column": error.column}
-            problem = f"{head}: {error.found}"
-            raise ProgramError(problem, expected=error.expected, hint=error.hint, **where) from None
+            place = Place(error.file or self.name, error.line or 0, error.column)
+            raise place.fail(f"{head}: {error.found}", error.expected or "", error.hint or "") from None
         plain = self.state.plain
         unused = next((letter for letter in block.values if letter in block.free), None)
-        if unused is not None and not head.startswith("APPR") and head not in ("RND", "CHF"):
+        if unused is not None and not head.startswith("APPR"):
             raise block.fail(unused, f"is no word of {head}", "its own words")
         positioned = head in ("L", "LP") and (len(self.state.recorder) > before or bool(block.values.keys() & {*"XYZ"}))
         if once is not None or ((modal is not None or plain.modal) and positioned):
@@ -205,11 +177,18 @@ class HeidenhainRun(ProgramRun):
         flow = self._flow(row, statement)
         return len(self.lines) if block.flow is Flow.END or flow is None else flow
 
-    def _dwell(self, row: int, rest: str) -> float:
-        number = re.search(r"(\d+(?:[.,]\d+)?|Q[LR]?\d+)\s*$", rest)
-        if number is None:
-            raise self._fail(row, "CYCL DEF 9.1 without its time", "CYCL DEF 9.1 DWELL 1.5")
-        return self._value(row, number[1].replace(",", "."), 1)
+    def _block_of(self, row: int, statement: Statement) -> CurrentBlock:
+        """The statement with the numbers of its words."""
+        words = statement.block(lambda *word: self._word_value(row, *word))
+        calls = [back for back, label in self._returns if label < 0]  # the first is of the main program
+        block = CurrentBlock(self.name, replace(words, line=calls[0]) if calls else words)
+        for word in words.words[1:]:
+            block.refuse_if(word.letter in block.values, word, "repeats a word of its statement", "each word once")
+            largest = LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD
+            block.refuse_if(abs(word.value) > largest, word, "is beyond 100 m, or any number of a control")
+            block.values[word.letter] = word
+        block.free = set(block.values)
+        return block
 
     def _word_value(self, row: int, key: str, text: str, column: int) -> float:
         """The number of a word; of axes that the control turns to a plane 0, which counts in an untilted one alone."""
@@ -250,7 +229,7 @@ class HeidenhainRun(ProgramRun):
                     self._assign(row, key, self._value(row, written, column))
         elif head in CONDITIONS:
             holds, number, name = condition(head, rest, self._parameter, self._place(row))
-            return self._jump(row, self._label(row, number, name)) if holds else after
+            return self._condition_jump(row, self._label(row, number, name)) if holds else after
         elif head == "FUNCTION MODE" and rest.split() != ["MILL"]:
             raise self._fail(row, f"{head}{rest}: turning is not supported", "FUNCTION MODE MILL")
         elif head == "FN14":
@@ -272,6 +251,16 @@ class HeidenhainRun(ProgramRun):
                 raise self._fail(row, f"the subprogram of line {label + 1} has no end", "LBL 0")
             return None
         return after
+
+    def _condition_jump(self, row: int, to: int) -> int:
+        """Go to a label; back to it only if anything has changed since the last time."""
+        frames = self.state.frames
+        kept = self.state.plain.parameters, self._locals[-1], frames.position, frames.g92, frames.linear
+        now = repr((len(self.state.recorder), kept))
+        if to <= row and self._passes.get(row) == now:
+            raise self._fail(row, "a loop that never ends: no parameter or position changes", "one that ends")
+        self._passes[row] = now
+        return self._jump(row, to)
 
     def _label(self, row: int, number: str | None, name: str | None) -> int:
         """The line of a label in the program that runs. Raises `InputError` unless there is one."""

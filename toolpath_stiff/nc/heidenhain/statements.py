@@ -32,6 +32,10 @@ _WORD = re.compile(
 )
 _LABEL = re.compile(r'\s*/?\s*(?:N?\d+\s+)?/?\s*LBL\s*(?:0*(\d+)|"([^"]*)")\s*$')
 PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
+_SPECIAL = {
+    "BEGIN PGM": re.compile(r"\b(INCH)()\s*$"),
+    "CYCL DEF 9.1": re.compile(rf"()({NUMBER}|Q[LR]?\d+)\s*$"),
+}
 # Heads whose rest has another form, or does not matter.
 _OTHERWISE = re.compile(
     r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
@@ -102,6 +106,9 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> Statement:
             while after < len(lines) and PARAMETER.match(lines[after]):
                 words += _words(code_text(lines[after]), 0, Place(name, after + 1), shown)
                 after += 1
+    special = _SPECIAL[shown].search(text, end) if shown in _SPECIAL else None
+    if special is not None:  # a unit, or a time behind its name in the control's language
+        words = [(special[1] or "#", (special[2] or "").replace(",", "."), special.start() + 1, special[0].strip())]
     return Statement(row + 1, shown, head.start() + 1, tuple(words), rest, optional, after)
 
 
