@@ -11,7 +11,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter, radii_of
 from toolpath_stiff.cutting.engagement import engage
-from toolpath_stiff.cutting.final_surface import final_strip, final_walls
+from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.passes import walls_of_all_passes
 from toolpath_stiff.cutting.patches import Patches
@@ -149,7 +149,7 @@ def evaluate_cut(
         removed[block] = volume
         parts.append(some)
     patches = Patches.joined(parts)
-    walls, strips = final_walls(*given, shared=True), final_strip(*given)
+    (walls, own), strips = walls_of_passes(*given), final_strip(*given)
     cut = replace(cut, removed=removed, wall_heights=walls)
     made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
@@ -168,7 +168,7 @@ def evaluate_cut(
         values[again] = values[again - 1]
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
         values[again] = values[again - 1]
-    cut = _with_walls_of_all_passes(cut, final_walls(*given), profiles, step)
+    cut = _with_walls_of_all_passes(cut, own, profiles, step)
     return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=_warnings(cut))
 
 

@@ -115,7 +115,11 @@ def _contact_along(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatA
     next, which goes on as that ended, count as one.
     """
     turn = np.diff(np.arctan2(stations["ahead_y"], stations["ahead_x"]), prepend=9.0)
-    steady = (np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi) < SAME) & (np.abs(np.diff(stations["down"], prepend=9.0)) < SAME) & ~stations["plunge"]
+    steady = (
+        (np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi) < SAME)
+        & (np.abs(np.diff(stations["down"], prepend=9.0)) < SAME)
+        & ~stations["plunge"]
+    )
     gap = np.diff(stations["path"], prepend=-np.inf)
     node = np.cumsum(~(steady & (gap < TOUCH))) - 1
     first = np.searchsorted(node, np.arange(node[-1] + 1 if len(node) else 0))
