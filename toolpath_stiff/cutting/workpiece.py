@@ -142,7 +142,7 @@ def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> W
 
 
 def _compiled() -> ModuleType:
-    """The compiled loops; with numba, when this is first called: half a second, and some seconds to compile the first time."""
+    """The compiled loops. numba comes with them: half a second, and some seconds to compile the first time."""
     from toolpath_stiff.cutting import compiled_sweeps
 
     return compiled_sweeps
