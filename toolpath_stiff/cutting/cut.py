@@ -11,7 +11,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter, radii_of
 from toolpath_stiff.cutting.engagement import engage
-from toolpath_stiff.cutting.final_surface import final_strip, final_walls
+from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.passes import walls_of_all_passes
 from toolpath_stiff.cutting.patches import Patches
@@ -31,6 +31,7 @@ from toolpath_stiff.units import per_min_from_rad_per_s
 BLOCK = 16_384  # stations at a time
 MOST_NAMED = 5  # lines in a warning
 ROUNDED = 1e-12  # of a cosine
+TURN = 0.02  # rad between two moves, below which the second begins as the first ends: chords of a curve
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -148,21 +149,37 @@ def evaluate_cut(
         removed[block] = volume
         parts.append(some)
     patches = Patches.joined(parts)
-    walls, strips = final_walls(*given, shared=True), final_strip(*given)
+    (walls, own), strips = walls_of_passes(*given), final_strip(*given)
     cut = replace(cut, removed=removed, wall_heights=walls)
     made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
         values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
     profiles = np.repeat(np.where(made[:, :2, None], 0.0, np.nan), HEIGHTS, axis=2)
     _note_engagement(cut, patches)
+    engaged = np.zeros(len(samples), dtype=bool)
+    engaged[patches.station] = True
+    repeated = _repeats_the_one_before(samples, np.concatenate([made, engaged[:, None]], axis=1))
     for number, cutter in cutters.items():
-        engaged = np.zeros(len(samples), dtype=bool)
-        engaged[patches.station] = True
-        rows = np.flatnonzero(engaged & (samples.tool == number))
+        rows = np.flatnonzero(engaged & ~repeated & (samples.tool == number))
         for start in range(0, len(rows), BLOCK):
             _evaluate(cut, model, origin, cutter, patches, spindle, (strips, profiles), rows[start : start + BLOCK])
-    cut = _with_walls_of_all_passes(cut, final_walls(*given), profiles, step)
+    again = np.flatnonzero(repeated)
+    for values in (cut.mean_force, cut.peak_force, cut.deflection, cut.wall_force, profiles):
+        values[again] = values[again - 1]
+    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
+        values[again] = values[again - 1]
+    cut = _with_walls_of_all_passes(cut, own, profiles, step)
     return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=_warnings(cut))
+
+
+def _repeats_the_one_before(samples: Samples, same: BoolArray) -> BoolArray:
+    """(n,) samples where a move goes on from the one before with hardly a turn; `same` (n, k) may not differ either."""
+    first, second = slice(None, -1), slice(1, None)
+    straight = (samples.tangent[first] * samples.tangent[second]).sum(axis=1) >= np.cos(TURN)
+    straight &= (samples.position[first] == samples.position[second]).all(axis=1) & samples.cutting[first]
+    straight &= (samples.tool[first] == samples.tool[second]) & (samples.feed[first] == samples.feed[second])
+    straight &= (samples.spindle[first] == samples.spindle[second]) & (same[first] == same[second]).all(axis=1)
+    return np.concatenate([[False], straight])
 
 
 def _nothing_cut(

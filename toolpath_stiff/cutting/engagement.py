@@ -21,13 +21,13 @@ from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.results import Progress, counter
 
 AROUND = 33  # points of a ring, denser at the sides, where a light cut is
-LEVELS, CORNER_LAYERS = 12, 8  # layers of the cylinder; of a corner or ball
+LEVELS, CORNER_LAYERS = 12, 6  # layers of the cylinder; of a corner or ball
 COARSE = 3  # rings that look how high a corner or ball cuts
 END_POINTS = 200  # of the end of a cutter that descends
-HALVINGS, SECANTS = 14, 8  # of up to 9 degrees: 1e-5 rad; in turn with halvings
+HALVINGS, SECANTS = 14, 6  # of up to 9 degrees: 1e-5 rad; in turn with halvings
 # Stations that share a contact: turn, rad, and tilt of the feed from one to the next; relative difference of rate and
 # size of the contacts at the ends of a stretch, which has so many radii at most; stations that it may have.
-SAME, ALIKE, SPAN, STRIDES = 0.05, 0.02, 0.5, (8, 4, 2, 1)
+SAME, ALIKE, SPAN, STRIDES = 0.05, 0.03, 0.6, (8, 4, 2, 1)
 NARROW = 1e-4  # rad, arcs below are rounding
 PLATEAU = 1e-6  # m: heights closer than this are a level
 # Relative change of the rate of removal between two stations that is looked into, and the steps for it in radii: the
@@ -115,7 +115,11 @@ def _contact_along(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatA
     next, which goes on as that ended, count as one.
     """
     turn = np.diff(np.arctan2(stations["ahead_y"], stations["ahead_x"]), prepend=9.0)
-    steady = (np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi) < SAME) & (np.abs(np.diff(stations["down"], prepend=9.0)) < SAME) & ~stations["plunge"]
+    steady = (
+        (np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi) < SAME)
+        & (np.abs(np.diff(stations["down"], prepend=9.0)) < SAME)
+        & ~stations["plunge"]
+    )
     gap = np.diff(stations["path"], prepend=-np.inf)
     node = np.cumsum(~(steady & (gap < TOUCH))) - 1
     first = np.searchsorted(node, np.arange(node[-1] + 1 if len(node) else 0))
@@ -275,14 +279,19 @@ def _ends(
     some, r, z, (a, b) = stations[moving], radius[moving], height[moving], bracket[:, moving]
     outside, within = np.full((2, len(moving)), np.nan)
     for step in range(SECANTS if smooth else HALVINGS):
-        share = outside / (outside - within) if smooth and step % 2 else np.full(len(moving), 0.5)
-        middle = a + np.clip(np.where(np.isnan(share), 0.5, share), 0.05, 0.95) * (b - a)
+        middle = a + (np.clip(_secant(outside, within), 0.05, 0.95) if smooth and step % 2 else 0.5) * (b - a)
         above = _above(work, some, r, middle, z)
         inside = above > 0.0
         a, b = np.where(inside, a, middle), np.where(inside, middle, b)
         outside, within = np.where(inside, outside, above), np.where(inside, above, within)
-    ends[moving] = 0.5 * (a + b)
+    ends[moving] = a + (_secant(outside, within) if smooth else 0.5) * (b - a)
     return ends
+
+
+def _secant(outside: FloatArray, within: FloatArray) -> FloatArray:
+    """Share of a bracket where a line through the values at its ends, below and above 0, crosses 0; nan: not known."""
+    share = outside / (outside - within)
+    return np.where(np.isnan(share), 0.5, share)
 
 
 def _rates(stations: AnyArray, patches: Patches) -> FloatArray:

@@ -18,33 +18,38 @@ LATER = 0.1  # radii of the cutter along the path from where on a pass is anothe
 ACROSS = 41  # points across the cutter's end
 
 
-def final_walls(
-    work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter], shared: bool = False
-) -> FloatArray:
+def final_walls(work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
     """(n, 2, 2) m above the tip: lowest and highest point of the wall that a sample makes on its left and right.
 
-    nan where the finished part has no wall there, or a later pass has touched it (a spring pass makes it anew),
-    unless `shared`: then only one that came deeper. A corner's radius is below the wall.
+    nan where the finished part has no wall there, or a later pass has touched it (a spring pass makes it anew). A
+    corner's radius is below the wall.
     """
-    walls = np.full((len(samples), 2, 2), np.nan)
+    return walls_of_passes(work, moves, samples, cutters)[1]
+
+
+def walls_of_passes(
+    work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]
+) -> tuple[FloatArray, FloatArray]:
+    """Walls that no later pass has cut deeper than a sample did, and `final_walls`, which none has touched since."""
+    made, own = np.full((2, len(samples), 2, 2), np.nan)
     for rows, stations in blocks_of_stations(work, moves, samples, cutters):
-        sides = np.array([[0.0, np.pi]])
-        wall, inner = (
-            points_around(stations, (stations["reach"] + offset)[:, None], sides)
-            for offset in (BESIDE, TOUCHED if shared else -TOUCHED)
-        )
-        every = np.full(len(wall[0]), len(work.pieces))
+        sides, reach = np.array([[0.0, np.pi]]), stations["reach"][:, None]
+        wall = points_around(stations, reach + BESIDE, sides)
+        every, tip = np.full(len(wall[0]), len(work.pieces)), np.repeat(stations["z"], 2)
         other = stations["path"] + LATER * stations["reach"]
         later = np.repeat(np.searchsorted(work.pieces["before"], other, "right"), 2)
-        tip = np.repeat(stations["z"], 2)
-        high = (
-            np.minimum(work.tops(*wall, (np.zeros_like(every), every))[0], work.tops(*inner, (later, every))[0]) - tip
-        )
+        high = work.tops(*wall, (np.zeros_like(every), every))[0] - tip
         high = np.minimum(high, np.repeat(stations["longest"], 2))
         low = np.maximum(work.stock.bottoms(*wall) - tip, np.repeat(stations["reach"] - stations["flat"], 2))
-        stands = (high - low > BESIDE) & ~np.repeat(stations["plunge"], 2)
-        walls[rows] = np.where(stands[:, None], np.stack([low, high], axis=1), np.nan).reshape(-1, 2, 2)
-    return walls
+        stands = np.flatnonzero((high - low > BESIDE) & ~np.repeat(stations["plunge"], 2))
+        for walls, offset in ((made, TOUCHED), (own, -TOUCHED)):
+            x, y = (axis[stands] for axis in points_around(stations, reach + offset, sides))
+            top = np.minimum(high[stands], work.tops(x, y, (later[stands], every[stands]))[0] - tip[stands])
+            part = np.full((len(tip), 2), np.nan)
+            stays = top - low[stands] > BESIDE
+            part[stands[stays]] = np.stack([low[stands], top], axis=1)[stays]
+            walls[rows] = part.reshape(-1, 2, 2)
+    return made, own
 
 
 def final_strip(work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:

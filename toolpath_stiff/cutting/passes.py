@@ -20,7 +20,12 @@ SAME = 1e-7  # m, ranges of height closer than this are one
 
 
 def walls_of_all_passes(
-    samples: Samples, cutters: Mapping[int, Cutter], made: FloatArray, own: FloatArray, profiles: FloatArray, step: float
+    samples: Samples,
+    cutters: Mapping[int, Cutter],
+    made: FloatArray,
+    own: FloatArray,
+    profiles: FloatArray,
+    step: float,
 ) -> FloatArray:
     """(n, 2, HEIGHTS) m, errors of the walls that stay, from the lower to the upper end of each; nan: no wall.
 
