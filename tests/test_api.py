@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import math
 import pickle
 import re
 import subprocess
@@ -23,6 +24,11 @@ SLOT = "G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X40\nG2 X60 Y20 R20\nM2\n"
 RAW = "x_mm,y_mm,z_mm,direction,jog_um,force_N,displacement_um\n" + "".join(
     f"0,0,800,X,{jog},{40 * jog},{0.2 * jog}\n" for jog in (0, 200, -200, 0)
 )
+SLOTS = ["record,time_s,fx_N,fy_N,feed_per_tooth_mm,spindle_rpm,depth_mm"] + [
+    f"{feed},{k / 4000},{100 * feed},{-900 * feed + 20 * math.sin(0.15 * math.pi * k)},{feed},6000,3"
+    for feed in (0.04, 0.06, 0.08)
+    for k in range(400)
+]
 PLACE = {"x_mm": (-60, 60), "y_mm": 0, "z_mm": (700, 800), "rotate_deg": 0, "step_mm": 10, "points": 5}
 
 # The command -> the function that must give the same JSON. Each in a folder with slot.nc and raw.csv.
@@ -60,6 +66,7 @@ PAIRS = {
     "plan --between spindle_compliance,none --n 2 --cost pose=20": lambda: tps.plan(
         machine="nist", between=("spindle_compliance", "none"), n=2, minutes={"pose": 20}
     ),
+    "forces slots.csv --cut cut.toml --axes=x,y,z": lambda: tps.forces("slots.csv", "cut.toml"),
     "machine recover --starts 2": lambda: tps.recover_geometry(starts=2),
     "machine check nist.toml": lambda: tps.Machine.load("nist.toml").check(),
     "effects list": tps.effects,
@@ -67,7 +74,7 @@ PAIRS = {
         "nist-table1", "nist", "missing.toml", noise_percent=20
     ),
 }
-NO_PICTURES = ("analyze", "map", "place", "case-study", "compare", "diagnose", "update", "plan")
+NO_PICTURES = ("analyze", "map", "place", "case-study", "compare", "diagnose", "update", "plan", "forces")
 
 
 @pytest.fixture
@@ -75,6 +82,8 @@ def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("slot.nc").write_text(SLOT)
     Path("raw.csv").write_text(RAW)
+    Path("slots.csv").write_text("\n".join(SLOTS))
+    Path("cut.toml").write_text("[[tool]]\nnumber = 1\ndiameter_mm = 10\nflutes = 3\nhelix_deg = 30\n")
     tps.Machine.load("nist").save("nist.toml")
     tps.effect_template("my_screw").save("my_screw.py")
     return tmp_path
@@ -123,7 +132,7 @@ def test_many_programs_are_their_function_s(here, capsys):
 
 def test_every_command_is_held_to_its_function():
     """What has no JSON of its own: `rig` shares nothing with the library, `studio` serves a page."""
-    alone = {"reduce", "path", "cut", "compensate"}  # in tests of their own
+    alone = {"reduce", "path", "cut", "compensate", "forces"}  # in tests of their own
     assert {line.split()[0] for line in PAIRS} | alone | {"rig", "studio"} == set(COMMANDS)
 
 
@@ -131,7 +140,7 @@ def test_path_is_its_function(here, capsys):
     assert main(["path", "slot.nc", "--step", "5", "--csv"]) == 0
     found = tps.sample_path("slot.nc", step_mm=5)
     assert capsys.readouterr().out == str(found)
-    assert list(found.to_dict())[-2:] == ["feed_mm_per_min", "spindle_rpm"]
+    assert list(found.to_dict())[-1] == "feed_mm_per_min"
 
 
 def test_a_saved_folder_is_the_command_s(here):

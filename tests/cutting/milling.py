@@ -1,5 +1,7 @@
 """A program on a box of stock, for tests of engagement; mm in, SI out."""
 
+import itertools
+
 import numpy as np
 
 from toolpath_stiff.cutting.cutters import Cutter
@@ -28,19 +30,16 @@ class Milling:
         """All patches, and the removed volume of each sample."""
         blocks = list(engage(*self.context))
         assert [rows.start for rows, _, _ in blocks[1:]] == [rows.stop for rows, _, _ in blocks[:-1]]
-        return Patches.joined([patches for _, patches, _ in blocks]), np.concatenate(
-            [volume for _, _, volume in blocks]
-        )
+        _, patches, volume = zip(*blocks, strict=True)
+        return Patches.joined(patches), np.concatenate(volume)
 
     def removed(self):
         return self.engaged()[1]
 
-    def contact(self, x, y=None):
-        """Patches of the last sample at x, y (mm): rows of low, high (mm), entry, exit (degrees)."""
-        x_m, y_m, _ = self.samples.position.T
-        near = np.abs(x_m * 1e3 - x) < 1e-6
-        if y is not None:
-            near &= np.abs(y_m * 1e3 - y) < 1e-6
+    def contact(self, x, line=None):
+        """Patches of the last sample at x (mm): rows of low, high (mm), entry, exit (degrees)."""
+        near = np.abs(self.samples.position[:, 0] * 1e3 - x) < 1e-6
+        near &= (self.samples.line == line) | (line is None)
         patches = self.engaged()[0]
         some = patches.take(patches.station == np.flatnonzero(near & (self.samples.motion != 0))[-1])
         return np.stack([some.low * 1e3, some.high * 1e3, np.degrees(some.entry), np.degrees(some.exit)], axis=1)
@@ -53,4 +52,4 @@ class Milling:
             count = max(int(np.ceil(sweep / np.sqrt(8.0 * sagitta / radius))), 1) if sweep else 1
             shares = np.linspace(0.0, 1.0, count + 1)
             points = points_along(self.moves, np.full(count + 1, row), shares)[0] * 1e3
-            yield from zip(points[:-1], points[1:], strict=True)
+            yield from itertools.pairwise(points)

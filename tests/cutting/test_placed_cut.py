@@ -1,4 +1,4 @@
-"""The placement of least surface error: foretold as the chain has it, no worse than now, found by no other aim."""
+"""The placement of least surface error: foretold as the chain has it, better than now, and nothing else worse."""
 
 from __future__ import annotations
 
@@ -26,19 +26,12 @@ def p95(origin):
 
 def test_the_least_error():
     program = tps.Program.from_text(TEXT, name="part.nc")
-    placed = {
-        aim: tps.place(
-            program, objective=aim, points=5, step_mm=4.0, **BOX, **({"cut": GIVEN} if aim == "error" else {})
-        )
-        for aim in ("balanced", "error")
-    }
-    best = placed["error"]
+    best = tps.place(program, objective="error", cut=GIVEN, points=5, step_mm=4.0, **BOX)
     told = best.to_dict()["surface_error_um"]
     assert told["chosen"] == pytest.approx(p95(best.origin_mm_deg), rel=0.02)
     assert told["chosen"] < told["before"] and not best.worse
-    assert told["chosen"] <= p95(placed["balanced"].origin_mm_deg) * 1.001
+    assert told["before"] == pytest.approx(p95(None), rel=0.02)
     assert f"within {told['chosen']:.2f} um" in str(best)
-    assert placed["balanced"].surface_error_um is None and "surface_error_um" not in placed["balanced"].to_dict()
 
 
 def test_what_is_refused():

@@ -32,6 +32,12 @@ CATALOGUE = (
     "platform_radius_error",
     "gauge_scale",
     "thermal_drift",
+    "tool_bending",
+    "frame_sway",
+    "joint_offset",
+    "indicator_off_tip",
+    "load_cell_curvature",
+    "stand_compliance",
 )
 
 # A user's own effect file.

@@ -163,6 +163,7 @@ def test_choices_are_never_fitted():
         ("setup_compliance", "setup"),
         ("gauge_scale", "direction"),
         ("gauge_scale", "setup"),
+        ("joint_offset", "joint"),
     }
     assert all("riser" in neutral_values(e).values() for n, e in all_effects().items() if (n, "setup") in chosen)
 

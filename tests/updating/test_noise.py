@@ -13,6 +13,7 @@ from tests.conftest import seeds
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, correlated_covariance, dense, readings_by_hand, simple_noise, table_1
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.noise import Scatter, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import from_repeats, repeat_groups
@@ -276,3 +277,76 @@ def test_readings_that_do_not_state_their_scatter_are_taken_for_as_good_as_the_o
     (noise,) = noise_models(some)
     assert noise.name == "stated" and "12 readings do not state it" in noise.origin
     assert noise.repeat[-1] == pytest.approx(math.sqrt(np.mean(noise.repeat[:30] ** 2)), rel=0.02)
+
+
+def apart(seed, sds, clampings, by_setup, points=24):
+    """Points along X, Y, Z in two set-ups, each clamped twice, two readings a clamping and direction."""
+    rng = np.random.default_rng(seed)
+    rows = [(p, c, axis, r) for c in range(2) for p in range(points) for axis in range(3) for r in range(2)]
+    point, clamp, axis, _ = (np.array(column) for column in zip(*rows, strict=True))
+    kind = point % 2 if by_setup else axis
+    shared = np.array(clampings)[point % 2] * rng.standard_normal((points, 2))[point, clamp]
+    own = np.array(sds)[kind] * rng.standard_normal(len(rows))
+    return readings_by_hand(
+        np.exp(17.0 + 0.1 * point + axis + shared + own),
+        position=np.stack([0.01 * point, 0.0 * point, 0.8 + 0.0 * point], axis=1),
+        direction=np.eye(3)[axis],
+        point=point.tolist(),
+        clamp=[f"{p}-{c}" for p, c in zip(point, clamp, strict=True)],
+        setup=np.where(point % 2, "riser", "table").tolist(),
+    )
+
+
+def test_scatter_differs_by_axis_and_clamping_by_set_up_where_repeats_tell():
+    by_axis = [noise_models(apart(seed, (0.01, 0.01, 0.04), (0.005, 0.005), False))[0] for seed in range(6)]
+    of_axis = np.sqrt(np.mean([np.square(noise.reading[:6:2]) for noise in by_axis], axis=0))
+    assert of_axis == pytest.approx(np.hypot([0.01, 0.01, 0.04], 0.005), rel=0.15)
+    assert all("along Z" in noise.origin for noise in by_axis)
+    by_setup = [noise_models(apart(seed, (0.01, 0.01), (0.003, 0.04), True))[0] for seed in range(6)]
+    of_setup = np.sqrt(np.mean([np.square(noise.clampings[[0, 6]]) for noise in by_setup], axis=0))
+    assert of_setup == pytest.approx([0.003, 0.04], rel=0.5)
+    assert of_setup[1] == pytest.approx(0.04, rel=0.2)
+    assert all("in set-up riser" in noise.origin for noise in by_setup)
+    # Where they are alike they are not told apart.
+    alike = [noise_models(apart(seed, (0.02, 0.02, 0.02), (0.01, 0.01), False))[0] for seed in range(24)]
+    assert not any(";" in noise.origin for noise in alike)
+
+
+def test_clampings_of_their_own_in_the_covariance():
+    rng = np.random.default_rng(0)
+    own, groups = rng.uniform(0.5, 2.0, 12), Groups.by(np.arange(12) % 4)
+    common, shared = np.array([0.1, 0.0, 2.0, 0.7]), rng.standard_normal((3, 12))
+    whole = np.diag(own) + shared.T @ shared + common[groups.of][:, None] * (groups.of[:, None] == groups.of)
+    structured, rows = Covariance(own, groups, common, shared), rng.standard_normal((5, 12))
+    inverse = np.linalg.inv(whole)
+    assert structured.diagonal == pytest.approx(np.diag(whole))
+    assert structured.squares(rows) == pytest.approx(np.einsum("ni,ij,nj->n", rows, whole, rows))
+    assert structured.log_determinant == pytest.approx(np.linalg.slogdet(whole)[1])
+    assert structured.precision.times(rows) == pytest.approx(rows @ inverse)
+    assert structured.precision.squares(rows) == pytest.approx(np.einsum("ni,ij,nj->n", rows, inverse, rows))
+    assert structured.precision.products(rows[None]) == pytest.approx((rows @ inverse @ rows.T)[None])
+    assert structured.precision.diagonal == pytest.approx(np.diag(inverse))
+    assert structured.precision.block(np.array([1, 5, 6])) == pytest.approx(inverse[np.ix_([1, 5, 6], [1, 5, 6])])
+    drawn = structured.draw(rng, 20_000) + np.sqrt(own) * rng.standard_normal((20_000, 12))
+    # A covariance of 20,000 draws is known to 1 % of the product of its standard deviations; four of those.
+    scale = np.sqrt(np.outer(np.diag(whole), np.diag(whole)))
+    assert np.abs((np.cov(drawn.T) - whole) / scale).max() < 0.045
+
+
+def test_a_stated_scatter_counts_its_clamping_once():
+    # Readings of very different quality in the same clamping: each scatters as it states, no more.
+    stated = np.array([0.005, 0.05, 0.02, 0.03] * 6)
+    data = readings_by_hand(np.full(24, 5e7), clamp=np.arange(24) // 4, sd=5e7 * stated)
+    (noise,) = noise_models(data)
+    assert noise.reading == pytest.approx(stated)
+    assert covariance(replace(noise, strut_spread=0.0, joint_error=0.0), Predictor(nist(), data)).diagonal == (
+        pytest.approx(stated**2)
+    )
+    assert "counted once" in noise.origin
+
+
+def test_a_guess_says_what_it_could_hide():
+    low, high = noise_models(table_1())
+    for noise, total in ((low, 0.02), (high, 0.10)):
+        hidden = 3.9 * np.sqrt((total**2 - noise.clamping**2) / 42 + noise.clamping**2 / 14)
+        assert f"less than {100 * hidden:.2g} % (rms) could hide under it" in noise.origin

@@ -123,6 +123,48 @@ def test_joints_that_give_along_a_pin_are_recognised(folder):
     assert low < 3e-8 < high
 
 
+def test_a_long_tool_that_bends_with_its_cube_is_recognised(folder):
+    # A cantilever, 3 E I / l^3; the campaign has two lengths, the long tool at a sixth of its poses.
+    predictor = sound(3, folder)
+    data, length = predictor.data, predictor.machine.reference_tool_length
+    axis = predictor.full_path.rotation[:, :, 2]
+    across = 1.0 - (data.direction * axis).sum(axis=1) ** 2
+    found = portrait_with(predictor, 2.5e-9 * across * ((length + data.tool_extension) / length) ** 3)
+    assert found.terms[0].term.link == "tool"
+    assert found.terms[0].term.variable == "tool length"
+    assert "tool's length" in term_words(found.terms[0].term)
+    low, high = found.terms[0].interval
+    assert low < 2.5e-9 < high
+
+
+def test_a_hose_that_holds_the_platform_is_recognised(folder):
+    # A spring of 4 N/um along Y at the middle of the platform joints, by Sherman and Morrison (1950) on the compliance
+    # of six springs, J^-1 K^-1 J^-T, put together here.
+    predictor = sound(4, folder)
+    path, direction = predictor.full_path, predictor.data.direction
+    struts = path.struts
+    jacobian = np.concatenate([struts.directions, np.cross(struts.arms, struts.directions)], axis=-1)
+    inverse = np.linalg.inv(jacobian)
+    softness = 1.0 / path.machine.strut_law.stiffness(struts.lengths)
+    compliance = np.einsum("nij,nj,nkj->nik", inverse, softness, inverse)
+    middle, y = struts.arms.mean(axis=1), np.array([0.0, 1.0, 0.0])
+    held = np.concatenate([np.broadcast_to(y, middle.shape), np.cross(middle, y)], axis=1)
+    moved = np.einsum("nij,nj->ni", compliance, held)
+    along = (moved[:, :3] * direction).sum(axis=1)
+    taken = along**2 / (1.0 / 4e6 + (moved * held).sum(axis=1))
+    found = portrait_with(predictor, -taken)
+    (one,) = found.terms
+    assert (one.term.link, one.term.action, one.term.direction) == ("platform", "spring", "Y")
+    low, high = one.interval
+    assert low < 4e6 < high
+    assert not found.lacking
+    assert "dictionary lacks" not in portrait_entry(found)["text"]
+    left = portrait_entry(replace(found, held_out_rms=1.31 * found.noise_floor))
+    assert left["lacking"]
+    assert left["text"].startswith("The dictionary lacks what is missing: the terms stand for it, the error at points")
+    assert "1.3 times the noise, and link and variable may be wrong" in left["text"]
+
+
 def test_what_depends_on_two_variables_is_recognised(folder):
     # A fixture of one set-up that gives sideways beyond the load that friction holds.
     predictor = sound(1, folder)

@@ -59,19 +59,28 @@ def compensate(
     ------
     InputError
         Nothing is known of the cut, no pass makes a final wall, or a block cannot be written otherwise: where and why.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> text = "G21 G90\nT1 M6\nS8000 M3\nG0 X-20 Y-15 Z5\nG1 Z-4 F300\nY-4.5\nX120 F900\nY-15\nG0 Z5\nM2\n"
+    >>> tool = "[[tool]]\nnumber = 1\ndiameter_mm = 10\nflutes = 3\nhelix_deg = 30\nstick_out_mm = 30\n"
+    >>> stock = "[stock]\nbox_mm = [100, 40, 20]\ncorner_mm = [0, 0, -20]\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     cut = pathlib.Path(folder, "cut.toml")
+    ...     _ = cut.write_text(f"{stock}[coefficients]\nmaterial = 'Al7075'\n{tool}")
+    ...     wall = tps.compensate(tps.Program.from_text(text, name="wall.nc"), cut=cut)
+    ...     written = wall.save(pathlib.Path(folder, "wall_comp.nc")).name
+    >>> wall.changed, written, wall.rewritten.text.splitlines()[5][:5]
+    (True, 'wall_comp.nc', 'Y-4.4')
+    >>> wall.walls["mean_before_um"] > 1.0, wall.walls["left_percent"] < 5.0
+    (True, True)
     """
-    on, part, origin, setup = (
-        machine_from(machine),
-        program_from(program),
-        origin_si(origin_mm_deg),
-        cut_setup(cut, material, stock_mm),
-    )
-    if setup is None:
-        raise InputError("no cut to compensate", hint="say --cut FILE, or --material and --stock")
-    model = on.running(part)
+    on, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
+    model, setup = on.running(part), _known(cut_setup(cut, material, stock_mm))
     default = model.machine.default_origin
-    first = part.moves(origin, default)
-    place = origin or (first.origin if first.origin_source == "program" else default)
+    first, place = _read(part, origin, default)
     tell = teller(progress)
 
     def evaluate(program: ReadProgram) -> Cut:
@@ -98,7 +107,7 @@ def compare_walls(
     step_mm: inputs.Step = 1.0,
     progress: Progress | None = None,
 ) -> WallComparison:
-    """Measured walls of a part against the error of the surface that its cut foretells: where the model fails.
+    r"""Measured walls of a part against the error of the surface that its cut foretells: where the model fails.
 
     Parameters
     ----------
@@ -120,6 +129,22 @@ def compare_walls(
     ------
     InputError
         The file cannot be read, nothing is known of the cut, or no point lies on a final wall.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import toolpath_stiff as tps
+    >>> text = "G21 G90\nT1 M6\nS8000 M3\nG0 X-20 Y-15 Z5\nG1 Z-4 F300\nY-4.5\nX120 F900\nY-15\nG0 Z5\nM2\n"
+    >>> tool = "[[tool]]\nnumber = 1\ndiameter_mm = 10\nflutes = 3\nhelix_deg = 30\nstick_out_mm = 30\n"
+    >>> stock = "[stock]\nbox_mm = [100, 40, 20]\ncorner_mm = [0, 0, -20]\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     cut = pathlib.Path(folder, "cut.toml")
+    ...     _ = cut.write_text(f"{stock}[coefficients]\nmaterial = 'Al7075'\n{tool}")
+    ...     points = pathlib.Path(folder, "points.csv")
+    ...     _ = points.write_text("x_mm,y_mm,z_mm,nx,ny,nz,deviation_um\n40,0.5,-2,0,-1,0,9\n60,0.5,-2,0,-1,0,9\n")
+    ...     compared = tps.compare_walls(points, program=tps.Program.from_text(text, name="wall.nc"), cut=cut)
+    >>> len(compared.line), compared.factor[0] > 0.5, [row["points"] for row in compared.lines]
+    (2, True, [2])
     """
     if program is None:
         raise InputError("walls without the program that cut them", hint="say --program FILE")

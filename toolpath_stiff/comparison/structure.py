@@ -149,7 +149,8 @@ class Scattering:
         """Scatter of `draws` sets of readings, and the excess of each place for an excess of 1."""
         n = len(clamps.of)
         common = rng.standard_normal((draws, len(self.covariance.shared))) @ self.covariance.shared
-        clamped = rng.standard_normal((draws, clamps.count))[:, clamps.of] * noise.clamping
+        clamped = rng.standard_normal((draws, clamps.count))[:, clamps.of]
+        clamped = clamped * (noise.clamping if noise.clampings is None else noise.clampings)
         # Clampings beyond the first of their places: degrees of freedom behind an estimate of the clamping.
         first = np.unique(self.places.of, return_index=True)[1]
         again = clamps.count - len(np.unique(clamps.of[first]))

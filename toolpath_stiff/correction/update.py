@@ -45,7 +45,7 @@ from toolpath_stiff.inference.hypotheses import score_families, signatures, tabl
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.votes import outvoted, votes
-from toolpath_stiff.planning.plan import INDICATORS
+from toolpath_stiff.planning.plan import telling
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.stiffness.sizes import joined
 
@@ -261,7 +261,7 @@ def _instruments(problem: Problem, none: Fit, alone: Fit) -> dict[str, str]:
     effects = [effect for effect in testable_effects(problem.predictor)[0] if effect.is_instrument]
     bests = {family.name: family.best for family in score_families(problem, effects, none) if family.best is not None}
     against = votes(problem, alone, bests)
-    told_by = {effect.name: effect.told_by or INDICATORS[effect.link].removeprefix("none: ") for effect in effects}
+    told_by = {effect.name: telling(effect).removeprefix("none: ") for effect in effects}
     return {name: told_by[name] for name, differences in against.items() if not outvoted(differences)}
 
 

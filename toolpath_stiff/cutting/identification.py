@@ -15,7 +15,7 @@ from toolpath_stiff.cutting.forces import mean_responses
 from toolpath_stiff.cutting.patches import Patches
 from toolpath_stiff.errors import MeasurementError
 
-LEAST_SCATTER = 1e-9  # N: exact forces are weighed as if they scattered by this
+LEAST_SCATTER = 1e-6  # of the largest force: no dynamometer reads finer
 ONE = np.ones(1)
 SURE = 0.975  # quantile of Student's t: intervals of 95 %
 
@@ -62,21 +62,23 @@ def least_squares(response: FloatArray, force: FloatArray) -> tuple[FloatArray, 
     design, measured = design[..., told], force[:, recorded]
     freedom = len(force) - 2  # a straight line each
     deviation = np.ones(measured.shape[1])
+    size = np.sqrt((design**2).sum(axis=(0, 1)))  # of columns: N per N/m2 beside N per N/m
     for _ in range(2):  # the first fit gives the scatter of each direction, the second weighs by it
-        rows = (design / deviation[:, None]).reshape(-1, told.sum())
-        solved, _, rank, _ = np.linalg.lstsq(rows, (measured / deviation).ravel(), rcond=1e-9)
+        rows = (design / size / deviation[:, None]).reshape(-1, told.sum())
+        solved, _, rank, _ = np.linalg.lstsq(rows, (measured / deviation).ravel(), rcond=1e-12)
         if rank < told.sum() or freedom < 1:
             raise MeasurementError(
                 "these slots do not tell the coefficients apart",
                 expected="slots at 3 different feeds or more, forces along x, y and, of a corner radius, z",
             )
-        values = np.asarray(solved, dtype=float)
+        values = np.asarray(solved / size, dtype=float)
         residual = measured - product(design, values[:, None])[..., 0]
-        deviation = np.maximum(np.sqrt((residual**2).sum(axis=0) / freedom), LEAST_SCATTER)
+        deviation = np.sqrt((residual**2).sum(axis=0) / freedom)
+        deviation = np.maximum(deviation, LEAST_SCATTER * np.abs(measured).max())
     coefficients, covariance = np.zeros(6), np.zeros((6, 6))
     coefficients[told] = values
-    rows = (design / deviation[:, None]).reshape(-1, told.sum())
-    covariance[np.ix_(told, told)] = np.linalg.inv(rows.T @ rows)
+    rows = (design / size / deviation[:, None]).reshape(-1, told.sum())
+    covariance[np.ix_(told, told)] = np.linalg.inv(rows.T @ rows) / size / size[:, None]
     unknown = np.repeat(coefficients[[0, 3]] * UNKNOWN, 3)
     covariance[np.diag_indices(6)] += np.where(told, 0.0, unknown) ** 2
     return coefficients, covariance, told

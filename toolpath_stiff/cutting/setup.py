@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.cutting import stock as stocks
 from toolpath_stiff.cutting.coefficients import Coefficients, coefficients_from, material, read_coefficients
 from toolpath_stiff.cutting.cutters import Cutter, cutter_of, merged_tool
-from toolpath_stiff.cutting.stock import Stock, box_stock, stock_of_extents
+from toolpath_stiff.cutting.stock import Stock, box_stock, stock_from_stl, stock_of_extents
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.courses import Extents, extents
@@ -182,7 +181,7 @@ def stock_of(setup: CutSetup, moves: Moves, cutters: Mapping[int, Cutter]) -> St
     """
     if setup.body:
         smallest = min(cutter.diameter for cutter in cutters.values())
-        return stocks.stock_from_stl(setup.body, smallest / CELLS)
+        return stock_from_stl(setup.body, smallest / CELLS)
     if setup.size is None:
         return stock_of_extents(moves, cutters)
     low, origin = setup.corner, "given"

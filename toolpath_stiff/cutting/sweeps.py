@@ -19,7 +19,7 @@ from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves
 
 SAGITTA = 2e-7  # m, of chords in place of an arc that is not level in the plane
-STRAIGHT, ARC_TURN = 4.0, 0.5 * np.pi  # longest pieces: radii of the cutter; rad (of narrow arcs a ninth)
+STRAIGHT, ARC_TURN, NARROW_TURN = 4.0, 0.5 * np.pi, np.pi / 60.0  # longest pieces: radii of the cutter; rad
 
 
 # A piece of the cutting path; SI. Pieces stand in the order of time.
@@ -61,7 +61,7 @@ def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, In
     arcs = np.flatnonzero(cuts & (moves.arc_sweep != 0.0))
     if len(arcs):
         frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
-        turn = np.where(frame.radius_start < radius[arcs], ARC_TURN / 9.0, ARC_TURN)
+        turn = np.where(frame.radius_start < radius[arcs], NARROW_TURN, ARC_TURN)
         turn = np.where(bent[arcs], np.sqrt(8.0 * SAGITTA / frame.radius_start), turn)
         counts[arcs] = np.ceil(sweep / turn - 1e-9)
     first = np.append(0, np.cumsum(counts.astype(np.int64)))

@@ -161,7 +161,7 @@ def _not_excluded(hidden: Unexcluded) -> Document:
         "up_to": json_number(hidden.value / hidden.parameter.si, 2),
         "rms_percent": percent_of(hidden.rms, 2),
         "probability": json_number(hidden.probability, 2),
-        "would_tell": would_tell(hidden),
+        "would_tell": would_tell(hidden.effect),
     }
 
 

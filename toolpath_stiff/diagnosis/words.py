@@ -21,8 +21,9 @@ from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
 from toolpath_stiff.inference.votes import CHANCE, SMALL, outvoted, vote_words
-from toolpath_stiff.planning.plan import INDICATORS
+from toolpath_stiff.planning.plan import INDICATORS, telling
 from toolpath_stiff.portrait.words import alike_text
+from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
 
@@ -119,6 +120,8 @@ def _rivals(diagnosis: Examination) -> str:
     causes = [_cause(diagnosis, name) for name in diagnosis.explanations]
     if len(causes) < 2:
         return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
+    if diagnosis.explanations[0] not in (NONE, diagnosis.best):
+        return f"What is likeliest lowers no error at points that are left out: {'; '.join(causes)}."
     first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
     if first < POSITIVE * second:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
@@ -204,9 +207,9 @@ def _not_told_apart(diagnosis: Examination) -> list[str]:
 
 
 def _telling(diagnosis: Examination) -> dict[str, str]:
-    """Plausible effect -> the reading that tells it from what looks the same at the tip, where the effect names one."""
+    """Plausible effect -> the reading that tells it from what looks the same at the tip."""
     effects = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
-    return {effect.name: effect.told_by for effect in effects if effect.told_by}
+    return {effect.name: would_tell(effect) for effect in effects}
 
 
 def next_steps(diagnosis: Examination, request: Asked | None = None) -> list[str]:
@@ -290,7 +293,7 @@ def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
     return f"{words}; an indicator {tells} would tell" if tells else words
 
 
-def would_tell(hidden: Unexcluded) -> str:
+def would_tell(effect: Effect) -> str:
     """Where an indicator would show an effect, or what else to measure."""
-    place = INDICATORS[hidden.effect.link]
+    place = telling(effect)
     return place.removeprefix("none: ") if place.startswith("none: ") else f"an indicator {place}"

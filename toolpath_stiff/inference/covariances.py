@@ -1,9 +1,10 @@
 """Covariances of readings that need no n x n matrix: own scatter, groups that scatter together, a few shared columns.
 
-    V = diag(own) + common Z Z^T + S^T S,
+    V = diag(own) + Z diag(common) Z^T + S^T S,
 
-Z has a column of ones and noughts a group (a clamping), S a row for each nuisance that all readings share (six struts,
-36 coordinates of joints). Everything follows from the blocks C = diag(own) + common Z Z^T, whose inverse is known, by
+Z has a column of ones and noughts a group (a clamping, which may scatter more than another), S a row for each nuisance
+that all readings share (six struts, 36 coordinates of joints). Everything follows from the blocks C = diag(own) +
+Z diag(common) Z^T, whose inverse is known, by
 
     V^-1  = C^-1 - F^T F,       F = L^-1 S C^-1,   L L^T = 1 + S C^-1 S^T   (Woodbury 1950),
     ln|V| = ln|C| + ln|1 + S C^-1 S^T|                                      (matrix determinant lemma)
@@ -36,6 +37,10 @@ class Groups:
     def by(cls, labels: AnyArray) -> Groups:
         """Readings with equal labels (n,) together."""
         return cls(np.unique(labels, return_inverse=True)[1].reshape(-1).astype(np.int64))
+
+    def spread(self, values: float | FloatArray) -> FloatArray:
+        """(n,) of each reading's group, of values of all groups or (groups,)."""
+        return np.broadcast_to(values, self.count)[self.of]
 
     @cached_property
     def _order(self) -> Rows:
@@ -91,14 +96,14 @@ class Covariance:
     own_variance
         (n,) variance of each reading's own scatter, more than 0.
     groups, common
-        Readings that scatter together, and the variance that they have in common.
+        Readings that scatter together, and the variance that they have in common: of all groups, or (groups,).
     shared
         (q, n) by how much one standard deviation of each shared nuisance moves each reading.
     """
 
     own_variance: FloatArray
     groups: Groups
-    common: float
+    common: float | FloatArray
     shared: FloatArray
 
     def __len__(self) -> int:
@@ -107,11 +112,11 @@ class Covariance:
     @property
     def diagonal(self) -> FloatArray:
         """(n,) variance of each reading."""
-        return np.asarray(self.own_variance + self.common + (self.shared**2).sum(axis=0))
+        return np.asarray(self.own_variance + self.groups.spread(self.common) + (self.shared**2).sum(axis=0))
 
     def squares(self, rows: FloatArray) -> FloatArray:
         """(...,) x V x^T of rows (..., n): variances of these combinations of readings."""
-        unshared = (rows**2 * self.own_variance).sum(axis=-1) + self.common * (self.groups.sums(rows) ** 2).sum(axis=-1)
+        unshared = (rows**2 * self.own_variance).sum(axis=-1) + (self.common * self.groups.sums(rows) ** 2).sum(axis=-1)
         return np.asarray(unshared + ((rows @ self.shared.T) ** 2).sum(axis=-1))
 
     def widened(self, rows: Rows, variance: FloatArray) -> Covariance:
@@ -122,7 +127,7 @@ class Covariance:
 
     def draw(self, rng: np.random.Generator, draws: int) -> FloatArray:
         """(draws, n) normal scatter that readings have in common, without that of each reading on its own."""
-        common = np.sqrt(self.common) * rng.standard_normal((draws, self.groups.count))[:, self.groups.of]
+        common = (np.sqrt(self.common) * rng.standard_normal((draws, self.groups.count)))[:, self.groups.of]
         return np.asarray(common + rng.standard_normal((draws, len(self.shared))) @ self.shared)
 
     @cached_property
@@ -163,7 +168,7 @@ class Precision:
 
     own_variance: FloatArray
     groups: Groups
-    common: float
+    common: float | FloatArray
     factors: FloatArray
     fitted: FloatArray
 
@@ -186,7 +191,7 @@ class Precision:
     def _of_blocks(self, rows: FloatArray) -> FloatArray:
         """C^-1 x of rows (..., n)."""
         if self.groups.alone:
-            return rows / (self.own_variance + self.common)
+            return rows / (self.own_variance + self.groups.spread(self.common))
         moved = self.pull * self.groups.sums(rows / self.own_variance)
         return np.asarray((rows - moved[..., self.groups.of]) / self.own_variance)
 

@@ -85,7 +85,7 @@ def noise_doubt(problem: Problem, noise: Noise, gate: Gate, verdict: str, seed: 
 
 def _gate_at(problem: Problem, noise: Noise, factor: float, seed: int) -> Gate:
     """The absolute test of the model alone under a noise `factor` times as large."""
-    larger = replace(noise, repeat=factor * noise.repeat, clamping=factor * noise.clamping)
+    larger = noise.times(factor)
     scaled = Problem.of(problem.predictor, larger)
     base, draws = scaled.score_base(), simulate(larger, scaled.scatter.covariance, seed)
     forms = Forms(discrepancy_forms(problem.predictor), scaled.scatter.precision)

@@ -43,7 +43,16 @@ from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import findings, fitted_nuisances
 from toolpath_stiff.inference.several import search_pairs, search_triples
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
-from toolpath_stiff.inference.votes import Votes, closest, left_out_of, lowers_error, outvoted, rivals_of, votes
+from toolpath_stiff.inference.votes import (
+    Votes,
+    closest,
+    left_open,
+    left_out_of,
+    lowers_error,
+    outvoted,
+    rivals_of,
+    votes,
+)
 from toolpath_stiff.stiffness.contract import Effect
 
 NONE = "none"
@@ -62,7 +71,6 @@ SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alo
 # Raftery 1995, Bayes factors).
 POSITIVE = 3.0
 TAKEN_UP = ("joint_offset", "weak_strut")  # effects that the nuisances take up
-MOST_BESIDE = 3  # explanations of a verdict that the votes leave open; all votes are in the document
 Evidence = dict[tuple[str, ...], float]  # of effects, pairs and triples by their names
 
 
@@ -420,12 +428,13 @@ def put_to_vote(
     ]
     top = next((name for name in standing if name in fits), None)
     if top is None:
-        return ("adequate", (NONE,), {}) if gates.none_stands else ("unexplained", (), {})
-    ballots = votes(problem, fits[top], {NONE: base} | rivals_of(fits[top], fits))
+        beside = tuple(dict.fromkeys([*explanations, NONE]))
+        return ("ambiguous", beside, {}) if gates.none_stands else ("unexplained", (), {})
+    rivals = ({NONE: base} if gates.none_stands else {}) | rivals_of(fits[top], fits)
+    ballots = votes(problem, fits[top], rivals)
     ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
     open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
-    beside = tuple(dict.fromkeys([*standing, *open_rivals]))[: max(len(standing), MOST_BESIDE)]
-    return "ambiguous" if open_rivals else verdict, beside, ballots
+    return ("ambiguous" if open_rivals else verdict), left_open(top, standing, open_rivals, ballots), ballots
 
 
 def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:

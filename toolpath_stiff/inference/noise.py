@@ -27,7 +27,7 @@ from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, copied, from_repeats
+from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, copied, from_repeats, scatter_apart
 from toolpath_stiff.readings.measurements import Readings
 
 # Sd of what the links that the model takes for rigid change ln stiffness by, rms; assumed: along each axis 1 % in all,
@@ -45,6 +45,7 @@ LEAST = 1e-3
 # Degrees of freedom that a standard deviation is worth: one that is right within 10 % (1 / sqrt(2 x 50)) where a person
 # states it, within a third where it is guessed; assumed.
 STATED_FREEDOM, GUESSED_FREEDOM = 50.0, 4.0
+SHOWS = 3.9  # whitened length that 80 % of campaigns show at 5 % false alarms among some twenty candidates
 CONTRADICTED = 3.3  # standard deviations of the logarithm of their ratio from which repeats overrule a stated noise
 
 
@@ -59,7 +60,9 @@ class Noise:
     repeat
         (n,) relative standard deviation of each reading's own scatter.
     clamping
-        Relative standard deviation common to the readings of one clamping.
+        Relative standard deviation common to the readings of one clamping; root of the mean square where
+    clampings
+        (n,) they differ; None: they do not.
     strut_spread
         Relative standard deviation of the struts' stiffnesses.
     joint_error
@@ -87,6 +90,7 @@ class Noise:
     origin: str
     remark: str = ""
     tip: BoolArray | None = None
+    clampings: FloatArray | None = None
 
     @property
     def guess(self) -> str:
@@ -96,7 +100,7 @@ class Noise:
     @property
     def reading(self) -> FloatArray:
         """(n,) relative standard deviation of one reading, re-clamping included."""
-        return np.hypot(self.repeat, self.clamping)
+        return np.hypot(self.repeat, self.clamping if self.clampings is None else self.clampings)
 
     @property
     def floor_percent(self) -> float:
@@ -118,7 +122,14 @@ class Noise:
 
     def select(self, rows: BoolArray | IntArray) -> Noise:
         """The noise of some of the readings."""
-        return replace(self, repeat=self.repeat[rows], tip=None if self.tip is None else self.tip[rows])
+        clampings = None if self.clampings is None else self.clampings[rows]
+        tip = None if self.tip is None else self.tip[rows]
+        return replace(self, repeat=self.repeat[rows], tip=tip, clampings=clampings)
+
+    def times(self, factor: float) -> Noise:
+        """A noise so many times as large."""
+        clampings = None if self.clampings is None else factor * self.clampings
+        return replace(self, repeat=factor * self.repeat, clamping=factor * self.clamping, clampings=clampings)
 
 
 def noise_models(
@@ -152,7 +163,10 @@ def noise_models(
     for noise in models:
         repeat = np.sqrt(np.maximum(relative**2 - noise.clamping**2, LEAST**2))
         repeat[data.tip] = noise.repeat
-        with_loops.append(replace(noise, repeat=repeat, tip=data.tip))
+        clampings = None if noise.clampings is None else np.full(len(data), noise.clamping)
+        if clampings is not None:
+            clampings[data.tip] = noise.clampings
+        with_loops.append(replace(noise, repeat=repeat, tip=data.tip, clampings=clampings))
     return tuple(with_loops)
 
 
@@ -163,13 +177,22 @@ def _noise_of_tip(
     repeats = None if copies else from_repeats(data)
 
     def model(
-        name: str, repeat: float | FloatArray, clamping: float, freedom: float, origin: str, remark: str = ""
+        name: str,
+        repeat: float | FloatArray,
+        clamping: float | FloatArray,
+        freedom: float,
+        origin: str,
+        remark: str = "",
     ) -> Noise:
         every = np.maximum(np.full(len(data), repeat), LEAST)
         if np.min(repeat) < LEAST:
             origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
         wild = OUTLIERS if repeats is None else repeats.wild
-        return Noise(name, every, clamping, strut_spread, joint_error, wild, OUTLIER_WIDTH, freedom, origin, remark)
+        mean = float(np.sqrt(np.mean(np.square(clamping))))
+        each = clamping if isinstance(clamping, np.ndarray) else None
+        return Noise(
+            name, every, mean, strut_spread, joint_error, wild, OUTLIER_WIDTH, freedom, origin, remark, clampings=each
+        )
 
     remark = ""
     if stated is not None:
@@ -187,21 +210,40 @@ def _noise_of_tip(
         origin = f"estimated from {repeats.differences} differences between repeats: "
         origin += _percent(repeats.repeat, repeats.clamping)
         origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
-        return (model("measured", repeats.repeat, repeats.clamping, repeats.freedom, origin, remark),)
+        repeat, clamping, words = scatter_apart(data, repeats)
+        return (model("measured", repeat, clamping, repeats.freedom, origin + words, remark),)
     if known.any():
         relative = np.where(known, relative, total)
-        clamping = min(CLAMPING, float(np.median(relative)) / np.sqrt(2.0))
-        repeat = np.sqrt(np.maximum(relative**2 - clamping**2, 0.5 * relative**2))
-        origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of which {100 * clamping:.2g} % is "
-        origin += "assumed to be clamping"
+        # At most half the variance of a clamping's best reading, so that it counts once in each of them.
+        clamps = Groups.by(data.clamp)
+        least = np.full(clamps.count, CLAMPING * np.sqrt(2.0))
+        np.minimum.at(least, clamps.of, relative)
+        each = least[clamps.of] / np.sqrt(2.0)
+        mean = float(np.sqrt(np.mean(each**2)))
+        origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of which {100 * mean:.2g} % is "
+        origin += "assumed to be clamping: it stands in them and is counted once"
         if not known.all():
             origin += f"; {int((~known).sum())} readings do not state it and are assumed to scatter as the others do"
-        return (model("stated", repeat, float(clamping), STATED_FREEDOM, origin),)
+        repeat = np.sqrt(relative**2 - each**2)
+        return (model("stated", repeat, each if np.ptp(each) > 0.0 else mean, STATED_FREEDOM, origin),)
     why = "the repeats agree exactly, as copies do" if copies else "the data hold neither repeats nor sd_N_per_mm"
+    clampings = len(np.unique(data.clamp))
     return tuple(
-        model(name, *_shared(guess), GUESSED_FREEDOM, f"a {name} guess, {_percent(*_shared(guess))}: {why}")
+        model(
+            name, *_shared(guess), GUESSED_FREEDOM,
+            f"a {name} guess, {_percent(*_shared(guess))}: {why}; were it right, what changes the stiffness by less "
+            f"than {100 * _hidden(*_shared(guess), len(data), clampings):.2g} % (rms) could hide under it",
+        )
         for name, guess in GUESSES.items()
-    )
+    )  # fmt: skip
+
+
+def _hidden(repeat: float, clamping: float, readings: int, clampings: int) -> float:
+    """Relative rms change that so many readings in so many clampings do not show: of whitened length `SHOWS`.
+
+    Of a change that differs from reading to reading; strut law and the struts' and joints' own scatter hide more.
+    """
+    return float(SHOWS * np.sqrt(repeat**2 / readings + clamping**2 / clampings))
 
 
 def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str) -> str:
@@ -209,10 +251,8 @@ def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str) -
 
     Both are estimates: the stated one to `STATED_FREEDOM`, the repeats' to theirs (sd of a ratio's logarithm).
     """
-    total, shown = repeat, repeats.repeat
-    if repeats.clamps:
-        total, shown = float(np.hypot(repeat, clamping)), float(np.hypot(repeats.repeat, repeats.clamping))
-    ratio = shown / total
+    total = float(np.hypot(repeat, clamping)) if repeats.clamps else repeat
+    ratio = repeats.total / total
     if abs(np.log(ratio)) < CONTRADICTED * np.sqrt(0.5 / STATED_FREEDOM + 0.5 / repeats.freedom):
         return ""
     return (
@@ -236,7 +276,11 @@ def covariance(noise: Noise, predictor: Predictor) -> Covariance:
     shared = [noise.strut_spread * predictor.strut_columns(), noise.joint_error * predictor.joint_columns]
     shared.append(REST * predictor.rest_columns())
     rows = np.ascontiguousarray(np.concatenate(shared, axis=1).T)
-    return Covariance(noise.repeat**2, Groups.by(predictor.data.clamp), noise.clamping**2, rows)
+    clamps = Groups.by(predictor.data.clamp)
+    common: float | FloatArray = noise.clamping**2
+    if noise.clampings is not None:
+        common = clamps.sums(noise.clampings**2) / np.bincount(clamps.of)
+    return Covariance(noise.repeat**2, clamps, common, rows)
 
 
 MOST_WILD = 0.05  # share of readings that may be taken for wild; more where more of them are

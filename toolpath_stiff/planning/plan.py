@@ -37,6 +37,7 @@ from toolpath_stiff.planning.gaps import (
 from toolpath_stiff.planning.indicators import loops_between, with_indicators
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.visits import Visits, possible_visits
+from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.units import min_from_s
 
 Pair = tuple[str, str]  # names of two rivals
@@ -56,6 +57,11 @@ INDICATORS = {
     "geometry": "none: measure the length or radius itself",
     "instrument": "none: compare the gauge with a second one, and watch the indicator without load",
 }
+
+
+def telling(effect: Effect) -> str:
+    """Where an indicator reads an effect's own deflection; after "none: " another reading that tells of it."""
+    return f"none: {effect.told_by}" if effect.told_by else INDICATORS[effect.link]
 
 
 @dataclass(frozen=True)
@@ -170,9 +176,9 @@ class RivalPlan:
             both = [rival for rival in self.rivals if rival.name in names]
             common = set.intersection(*(set(rival.names) for rival in both))
             effects = [active.effect for rival in both for active in rival.effects]
-            links = [effect.link for effect in effects if effect.name not in common]
+            places = {effect.link: telling(effect) for effect in effects if effect.name not in common}
             best, gap = float(share.gaps_with(())[self.usable].max()), share.gap(self.chosen)
-            pairs.append(PairGap(names, gap, best, gap >= LEAST_GAP, {link: INDICATORS[link] for link in links}))
+            pairs.append(PairGap(names, gap, best, gap >= LEAST_GAP, places))
         return tuple(sorted(pairs, key=lambda pair: pair.separation_sigma))
 
     @property

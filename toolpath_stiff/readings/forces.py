@@ -54,12 +54,6 @@ class CoefficientFit(FolderResult):
         What was assumed, and read differently.
     inputs
         Files that were read.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.CoefficientFit.command
-    'forces'
     """
 
     command: ClassVar[str] = "forces"

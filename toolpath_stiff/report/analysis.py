@@ -9,7 +9,7 @@ from toolpath_stiff.analysis.statistics import sample_columns
 from toolpath_stiff.column_files import check_parquet, csv_pieces, parquet_pieces
 from toolpath_stiff.documents import Document
 from toolpath_stiff.path.table import PATH_COLUMNS
-from toolpath_stiff.report import analysis_page, cut
+from toolpath_stiff.report import analysis_page, cut, cut_files
 from toolpath_stiff.report.analysis_tables import (
     TITLES,
     and_more,
@@ -58,9 +58,9 @@ DATA = {
     "samples.csv": samples_csv,
     "samples.parquet": samples_parquet,
     "summary.json": Analysis.to_json,
-    "cut.csv": cut.stations_csv,
-    "cut_lines.csv": cut.lines_csv,
-    "surface.vtk": cut.surface_vtk,
+    "cut.csv": cut_files.stations_csv,
+    "cut_lines.csv": cut_files.lines_csv,
+    "surface.vtk": cut_files.surface_vtk,
 }
 OF_CUT = ("cut.csv", "cut_lines.csv", "surface.vtk", "cut.png")
 PAGE, page = "report.html", analysis_page.page

@@ -175,14 +175,8 @@ def shift_program(
     >>> import numpy as np
     >>> from toolpath_stiff.nc.reader import parse_program
     >>> from toolpath_stiff.rewriting.side_shift import SideShift
-    >>> program = parse_program("G21 G90 F600
-    G0 X0 Y0 Z0
-    G1 X10
-    G1 Y20 (wall)
-    G1 X0
-    M30
-    ", "slot.nc")
-    >>> shift = SideShift(program.moves, {2: (np.array([0.0, 1.0]), np.array([-0.02, -0.02]))})  # mm, left is +
+    >>> program = parse_program("G21 G90 F600\nG0 X0 Y0 Z0\nG1 X10\nG1 Y20 (wall)\nG1 X0\nM30\n", "slot.nc")
+    >>> shift = SideShift(program.moves, {1: (np.array([0.0, 1.0]), np.array([-0.02, -0.02]))})  # mm, left is +
     >>> shifted, rows = shift_program(program, (0.0,) * 6, shift.courses)
     >>> print(shifted, end="")
     G21 G90 F600
@@ -192,7 +186,7 @@ def shift_program(
     G1 X0
     M30
     >>> rows
-    [0, 1, 2, 3]
+    [0, 1, 2]
     """
     check_rewritable(program)
     place = pose_in_mm(origin)

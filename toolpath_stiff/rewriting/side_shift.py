@@ -73,7 +73,7 @@ class SideShift:
         ]
         self._start, self._end = (ends[:, 0] + 1j * ends[:, 1] for ends in self._ends)
         center = mm_from_m(moves.arc_center)
-        self._center, self._height = center[:, 0] + 1j * center[:, 1], center[:, 2]
+        self._center = center[:, 0] + 1j * center[:, 1]
         self._normal = np.where(moves.arc_normal[:, 2] < 0.0, -1.0, 1.0)
         self._sweep = moves.arc_sweep * self._normal  # counter-clockwise, seen from above
         self._length = mm_from_m(move_lengths(moves))

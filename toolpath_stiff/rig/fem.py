@@ -52,7 +52,7 @@ class FemMachine(HiddenMachine):
     bearings, flange
         m/N at the spindle in platform axes; rotation vector, root of rad/(N m).
     riser
-        m/N per m^3, 1 / (3 EI) of the column under the work in the set-up `riser`.
+        m/N sideways of the block under the work in the set-up `riser`, broader than high: in shear.
     seat, seat_strut
         Give of one strut's platform joint in one direction: platform axes, root of m/N.
     swing, opening, turning, worn
@@ -261,9 +261,8 @@ def _work(machine: FemMachine, rows: Rows, state: CommandedRows, pose: IntArray)
     tips = state.place.work_point
     table = fem_parts.table_give(state.nominal, tips, machine.mounts, machine.plate, machine.floor)[pose]
     along = np.einsum("ni,nij,nj->n", rows.direction, table, rows.direction)
-    tall = tips[pose, 2] - table_top(state.nominal)
-    column = machine.riser * tall**3 * (rows.setup == "riser") * (1.0 - rows.direction[:, 2] ** 2)
-    return np.asarray(rows.force * (along + column))
+    riser = machine.riser * (rows.setup == "riser") * (1.0 - rows.direction[:, 2] ** 2)
+    return np.asarray(rows.force * (along + riser))
 
 
 def displacements(

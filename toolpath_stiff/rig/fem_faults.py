@@ -2,7 +2,7 @@
 
 `links` are those whose give has this signature at the tip (words of `unknown.LINKS`), `names` the effects of the
 catalogue, by their titles, that are a right name of the fault; without one it lies outside the catalogue. Limits are
-assumed: beyond them a machine would be noticed without a diagnosis.
+assumed: beyond them a machine would be noticed without a diagnosis; they lie within what the catalogue admits.
 """
 
 from collections.abc import Callable
@@ -80,9 +80,9 @@ FAULTS: dict[str, Fault] = {
     "platform_soft": _fault("platform", "platform_flexibility", CRACKED, _both(_softened("rim"), _softened("spokes"))),
     "joints_soft": _fault(ALL, "joint_compliance strut_law", SOFT, _grown("joint")),
     "joints_in_contact": _fault(ALL, "contact_nonlinearity joint_compliance strut_law", SOFT, _grown("hertz")),
-    "joints_turn_hard": _fault("joints", "joint_moment_stiffness", 2e6, _grown("turning", *[1] * 6)),
-    "struts_curved": _fault(ALL, "strut_law", 0.4, _grown("curvature"), signed),
-    "strut_weak": _fault(ONE, "weak_strut", 2.3, _softened("strut_factors", _strut), one_strut),
+    "joints_turn_hard": _fault("joints", "joint_moment_stiffness", 1.2e6, _grown("turning", *[1] * 6)),
+    "struts_curved": _fault(ALL, "strut_law", 0.3, _grown("curvature"), signed),
+    "strut_weak": _fault(ONE, "weak_strut", 1.5, _softened("strut_factors", _strut), one_strut),
     "frame_soft": _fault("frame", "frame_compliance frame_sway", CRACKED, _softened("members")),
     "frame_corner_soft": _fault(
         "frame", "frame_compliance", SOFT,
@@ -92,17 +92,17 @@ FAULTS: dict[str, Fault] = {
     "table_mounts_soft": _fault("table", "table_compliance", CRACKED, _softened("mounts")),
     "riser_soft": _fault("table", "setup_compliance", SOFT, _grown("riser"), needs="setup"),
     "platform_wide": _fault("platform,joints,geometry", "platform_radius_error", 0.02, _grown("radius_error"), signed),
-    "tool_entered_wrong": _fault("tool,geometry", "tool_length_error", 0.06, _grown("tip_error"), signed),
+    "tool_entered_wrong": _fault("tool,geometry", "tool_length_error", 0.04, _grown("tip_error"), signed),
     "cell_scaled": _fault(
-        "instrument", "gauge_scale", 0.2,
+        "instrument", "gauge_scale", 0.15,
         lambda m, p: {"gauge_target": "XYZ"[p["axis"]], "gauge_factor": 1.0 + p["size"]},
         drawn(whole("axis", 0, 3), signed),
     ),
-    "indicator_drifts": _fault("instrument", "thermal_drift", 3.3e-7, _grown("drift"), signed, "time_min"),
+    "indicator_drifts": _fault("instrument", "thermal_drift", 2.5e-7, _grown("drift"), signed, "time_min"),
     "tool_slender": _fault("tool", "tool_bending", 3.0, _softened("tool")),
     "frame_feet_soft": _fault(WORK, "frame_sway", CRACKED, _softened("feet")),
     "joint_off_its_place": _fault(
-        f"{ONE},platform,frame,geometry", "joint_offset", 0.03,
+        f"{ONE},platform,frame,geometry", "joint_offset", 0.012,
         lambda m, p: {"platform_errors": m.platform_errors + p["size"] * np.outer(_strut(p), _unit(p))},
         drawn(one_strut, _direction),
     ),

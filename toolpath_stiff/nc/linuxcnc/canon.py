@@ -18,6 +18,7 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import PostedKinematics
+from toolpath_stiff.nc.linuxcnc import program_words
 from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Jump, Move, Recorder
 from toolpath_stiff.nc.request import ZERO
@@ -27,21 +28,9 @@ from toolpath_stiff.units import MM_PER_INCH
 
 CALL = re.compile(r"^ *\d+ +N(?:\.+|(\d+)) *([A-Z][A-Z0-9_]*)\((.*)\) *$", re.MULTILINE)
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
-# What the words of a program's line say, where `rs274` prints too little.
-MOTION_CODE = re.compile(r"G0*(0|1|2|3|5|33|38|73|74|76|8\d)(?![\d])")
-CYCLE_CODES = {"73", "74", "76", *(f"8{digit}" for digit in range(1, 10))}
-MACHINE_MOVE = re.compile(r"G0*53(?![\d.])")
-HOME_MOVE = re.compile(r"G0*(28|30)(?![\d.])")
-DISTANCE_MODE = re.compile(r"G0*9([01])(?![\d.])")
-LEAVES = re.compile(r"O|.*M0*9[89](?!\d)")  # lines of which rs274 prints no comment: calls, returns, loops, conditions
-FINE_WORD = re.compile(r"[XYZ]\[?[-+]?\d*\.\d{4,}[1-9]")  # more decimals than rs274 prints
+TURNS = {"START_SPINDLE_CLOCKWISE": 1, "START_SPINDLE_COUNTERCLOCKWISE": -1, "STOP_SPINDLE_TURNING": 0}
 PLANES = {"XY": "G17", "XZ": "G18", "YZ": "G19"}
 LENGTH_UNKNOWN_BELOW_MM = 0.9 * UNKNOWN_LENGTH_MM
-REFUSED = {  # problem, what was expected
-    "CHANGE_TOOL_NUMBER": ("M61: LinuxCNC's rs274 goes on with length and diameter of the tool before", "T and M6"),
-    "NURBS_FEED": ("a spline, whose points LinuxCNC does not print", "arcs and lines"),
-    "STRAIGHT_PROBE": ("probing: what follows depends on what is met", "no probing"),
-}
 SAME_PLACE = 2e-4  # two units in the last place printed, in the unit in force
 ROUNDING = 1e-6  # far less than one of them
 
@@ -93,10 +82,10 @@ class Follower:
 
     def __post_init__(self) -> None:
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
-        self.fine = any(FINE_WORD.search(line.words) for line in self.lines)
+        self.fine = any(program_words.FINE_WORD.search(line.words) for line in self.lines)
         self.passed = [0]  # how many of the first lines no run that comes straight on leaves out
         for line in self.lines:
-            shows = line.words.strip("%") and not line.optional and not LEAVES.match(line.words)
+            shows = line.words.strip("%") and not line.optional and not program_words.LEAVES.match(line.words)
             self.passed.append(self.passed[-1] + bool(shows))
 
     def follow(self, text: str) -> None:
@@ -104,12 +93,13 @@ class Follower:
         for match in CALL.finditer(text):
             number, name, inner = match.groups()
             action = getattr(self, f"_on_{name.lower()}", None)
-            if action is not None or name in REFUSED:
+            if action is not None or name in program_words.REFUSED:
                 self.reading = self.reading if number is None else int(number)
-            if name in REFUSED:
-                raise self.fail(*REFUSED[name])
+            if name in program_words.REFUSED:
+                raise self.fail(*program_words.REFUSED[name])
             if action is not None:
                 action(inner)
+            self.turn = TURNS.get(name, self.turn)
 
     def fail(self, problem: str, expected: str = "", hint: str = "", line: int | None = None) -> InputError:
         """An error of a line of the program, unless one is given of that being read."""
@@ -129,9 +119,9 @@ class Follower:
             self._note_jump(int(text))
             self.line, self.moves_of_line = int(text), 0
             self._note_numbers(self.lines[self.line - 1])
-            codes = MOTION_CODE.findall(self._words(self.line))
+            codes = program_words.MOTION_CODE.findall(self._words(self.line))
             if codes:
-                self.cycle = codes[-1] in CYCLE_CODES
+                self.cycle = codes[-1] in program_words.CYCLE_CODES
         elif text.startswith("interpreter: cutter radius compensation on"):
             self._check_diameter()
 
@@ -144,12 +134,12 @@ class Follower:
             left += 1
         while after > 1 and not self.lines[after - 1].words:
             after -= 1
-        left = left if LEAVES.match(self.lines[left - 1].words) else self.line
-        after = after if LEAVES.match(self.lines[after - 1].words) else line - 1
+        left = left if program_words.LEAVES.match(self.lines[left - 1].words) else self.line
+        after = after if program_words.LEAVES.match(self.lines[after - 1].words) else line - 1
         self.jumps.append(Jump(len(self.recorder), left, after))
 
     def _note_numbers(self, line: Line) -> None:
-        for mode in DISTANCE_MODE.findall(line.plain):
+        for mode in program_words.DISTANCE_MODE.findall(line.plain):
             self.incremental = mode == "1"
         here, before = line.coordinates or {}, dict.fromkeys("XYZ", 0.0) if self.incremental else self.given
         self.steps = {axis: value - before.get(axis, math.nan) for axis, value in here.items()}
@@ -234,15 +224,6 @@ class Follower:
 
     def _on_set_spindle_mode(self, inner: str) -> None:
         self.surface_speed = _numbers(inner)[-1] != 0.0
-
-    def _on_start_spindle_clockwise(self, _: str) -> None:
-        self.turn = 1
-
-    def _on_start_spindle_counterclockwise(self, _: str) -> None:
-        self.turn = -1
-
-    def _on_stop_spindle_turning(self, _: str) -> None:
-        self.turn = 0
 
     def _on_start_speed_feed_sync(self, inner: str) -> None:
         self.synchronised = abs(_numbers(inner)[0]) * self.scale
@@ -354,7 +335,7 @@ class Follower:
         """Until a move names Z, rs274 prints the number that Z had before the length changed."""
         words = self._words(self.line)
         named = "Z" in self.lines[self.line - 1].named
-        if self.cycle or (named and self.incremental) or (HOME_MOVE.search(words) and not named):
+        if self.cycle or (named and self.incremental) or (program_words.HOME_MOVE.search(words) and not named):
             problem = "a move from a height that rs274 has lost: the tool length changed between the last move and M6"
             raise self.fail(problem, "G90 G0 with Z before it", line=self.line)
         if named:
@@ -370,12 +351,13 @@ class Follower:
         words = self._words(self.line)
         named = {AXES.index(letter) for letter in self.lines[self.line - 1].named}
         named |= {0, 1} if {"@", "^"} & set(words) else set()
-        machine = bool(MACHINE_MOVE.search(words))
-        if HOME_MOVE.search(words):  # first to the intermediate point, then home
+        machine = bool(program_words.MACHINE_MOVE.search(words))
+        if program_words.HOME_MOVE.search(words):  # first to the intermediate point, then home
             machine = self.moves_of_line > 0
             named = named or (set(range(6)) if machine else set())
         self.moves_of_line += 1
-        if self.cycle and not HOME_MOVE.search(words):  # to the hole at the old height, or along the normal
+        # To the hole at the old height, or along the normal.
+        if self.cycle and not program_words.HOME_MOVE.search(words):
             normal = geometry.PLANES[self.plane][2]
             along = all(start[axis] == end[axis] for axis in range(6) if axis != normal)
             named = {normal} if along else named - {normal}

@@ -1,6 +1,7 @@
 // The finished part: walls and floors coloured by the error of their surface; it turns with the path.
 const errors = data.part, corners = new Uint16Array(bytes(errors.corners)), made = new Int32Array(bytes(errors.sample));
-const errorOf = unpack(errors.error, errors.error_range), quadCount = made.length, whereOf = new Float32Array(2 * quadCount);
+const errorOf = unpack(errors.error, errors.error_range), quadCount = made.length;
+const whereOf = new Float32Array(2 * quadCount);
 const errorColour = (e) => (Number.isNaN(e) ? ink.soft : errors.colours[Math.max(0, Math.min(CLASSES - 1,
   Math.floor((e / errors.limit + 1) / 2 * CLASSES)))]);
 const cornerOf = (q, c) => [0, 1, 2].map((axis) => {

@@ -28,7 +28,6 @@ class FrameSway(Effect):
         ("vertical", "nm/N vertically"),
         ("rocking", "nrad/(N m) in rocking"),
     )
-    told_by = "an indicator between a frame vertex and the floor, or between the table and the floor"
     parameters = (
         compliance("sideways", 200.0, (2.0, 10.0), BUILT, "compliance of the frame along X and Y"),
         compliance("vertical", 200.0, (2.0, 10.0), BUILT, "compliance of the frame along Z"),
