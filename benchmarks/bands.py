@@ -11,7 +11,8 @@ that the model calls the weakest too; 90 % bands hold at least 85 % beyond them.
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -29,12 +30,10 @@ from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.machine.file import load_machine, parse_machine
 from toolpath_stiff.readings.measurements import read_measurements
-from toolpath_stiff.rig import fem_solution, hidden
 from toolpath_stiff.rig.campaigns import AXES, POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, draw_case, effects_of_layout, rows_of
 from toolpath_stiff.rig.exercise import csv_text
-from toolpath_stiff.rig.fem import FemMachine
-from toolpath_stiff.rig.fem_case import faults_of
+from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.nominal import load_nominal, reachable
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import m_from_mm, mm_from_m, rad_from_deg
@@ -43,10 +42,11 @@ FIRST_SEED = 900_000
 RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_bands.jsonl"
 POSES, REPEATED, RADIUS, HEIGHTS, TILTS = (12, 28), 3, 300.0, (400.0, 1200.0), (5.0, 25.0)  # mm, degrees; assumed
 INSIDE, OUTSIDE = 24, 12
+MOST_DRAWS, AGAIN = 4, 10_000_000
 NORMAL_90 = 1.644854  # two-sided 90 % quantile of the normal distribution
 NARROWER = (0.9, 1.0, 1.1)  # factors on the bands: what a tenth more or less would have held
 # Not drawn: a fault of an instrument is none of the machine; there is one set-up.
-SET_ASIDE = ("gauge_scale", "thermal_drift", "cell_scaled", "indicator_drifts", "setup_compliance")
+SET_ASIDE = ("gauge_scale", "thermal_drift", "setup_compliance")
 NARROW = NARROWER.index(1.0)
 
 
@@ -102,14 +102,18 @@ def truth_of(case: DrawnCase, path: FloatArray) -> FloatArray:
     """(36,) N/m on the hidden machine under 1000 N."""
     columns = [*mm_from_m(path[:, :3]).T, *np.degrees(path[:, 3:6]).T, *path[:, 6:].T]
     rows = rows_of({**dict(zip((*POSE, "dx", "dy", "dz"), columns, strict=True)), "force_N": np.full(len(path), 1e3)})
-    if isinstance(case.machine, FemMachine):
-        return fem_solution.true_stiffness(case.nominal, case.machine, rows)
-    return hidden.true_stiffness(case.nominal, case.machine, rows)
+    return case.machine.stiffness(case.nominal, rows)
 
 
 def run(job: Job) -> Record:
-    """The record of a case; with `error`, the traceback, where it failed."""
-    return record_of({**asdict(job), "layout": job.built, "group": job.hidden}, lambda folder: _judged(job, folder))
+    """The record of a case; with `error` where it failed; of a fault with which a pose cannot be, that of the next."""
+    record: Record = {}
+    for attempt in range(MOST_DRAWS):
+        drawn = replace(job, seed=job.seed + attempt * AGAIN)
+        record = record_of({**asdict(job), "layout": job.built, "group": job.hidden}, partial(_judged, drawn))
+        if "no pose near" not in record.get("error", ""):
+            break
+    return record
 
 
 def _judged(job: Job, folder: Path) -> Record:
@@ -117,8 +121,13 @@ def _judged(job: Job, folder: Path) -> Record:
     rng, machine, name = np.random.default_rng([job.seed, 1]), load_machine("nist"), job.hidden
     table = campaign(rng)
     if name == "one":
-        known = faults_of(table, catalogue=True) if job.built == "fem" else effects_of_layout("paper")
-        name = str(rng.choice([fault for fault in known if fault not in SET_ASIDE]))
+        known = [effect for effect in effects_of_layout("paper") if effect not in SET_ASIDE]
+        if job.built == "fem":
+            known = [
+                fault for fault, kind in FAULTS.items()
+                if kind.names and "instrument" not in kind.links and all(column in table for column in kind.columns)
+            ]  # fmt: skip
+        name = str(rng.choice(known))
     case = draw_case(job.seed, "campaign", name, 0.02, plan=table, built=job.built)
     (folder / "measured.csv").write_text(csv_text(case.rows))
     data = read_measurements(str(folder / "measured.csv"), machine)

@@ -9,6 +9,7 @@ import pytest
 
 from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.error_model import ErrorModel, coordinates
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.model import STRUT_LAW, EffectEntry, Uncertainty
 from toolpath_stiff.nc.reader import read_program
@@ -124,6 +125,41 @@ def test_geometry_effects_are_applied_once(program):
     moved = np.abs(near.at.stiffness - found.at.stiffness)[found.counted]
     # 2 mm of tool on arms of 300 mm: the slope changes by a per cent or two over it; small slopes by more.
     assert found.parameter_band.deviation[found.counted] == pytest.approx(moved, rel=0.05, abs=0.02 * moved.max())
+
+
+def with_errors(places_m, struts=0.0, near=0.0, away=0.0):
+    """The law known exactly; struts that differ, and what the model lacks."""
+    place = coordinates(np.atleast_2d(places_m), np.zeros((1, 3)))
+    errors = ErrorModel(np.zeros((2, 44)), struts, 0.0, near, away, place)
+    return NIST.with_changes(uncertainty=Uncertainty(STRUT_LAW, np.ones(2), np.eye(2), errors))
+
+
+def test_struts_that_differ_widen_the_band(program):
+    found = analyze(with_errors([0.0, 0.0, 0.0], struts=0.01), program, step=0.05)
+    squares = 0.0
+    for strut in range(1, 7):
+        weak = NIST.with_changes(effects=(EffectEntry("weak_strut", {"strut": strut, "factor": 0.9999}),))
+        squares += (100.0 * (analyze(weak, program, step=0.05).at.stiffness - found.at.stiffness)) ** 2
+    counted = found.counted
+    assert found.parameter_band.deviation[counted] == pytest.approx(np.sqrt(squares)[counted], rel=1e-3)
+
+
+def test_the_band_widens_away_from_the_measured_poses_and_says_so(program):
+    origin = analyze(NIST, program, step=0.05).samples.position
+    here, away = (with_errors(origin[-1] + [0.0, 0.0, z], near=0.01, away=0.03) for z in (0.0, 2.0))
+    for machine, few, least, most in ((here, 0.0, 0.01, 0.02), (away, 1.0, 0.03, 0.03)):
+        found = analyze(machine, program, step=0.05)
+        relative = (found.parameter_band.deviation / found.at.stiffness)[found.counted]
+        assert relative.min() >= least * (1.0 - 1e-6)
+        assert relative.max() <= most * (1.0 + 1e-6)
+        figures = found.to_dict()["parameter_uncertainty"]
+        assert figures["few_readings_share"] == few
+        assert figures["few_readings_at_min"] == bool(few)
+        assert figures["form_known"]
+        assert ("few readings near here" in str(found)) == bool(few)
+        # What the model lacks is alike along one axis, half of it elsewhere: it averages out in part.
+        weight = np.where(found.counted, found.samples.weight, 0.0)
+        assert found.parameter_band.deviation_of_mean(weight) < 0.9 * found.parameter_band.deviation.max()
 
 
 def test_no_such_parameter():

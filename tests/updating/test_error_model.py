@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import as_written
-from tests.updating.cases import campaign, readings_by_hand
+from tests.updating.cases import campaign, dense, readings_by_hand
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.errors import InputError
@@ -90,12 +90,17 @@ def test_an_update_writes_how_far_it_may_be_off(fitted):
     for name in ("loadings", "struts", "joints", "near", "away", "places"):
         np.testing.assert_allclose(getattr(read, name), getattr(errors, name), rtol=1e-9, atol=1e-9)
     assert machine_toml(again) == machine_toml(machine)
-    # Scatter, struts and joints together are what the fit itself says of its unknowns, times what the readings show.
-    fit = update.last.fit
-    expected = error_model(fit, update.task.data, update.noise).loadings
-    shown = np.sqrt((expected**2).sum(axis=1)) / np.sqrt(np.diag(fit.covariance))
-    assert (shown > 0.5).all()
-    assert (shown < 2.0).all()
+    # By how much scatter, struts and joints move law and sizes, through the least squares written out.
+    fit, noise = update.last.fit, update.noise
+    of_fit, covariance = error_model(fit, update.task.data, noise), fit.scatter.covariance
+    by_reading = fit.covariance @ fit.jacobian.T @ np.linalg.inv(dense(covariance))
+    own, geometry = np.split(of_fit.loadings, [-42], axis=1)
+    of_geometry = by_reading @ covariance.shared[:42].T * (of_fit.struts / noise.strut_spread)
+    scale = np.sqrt(np.diag(fit.covariance))[:, None]
+    assert geometry / scale == pytest.approx(of_geometry / scale, abs=1e-6)
+    assert of_fit.struts / noise.strut_spread == pytest.approx(of_fit.joints / noise.joint_error)
+    ratio = (own @ own.T) / (by_reading @ dense(replace(covariance, shared=covariance.shared[:0])) @ by_reading.T)
+    assert ratio == pytest.approx(np.full_like(ratio, ratio[0, 0]), rel=1e-4)
 
 
 def test_the_form_is_least_known_away_from_the_measured_poses(fitted):

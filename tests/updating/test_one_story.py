@@ -87,12 +87,13 @@ def test_every_text_prints_these_two_errors():
     update = update_of(diagnosis.data, diagnosis.best)
     story = f"as given {found['baseline']['as_given'][MEAN]:.2f} %, strut law refitted {found['baseline'][MEAN]:.2f} %"
     last = f", with {diagnosis.best} {found['candidates'][0][MEAN]:.2f} %"
+    with_choice = last.replace(diagnosis.best, diagnosis.rows.best.label)
     texts = [
         (compare_report.text(comparison), ""),
         (compare_html(comparison, {}), ""),
         (diagnose_report.text(diagnosis), last),
         (diagnose_html(diagnosis, {}), last),
-        (update_report.text(update), last),
+        (update_report.text(update), with_choice),
     ]
     for text, rest in texts:
         assert story + rest in re.sub(r"\s+", " ", text)

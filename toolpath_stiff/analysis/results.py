@@ -356,8 +356,10 @@ def _assumptions(analysis: Analysis) -> list[str]:
     range_of_law = f"the strut law is extrapolated outside {low:.1f} to {high:.1f} mm of strut length"
     sentences.append("the stiffness of a strut is the same at every length" if law.constant else range_of_law)
     if analysis.parameter_band is not None:
+        whole = ", of struts, joints and what the model lacks, as `[uncertainty.errors]` of the machine file has them"
+        beside = whole if analysis.parameter_band.form.any() else " alone"
         sentences.append(
-            "the band of the stiffness holds the uncertainty of the fitted parameters alone, propagated linearly: "
+            f"the band of the stiffness holds the uncertainty of the fitted parameters{beside}, propagated linearly: "
             f"{', '.join(analysis.parameter_band.names)}"
         )
     if not acting_effects(model):

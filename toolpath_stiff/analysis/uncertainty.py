@@ -133,4 +133,5 @@ def band_figures(band: ParameterBand, stiffness: FloatArray, weight: FloatArray)
         figures[f"{name}_sd_N_per_mm"] = n_per_mm_from_n_per_m(sd)
         figures[f"{name}_95_N_per_mm"] = [n_per_mm_from_n_per_m(end) for end in ends]
     few = float(weight[band.few].sum() / weight.sum())
-    return {**figures, "few_readings_share": few, "few_readings_at_min": bool(band.few[low])}
+    figures |= {"few_readings_share": few, "few_readings_at_min": bool(band.few[low])}
+    return {**figures, "form_known": bool(band.form[low] > 0.0)}

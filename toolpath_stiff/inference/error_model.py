@@ -5,7 +5,8 @@ The logarithm of the true stiffness differs from a fit's by three errors, whose 
     scatter    of readings and clampings, which law and sizes have taken up: times `SCATTERS` of the noise model;
     geometry   struts that are not alike, joints off their places: times `GEOMETRIES` of what the noise model assumes.
                They belong to the machine: where law and sizes have taken them up they are no error, elsewhere they are;
-    form       what neither describes, smooth over poses and different by direction, of `FORMS` (relative sd).
+    form       what neither describes (links that the model takes for rigid, too), smooth over poses and different by
+               direction, of `FORMS` (relative sd).
 
 A quarter of the measured poses is left out at a time, a region each, for a reading whose neighbours were fitted tells
 little of what is away from all of them. The sizes count by how likely they make the errors there: with four to eight
@@ -15,6 +16,7 @@ scatter, not for the stiffness under it.
 """
 
 from collections.abc import Iterator, Sequence
+from math import erfc
 
 import numpy as np
 
@@ -24,7 +26,7 @@ from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.fits import prior_of
 from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.machine.error_model import ErrorModel, alike, coordinates
+from toolpath_stiff.machine.error_model import GEOMETRY, ErrorModel, alike, coordinates
 from toolpath_stiff.readings.measurements import Readings
 
 # Sizes that are weighed, and how they are expected; assumed. The scatter is known to the noise model's degrees of
@@ -37,7 +39,7 @@ FEWEST_PLACES, HALVINGS = 8, 2  # poses to be told from each other; regions are 
 MOST_READINGS = 400  # spread over the campaign, from which the sizes are read
 MOST_DIRECTIONS, FORM_IN_AXES = 12, 0.01  # along which a region's errors may be other than scatter; by what form
 TAILS = 4.0  # degrees of freedom of the expected scatter
-ROUNDING = 1e-12
+ROUNDING, BISECTIONS = 1e-12, 25
 
 
 def error_model(fit: Fit, data: Readings, noise: Noise) -> ErrorModel | None:
@@ -51,20 +53,21 @@ def error_model(fit: Fit, data: Readings, noise: Noise) -> ErrorModel | None:
         return None
     rows = np.unique(np.linspace(0, len(data) - 1, min(len(data), MOST_READINGS)).round().astype(np.int64))
     jacobian, residual, covariance = fit.jacobian[rows], fit.residual[rows], fit.scatter.covariance
-    common = covariance.groups.spread(covariance.common)
+    shared, common = covariance.shared[:GEOMETRY], covariance.groups.spread(covariance.common)
     same = covariance.groups.of[rows, None] == covariance.groups.of[rows]
     parts = (
         np.diag(covariance.own_variance[rows]) + common[rows] * same,
-        covariance.shared[:, rows].T @ covariance.shared[:, rows],
+        shared[:, rows].T @ shared[:, rows],
         alike(place[rows], data.direction[rows]),
     )
+    assumed = parts[0] + covariance.shared[:, rows].T @ covariance.shared[:, rows]
     sizes = np.stack([axis.ravel() for axis in np.meshgrid(SCATTERS, [*GEOMETRIES], [*FORMS], indexing="ij")], axis=1)
     beyond = np.log(SCATTERS) / np.sqrt(0.5 / noise.freedom)
     expected = (1.0 + beyond**2 / TAILS) ** (-0.5 * (TAILS + 1.0))
     prior = expected[:, None, None] * np.array([*GEOMETRIES.values()])[:, None] * np.array([*FORMS.values()])
     log_weights, away = np.log(prior.ravel()), list[FloatArray]()
     for out in regions(place[rows], data.point[rows]):
-        left = _left_out(out, jacobian, parts, fit.law_free)
+        left = _left_out(out, jacobian, assumed, fit.law_free)
         log_weights += _log_likelihoods(left @ residual, [left @ part @ left.T for part in parts], sizes**2)
         away.append(np.diag(left @ parts[2] @ left.T))
     weights = np.exp(log_weights - log_weights.max())
@@ -73,10 +76,10 @@ def error_model(fit: Fit, data: Readings, noise: Noise) -> ErrorModel | None:
     by_reading = fit.covariance @ fit.scatter.precision.times(fit.jacobian.T)  # of each unknown
     taken_up = by_reading * covariance.own_variance
     taken_up += common * covariance.groups.sums(by_reading)[:, covariance.groups.of]
-    own, geometry = _root(taken_up @ by_reading.T), by_reading @ covariance.shared.T
-    left = np.eye(len(rows)) - jacobian @ _estimator(jacobian, parts[0] + parts[1], fit.law_free)
+    own, geometry = _root(taken_up @ by_reading.T), by_reading @ shared.T
+    left = np.eye(len(rows)) - jacobian @ _estimator(jacobian, assumed, fit.law_free)
     near = float(np.diag(left @ parts[2] @ left.T).mean())
-    here = [fit.jacobian @ own, covariance.shared.T - fit.jacobian @ geometry]
+    here = [fit.jacobian @ own, shared.T - fit.jacobian @ geometry]
     typical = np.array([*(float((part**2).sum(axis=1).mean()) for part in here), near])
     factor = _coverage_factor(weights, sizes**2 @ typical)
     scatter, of_geometry, form = (factor * np.sqrt(weights @ sizes**2)).tolist()
@@ -109,12 +112,11 @@ def _estimator(jacobian: FloatArray, covariance: FloatArray, law_free: bool) -> 
     return np.asarray(scaled_inverse(information) @ weighted)
 
 
-def _left_out(out: IntArray, jacobian: FloatArray, parts: Sequence[FloatArray], law_free: bool) -> FloatArray:
+def _left_out(out: IntArray, jacobian: FloatArray, assumed: FloatArray, law_free: bool) -> FloatArray:
     """(m, n) matrix by which readings make the errors of m that are left out of the fit."""
     kept = np.delete(np.arange(len(jacobian)), out)
-    covariance = (parts[0] + parts[1])[np.ix_(kept, kept)]
     left = np.eye(len(jacobian))[out]
-    left[:, kept] = -jacobian[out] @ _estimator(jacobian[kept], covariance, law_free)
+    left[:, kept] = -jacobian[out] @ _estimator(jacobian[kept], assumed[np.ix_(kept, kept)], law_free)
     return left
 
 
@@ -147,12 +149,10 @@ def _root(covariance: FloatArray) -> FloatArray:
 
 def _coverage_factor(weights: FloatArray, variances: FloatArray) -> float:
     """Factor on the root of the mean variance at which 95 % of a mixture of normal errors lie within 1.96 of it."""
-    from scipy.optimize import brentq
-    from scipy.special import ndtr
-
     sd, mean = np.sqrt(variances), float(np.sqrt(weights @ variances))
-
-    def outside(factor: float) -> float:
-        return float(weights @ (2.0 * ndtr(-factor * NORMAL_95 * mean / sd))) - 0.05
-
-    return float(brentq(outside, 0.5, 3.0, xtol=1e-6))
+    likely, low, high = weights > weights.max() * ROUNDING, 0.5, 3.0
+    for _ in range(BISECTIONS):
+        factor = 0.5 * (low + high)
+        outside = [erfc(factor * NORMAL_95 * mean / (x * 2.0**0.5)) for x in sd[likely].tolist()]
+        low, high = (factor, high) if weights[likely] @ outside > 0.05 else (low, factor)
+    return factor

@@ -106,7 +106,8 @@ def read(request: Request) -> ReadProgram:
         raise ProgramError("the program is empty", expected="an NC program", file=name)
     native, (language, sign) = request.interpreter == "linuxcnc", recognise(lines, name, request.controller.dialect)
     if native and (language == CUTTER_LOCATION_FILE or language in LANGUAGE_RUNS):
-        problem = f"LinuxCNC's interpreter does not read this: {language} ({sign})"
+        what = "cutter-location files" if language == CUTTER_LOCATION_FILE else f"{language} ({sign})"
+        problem = f"LinuxCNC's interpreter reads no {what}"
         raise ProgramError(problem, expected="--interpreter builtin", file=name)
     if language == CUTTER_LOCATION_FILE:
         return _with_feed(cutter_location.read(request), request)

@@ -63,7 +63,10 @@ def _band(summary: Document) -> list[tuple[str, str]]:
     if not (band := summary.get("parameter_uncertainty")):
         return []
     mean, lowest = (" to ".join(map(number, band[f"{name}_95_N_per_mm"])) for name in ("mean", "min"))
-    return [("95 % band", f"mean {mean}, min {lowest} N/mm, from the fitted parameters alone")]
+    alone = "" if band["form_known"] else ", from the fitted parameters alone"
+    few = band["few_readings_share"]
+    here = f"few readings near here: {few:.0%} of the path{', its weakest place' * band['few_readings_at_min']}"
+    return [("95 % band", f"mean {mean}, min {lowest} N/mm{alone}"), *([("", here)] if few else [])]
 
 
 def _weakest(place: Document | None) -> list[tuple[str, str]]:

@@ -162,6 +162,14 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
 def line(state: State, block: CurrentBlock, code: str) -> None:
     """L, LP: straight to a point. In machine coordinates under M91."""
     plain, there, rapid = state.plain, polar(state, block) if code == "LP" else named(state, block), feed(state, block)
+    if plain.tilt is not None and there.keys() & {3, 4, 5}:
+        block.refuse_if(
+            there.keys() & {0, 1, 2} and not rapid, None, "turns rotary axes in a tilted plane", "FMAX, or no A, B, C"
+        )
+        for axis in there.keys() & {3, 4, 5}:
+            word = block.values.get(AXES[axis]) or block.values[f"I{AXES[axis]}"]
+            state.note(block.line, word, "turns the machine's axes to the tilted plane, which gives the tool's axis")
+            del there[axis]
     if block.take("M92") is not None:
         block.refuse_if(not rapid, "M92", "in a cut: the machine builder says where its points are", "FMAX")
         state.warnings.append(
@@ -182,17 +190,9 @@ def line(state: State, block: CurrentBlock, code: str) -> None:
         values = {AXES[a]: Word(AXES[a], v / unit if a < 3 else v, 1, AXES[a]) for a, v in there.items()}
         current = CurrentBlock(block.name, block.block, {"G53": block.values["M91"]}, {}, values, set(values))
         state.motion, plain.heading, plain.pole = "G0" if rapid else "G1", None, None
-        plain.unknown -= there.keys()
+        plain.unknown -= there.keys() if plain.tilt is None else set()
         machine_move(state, current, "G53")
         return
-    if plain.tilt is not None and there.keys() & {3, 4, 5}:
-        block.refuse_if(
-            there.keys() & {0, 1, 2} and not rapid, None, "turns rotary axes in a tilted plane", "FMAX, or no A, B, C"
-        )
-        for axis in there.keys() & {3, 4, 5}:
-            word = block.values.get(AXES[axis]) or block.values[f"I{AXES[axis]}"]
-            state.note(block.line, word, "turns the machine's axes to the tilted plane, which gives the tool's axis")
-            del there[axis]
     compensate(state, block, there)
     if there:
         go(state, block, there, rapid=rapid)
@@ -271,9 +271,9 @@ def corner(state: State, block: CurrentBlock, code: str) -> None:
     """CHF, RND: the corner between the contour elements before and behind it is cut off, or rounded."""
     block.refuse_if(state.plain.held is None, None, "without a contour element before it", "L, C, CR or CT before it")
     size = block.take("#") if code == "CHF" and block.has("#") else block.take("R")
-    own = block.take("F")
-    if own is not None:  # holds for the corner alone
-        block.values["own"] = Word("F", own * inch_tenths(state), 1, "F")
+    rate = block.take("F")
+    if rate is not None:  # holds for the corner alone
+        block.values["F alone"] = Word("F", rate * inch_tenths(state), 1, "F")
     block.refuse_if(not size or size < 0.0, None, "without its size", "RND R5, CHF 2")
     block.values["size"] = Word("R", (size or 0.0) * state.length_scale, 1, "R")
     state.plain.corner = block
@@ -283,7 +283,8 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     """Carry out the element that waited, shortened, and its corner; the tool then stands where the next one begins."""
     (block, held, rate), corner_block, modal = state.plain.held or (None, None, None), state.plain.corner, state.feed
     state.plain.held = state.plain.corner = None
-    assert block is not None and held is not None and corner_block is not None
+    if block is None or held is None or corner_block is None:  # in a check, after the corner's own error
+        raise after.fail(None, "follows a corner (CHF, RND) that was not read", "a corner that fits")
     first, second, _ = PLANES[state.plane]
     size, rounded = corner_block.values["size"].value, corner_block.block.words[0].text == "RND"
     after.refuse_if(rapid or there.keys() - {first, second}, None, *_NO_CORNER)
@@ -296,8 +297,8 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     begin, end, center, turn = cut or (held[1], held[1], None, 0)
     state.feed = rate
     move(state, block, {first: begin.real, second: begin.imag}, held[2], held[3])
-    own = corner_block.values.get("own")
-    state.feed = own.value if own else rate
+    alone = corner_block.values.get("F alone")
+    state.feed = alone.value if alone else rate
     if cut is not None:
         move(state, corner_block, {first: end.real, second: end.imag}, center, turn)
     state.feed = modal

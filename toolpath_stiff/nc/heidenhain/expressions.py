@@ -15,6 +15,10 @@ from toolpath_stiff.nc.place import Place
 _TOKEN = re.compile(rf"\s*({NUMBER}|Q[LR]?\d+|DIV|LEN|ANG|[A-Z]+|[-+*/^()])")
 _RANKS = {"+": 1, "-": 1, "*": 2, "/": 2, "DIV": 2, "^": 3, "LEN": 1, "ANG": 1}
 _DEEPEST = 50
+_ASSIGNED = re.compile(r"\s*(Q[LR]?\d+)?\s*=\s*(.+)$")
+_JUMP = re.compile(r'\s*IF\s*(.+?)\s*(EQU|NE|GT|LT)\s*(.+?)\s*GOTO\s*LBL\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*$')
+CONDITIONS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
+EQUAL = 1e-9
 
 
 def _whole(value: float) -> float:
@@ -39,6 +43,27 @@ OPERATORS: dict[str, Callable[[float, float], float]] = {
     "DIV": lambda a, b: a / b, "^": math.pow, "LEN": math.hypot,
     "ANG": lambda a, b: _trimmed(math.degrees(math.atan2(a, b)) % 360.0),
 }  # fmt: skip
+
+
+def assigned(head: str, rest: str, parameter: Callable[[str], float], place: Place) -> tuple[str, float]:
+    """Name and value of an assignment: `Q5 = ...`, with the name as its head, or `FN 1: Q5 = ...`."""
+    formula = _ASSIGNED.match(rest)
+    if formula is None or not (formula[1] or head[0] == "Q"):
+        raise place.fail(f"{head}{rest[:40]} is no assignment", "Q5 = +10")
+    return formula[1] or head, work_out(formula[2], parameter, place)
+
+
+def condition(
+    head: str, rest: str, parameter: Callable[[str], float], place: Place
+) -> tuple[bool, str | None, str | None]:
+    """Whether the condition of FN 9 to FN 12 holds, and the label to which it then goes: a number, or a name."""
+    jump = _JUMP.match(rest)
+    if jump is None or jump[2] != CONDITIONS[head]:
+        raise place.fail(f"{head}:{rest[:40]} is no condition", f"IF +Q1 {CONDITIONS[head]} +5 GOTO LBL 2")
+    left, right = (work_out(jump[part], parameter, place) for part in (1, 3))
+    same = abs(left - right) <= EQUAL
+    holds = {"EQU": same, "NE": not same, "GT": left > right and not same, "LT": left < right and not same}
+    return holds[jump[2]], jump[4], jump[5]
 
 
 def work_out(text: str, parameter: Callable[[str], float], place: Place) -> float:

@@ -13,18 +13,18 @@ from toolpath_stiff.nc.heidenhain.contour import compensate, go
 from toolpath_stiff.nc.heidenhain.coordinates import hold_tip
 from toolpath_stiff.nc.heidenhain.points import feed, named, present
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.state import CurrentBlock, Flow, State
+from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import SECONDS_PER_DAY
 
 # M functions that are those of the one table of codes.
 SHARED = ("M0", "M1", "M2", "M3", "M4", "M5", "M7", "M8", "M9", "M19", "M30")
+SPINDLE = {"M13": "M3", "M14": "M4"}  # with coolant
 # Others that leave the programmed path alone, and those that do not: by what they do.
 PASSIVE = {
     name: what
     for what, names in {
         "tool change by hand: TOOL CALL is what counts": "M6",
-        "spindle and coolant on": "M13 M14",
         "how the control plans ahead: the path is taken as programmed": "M90 M112 M113 M120 M124 M132 M133 M134 M135",
         "replacement tools": "M101 M102 M107 M108",
         "feeds in plunging, on arcs, of rotary axes": "M103 M109 M110 M111 M116 M117 M131",
@@ -60,13 +60,15 @@ def miscellaneous(state: State, block: CurrentBlock) -> None:
             state.plain.shorter = letter == "M126"
         elif letter in ("M128", "M129"):
             hold_tip(state, block, letter)
-        elif letter in ("M2", "M30"):
-            block.flow = Flow.END
         elif letter == "M137":
             feed_mode(state, block, "G94")
         elif letter in SHARED:
+            CODES[letter].act(state, block, letter)
             if CODES[letter].listed:
                 state.note(block.line, word, CODES[letter].listed)
+        elif letter in SPINDLE:
+            CODES[SPINDLE[letter]].act(state, block, SPINDLE[letter])
+            state.note(block.line, word, CODES["M8"].listed)
         elif letter in PASSIVE or letter in REFUSED:
             state.note(block.line, word, PASSIVE.get(letter) or REFUSED[letter])
             if letter in ("M103", "M112", "M118", "M120", "M124", "M101"):

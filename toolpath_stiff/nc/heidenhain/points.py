@@ -13,6 +13,7 @@ from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH
 
 WORDS_OF_AXES = {f"{step}{letter}": axis for axis, letter in enumerate(AXES) for step in ("", "I")}
+ROTARY = "A, B, C are roll, pitch and yaw of the platform: where they are another machine's axes, [kinematics] says so"
 ON_CIRCLE_MM = 0.016  # how far an end may lie off its circle (user's manual, "Circular path C")
 
 
@@ -46,6 +47,8 @@ def named(state: State, block: CurrentBlock) -> dict[int, float]:
         value = value * state.length_scale if axis < 3 else value
         block.refuse_if(axis in there, letter, "and its step are both given", "one of them")
         there[axis] = here[axis] + value if letter[0] == "I" else value
+        if axis > 2 and value and state.frames.posted is None and state.plain.tilt is None:
+            state.assume(ROTARY)
         if letter[0] != "I" and axis > 2 and state.plain.shorter:  # M126
             there[axis] = here[axis] + math.remainder(value - here[axis], 360.0)
     block.free -= words

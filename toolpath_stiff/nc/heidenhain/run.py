@@ -6,20 +6,22 @@ straight statements, most of a CAM system's program, are written as G0 and G1 an
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX, call
-from toolpath_stiff.nc.heidenhain.expressions import work_out
+from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, assigned, condition
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
 from toolpath_stiff.nc.heidenhain.plain_statements import EMPTY, as_g_code, corner_follows
 from toolpath_stiff.nc.heidenhain.points import WORDS_OF_AXES
-from toolpath_stiff.nc.heidenhain.statements import Statement, code_text, read_statement
+from toolpath_stiff.nc.heidenhain.statements import Statement, labels, read_statement
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up, meaning_of, refusal_of
 from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Remark
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.program_run import DEEPEST, ProgramRun, Tally, beyond_the_end
@@ -29,13 +31,10 @@ from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 
 MOST_STEPS = 1_000_000  # statements that run, all repeats counted
 MOST_IDLE = 100_000  # of them without a move between
-LABEL = re.compile(r"\s*/?\s*(?:N?\d+\s+)?LBL\s*(?:(\d+)|\"([^\"]*)\")\s*$", re.IGNORECASE)
 CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*\d+)?)?\s*$')
-JUMP = re.compile(r'\s*IF\s*(.+?)\s*(EQU|NE|GT|LT)\s*(.+?)\s*GOTO\s*LBL\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*$')
-ASSIGNED = re.compile(r"\s*(Q[LR]?\d+)?\s*=\s*(.+)$")
 SPECIAL = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
-KINDS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
-EQUAL = 1e-9
+CONTOUR = frozenset(("RND", "CHF", "L", "LP", "C", "CP", "CR", "CT", "CTP", "LN"))
+FORMULAS = ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
 TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control works out for a tilted plane
 
 
@@ -51,12 +50,13 @@ class HeidenhainRun(ProgramRun):
         self._lex()
         self._main_lines = len(self.lines)
         self._statements: dict[int, Statement] = {}
-        self._labels: dict[tuple[int, str], int] | None = None
+        self._labels: dict[int, dict[str, list[int]]] = {}  # by the first line of their program
         self._files: list[tuple[int, int, str]] = []  # first line, line after the last, name
         self._returns: list[tuple[int, int]] = []  # of calls: the line after, and the label's line (-1: a program)
         self._repeats: dict[tuple[int, int], int] = {}
         self._locals: list[dict[str, float]] = [{}]
         self._steps = 0
+        self._passes: dict[int, str] = {}  # what a condition found when it went back last
         self._moved = (0, 0)
         self._row = 0
 
@@ -85,11 +85,10 @@ class HeidenhainRun(ProgramRun):
             statement = self._statement(row)
             self._count(statement)
 
-    def _place_name(self, row: int) -> tuple[str, int]:
-        for first, stop, name in self._files:
-            if first <= row < stop:
-                return name, row - first + 1
-        return self.name, row + 1
+    def _place(self, row: int) -> Place:
+        """File and line (from 1) of a line that is read."""
+        in_files = (Place(name, row - first + 1) for first, stop, name in self._files if first <= row < stop)
+        return next(in_files, super()._place(row))
 
     @staticmethod
     def meaning(code: str) -> str:
@@ -110,7 +109,14 @@ class HeidenhainRun(ProgramRun):
             self._moved = (moves, self._steps)
         if self._steps > MOST_STEPS or self._steps - self._moved[1] > MOST_IDLE:
             raise self._fail(row, "a loop that never ends, or never moves", f"at most {MOST_STEPS} statements")
-        statement = self._statement(row)
+        try:
+            return self._carried_out(row, self._statement(row))
+        except InputError as error:
+            if row >= self._main_lines:  # its block stands on the line that calls its file
+                error.file, error.line, _ = self._place(row)
+            raise
+
+    def _carried_out(self, row: int, statement: Statement) -> int:
         if not statement.head or (statement.optional and 1 in self.switches):
             return statement.after
         if self.tally is not None:
@@ -143,35 +149,9 @@ class HeidenhainRun(ProgramRun):
         if code is None:
             problem, hint = refusal_of(head)
             raise self._fail(row, f"{head} {problem}", "", hint, statement.column)
-        block = CurrentBlock(self.name, statement.block(lambda *word: self._word_value(row, *word)))
-        for word in block.block.words[1:]:
-            if word.letter in block.values:
-                raise block.fail(word, f"repeats the word {word.letter} of its statement", "each word once")
-            largest = LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD
-            block.refuse_if(
-                abs(word.value) > largest, word, "is beyond 100 m, or any number of a control", f"{largest:g}"
-            )
-            block.values[word.letter] = word
-        block.free = set(block.values)
+        block = self._block_of(row, statement)
         self.state.plain.to_corner = self._to_corner[statement.after - 1]
-        if head == "BEGIN PGM":
-            block.free = {"INCH"} if re.search(r"\bINCH\s*$", statement.rest) else set()
-            block.values |= {"INCH": block.block.words[0]}
-        elif head == "CYCL DEF 9.1":
-            block.values["#"] = block.block.words[0]._replace(value=self._dwell(row, statement.rest))
-            block.free = {"#"}
-        waits = self.state.plain.held is not None and head not in (
-            "RND",
-            "CHF",
-            "L",
-            "LP",
-            "C",
-            "CP",
-            "CR",
-            "CT",
-            "CTP",
-            "LN",
-        )
+        waits = self.state.plain.held is not None and head not in CONTOUR
         if waits and not head.startswith("DEP"):
             raise block.fail(None, "stands between a corner (CHF, RND) and the element behind it", "the element")
         miscellaneous(self.state, block)
@@ -182,12 +162,13 @@ class HeidenhainRun(ProgramRun):
         try:
             code.act(self.state, block, head)
         except InputError as error:
-            if error.column == statement.column and not error.found.startswith(head):
-                error.found = f"{head}: {error.found}"
-            raise
+            if error.column != statement.column or str(error.found).startswith(head):
+                raise
+            place = Place(error.file or self.name, error.line or 0, error.column)
+            raise place.fail(f"{head}: {error.found}", error.expected or "", error.hint or "") from None
         plain = self.state.plain
         unused = next((letter for letter in block.values if letter in block.free), None)
-        if unused is not None and not head.startswith("APPR") and head not in ("RND", "CHF"):
+        if unused is not None and not head.startswith("APPR"):
             raise block.fail(unused, f"is no word of {head}", "its own words")
         positioned = head in ("L", "LP") and (len(self.state.recorder) > before or bool(block.values.keys() & {*"XYZ"}))
         if once is not None or ((modal is not None or plain.modal) and positioned):
@@ -196,11 +177,18 @@ class HeidenhainRun(ProgramRun):
         flow = self._flow(row, statement)
         return len(self.lines) if block.flow is Flow.END or flow is None else flow
 
-    def _dwell(self, row: int, rest: str) -> float:
-        number = re.search(r"(\d+(?:[.,]\d+)?|Q[LR]?\d+)\s*$", rest)
-        if number is None:
-            raise self._fail(row, "CYCL DEF 9.1 without its time", "CYCL DEF 9.1 DWELL 1.5")
-        return self._value(row, number[1].replace(",", "."), 1)
+    def _block_of(self, row: int, statement: Statement) -> CurrentBlock:
+        """The statement with the numbers of its words."""
+        words = statement.block(lambda *word: self._word_value(row, *word))
+        calls = [back for back, label in self._returns if label < 0]  # the first is of the main program
+        block = CurrentBlock(self.name, replace(words, line=calls[0]) if calls else words)
+        for word in words.words[1:]:
+            block.refuse_if(word.letter in block.values, word, "repeats a word of its statement", "each word once")
+            largest = LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD
+            block.refuse_if(abs(word.value) > largest, word, "is beyond 100 m, or any number of a control")
+            block.values[word.letter] = word
+        block.free = set(block.values)
+        return block
 
     def _word_value(self, row: int, key: str, text: str, column: int) -> float:
         """The number of a word; of axes that the control turns to a plane 0, which counts in an untilted one alone."""
@@ -239,14 +227,15 @@ class HeidenhainRun(ProgramRun):
             for key, written, column, _ in statement.words:
                 if key[0] == "Q" and written not in SPECIAL and written != "PREDEF":
                     self._assign(row, key, self._value(row, written, column))
-        elif head in KINDS:
-            return self._condition(row, statement)
+        elif head in CONDITIONS:
+            holds, number, name = condition(head, rest, self._parameter, self._place(row))
+            return self._condition_jump(row, self._label(row, number, name)) if holds else after
+        elif head == "FUNCTION MODE" and rest.split() != ["MILL"]:
+            raise self._fail(row, f"{head}{rest}: turning is not supported", "FUNCTION MODE MILL")
         elif head == "FN14":
             raise self._fail(row, f"the program stops with its error {rest.strip()}", "a program that runs through")
-        elif (
-            head.startswith("FN") and head in ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
-        ) or head[0] == "Q":
-            self._formula(row, statement)
+        elif head[0] == "Q" or head in FORMULAS:
+            self._assign(row, *assigned(head, rest, self._parameter, self._place(row)))
         elif head == "LBL":
             return self._end_of_subprogram(row, statement)
         elif head == "CALL LBL":
@@ -263,43 +252,27 @@ class HeidenhainRun(ProgramRun):
             return None
         return after
 
-    def _formula(self, row: int, statement: Statement) -> None:
-        formula = ASSIGNED.match(statement.rest)
-        name = formula and (formula[1] or statement.head)
-        if formula is None or not name or name.startswith("QS"):
-            raise self._fail(
-                row, f"{statement.head}{statement.rest} is no assignment", "Q5 = +10", column=statement.column
-            )
-        self._assign(row, name, work_out(formula[2], self._parameter, self._place(row)))
-
-    def _condition(self, row: int, statement: Statement) -> int:
-        jump = JUMP.match(statement.rest)
-        if jump is None or jump[2] not in (
-            KINDS[statement.head],
-            "EQU" if statement.head == "FN9" else KINDS[statement.head],
-        ):
-            raise self._fail(row, f"{statement.head}:{statement.rest[:40]} is no condition", "IF Q1 EQU 5 GOTO LBL 2")
-        left, right = (work_out(jump[part], self._parameter, self._place(row)) for part in (1, 3))
-        same = abs(left - right) <= EQUAL
-        true = {"EQU": same, "NE": not same, "GT": left > right and not same, "LT": left < right and not same}[jump[2]]
-        return self._jump(row, self._label(row, jump[4], jump[5])) if true else statement.after
+    def _condition_jump(self, row: int, to: int) -> int:
+        """Go to a label; back to it only if anything has changed since the last time."""
+        frames = self.state.frames
+        kept = self.state.plain.parameters, self._locals[-1], frames.position, frames.g92, frames.linear
+        now = repr((len(self.state.recorder), kept))
+        if to <= row and self._passes.get(row) == now:
+            raise self._fail(row, "a loop that never ends: no parameter or position changes", "one that ends")
+        self._passes[row] = now
+        return self._jump(row, to)
 
     def _label(self, row: int, number: str | None, name: str | None) -> int:
         """The line of a label in the program that runs. Raises `InputError` unless there is one."""
-        if self._labels is None:
-            self._labels = {}
-            for index, line in enumerate(self.lines):
-                label = LABEL.match(code_text(line)) if "LBL" in line.upper() else None
-                key = (self._program_of(index), f"{int(label[1])}" if label[1] else label[2]) if label else None
-                if key is not None and key[1] != "0":
-                    self._labels[key] = -1 if key in self._labels else index
+        program = self._program_of(row)
+        if program not in self._labels:
+            stop = next((stop for first, stop, _ in self._files if first == program), self._main_lines)
+            self._labels[program] = labels(self.lines, program, stop)
         shown = name if name is not None else f"{self._value(row, number or '', 1):g}"
-        line_of = self._labels.get((self._program_of(row), shown))
-        if line_of is None or line_of < 0:
-            raise self._fail(
-                row, f"LBL {shown}: the program has {'none' if line_of is None else 'several'}", "one label"
-            )
-        return line_of
+        places = self._labels[program].get(shown, [])
+        if len(places) != 1:
+            raise self._fail(row, f"LBL {shown}: the program has {'several' if places else 'none'}", "one label")
+        return places[0]
 
     def _program_of(self, row: int) -> int:
         return next((first for first, stop, _ in self._files if first <= row < stop), 0)
@@ -307,9 +280,7 @@ class HeidenhainRun(ProgramRun):
     def _end_of_subprogram(self, row: int, statement: Statement) -> int:
         if not re.match(r"\s*0+\s*$", statement.rest) or not self._returns or self._returns[-1][1] < 0:
             return statement.after
-        back, _ = self._returns.pop()
-        self._locals.pop()
-        return self._jump(row, back)
+        return self._jump(row, self._returns.pop()[0])
 
     def _call(self, row: int, statement: Statement) -> int:
         called = CALLED.match(statement.rest)
@@ -337,7 +308,8 @@ class HeidenhainRun(ProgramRun):
         if len(self._returns) >= DEEPEST:
             raise self._fail(row, f"more than {DEEPEST} calls within each other", "calls that end")
         self._returns.append((back, label))
-        self._locals.append({})
+        if label < 0:  # QL parameters belong to a program
+            self._locals.append({})
 
     def _program(self, row: int, statement: Statement) -> int:
         """Read the file of a program that is called, unless it is there; its lines follow those that are read."""
@@ -345,20 +317,15 @@ class HeidenhainRun(ProgramRun):
         stem = name.removesuffix(".H")
         known = next((first for first, _, file in self._files if Path(file).stem.upper() == stem), None)
         if known is None:
-            folder = Path(self.folder) if self.folder else None
-            files = (
-                []
-                if folder is None or not stem
-                else [f for f in sorted(folder.iterdir()) if f.suffix.upper() in (".H", "")]
-            )
-            file = next((file for file in files if file.stem.upper() == stem and file.is_file()), None)
+            files = sorted(Path(self.folder).iterdir()) if self.folder and stem else []
+            named = (file for file in files if file.suffix.upper() in (".H", "") and file.stem.upper() == stem)
+            file = next((file for file in named if file.is_file()), None)
             if file is None:
                 problem = f"CALL PGM {name}: no folder of programs has it"
                 raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=statement.column)
             known = len(self.lines) + 1
             self.lines = (*self.lines, "END PGM", *read_lines(file))  # which ends what has no END PGM before it
             self._files.append((known, len(self.lines), file.name))
-            self._labels = None
             self._lex()
         self._enter_call(row, statement.after, -1)
         return known

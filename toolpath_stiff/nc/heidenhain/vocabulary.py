@@ -6,7 +6,7 @@ FN). M functions that mean what they mean in G code are the one table's (`codes.
 
 from toolpath_stiff.nc.codes.code import Act, Code, Refused, holds_anyway
 from toolpath_stiff.nc.codes.registry import code_meaning
-from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, functions
+from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, functions, tools
 from toolpath_stiff.nc.heidenhain.contour import MANUAL, PATHS, POLAR
 from toolpath_stiff.nc.state import Group
 
@@ -46,8 +46,8 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("DEP LT|DEP LN|DEP CT|DEP LCT", approach.depart, "departure from a contour"),
     )),
     ("M tool change", _TOOLS, (
-        ("TOOL CALL", coordinates.tool_call, "tool, tool axis, speed, feed"),
-        ("TOOL DEF", coordinates.tool_definition, "length and radius of a tool, or the next tool"),
+        ("TOOL CALL", tools.tool_call, "tool, tool axis, speed, feed"),
+        ("TOOL DEF", tools.tool_definition, "length and radius of a tool, or the next tool"),
     )),
     ("dynamic offset", _TRANSFORM, (
         ("CYCL DEF 7.1|CYCL DEF 7.2|CYCL DEF 7.3|CYCL DEF 7.4|CYCL DEF 7.5|CYCL DEF 7.6", coordinates.shift, "shift"),
@@ -90,7 +90,7 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("FN15|FN16|FN19|FN20|FN29|FN37|FN38", _LISTED, "message, PLC: changes no path"),
     )),
     ("non-modal", _BASICS, (
-        ("BLK FORM 0.1|BLK FORM 0.2", coordinates.blank, "corner of the blank"),
+        ("BLK FORM 0.1|BLK FORM 0.2", tools.blank, "corner of the blank"),
         ("BLK FORM CYLINDER|BLK FORM ROTATION|BLK FORM FILE|FUNCTION MODE|SEL TABLE|FUNCTION FEED|FUNCTION SPINDLE",
          _LISTED, "changes no path"),
     )),
@@ -102,6 +102,7 @@ STATEMENTS: dict[str, Code] = {
     for name in names.split("|")
 }
 OWN = {
+    "M13": "spindle on, coolant", "M14": "spindle on, reversed, coolant",
     "M89": "the cycle after each positioning", "M99": "the cycle here", "M91": "machine coordinates",
     "M92": "points of the machine builder", "M126": "rotary axes go the shorter way", "M127": "they go as programmed",
     "M128": "tool centre point control", "M129": "tool centre point control off", "M140": "retract along the tool",
@@ -147,8 +148,8 @@ def meaning_of(name: str) -> str:
 
     Examples
     --------
-    >>> meaning_of("CR"), meaning_of("M13")
-    ('arc of a radius', 'spindle and coolant on: not acted upon')
+    >>> meaning_of("CR"), meaning_of("M118")
+    ('arc of a radius', 'moves by the handwheel: not acted upon')
     """
     if name[0] == "M" and name[1:].isdigit():
         passive = functions.PASSIVE.get(name)

@@ -93,7 +93,7 @@ def _draw_band(axes: Axes, s: FloatArray, band: tuple[FloatArray, FloatArray], c
     # Rows that keep the extremes of both edges: a band drawn on either's rows alone would cut the other's.
     keep = np.union1d(extremes_by_column(s, low, columns), extremes_by_column(s, high, columns))
     look: Look = {"color": CURVE_BLUE, "alpha": 0.18, "linewidth": 0}
-    axes.fill_between(s[keep], low[keep], high[keep], zorder=3, label="95 % of the fitted parameters", **look)
+    axes.fill_between(s[keep], low[keep], high[keep], zorder=3, label="95 % band", **look)
 
 
 def _set_limits(axes: Axes, analysis: Analysis, band: tuple[FloatArray, FloatArray] | None, show_plunges: bool) -> None:
