@@ -80,7 +80,7 @@ MIXED = (
 
 
 def simulated(milling, station, angle, height):
-    """Whether points of the cutter lie in what its bodies every 20 um of path have left, up to a tenth of a mm before."""
+    """Whether points of the cutter lie in what its bodies every 20 um of path leave, up to a tenth of a mm before."""
     moves, samples, cutter = milling.moves, milling.samples, milling.cutter
     lengths = move_lengths(moves)
     row = samples.move[station]

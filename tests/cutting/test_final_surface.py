@@ -53,6 +53,7 @@ def test_a_wall_through_the_stock_begins_at_its_underside():
     [
         (0.0, 0.0, 8.0, (-5.0, 3.0)),
         (5.0, 0.0, 1.0, (-0.5, 0.5)),
+        (5.0, 0.0, 0.1, (0.0, 0.0)),
         (5.0, 0.2, 1.0, (-0.5, 0.5)),
         (2.0, 0.0, 6.0, (-3, 3)),
     ],
@@ -113,7 +114,7 @@ def test_the_stock_of_an_stl_file_has_its_heights(tmp_path, text):
 def test_stocks_that_cannot_be_are_refused(tmp_path):
     path = tmp_path / "cut_off.stl"
     path.write_bytes(body(tmp_path, False).read_bytes()[:-7])
-    with pytest.raises(InputError, match="cut_off.stl: no STL file, or one that is cut off"):
+    with pytest.raises(InputError, match=r"cut_off\.stl: no STL file, or one that is cut off"):
         stock_from_stl(path, 1e-3)
     with pytest.raises(InputError, match="cells of 1e-05 mm"):
         stock_from_stl(body(tmp_path, True), 1e-8)

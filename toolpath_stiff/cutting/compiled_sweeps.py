@@ -50,7 +50,7 @@ def down_slope(slope, beside, reach, flat):
 
 @inline
 def foot(piece, x, y):
-    """Place along the whole line or circle, place on the piece, distance beside, squared along, and of centre and point."""
+    """Place along the whole line or circle, place on the piece, distance beside, squared along, square of the unit."""
     dx, dy, extent = x - piece[X], y - piece[Y], piece[EXTENT]
     if piece[TURN] == 0.0:
         along, beside = dx * piece[COS] + dy * piece[SIN], abs(dx * piece[SIN] - dy * piece[COS])
@@ -88,13 +88,14 @@ def height_above(piece, x, y, slack):
 
 
 @loop
-def index_of(pieces, low, high, corner, size, columns, half, clear):
+def index_of(pieces, low, high, half, cells):
     """Starts, piece, the first entry that counts after each, and lower bound, as `Workpiece` has them."""
-    cells = (high[:, 0].max() + 1) * columns
-    starts, filled = np.zeros(cells + 1, np.int64), np.zeros(cells, np.int64)
+    corner, size, columns, clear = cells
+    count = (high[:, 0].max() + 1) * columns
+    starts, filled = np.zeros(count + 1, np.int64), np.zeros(count, np.int64)
     piece, counts_from, oldest, below = starts, starts, starts, np.zeros(0)
     for fill in (False, True):
-        bound = np.full(cells, np.inf)
+        bound = np.full(count, np.inf)
         for p in range(len(pieces)):
             part = pieces[p]
             bottom = part[Z] + min(part[SLOPE] * part[EXTENT], 0.0)
@@ -137,12 +138,13 @@ def first_from(piece, low, high, value):
 
 
 @loop
-def lowest(pieces, cells, index, x, y, window, slack_from, slack, clear, top, owner):
-    """Lower `top` and set `owner`, as `Workpiece.tops` has them."""
-    corner_x, corner_y, size, columns = cells
+def lowest(pieces, cells, index, points, window, late, result):
+    """Lower the tops and set the owners of points in `result`, as `Workpiece.tops` has them."""
+    corner, size, columns, clear = cells
     starts, piece, counts_from, below = index
+    (x, y), (slack_from, slack), (top, owner) = points, late, result
     for i in range(len(x)):
-        column, row = math.floor((y[i] - corner_y) / size), math.floor((x[i] - corner_x) / size)
+        column, row = math.floor((y[i] - corner[1]) / size), math.floor((x[i] - corner[0]) / size)
         cell = row * columns + column
         if row < 0 or column < 0 or column >= columns or cell + 1 >= len(starts):
             continue
@@ -155,8 +157,8 @@ def lowest(pieces, cells, index, x, y, window, slack_from, slack, clear, top, ow
         for entry in range(high - 1, low - 1, -1):
             if below[entry] >= best:
                 continue
-            late = slack if piece[entry] >= slack_from[i] else 0.0
-            height = height_above(pieces[piece[entry]], x[i], y[i], late)
+            smaller = slack if piece[entry] >= slack_from[i] else 0.0
+            height = height_above(pieces[piece[entry]], x[i], y[i], smaller)
             if height < best:
                 last = piece[entry] if height < best - clear else last
                 best = height

@@ -149,7 +149,9 @@ def evaluate_cut(
         removed[block] = volume
         parts.append(some)
     patches = Patches.joined(parts)
-    (walls, own), strips = walls_of_passes(*given), final_strip(*given)
+    repeated = _repeats_the_one_before(samples)
+    first, few = np.cumsum(~repeated) - 1, (work, program.moves, samples.take(~repeated), cutters)
+    (walls, own), strips = (made[first] for made in walls_of_passes(*few)), final_strip(*few)[first]
     cut = replace(cut, removed=removed, wall_heights=walls)
     made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
@@ -158,7 +160,7 @@ def evaluate_cut(
     _note_engagement(cut, patches)
     engaged = np.zeros(len(samples), dtype=bool)
     engaged[patches.station] = True
-    repeated = _repeats_the_one_before(samples, np.concatenate([made, engaged[:, None]], axis=1))
+    repeated[1:] &= engaged[1:] == engaged[:-1]
     for number, cutter in cutters.items():
         rows = np.flatnonzero(engaged & ~repeated & (samples.tool == number))
         for start in range(0, len(rows), BLOCK):
@@ -172,13 +174,14 @@ def evaluate_cut(
     return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=_warnings(cut))
 
 
-def _repeats_the_one_before(samples: Samples, same: BoolArray) -> BoolArray:
-    """(n,) samples where a move goes on from the one before with hardly a turn; `same` (n, k) may not differ either."""
+def _repeats_the_one_before(samples: Samples) -> BoolArray:
+    """(n,) samples where a move goes on from the one before with hardly a turn, and nothing else differs."""
     first, second = slice(None, -1), slice(1, None)
     straight = (samples.tangent[first] * samples.tangent[second]).sum(axis=1) >= np.cos(TURN)
     straight &= (samples.position[first] == samples.position[second]).all(axis=1) & samples.cutting[first]
     straight &= (samples.tool[first] == samples.tool[second]) & (samples.feed[first] == samples.feed[second])
-    straight &= (samples.spindle[first] == samples.spindle[second]) & (same[first] == same[second]).all(axis=1)
+    straight &= samples.spindle[first] == samples.spindle[second]
+    straight[1:] &= ~straight[:-1]
     return np.concatenate([[False], straight])
 
 

@@ -86,7 +86,7 @@ def _volumes(
     joined: BoolArray,
     level: int = 0,
 ) -> FloatArray:
-    """(n - 1,) m3 between n stations, where `joined` (n - 1,); in ever finer steps where the rate of removal changes."""
+    """(n - 1,) m3 between n stations, where `joined` (n - 1,); in ever finer steps where the rate changes."""
     length, share = np.where(joined, np.diff(stations["path"]), 0.0), np.diff(stations["share"])
     volume = 0.5 * length * (rate[1:] + rate[:-1])
     if level == len(STEPS):
@@ -279,12 +279,13 @@ def _ends(
     some, r, z, (a, b) = stations[moving], radius[moving], height[moving], bracket[:, moving]
     outside, within = np.full((2, len(moving)), np.nan)
     for step in range(SECANTS if smooth else HALVINGS):
-        middle = a + (np.clip(_secant(outside, within), 0.05, 0.95) if smooth and step % 2 else 0.5) * (b - a)
+        share = _secant(outside, within) if smooth and step % 2 else np.full(len(moving), 0.5)
+        middle = a + np.clip(share, 0.05, 0.95) * (b - a)
         above = _above(work, some, r, middle, z)
         inside = above > 0.0
         a, b = np.where(inside, a, middle), np.where(inside, middle, b)
         outside, within = np.where(inside, outside, above), np.where(inside, above, within)
-    ends[moving] = a + (_secant(outside, within) if smooth else 0.5) * (b - a)
+    ends[moving] = a + (_secant(outside, within) if smooth else np.full(len(moving), 0.5)) * (b - a)
     return ends
 
 

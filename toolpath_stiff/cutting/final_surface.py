@@ -16,6 +16,9 @@ BESIDE = 2e-6  # m, outside of a wall, where it must stand; and how far above th
 TOUCHED = 2e-7  # m, within which a later pass touches a surface, and makes it: less than any surface error
 LATER = 0.1  # radii of the cutter along the path from where on a pass is another one
 ACROSS = 41  # points across the cutter's end
+# Radii of a ball, above the finished surface: where the nearest of these points may lie beside a narrow scallop,
+# (pi / 80)^2 / 2.
+SCALLOP = 8e-4
 
 
 def final_walls(work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
@@ -69,13 +72,15 @@ def final_strip(work: Workpiece, moves: Moves, samples: Samples, cutters: Mappin
         surface = (stations["z"][:, None] + corner - depth * stations["level"][:, None]).ravel()
         x, y = points_around(stations, np.hypot(offset, ahead), np.arctan2(ahead, offset))
         every = np.full(len(surface), len(work.pieces))
-        stays = np.abs(work.tops(x, y, (np.zeros_like(every), every))[0] - surface) < BESIDE
+        ball = np.repeat(np.where(stations["flat"] == 0.0, SCALLOP * stations["reach"], 0.0), ACROSS)
+        stays = np.abs(work.tops(x, y, (np.zeros_like(every), every))[0] - surface) < BESIDE + ball
         stays &= (work.stock.bottoms(x, y) < surface) & ~np.repeat(stations["plunge"], ACROSS)
         # A flat end passes a point of the floor twice, with its front and with its back.
         other = stations["path"] + LATER * stations["reach"] + 2.0 * stations["flat"]
         some = np.flatnonzero(stays)
         later = np.searchsorted(work.pieces["before"], other, "right")[some // ACROSS]
-        stays[some] = work.tops(x[some], y[some], (later, every[some]))[0] > surface[some] + TOUCHED
+        above = work.tops(x[some], y[some], (later, every[some]))[0] - surface[some]
+        stays[some] = (above > TOUCHED) | ((above < -TOUCHED) & (ball[some] > 0.0))
         stays = stays.reshape(offset.shape)
         low, high = np.where(stays, offset, np.inf).min(axis=1), np.where(stays, offset, -np.inf).max(axis=1)
         strips[rows] = np.where(stays.any(axis=1)[:, None], np.stack([low, high], axis=1), np.nan)

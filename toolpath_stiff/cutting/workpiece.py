@@ -9,6 +9,7 @@ import importlib.util
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import ModuleType
 
 import numpy as np
 
@@ -25,6 +26,8 @@ CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
 MOST_ENTRIES = 60_000_000  # of the index; larger cells beyond
 OFFSET = np.array([0.3819e-3, 0.2764e-3])  # m: walls at round coordinates shall not run along borders of cells
 
+Index = tuple[IntArray, IntArray, IntArray, FloatArray]
+
 
 @dataclass(frozen=True)
 class Workpiece:
@@ -38,10 +41,9 @@ class Workpiece:
         (m,) of `sweeps.PIECE`; (moves + 1,) the first piece of each move.
     corner, size, columns
         (2,) m of the lowest cell; m; number of cells along y.
-    starts, piece
-        (cells + 1,) first entry of each cell; (e,) piece of each entry, ascending in a cell.
-    counts_from, below
-        (e,) the first entry of its cell that counts after it; m, the piece leaves no less anywhere in the cell.
+    index
+        (cells + 1,) first entry of each cell; (e,) piece of each entry, ascending in a cell; (e,) the first of its
+        entries that counts after it; (e,) m, the piece leaves no less anywhere in the cell.
     compiled
         Whether numba looks up.
     """
@@ -52,16 +54,14 @@ class Workpiece:
     corner: FloatArray
     size: float
     columns: int
-    starts: IntArray
-    piece: IntArray
-    counts_from: IntArray
-    below: FloatArray
+    index: Index
     compiled: bool
 
     @cached_property
     def key(self) -> IntArray:
         """(e,) cell * m + piece, ascending."""
-        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts)) * len(self.pieces) + self.piece
+        starts, piece = self.index[:2]
+        return np.repeat(np.arange(len(starts) - 1), np.diff(starts)) * len(self.pieces) + piece
 
     def tops(
         self,
@@ -78,12 +78,9 @@ class Workpiece:
         """
         top, owner = self.stock.tops(x, y), np.full(len(x), -1)
         if self.compiled:
-            from toolpath_stiff.cutting.compiled_sweeps import lowest
-
-            late = every(len(x), len(self.pieces)) if slack_from is None else slack_from
-            cells = self.corner[0], self.corner[1], self.size, self.columns
-            index = self.starts, self.piece, self.counts_from, self.below
-            lowest(_table(self.pieces), cells, index, x, y, window, late, slack, CLEAR, top, owner)
+            late = np.full(len(x), len(self.pieces)) if slack_from is None else slack_from
+            cells, index = (self.corner, self.size, self.columns, CLEAR), self.index
+            _compiled().lowest(_table(self.pieces), cells, index, (x, y), window, (late, slack), (top, owner))
             return top, owner
         low, high = self._entries(x, y, window)
         counts = high - low
@@ -91,10 +88,10 @@ class Workpiece:
             some = counts[rows]
             point = np.repeat(np.arange(rows.start, rows.stop), some)
             entry = np.arange(len(point)) + np.repeat(low[rows] - np.cumsum(some) + some, some)
-            piece = self.piece[entry]
-            late = np.zeros(len(point)) if slack_from is None else np.where(piece >= slack_from[point], slack, 0.0)
+            piece = self.index[1][entry]
+            smaller = np.zeros(len(point)) if slack_from is None else np.where(piece >= slack_from[point], slack, 0.0)
             part = np.take(_table(self.pieces), piece, axis=0).view(PIECE)[:, 0]
-            height = heights_above(part, x[point], y[point], late)
+            height = heights_above(part, x[point], y[point], smaller)
             hit = np.flatnonzero(some)
             if not len(hit):
                 continue
@@ -115,15 +112,10 @@ class Workpiece:
         low, high = (np.searchsorted(self.key, cell + piece) for piece in window)
         last = np.maximum(high - 1, 0)
         since = (window[0] == 0) & (high > low)
-        low[since] = np.maximum(low[since], self.counts_from[last[since]])
+        low[since] = np.maximum(low[since], self.index[2][last[since]])
         none = cell < 0
         low[none] = high[none] = 0
         return low, np.maximum(high, low)
-
-
-def every(n: int, value: int) -> IntArray:
-    """(n,) of a number."""
-    return np.full(n, value, dtype=np.int64)
 
 
 def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> Workpiece:
@@ -131,8 +123,8 @@ def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> W
     pieces, first = sweeps_of(moves, cutters)
     if not len(pieces):
         none = np.zeros(0, dtype=np.int64)
-        nothing = np.zeros(1, dtype=np.int64)
-        return Workpiece(stock, np.zeros(1, PIECE), first, np.zeros(2), 1.0, 0, nothing, none, none, np.zeros(0), False)
+        index = np.zeros(1, dtype=np.int64), none, none, np.zeros(0)
+        return Workpiece(stock, np.zeros(1, PIECE), first, np.zeros(2), 1.0, 0, index, False)
     compiled = len(pieces) >= MANY and importlib.util.find_spec("numba") is not None
     low, high = _boxes(pieces)
     size = (COMPILED_CELL if compiled else CELL) * float(pieces["reach"].min())
@@ -141,22 +133,24 @@ def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> W
     corner = low.min(axis=0) - OFFSET - size
     low, high = (np.floor((ends - corner) / size).astype(np.int64) for ends in (low, high))
     columns = int(high[:, 1].max()) + 1
-    index = (_compiled_index if compiled else _index)(pieces, low, high, corner, size, columns)
-    return Workpiece(stock, pieces, first, corner, size, columns, *index, compiled)
+    if compiled:
+        cells = corner, size, columns, CLEAR
+        index = _compiled().index_of(_table(pieces), low, high, _half(size), cells)
+    else:
+        index = _index(pieces, low, high, corner, size)
+    return Workpiece(stock, pieces, first, corner, size, columns, index, compiled)
 
 
-def _compiled_index(
-    pieces: AnyArray, low: IntArray, high: IntArray, corner: FloatArray, size: float, columns: int
-) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-    from toolpath_stiff.cutting.compiled_sweeps import index_of
+def _compiled() -> ModuleType:
+    """The compiled loops. numba comes with them: half a second, and some seconds to compile the first time."""
+    from toolpath_stiff.cutting import compiled_sweeps
 
-    return index_of(_table(pieces), low, high, corner, size, columns, _half(size), CLEAR)  # type: ignore[no-any-return]
+    return compiled_sweeps
 
 
-def _index(
-    pieces: AnyArray, low: IntArray, high: IntArray, corner: FloatArray, size: float, columns: int
-) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-    """`starts`, `piece`, `counts_from` and `below` of the pieces between cells `low` and `high` (m, 2)."""
+def _index(pieces: AnyArray, low: IntArray, high: IntArray, corner: FloatArray, size: float) -> Index:
+    """The index of the pieces between cells `low` and `high` (m, 2)."""
+    columns = int(high[:, 1].max()) + 1
     parts = list(_rasters(pieces, low, high, corner, size))
     cell, piece, below, above = (np.concatenate([part[k] for part in parts]) for k in range(4))
     cell = cell[:, 0] * columns + cell[:, 1]
