@@ -29,6 +29,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.machine.file import load_machine, parse_machine
+from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig.campaigns import AXES, POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, draw_case, effects_of_layout, rows_of
@@ -133,7 +134,9 @@ def _judged(job: Job, folder: Path) -> Record:
     data = read_measurements(str(folder / "measured.csv"), machine)
     added = [sorted(effect.get("names") or [effect["effect"]])[0] for effect in case.truth["effects"]]
     task = UpdateTask(machine, data, added, strut_law=True, force=True, files=(str(folder / "measured.csv"),))
-    model = build_model(parse_machine(update(task).machine_text()))
+    done = update(task)
+    # As fitted, also where a refitted law is no better than the file's, which an update does not write.
+    model = build_model(parse_machine(machine_toml(done.fitted(done.provenance))))
     path = path_of(table, rng)
     place: Any = SimpleNamespace(position=path[:, :3], abc=path[:, 3:6], tangent=path[:, 6:], tool_length=np.nan)
     at = evaluate(model, place.position, place.abc, place.tangent, np.nan, Load(), 1000.0)
