@@ -23,6 +23,8 @@ from toolpath_stiff.nc.codes.code import EVERYWHERE, Code, holds_anyway
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.cutter_location.vocabulary import DOUBTFUL, LISTED, READ, WORDS
 from toolpath_stiff.nc.cutter_location.vocabulary import REFUSED as REFUSED_WORD
+from toolpath_stiff.nc.heidenhain import functions as tnc
+from toolpath_stiff.nc.heidenhain import vocabulary as plain_language
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.stiffness.catalogue import packaged_effects
@@ -72,6 +74,39 @@ def codes_table() -> str:
     others = "Refused in every dialect, with the line and what to do instead; nothing is held against LinuxCNC:"
     tables = [*rows(heading, *_joined(understood)), "", others, ""]
     return "\n".join([*tables, *rows(("code", "what it is", "instead", "source"), *_joined(refused)), ""])
+
+
+# Statements of Heidenhain's language in random programs that an independent reader reads too; the test looks them up.
+HUNTED = (
+    "L", "LP", "CC", "C", "CP", "CR", "CT", "CHF", "RND", "CYCL DEF 7.1", "CYCL DEF 8.1", "CYCL DEF 10.1",
+    "CYCL DEF 11.1", "CYCL DEF 200", "CYCL DEF 201", "CYCL DEF 207", "PLANE SPATIAL", "PLANE RESET", "LBL", "CALL LBL",
+    "FN12", "Q",
+)  # fmt: skip
+UNHELD = ("BEGIN PGM", "END PGM", "FUNCTION TCPM", "FUNCTION RESET TCPM", "M")
+
+
+def statements_table() -> str:
+    """Heidenhain's statements and M functions, with what holds each of them; and those that are refused."""
+    table = plain_language.STATEMENTS.values()
+    rows_ = [(row.name, row.meaning, _language_function(row), row.source, _held(row)) for row in table]
+    listed = [(name, f"{what} (listed)", "", "as M functions", "") for name, what in tnc.PASSIVE.items()]
+    own = [(name, what, "", "as M functions", "geometry by hand") for name, what in plain_language.OWN.items()]
+    cells = [*_joined(rows_), *_joined(own), *_joined(listed)]
+    refused = [(row.name, row.what, row.hint, row.source) for row in plain_language.REFUSED.values()]
+    refused += [(name, what, "", "as M functions") for name, what in tnc.REFUSED.items()]
+    heading = ("statement", "meaning", "function in `nc/heidenhain`", "source", "held by")
+    below = rows(("statement", "what it is", "instead", "source"), *_joined(refused))
+    return "\n".join([*rows(heading, *cells), "", "Refused, with the line:", "", *below, ""])
+
+
+def _language_function(code: Code) -> str:
+    return "" if code.act in (tnc.nothing, tnc.listed, holds_anyway) else _function(code)
+
+
+def _held(code: Code) -> str:
+    if code.act is tnc.listed or code.name in UNHELD:
+        return ""
+    return "geometry by hand; independent reader" if code.name in HUNTED else "geometry by hand"
 
 
 def _joined(cells: Iterable[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
@@ -289,6 +324,7 @@ def _page(name: str, kind: str) -> str:
 COMMITTED: dict[str, Callable[[], str]] = {
     "codes": codes_table,
     "words": words_table,
+    "statements": statements_table,
     "table of effects": effects_table,
     "effects": effects_in_full,
     "unknowns": unknowns_table,

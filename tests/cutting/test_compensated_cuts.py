@@ -161,3 +161,13 @@ def test_a_compensated_wall_stepped_through_time(ae, ap, up):
     )
     assert abs(now - 1e3 * shift) <= 0.2 * abs(untouched)
     assert abs(untouched) > 2.0
+
+
+def test_a_contour_of_chords_is_walls_as_arcs_are():
+    """A boss as CAM systems write it: chords of 1.5 mm; a few between two walls do not keep the others from it."""
+    turn = -2.0 * np.pi * np.arange(101) / 100
+    chords = "".join(f"X{24.7 * np.cos(t):.4f} Y{24.7 * np.sin(t):.4f}\n" for t in turn[1:])
+    text = f"{HEAD}G0 X40 Y-8 Z5\nG1 Z-1 F500\nX24.7 Y0 F900\n{chords}X40 Y8\nG0 Z5\nM2\n"
+    compensated = tps.compensate(tps.Program.from_text(text, name="part.nc"), cut=setup(10, 30), step_mm=STEP)
+    assert compensated.walls["left_percent"] < 20.0
+    assert sum(map(bool, compensated.lines["left_alone"])) < 5

@@ -96,6 +96,24 @@ def test_a_wall_has_the_published_forces_and_the_error_of_all_that_gives_way(tmp
     assert rate == pytest.approx(1e-9 * 3.0 * 100.0 * (10.0 if side == "Y10" else 1.0), rel=2e-3)
 
 
+def test_of_two_levels_the_deeper_cut_stays(tmp_path):
+    """A slot in two levels: the second passes the walls of the first; its left wall is cut too deep by both."""
+    lines = ["G21 G90", "T1 M6 S6000 M3", *(f"G0 X-10 Y10 Z20\nG0 Z{z}\nG1 X110 F900" for z in (-3, -6)), "M30"]
+    both = cut_of(parse_program("\n".join(lines), "slot.nc"), tmp_path)
+    alone = [cut_of(program("Y10"), tmp_path)]
+    deep = SETUP.replace("box_mm = [100, 20, 10]", "box_mm = [100, 20, 7]")  # its top where the first level was
+    lines[2:4] = lines[3:4]
+    alone.append(cut_of(parse_program("\n".join(lines), "slot.nc"), tmp_path, deep))
+    first, second = (middle(cut) for cut in alone)
+    row = max(i for i in np.flatnonzero(both.ap > 0) if abs(both.samples.position[i, 0] - 0.05) < 1e-3)
+    assert both.wall_heights[row] == pytest.approx(np.array([[0.0, 6e-3]] * 2), abs=1e-6)
+    assert np.isnan(both.wall_mean[first]).all()  # the last pass owns the walls
+    parts = [(cut.wall_mean[at], cut.wall_low[at]) for cut, at in zip(alone, (first, second), strict=True)]
+    means, lows = np.transpose(parts, (1, 0, 2)).min(axis=1)
+    np.testing.assert_allclose(both.wall_low[row], lows, rtol=0.01)  # a profile is known at nine heights
+    assert (both.wall_mean[row] <= means + 2e-8).all()
+
+
 def test_where_the_work_sits_and_how_it_is_turned_changes_nothing_but_the_machine(tmp_path):
     """The same cut along Y of a turned program on a machine turned against it: row for row the same errors."""
     first = cut_of(program(), tmp_path, origin=(0.1, 0.05, 0.8, 0.0, 0.0, 0.0))

@@ -80,7 +80,7 @@ MIXED = (
 
 
 def simulated(milling, station, angle, height):
-    """Whether points of the cutter lie in what its bodies every 20 um of path have left, up to a tenth of a mm before."""
+    """Whether points of the cutter lie in what its bodies every 20 um of path leave, up to a tenth of a mm before."""
     moves, samples, cutter = milling.moves, milling.samples, milling.cutter
     lengths = move_lengths(moves)
     row = samples.move[station]
@@ -167,7 +167,7 @@ def test_an_inner_corner_is_the_peak():
     np.testing.assert_allclose(last, [[0.0, 3.0, 90.0 - angle_of(0.5), 180.0]], atol=5e-3)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     points=st.lists(st.tuples(st.integers(-20, 20), st.integers(-12, 12), st.integers(1, 8)), min_size=2, max_size=6),
     corner=st.sampled_from([0.0, 5.0, 2.0]),
@@ -195,4 +195,3 @@ def test_what_cannot_be_engaged_is_refused_with_its_line(text, line, message):
     with pytest.raises(ProgramError, match=message) as error:
         Milling(text)
     assert error.value.line == line
-

@@ -110,11 +110,11 @@ def test_any_cutter_is_the_sum_of_its_slices(cutter, flutes, helix, hand, run_ou
     contact = patch(sum(heights), min(arc), max(arc), heights[0])
     force = force_at(contact, cutter, TAPERED, np.array([[5e-5, rise]]), ON, np.array([[angle]]))[0, 0]
     summed = sliced(cutter, VALUES, 5e-5, rise, contact, angle, 1e-6)
-    # 4,000 slices miss an end of the arc by a part of a slice. Where the chip begins within a corner, Gauss's rule
-    # misses it by a part of one of 24 nodes, with the force at the edge along it.
+    # 4,000 slices miss an end of the arc by a part of a slice. Where the chip begins within a corner, or is thinner
+    # than the taper near the tip, Gauss's rule misses it by a part of a node, with the force at the edge along it.
     begins = cutter.corner_radius and (run_out or rise)
     length = heights[1] + np.sqrt(2 * cutter.corner_radius * heights[1])
-    missed = flutes / 24 if begins else 0.005 * flutes if cutter.corner_radius else 0.005
+    missed = flutes / 12 if begins else 0.05 * flutes if cutter.corner_radius else 0.005
     tolerance = 0.004 * np.abs(summed).sum() + 30e3 * length * missed
     assert force == pytest.approx(summed, abs=tolerance)
 

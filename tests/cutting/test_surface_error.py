@@ -67,12 +67,13 @@ def test_surface_of_a_cutter_stepped_through_time(name):
     compliance = mill.compliance[None] / 1e3
     # What yields cuts a little otherwise than what is rigid.
     assert mean_force(*job)[0] == pytest.approx(mill.force[-mill.steps :].mean(axis=0), rel=0.02, abs=3.5)
-    reach = 1.5 if mill.ball else 4.0
-    strip = np.array([[-reach, reach]])
-    floor = 1e6 * floor_error(*job, compliance, strip / 1e3)[0][0]
-    aside = strip[0, 0] + 2 * reach * (np.arange(STRIPS) + 0.5) / STRIPS
-    aside[STRIPS // 2] += 1e-9
-    assert floor == pytest.approx(mill.below(aside), abs=FLOOR)
+    aside = (np.arange(STRIPS) + 0.5) / STRIPS * 8.0 - 4.0
+    strips = np.array([[-4.0, 4.0]])
+    if mill.ball:
+        aside = np.array([-1.5, -0.3, 1e-6, 0.8, 1.9])
+        strips = np.stack([aside, aside], axis=1)
+    floors = [1e6 * floor_error(*job, compliance, strip[None] / 1e3)[0][0] for strip in strips]
+    assert np.concatenate(floors) == pytest.approx(mill.below(aside), abs=FLOOR)
     for which in () if mill.ball else ("left", "right") if side == "both" else (side,):
         walls = np.full((1, 2, 2), np.nan)
         walls[0, int(which == "right")] = 0.0, depth / 1e3

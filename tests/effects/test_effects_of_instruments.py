@@ -8,7 +8,6 @@ import pytest
 from tests.effects.cases import model_with, readings
 from tests.effects.test_effect_laws import directions
 from tests.stiffness.cases import nist, random_poses
-from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.stiffness.model import load_path
 
 
@@ -49,7 +48,7 @@ def test_a_curved_load_cell_scales_every_reading_by_its_load():
 
 
 def test_a_stand_that_tilts_is_read_as_a_table_that_does():
-    """Sideways by the square of the height, as a table that rocks; a horizontal load at the axis tells them not apart."""
+    """Sideways by the square of the height, as a table that rocks; a horizontal load on the axis tells nothing."""
     position = np.array([[0.0, 0.0, 0.6], [0.0, 0.0, 1.0]])
     along = np.tile([0.6, 0.8, 0.0], (2, 1))
     stand = model_with("stand_compliance", sideways=2e-9, tilting=3e-9)

@@ -1,5 +1,7 @@
-"""A small reader of Heidenhain's plain language, written for the tests from the manuals alone; shares nothing with the
-package. It reads the programs of `random_program`, one statement a line, to moves: kind, points along the way, tool axis.
+"""A small reader of Heidenhain's plain language, written for the tests from the manuals alone.
+
+It shares nothing with the package, and reads the programs of `random_program`, one statement a line, to moves: kind,
+points along the way, tool axis.
 """
 
 import math
@@ -162,7 +164,6 @@ class Reader:
             sweep = self.span(start, end[:2], middle, left)
             if head == "CP" and "IPA" in words:
                 sweep = math.radians(self.number(words["IPA"]))
-        shares = [share for share in SHARES]
         follow = self.lines[row + 1] if row + 1 < len(self.lines) else ""
         corner = re.match(r"(RND R|CHF )([\d.]+)", follow)
         begin = self.at
@@ -188,10 +189,10 @@ class Reader:
                 )
             self.cut = last
         elif middle is None:
-            self.add("R" if "FMAX" in line else "F", [begin + share * (end - begin) for share in shares])
+            self.add("R" if "FMAX" in line else "F", [begin + share * (end - begin) for share in SHARES])
         else:
             points = []
-            for share in shares:
+            for share in SHARES:
                 out = turn_about(2, math.degrees(sweep * share))[:2, :2] @ (start - middle)
                 points.append(np.array([*(middle + out), self.at[2] + share * (end[2] - self.at[2])]))
             self.add("F", points)
@@ -387,7 +388,8 @@ def _run(chance: random.Random, steps: bool = False) -> list[str]:
             ]
         elif kind == 3:
             lines += [
-                f"CR IX{a:+.3f} IY{b / 9:+.3f} R{chance.choice('+-')}{math.hypot(a, b / 9) * chance.uniform(0.6, 3):.3f} DR{sign}"
+                f"CR IX{a:+.3f} IY{b / 9:+.3f} DR{sign}"
+                f" R{chance.choice('+-')}{math.hypot(a, b / 9) * chance.uniform(0.6, 3):.3f}"
             ]
         elif kind == 4:
             lines += [f"L IX{a:+.2f} IY{b / 7:+.2f}", f"CT IX{b / 8 + 0.1:+.3f} IY{a + 1:+.3f}"]
@@ -403,11 +405,7 @@ def _run(chance: random.Random, steps: bool = False) -> list[str]:
                 f"LP IPR{a / 5:+.2f}",
             ]
         elif kind == 7:
-            lines += (
-                ["CC IX-7 IY+2", f"C IX-7 IY{'+2' if False else '+9'} DR{sign}"]
-                if False
-                else [f"L IX{a:+.3f} FMAX", "CC IX-4 IY+0", f"C IX-4 IY{sign}4 DR{chance.choice('+-')}"]
-            )
+            lines += [f"L IX{a:+.3f} FMAX", "CC IX-4 IY+0", f"C IX-4 IY{sign}4 DR{chance.choice('+-')}"]
         else:
             lines += [f"L {_point(chance) if not steps else 'IX+1 IY-2'} F{chance.randrange(50, 900)}"]
     return lines

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 
 import toolpath_stiff as tps
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig import beams, fem, fem_parts
 from toolpath_stiff.rig.case import draw_case
 from toolpath_stiff.rig.effects import at_strength, draw_shape, with_effect
@@ -243,6 +245,21 @@ def test_without_scatter_the_readings_are_the_truth_and_the_same_seed_gives_the_
     assert path["measured_near"].count(True) == 24
 
 
+@pytest.mark.parametrize(
+    ("asked", "fault"),
+    [
+        ({"built": "wood"}, "a machine built 'wood'"),
+        ({"hidden": "weak_strut"}, "nothing called 'weak_strut' to hide"),
+        ({"hidden": ("floor_tilts", "floor_tilts")}, "each once"),
+        ({"hidden": "riser_soft"}, "riser_soft needs the column setup"),
+    ],
+)
+def test_what_cannot_be_hidden_is_refused(asked, fault):
+    plan = {"x_mm": np.zeros(1), "y_mm": np.zeros(1), "z_mm": np.array([800.0]), "direction": ["X"]}
+    with pytest.raises(InputError, match=re.escape(fault)):
+        draw_case(1, "campaign", **{"built": "fem", "hidden": "none", **asked}, plan=plan)
+
+
 def test_an_exercise_on_elements_is_made_measured_and_opened(tmp_path, capsys):
     folder, plan = str(tmp_path / "blind"), tmp_path / "plan.csv"
     plan.write_text("x_mm,y_mm,z_mm,direction,loop\n0,0,800,X,\n0,0,800,X,strut 1\n")
@@ -256,5 +273,3 @@ def test_an_exercise_on_elements_is_made_measured_and_opened(tmp_path, capsys):
         assert json.loads(capsys.readouterr().out)["verdict"] == verdict
     assert main(["rig", "reveal", folder, "--claim", "table_compliance"]) == 0
     assert "it is in: table" in capsys.readouterr().out
-    assert main(["rig", "new", "--seed", "5", "--out", folder + "2", "--built", "fem", "--hidden", "weak_strut"]) == 2
-    assert "nothing called 'weak_strut' to hide" in capsys.readouterr().err

@@ -42,7 +42,7 @@ FloatArray = NDArray[np.float64]
 # Seed, layout, what is hidden, its size: one of each verdict.
 VERDICTS = {
     "adequate": (100, "paper", "none", None),
-    "identified": (7, "paper", "table_compliance", 0.1),
+    "identified": (7, "paper", "weak_strut", 0.1),
     "ambiguous": (7, "paper", "spindle_compliance", 0.1),
     "unexplained": (7, "paper", "cable_drag", 0.1),
 }

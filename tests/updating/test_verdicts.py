@@ -69,7 +69,7 @@ def test_a_sparse_campaign_without_anything_hidden_is_adequate_too():
 
 @pytest.mark.parametrize(
     "name",
-    ["strut_law", "weak_strut", "frame_compliance", "table_compliance", "setup_compliance", "gauge_scale"],
+    ["strut_law", "weak_strut", "frame_compliance"],
 )
 def test_42_readings_name_what_leaves_its_own_mark(name):
     # 10 % are beyond the bound of the law's curvature, and what lies at its bound may have a second one beside it.
@@ -81,17 +81,22 @@ def test_42_readings_name_what_leaves_its_own_mark(name):
     "name",
     [
         "spindle_compliance", "platform_flexibility", "joint_moment_stiffness", "tool_length_error",
-        "platform_radius_error",
+        "platform_radius_error", "table_compliance", "setup_compliance", "gauge_scale",
     ],
 )  # fmt: skip
 def test_42_readings_keep_what_they_cannot_tell_apart(name):
-    """Untilted, at one load, with one tool: several explain it; the truth is among them and `none` is not."""
+    """Untilted, at one load, with one tool: several explain it; the truth is among them and `none` is not.
+
+    Without tilt a table that gives along X is a tool that does: the axes are the same.
+    """
     judgement = judged(7, "paper", name, STRONG)
     assert judgement.verdict in ("ambiguous", "identified")
+    if name == "table_compliance":
+        assert judgement.verdict == "ambiguous" and "spindle_compliance" in judgement.plausible
     assert name in judgement.plausible and NONE not in judgement.plausible
 
 
-@pytest.mark.parametrize("name", ["spindle_compliance", "contact_nonlinearity", "thermal_drift"])
+@pytest.mark.parametrize("name", ["weak_strut", "contact_nonlinearity", "thermal_drift"])
 def test_tilted_poses_two_loads_and_a_clock_name_the_rest(name):
     judgement = judged(7, "tilted", name, STRONG)
     assert (judgement.verdict, judgement.plausible) == ("identified", (name,))
@@ -137,7 +142,7 @@ def test_residuals_of_the_other_sign_mean_something_else():
     assert not (found.verdict == "identified" and found.plausible == ["weak_strut"])
 
 
-@pytest.mark.parametrize("pair", ["weak_strut,spindle_compliance", "weak_strut,gauge_scale"])
+@pytest.mark.parametrize("pair", ["weak_strut,thermal_drift", "weak_strut,gauge_scale"])
 def test_two_strong_effects_are_both_named(pair):
     judgement = judged(7, "tilted", pair, STRONG)
     assert judgement.verdict == "identified" and set(judgement.plausible) == set(pair.split(","))

@@ -136,15 +136,11 @@ def place(
     model, origin = on.running(part), origin_si(origin_mm_deg)
     default, setup = model.machine.default_origin, cut_setup(cut, material, stock_mm)
     if (objective == ERROR) != (setup is not None):
-        raise InputError(
-            "--objective error and a cut need each other", hint="say --cut FILE, or --material and --stock"
-        )
+        problem = "--objective error and a cut need each other"
+        raise InputError(problem, hint="say --cut FILE, or --material and --stock")
     read = part.moves(origin, default)
-    present = origin or (read.origin if read.origin_source == "program" else default)
-    errors = None
-    if setup is not None:
-        cut_now = evaluate_cut(model, read, present, setup, m_from_mm(step_mm), progress)
-        errors = errors_of_walls(model, cut_now, present, read.name)
+    present, step = origin or (read.origin if read.origin_source == "program" else default), m_from_mm(step_mm)
+    now = None if setup is None else evaluate_cut(model, read, present, setup, step, progress)
     task = PlacementTask(
         model=model,
         program=read,
@@ -153,13 +149,13 @@ def place(
         bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
         rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
         load=parse_load(load),
-        step=m_from_mm(step_mm),
+        step=step,
         force=force_N,
         write="" if write is None else str(write),
         decimals=decimals,
         linearise=None if linearise_mm is None else m_from_mm(linearise_mm),
         control=part.request.controller,
-        errors=errors,
+        errors=None if now is None else errors_of_walls(model, now, present, read.name),
     )
     placed = place_program(task, counter(progress, f"{part.name}: search"))
     return replace(placed, inputs=(*part.inputs, *on.inputs))

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray
 from toolpath_stiff.documents import Document, certain, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
@@ -36,6 +36,7 @@ LARGEST = 1e-4  # m, and half of the width of cut: a line that would be shifted 
 SETTLED = 2e-7  # m, largest change of a shift that is worth another turn
 MOST_TURNS = 6
 CONTRACTION = 0.3  # of a turn's change to that of the turn before; a warning beyond
+SHORT = 3e-3  # m of a move, below which it is a part of a wall
 SAME = 1e-7  # m by which the error of a wall may grow: rounding of the numbers written, and of the stock's grid
 WORSE = "it would be worse"
 BETWEEN = "it lies between two walls: what a shift takes off one it adds to the other"
@@ -286,7 +287,7 @@ def compensate_program(
         raise ProgramError("no pass makes a wall of the finished part", file=program.name)
     alone = {int(row): "a plunge, or an arc on edge" for row in np.unique(before.row[~movable_rows(moves)[before.row]])}
     alone |= _too_far(before)
-    was, changes, turn = figures_of_walls(before, len(moves)), [_quantile(before.wanted)], 0
+    changes, turn, finals = [_quantile(before.wanted)], 0, set(before.row.tolist())
     while True:
         turn += 1
         shifts = _shifts(walls, alone)
@@ -301,12 +302,13 @@ def compensate_program(
             walls = after
             alone |= _too_far(after)
             continue
-        now = figures_of_walls(after, len(moves))
-        spoilt = set(np.flatnonzero(_worse(was, now).any(axis=1)).tolist())
+        spoilt = _spoilt(before, after, moves)
         if not spoilt or not side.courses:
             break
-        # A wall that was not shifted is spoilt by its neighbours: then all stay.
-        alone |= dict.fromkeys(spoilt - alone.keys() or np.unique(before.row).tolist(), WORSE)
+        # A wall that was not shifted is spoilt by its neighbours: they stay too, or all do.
+        beside = {other for row in spoilt for other in (row - 1, row + 1)} & finals
+        alone |= dict.fromkeys(spoilt - alone.keys() or beside - alone.keys() or finals, WORSE)
+    was, now = figures_of_walls(before, len(moves)), figures_of_walls(after, len(moves))
     ratios = [later / sooner for sooner, later in itertools.pairwise(changes) if later > SETTLED]
     contraction = max(ratios, default=float("nan"))
     return Compensation(
@@ -328,10 +330,17 @@ def _intended(shifts: Shifts, walls: Walls) -> FloatArray:
     return intended
 
 
-def _worse(was: Mapping[str, FloatArray], now: Mapping[str, FloatArray]) -> BoolArray:
-    """(rows, 2) walls whose error grew, in its mean size or its rms; one that is new, against the worst there was."""
+def _spoilt(before: Walls, after: Walls, moves: Moves) -> set[int]:
+    """Rows of walls whose error grew, in its mean size or its rms; one that is new, against the worst there was.
+
+    A move is a wall; moves shorter than `SHORT` that follow each other, as chords do, are one together.
+    """
+    short = move_lengths(moves) < SHORT
+    wall = np.cumsum(~(short & np.roll(short, 1)))
+    was, now = (figures_of_walls(replace(walls, row=wall[walls.row]), int(wall[-1]) + 1) for walls in (before, after))
     grown = [now[name] - np.where(was["length"] > 0.0, was[name], np.nanmax(was[name])) for name in ("size", "rms")]
-    return np.asarray(np.fmax(*grown) > SAME)
+    worse = (np.fmax(*grown) > SAME).any(axis=1)
+    return set(np.unique(before.row[worse[wall[before.row]]]).tolist())
 
 
 def _lines(

@@ -9,15 +9,16 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.coefficients import Coefficients
-from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.cutters import Cutter, radii_of
 from toolpath_stiff.cutting.engagement import engage
-from toolpath_stiff.cutting.final_surface import final_strip, final_walls
+from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
+from toolpath_stiff.cutting.passes import walls_of_all_passes
 from toolpath_stiff.cutting.patches import Patches
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
 from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import Stock
-from toolpath_stiff.cutting.surface_error import floor_error, shares, wall_error
+from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
 from toolpath_stiff.cutting.workpiece import Workpiece, workpiece_of
 from toolpath_stiff.nc.moves import ReadProgram
@@ -30,6 +31,7 @@ from toolpath_stiff.units import per_min_from_rad_per_s
 BLOCK = 16_384  # stations at a time
 MOST_NAMED = 5  # lines in a warning
 ROUNDED = 1e-12  # of a cosine
+TURN = 0.02  # rad between two moves, below which the second begins as the first ends: chords of a curve
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -147,19 +149,40 @@ def evaluate_cut(
         removed[block] = volume
         parts.append(some)
     patches = Patches.joined(parts)
-    walls, strips = final_walls(*given), final_strip(*given)
+    repeated = _repeats_the_one_before(samples)
+    first, few = np.cumsum(~repeated) - 1, (work, program.moves, samples.take(~repeated), cutters)
+    (walls, own), strips = (made[first] for made in walls_of_passes(*few)), final_strip(*few)[first]
     cut = replace(cut, removed=removed, wall_heights=walls)
     made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
         values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
+    profiles = np.repeat(np.where(made[:, :2, None], 0.0, np.nan), HEIGHTS, axis=2)
     _note_engagement(cut, patches)
+    engaged = np.zeros(len(samples), dtype=bool)
+    engaged[patches.station] = True
+    repeated[1:] &= engaged[1:] == engaged[:-1]
     for number, cutter in cutters.items():
-        engaged = np.zeros(len(samples), dtype=bool)
-        engaged[patches.station] = True
-        rows = np.flatnonzero(engaged & (samples.tool == number))
+        rows = np.flatnonzero(engaged & ~repeated & (samples.tool == number))
         for start in range(0, len(rows), BLOCK):
-            _evaluate(cut, model, origin, cutter, patches, spindle, strips, rows[start : start + BLOCK])
+            _evaluate(cut, model, origin, cutter, patches, spindle, (strips, profiles), rows[start : start + BLOCK])
+    again = np.flatnonzero(repeated)
+    for values in (cut.mean_force, cut.peak_force, cut.deflection, cut.wall_force, profiles):
+        values[again] = values[again - 1]
+    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
+        values[again] = values[again - 1]
+    cut = _with_walls_of_all_passes(cut, own, profiles, step)
     return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=_warnings(cut))
+
+
+def _repeats_the_one_before(samples: Samples) -> BoolArray:
+    """(n,) samples where a move goes on from the one before with hardly a turn, and nothing else differs."""
+    first, second = slice(None, -1), slice(1, None)
+    straight = (samples.tangent[first] * samples.tangent[second]).sum(axis=1) >= np.cos(TURN)
+    straight &= (samples.position[first] == samples.position[second]).all(axis=1) & samples.cutting[first]
+    straight &= (samples.tool[first] == samples.tool[second]) & (samples.feed[first] == samples.feed[second])
+    straight &= samples.spindle[first] == samples.spindle[second]
+    straight[1:] &= ~straight[:-1]
+    return np.concatenate([[False], straight])
 
 
 def _nothing_cut(
@@ -198,13 +221,10 @@ def _note_engagement(cut: Cut, patches: Patches) -> None:
     cut.ap[rows] = high - low
     cut.entry[rows] = np.minimum.reduceat(patches.entry, first)
     cut.exit[rows] = np.maximum.reduceat(patches.exit, first)
-    radius = np.zeros(len(cut.samples))
-    for number, cutter in cut.cutters.items():
-        radius[cut.samples.tool == number] = cutter.radius
     ahead = np.minimum(patches.entry, np.pi), np.minimum(patches.exit, np.pi)
     left, right = (np.cos(angle) for angle in ahead)
     widths = np.maximum.reduceat(left, first) - np.minimum.reduceat(right, first)
-    cut.ae[rows] = radius[rows] * widths
+    cut.ae[rows] = radii_of(cut.cutters, cut.samples.tool[rows]) * widths
 
 
 def _evaluate(
@@ -214,10 +234,13 @@ def _evaluate(
     cutter: Cutter,
     patches: Patches,
     spindle: FloatArray,
-    strips: FloatArray,
+    surfaces: tuple[FloatArray, FloatArray],
     rows: IntArray,
 ) -> None:
-    """Enter forces, deflections and errors of some samples (m,) that cut with one cutter, in their order."""
+    """Enter forces, deflections and errors of some samples (m,) that cut with one cutter, in their order.
+
+    `surfaces`: strips of floor (n, 2), and profiles of the walls (n, 2, HEIGHTS) to be entered.
+    """
     samples = cut.samples.take(rows)
     kept = patches.take(slice(*np.searchsorted(patches.station, (rows[0], rows[-1] + 1))))
     place = np.searchsorted(rows, kept.station).clip(max=len(rows) - 1)
@@ -233,7 +256,8 @@ def _evaluate(
     whole = with_tools(machine, samples, cut.cutters)
     cut.deflection[rows] = product(whole, mean[:, :, None])[..., 0]
     walls, of_walls, cut.wall_force[rows] = wall_error(*given, whole, cut.wall_heights[rows])
-    floors, of_floors = floor_error(*given, whole, strips[rows])
+    floors, of_floors = floor_error(*given, whole, surfaces[0][rows])
+    surfaces[1][rows] = walls
     _enter(cut, rows, slice(0, 2), walls @ shares()[1], walls)
     _enter(cut, rows, slice(2, 3), floors.mean(axis=1)[:, None], floors[:, None])
     # Of the machine as a share of the compliance that acts along the normal.
@@ -241,6 +265,15 @@ def _evaluate(
     share = machine_deviation(model, samples, origin, axes, machine)[:, (0, 0, 1)] / compliance
     of_coefficients = np.concatenate([of_walls, of_floors[:, None]], axis=1)
     cut.deviation[rows] = np.hypot(of_coefficients, share * cut.errors[rows])
+
+
+def _with_walls_of_all_passes(cut: Cut, own: FloatArray, profiles: FloatArray, step: float) -> Cut:
+    """The cut with each wall at the pass that owns it; `own` as `Cut.wall_heights`, profiles as of `_evaluate`."""
+    values = walls_of_all_passes(cut.samples, cut.cutters, cut.wall_heights, own, profiles, step)
+    before = np.abs(cut.wall_mean)
+    _enter(cut, np.arange(len(own)), slice(0, 2), values @ shares()[1], values)
+    cut.deviation[:, :2] *= np.abs(cut.wall_mean) / np.where(before > 0.0, before, 1.0)
+    return replace(cut, wall_heights=own)
 
 
 def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: FloatArray) -> None:

@@ -4,6 +4,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.units import m_from_mm, m_from_nm, m_from_um, pa_from_gpa, rad_from_deg
@@ -64,6 +67,14 @@ class Cutter:
     def radius(self) -> float:
         """m, half of the diameter."""
         return self.diameter / 2.0
+
+
+def radii_of(cutters: Mapping[int, Cutter], tools: IntArray) -> FloatArray:
+    """(n,) m, radius of the cutter of each tool number (n,); 0 of one that does not cut."""
+    radii = np.zeros(len(tools))
+    for number, cutter in cutters.items():
+        radii[tools == number] = cutter.radius
+    return radii
 
 
 def merged_tool(table: ToolEntry, further: ToolEntry) -> ToolEntry:

@@ -21,18 +21,21 @@ from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.results import Progress, counter
 
 AROUND = 33  # points of a ring, denser at the sides, where a light cut is
-LEVELS, CORNER_LAYERS = 12, 8  # layers of the cylinder; of a corner or ball
+LEVELS, CORNER_LAYERS = 12, 6  # layers of the cylinder; of a corner or ball
 COARSE = 3  # rings that look how high a corner or ball cuts
 END_POINTS = 200  # of the end of a cutter that descends
-HALVINGS, SECANTS = 14, 8  # of up to 9 degrees: 1e-5 rad; in turn with halvings
-SAME = 0.05  # rad and of 1, turn and tilt of the feed between moves that share the contact at their corner
+HALVINGS, SECANTS = 14, 6  # of up to 9 degrees: 1e-5 rad; in turn with halvings
+# Stations that share a contact: turn, rad, and tilt of the feed from one to the next; relative difference of rate and
+# size of the contacts at the ends of a stretch, which has so many radii at most; stations that it may have.
+SAME, ALIKE, SPAN, STRIDES = 0.05, 0.03, 0.6, (8, 4, 2, 1)
 NARROW = 1e-4  # rad, arcs below are rounding
 PLATEAU = 1e-6  # m: heights closer than this are a level
 # Relative change of the rate of removal between two stations that is looked into, and the steps for it in radii: the
 # rate begins as a root where a cutter enters.
 SMALL = 2e-5  # cubes of the radius, volumes that are not looked into
-STEPS = ((0.02, 0.05), (0.1, 0.01), (0.1, 0.002))
+STEPS = ((0.05, 0.05), (0.1, 0.01), (0.1, 0.002))
 
+NO_PATCHES = Patches(np.zeros(0, dtype=np.int64), *[np.zeros(0)] * 4)
 SIDES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, AROUND))  # shares of a ring
 
 
@@ -62,7 +65,7 @@ def engage(
     last["move"], last_rate, begin = -1, np.zeros(1), 0
     along, tell = partial(stations_along, work, moves, cutters), counter(progress, "engagement")
     for rows, stations in blocks_of_stations(work, moves, samples, cutters):
-        patches, rate = _contact_at_corners(work, stations)
+        patches, rate = _contact_along(work, stations)
         end = int(rows[-1]) + 1
         removed = np.zeros(end - begin)
         joint, rates = np.concatenate([last, stations]), np.concatenate([last_rate, rate])
@@ -72,8 +75,7 @@ def engage(
         if tell:
             tell(begin, len(samples))
     if begin < len(samples):
-        none = np.zeros(0)
-        yield slice(begin, len(samples)), Patches(none.astype(np.int64), *[none] * 4), np.zeros(len(samples) - begin)
+        yield slice(begin, len(samples)), NO_PATCHES, np.zeros(len(samples) - begin)
 
 
 def _volumes(
@@ -84,7 +86,7 @@ def _volumes(
     joined: BoolArray,
     level: int = 0,
 ) -> FloatArray:
-    """(n - 1,) m3 between n stations, where `joined` (n - 1,); in ever finer steps where the rate of removal changes."""
+    """(n - 1,) m3 between n stations, where `joined` (n - 1,); in ever finer steps where the rate changes."""
     length, share = np.where(joined, np.diff(stations["path"]), 0.0), np.diff(stations["share"])
     volume = 0.5 * length * (rate[1:] + rate[:-1])
     if level == len(STEPS):
@@ -106,26 +108,58 @@ def _volumes(
     return np.asarray(volume)
 
 
-def _contact_at_corners(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
-    """`_contact`; where a move goes on as the one before it ended, the contact there is turned with the feed."""
-    ahead = stations["ahead_x"] + 1j * stations["ahead_y"]
-    turn = np.append(0.0, np.angle(ahead[1:] / ahead[:-1]))
-    again = np.append(False, (np.diff(stations["path"]) < TOUCH) & (np.diff(stations["move"]) != 0))
-    again &= (np.abs(turn) < SAME) & (np.abs(np.diff(stations["down"], prepend=0.0)) < SAME) & ~stations["plunge"]
-    new = np.flatnonzero(~again)
-    patches, rate = _contact(work, stations[new])
-    source = np.cumsum(~again) - 1
-    first, last = (np.searchsorted(patches.station, source, side) for side in ("left", "right"))
-    counts = last - first
+def _contact_along(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
+    """`_contact` of stations in the order of the path, where it changes; what stays alike is turned with the feed.
+
+    At every eighth station, then between those that differ, up to every one. The end of a move and the start of the
+    next, which goes on as that ended, count as one.
+    """
+    turn = np.diff(np.arctan2(stations["ahead_y"], stations["ahead_x"]), prepend=9.0)
+    steady = (
+        (np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi) < SAME)
+        & (np.abs(np.diff(stations["down"], prepend=9.0)) < SAME)
+        & ~stations["plunge"]
+    )
+    gap = np.diff(stations["path"], prepend=-np.inf)
+    node = np.cumsum(~(steady & (gap < TOUCH))) - 1
+    first = np.searchsorted(node, np.arange(node[-1] + 1 if len(node) else 0))
+    broken = np.append(0, np.cumsum(~steady | (np.diff(stations["reach"], prepend=0.0) != 0.0)))[first + 1]
+    path, source = stations["path"][first], np.full(len(first), -1)
+    patches, rate, size = NO_PATCHES, np.zeros(len(first)), np.zeros(len(first))
+    for stride in STRIDES:
+        rows = np.flatnonzero((source < 0) & (np.arange(len(first)) % stride == 0))
+        some, rate[rows] = _contact(work, stations[first[rows]])
+        size[rows] = np.bincount(some.station, (some.exit - some.entry) * (some.high - some.low), len(rows))
+        source[rows] = rows
+        patches = Patches.joined([patches, replace(some, station=rows[some.station])])
+        begin = np.arange(0, len(first) - stride, stride)
+        end = begin + stride
+        alike = (broken[begin] == broken[end]) & (path[end] - path[begin] < SPAN * stations["reach"][first[begin]])
+        for values in (rate, size):
+            alike &= np.abs(values[end] - values[begin]) <= ALIKE * np.maximum(values[end], values[begin])
+        between = (begin[alike, None] + np.arange(1, stride)).ravel()
+        nearest = np.where(np.arange(1, stride) <= stride // 2, begin[alike, None], end[alike, None]).ravel()
+        new = source[between] < 0
+        source[between[new]] = nearest[new]
+        rate[between[new]], size[between[new]] = rate[nearest[new]], size[nearest[new]]
+    order = np.argsort(patches.station, kind="stable")
+    return _turned(patches.take(order), stations, first[source][node], source[node]), rate[node]
+
+
+def _turned(patches: Patches, stations: AnyArray, origin: IntArray, source: IntArray) -> Patches:
+    """Patches of all stations from those of others, whose rows are `origin` and whose patches have station `source`."""
+    low, high = (np.searchsorted(patches.station, source, side) for side in ("left", "right"))
+    counts = high - low
     station = np.repeat(np.arange(len(stations)), counts)
-    rows = np.arange(len(station)) + np.repeat(first - np.cumsum(counts) + counts, counts)
-    patches, by = patches.take(rows), np.where(again, turn, 0.0)[station]
+    patches = patches.take(np.arange(len(station)) + np.repeat(low - np.cumsum(counts) + counts, counts))
+    heading = np.arctan2(stations["ahead_y"], stations["ahead_x"])
+    by = np.where(origin == np.arange(len(stations)), 0.0, heading - heading[origin])
+    by = (by[station] + np.pi) % (2.0 * np.pi) - np.pi
     entry, exit_ = (
         np.where((ends > 0.0) & (ends < np.pi), np.clip(ends + by, 0.0, np.pi), ends)
         for ends in (patches.entry, patches.exit)
     )
-    kept = exit_ - entry > NARROW
-    return Patches(station, patches.low, patches.high, entry, exit_).take(kept), rate[source]
+    return Patches(station, patches.low, patches.high, entry, exit_).take(exit_ - entry > NARROW)
 
 
 def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
@@ -245,14 +279,20 @@ def _ends(
     some, r, z, (a, b) = stations[moving], radius[moving], height[moving], bracket[:, moving]
     outside, within = np.full((2, len(moving)), np.nan)
     for step in range(SECANTS if smooth else HALVINGS):
-        share = outside / (outside - within) if smooth and step % 2 else np.full(len(moving), 0.5)
-        middle = a + np.clip(np.where(np.isnan(share), 0.5, share), 0.05, 0.95) * (b - a)
+        share = _secant(outside, within) if smooth and step % 2 else np.full(len(moving), 0.5)
+        middle = a + np.clip(share, 0.05, 0.95) * (b - a)
         above = _above(work, some, r, middle, z)
         inside = above > 0.0
         a, b = np.where(inside, a, middle), np.where(inside, middle, b)
         outside, within = np.where(inside, outside, above), np.where(inside, above, within)
-    ends[moving] = 0.5 * (a + b)
+    ends[moving] = a + (_secant(outside, within) if smooth else np.full(len(moving), 0.5)) * (b - a)
     return ends
+
+
+def _secant(outside: FloatArray, within: FloatArray) -> FloatArray:
+    """Share of a bracket where a line through the values at its ends, below and above 0, crosses 0; nan: not known."""
+    share = outside / (outside - within)
+    return np.where(np.isnan(share), 0.5, share)
 
 
 def _rates(stations: AnyArray, patches: Patches) -> FloatArray:

@@ -16,6 +16,9 @@ BESIDE = 2e-6  # m, outside of a wall, where it must stand; and how far above th
 TOUCHED = 2e-7  # m, within which a later pass touches a surface, and makes it: less than any surface error
 LATER = 0.1  # radii of the cutter along the path from where on a pass is another one
 ACROSS = 41  # points across the cutter's end
+# Radii of a ball, above the finished surface: where the nearest of these points may lie beside a narrow scallop,
+# (pi / 80)^2 / 2.
+SCALLOP = 8e-4
 
 
 def final_walls(work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
@@ -24,24 +27,32 @@ def final_walls(work: Workpiece, moves: Moves, samples: Samples, cutters: Mappin
     nan where the finished part has no wall there, or a later pass has touched it (a spring pass makes it anew). A
     corner's radius is below the wall.
     """
-    walls = np.full((len(samples), 2, 2), np.nan)
+    return walls_of_passes(work, moves, samples, cutters)[1]
+
+
+def walls_of_passes(
+    work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]
+) -> tuple[FloatArray, FloatArray]:
+    """Walls that no later pass has cut deeper than a sample did, and `final_walls`, which none has touched since."""
+    made, own = np.full((2, len(samples), 2, 2), np.nan)
     for rows, stations in blocks_of_stations(work, moves, samples, cutters):
-        sides = np.array([[0.0, np.pi]])
-        wall, inner = (
-            points_around(stations, (stations["reach"] + offset)[:, None], sides) for offset in (BESIDE, -TOUCHED)
-        )
-        every = np.full(len(wall[0]), len(work.pieces))
+        sides, reach = np.array([[0.0, np.pi]]), stations["reach"][:, None]
+        wall = points_around(stations, reach + BESIDE, sides)
+        every, tip = np.full(len(wall[0]), len(work.pieces)), np.repeat(stations["z"], 2)
         other = stations["path"] + LATER * stations["reach"]
         later = np.repeat(np.searchsorted(work.pieces["before"], other, "right"), 2)
-        tip = np.repeat(stations["z"], 2)
-        high = (
-            np.minimum(work.tops(*wall, (np.zeros_like(every), every))[0], work.tops(*inner, (later, every))[0]) - tip
-        )
+        high = work.tops(*wall, (np.zeros_like(every), every))[0] - tip
         high = np.minimum(high, np.repeat(stations["longest"], 2))
-        low = np.maximum(work.stock.heights(*wall)[1] - tip, np.repeat(stations["reach"] - stations["flat"], 2))
-        stands = (high - low > BESIDE) & ~np.repeat(stations["plunge"], 2)
-        walls[rows] = np.where(stands[:, None], np.stack([low, high], axis=1), np.nan).reshape(-1, 2, 2)
-    return walls
+        low = np.maximum(work.stock.bottoms(*wall) - tip, np.repeat(stations["reach"] - stations["flat"], 2))
+        stands = np.flatnonzero((high - low > BESIDE) & ~np.repeat(stations["plunge"], 2))
+        for walls, offset in ((made, TOUCHED), (own, -TOUCHED)):
+            x, y = (axis[stands] for axis in points_around(stations, reach + offset, sides))
+            top = np.minimum(high[stands], work.tops(x, y, (later[stands], every[stands]))[0] - tip[stands])
+            part = np.full((len(tip), 2), np.nan)
+            stays = top - low[stands] > BESIDE
+            part[stands[stays]] = np.stack([low[stands], top], axis=1)[stays]
+            walls[rows] = part.reshape(-1, 2, 2)
+    return made, own
 
 
 def final_strip(work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
@@ -54,17 +65,23 @@ def final_strip(work: Workpiece, moves: Moves, samples: Samples, cutters: Mappin
     for rows, stations in blocks_of_stations(work, moves, samples, cutters):
         offset = stations["reach"][:, None] * np.sin(np.linspace(-0.5, 0.5, ACROSS) * np.pi)[None, :]
         corner, flat = (stations["reach"] - stations["flat"])[:, None], stations["flat"][:, None]
+        # Where the envelope is left behind its normal is across the motion: on a slope not straight beside the tip.
         inset = np.clip(np.abs(offset) - flat, 0.0, corner)
-        surface = (stations["z"][:, None] + corner - np.sqrt(corner**2 - inset**2)).ravel()
-        points = points_around(stations, np.abs(offset), np.where(offset < 0.0, np.pi, 0.0))
+        depth = np.sqrt(corner**2 - inset**2)
+        ahead = -depth * stations["down"][:, None]
+        surface = (stations["z"][:, None] + corner - depth * stations["level"][:, None]).ravel()
+        x, y = points_around(stations, np.hypot(offset, ahead), np.arctan2(ahead, offset))
         every = np.full(len(surface), len(work.pieces))
+        ball = np.repeat(np.where(stations["flat"] == 0.0, SCALLOP * stations["reach"], 0.0), ACROSS)
+        stays = np.abs(work.tops(x, y, (np.zeros_like(every), every))[0] - surface) < BESIDE + ball
+        stays &= (work.stock.bottoms(x, y) < surface) & ~np.repeat(stations["plunge"], ACROSS)
         # A flat end passes a point of the floor twice, with its front and with its back.
         other = stations["path"] + LATER * stations["reach"] + 2.0 * stations["flat"]
-        later = np.repeat(np.searchsorted(work.pieces["before"], other, "right"), ACROSS)
-        stays = np.abs(work.tops(*points, (np.zeros_like(every), every))[0] - surface) < BESIDE
-        stays &= work.tops(*points, (later, every))[0] > surface + TOUCHED
-        stays &= work.stock.heights(*points)[1] < surface
-        stays = stays.reshape(offset.shape) & ~stations["plunge"][:, None]
+        some = np.flatnonzero(stays)
+        later = np.searchsorted(work.pieces["before"], other, "right")[some // ACROSS]
+        above = work.tops(x[some], y[some], (later, every[some]))[0] - surface[some]
+        stays[some] = (above > TOUCHED) | ((above < -TOUCHED) & (ball[some] > 0.0))
+        stays = stays.reshape(offset.shape)
         low, high = np.where(stays, offset, np.inf).min(axis=1), np.where(stays, offset, -np.inf).max(axis=1)
         strips[rows] = np.where(stays.any(axis=1)[:, None], np.stack([low, high], axis=1), np.nan)
     return strips

@@ -78,20 +78,19 @@ def headings(samples: Samples) -> FloatArray:
 
 def points_around(stations: AnyArray, radius: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """x, y, m, of points around the axis, end to end; radius and angle (from the left, clockwise) are (n, ...)."""
-    radius, angle = np.broadcast_arrays(radius, angle)
-    each = stations[np.repeat(np.arange(len(stations)), radius[0].size if len(stations) else 0)]
-    across, ahead = (radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel()
-    x = each["x"] + ahead * each["ahead_x"] - across * each["ahead_y"]
-    return x, each["y"] + ahead * each["ahead_y"] + across * each["ahead_x"]
+    shape = (-1,) + (1,) * (np.broadcast(radius, angle).ndim - 1)
+    x, y, ahead_x, ahead_y = (stations[name].reshape(shape) for name in ("x", "y", "ahead_x", "ahead_y"))
+    across, ahead = radius * np.cos(angle), radius * np.sin(angle)
+    return (x + ahead * ahead_x - across * ahead_y).ravel(), (y + ahead * ahead_y + across * ahead_x).ravel()
 
 
 def heights_around(
     work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Top of the material before each station, underside of the stock, m above the tip; points as `points_around`."""
-    shape = np.broadcast_shapes(radius.shape, angle.shape)
     x, y = points_around(stations, radius, angle)
-    each = stations[np.repeat(np.arange(len(stations)), len(x) // max(len(stations), 1))]
-    top = work.tops(x, y, (np.zeros(len(x), dtype=np.int64), each["piece"]), each["recent"], SLACK)[0]
-    bottom = work.stock.heights(x, y)[1]
-    return (top - each["z"]).reshape(shape), (bottom - each["z"]).reshape(shape)
+    around = len(x) // max(len(stations), 1)
+    piece, recent, z = (np.repeat(stations[name], around) for name in ("piece", "recent", "z"))
+    top = work.tops(x, y, (np.zeros(len(x), dtype=np.int64), piece), recent, SLACK)[0]
+    shape = np.broadcast_shapes(radius.shape, angle.shape)
+    return (top - z).reshape(shape), (work.stock.bottoms(x, y) - z).reshape(shape)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cells import cells_of_boxes
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.errors import InputError
@@ -49,12 +49,26 @@ class Stock:
         low, high = mm_from_m(float(self.bottom.min())), mm_from_m(float(self.top.max()))
         return f"<Stock: {x:g} x {y:g} mm, z {low:g} to {high:g} mm: {self.origin}>"
 
-    def heights(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Top and underside, m, at points x, y; beside the stock the top is -inf."""
+    def tops(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """(n,) m of the top at points x, y; -inf beside the stock."""
+        if self.top.size == 1:
+            end = self.corner + self.cell
+            inside = (x >= self.corner[0]) & (x < end[0]) & (y >= self.corner[1]) & (y < end[1])
+            return np.where(inside, self.top[0, 0], -np.inf)
+        i, j, inside = self._cells(x, y)
+        return np.where(inside, self.top[i, j], -np.inf)
+
+    def bottoms(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """(n,) m of the underside at points x, y."""
+        if self.top.size == 1:
+            return np.full(len(x), self.bottom[0, 0])
+        i, j, _ = self._cells(x, y)
+        return np.asarray(self.bottom[i, j])
+
+    def _cells(self, x: FloatArray, y: FloatArray) -> tuple[IntArray, IntArray, BoolArray]:
         i, j = np.floor((x - self.corner[0]) / self.cell[0]), np.floor((y - self.corner[1]) / self.cell[1])
         inside = (i >= 0) & (j >= 0) & (i < self.top.shape[0]) & (j < self.top.shape[1])
-        i, j = np.where(inside, i, 0).astype(np.int64), np.where(inside, j, 0).astype(np.int64)
-        return np.where(inside, self.top[i, j], -np.inf), self.bottom[i, j]
+        return np.where(inside, i, 0).astype(np.int64), np.where(inside, j, 0).astype(np.int64), inside
 
 
 def box_stock(low: tuple[float, float, float], high: tuple[float, float, float], origin: str) -> Stock:

@@ -19,7 +19,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, product
 from toolpath_stiff.cutting.chips import flute_radii
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
-from toolpath_stiff.cutting.forces import TURN, blocks, lag_per_height, responses
+from toolpath_stiff.cutting.forces import EACH, TURN, blocks, forces_of_sets, lag_per_height
 from toolpath_stiff.cutting.patches import Patches
 
 HEIGHTS = 9  # of a wall at which its error is computed, both ends among them
@@ -90,7 +90,7 @@ def floor_error(
     compliance: FloatArray,
     strip: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """(n, STRIPS) m, error of the surface below n stations, from the right to the left end of each strip.
+    """(n, STRIPS) m, error of the surface below n stations, from right to left across each strip; of a ball (n, 1).
 
     Parameters
     ----------
@@ -105,11 +105,12 @@ def floor_error(
     tuple of FloatArray
         Errors, nan where no surface stays; (n,) m, standard deviation of their mean that comes from the coefficients.
     """
-    error, deviation = np.full((len(feed), STRIPS), np.nan), np.full(len(feed), np.nan)
+    flat = cutter.radius - cutter.corner_radius
+    count = STRIPS if flat > 0.0 else 1  # a scallop is narrow, and a ball passes each of its points once
+    error, deviation = np.full((len(feed), count), np.nan), np.full(len(feed), np.nan)
     cut = np.asarray(np.isfinite(strip).all(axis=1))
     right, left = strip[cut, :, None].swapaxes(0, 1)
-    aside = right + (left - right) * (np.arange(STRIPS) + 0.5) / STRIPS
-    flat = cutter.radius - cutter.corner_radius
+    aside = right + (left - right) * (np.arange(count) + 0.5) / count
     beyond = np.clip(np.abs(aside) - flat, 0.0, cutter.corner_radius)
     out = beyond / (cutter.corner_radius or 1.0)  # sine of the angle between the tool and the surface's normal
     along = np.sqrt(1.0 - out * out) / np.hypot(feed[cut, 0], feed[cut, 1])[:, None]
@@ -120,7 +121,8 @@ def floor_error(
     height = cutter.corner_radius - np.sqrt(np.maximum(cutter.corner_radius**2 - beyond**2, 0.0))
     chosen = (_of(patches, cut), cutter, coefficients, feed[cut], turning[cut])
     passes = [
-        _errors(*chosen, _tip_angle(cutter, angle, height, turning[cut]), pull) for angle in (ahead, TURN - ahead)
+        _errors(*chosen, _tip_angle(cutter, angle, height, turning[cut]), pull)
+        for angle in (ahead, TURN - ahead)[:count]
     ]
     error[cut], slopes, _ = _lowest(passes)
     deviation[cut] = _deviation(slopes.mean(axis=1), coefficients)
@@ -142,7 +144,7 @@ def _tip_angle(cutter: Cutter, angle: FloatArray, height: FloatArray, turning: F
 
 
 def _pull(normal: FloatArray, compliance: FloatArray, turning: FloatArray) -> FloatArray:
-    """(n, h, 3) m/N of error per force as `forces.responses` counts, by normals (n, h, 3)."""
+    """(n, h, 3) m/N of error per force as `forces.forces_of_sets` counts, by normals (n, h, 3)."""
     pull = product(normal, compliance)
     pull[..., 1] *= turning[:, None]
     return pull
@@ -160,11 +162,11 @@ def _errors(
     """The lowest of the flutes' passes."""
     radii = flute_radii(cutter) if cutter.run_out else np.zeros(1)
     lowest = np.zeros(tip.shape), np.zeros((*tip.shape, 6)), np.zeros((*tip.shape, 3))
-    for block, part in blocks(patches, len(tip)):
+    for block, part in blocks(patches, cutter, len(tip)):
         passes: list[Passes] = []
         for flute, short in enumerate(radii.max() - radii):
             angle = tip[block] + TURN * flute / cutter.flutes
-            response = responses(part, cutter, feed[block], turning[block], angle, coefficients.taper)
+            response = forces_of_sets(part, cutter, feed[block], turning[block], angle, coefficients.taper, EACH)
             slope = product(pull[block][..., None, :], response)[..., 0, :]
             force = product(response, coefficients.values[:, None])[..., 0]
             passes.append(((pull[block] * force).sum(axis=-1) + short, slope, force))

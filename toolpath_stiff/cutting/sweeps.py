@@ -161,7 +161,7 @@ def nearest(sweeps: AnyArray, x: FloatArray, y: FloatArray) -> tuple[FloatArray,
 def rise(sweeps: AnyArray, distance: FloatArray) -> FloatArray:
     """(e,) m, height of the cutter's end above its tip at a distance from the axis of up to its radius."""
     corner = sweeps["reach"] - sweeps["flat"]
-    return corner - np.sqrt(np.maximum(corner**2 - np.maximum(distance - sweeps["flat"], 0.0) ** 2, 0.0))
+    return np.asarray(corner - np.sqrt(np.maximum(corner**2 - np.maximum(distance - sweeps["flat"], 0.0) ** 2, 0.0)))
 
 
 def _distance(along: FloatArray, beside: FloatArray, spoke: FloatArray, place: FloatArray) -> FloatArray:

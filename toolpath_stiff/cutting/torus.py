@@ -3,93 +3,181 @@
 kappa is the angle between the tool's axis and the normal of its envelope: 0 at the tip, 90 degrees where the cylinder
 begins. The length of an edge is counted along the envelope, as along the cylinder by its height, where coefficients are
 identified. Engin, Altintas, International Journal of Machine Tools and Manufacture 41 (2001) 2195.
+
+Of n stations: patches below the corner's height, feed (n, 2) m per tooth along x and z, lag (n,) rad/m, less than 0 of
+what looks left-handed. Forces are those of k sets of coefficients, `values` (6, k), side by side.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.cutting.chips import flute_gaps, flute_laws
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.patches import Patches
 
-SLICES, ANGLES = 6, 12  # nodes: the sines within a patch to nine digits
-FINE = 24  # nodes of height with run-out or on a ramp, where the chip may begin or bend within the patch
+WIDEST = 0.4  # rad of kappa in a layer: three nodes give the sines in it to eight digits
+# Nodes and weights, shares of a layer.
+NODES = [(0.5 + 0.5 * node, 0.5 * weight) for node, weight in zip(*np.polynomial.legendre.leggauss(3), strict=True)]
+ANGLES = 8  # nodes of an arc: up to a half turn to nine digits
 TURN = 2.0 * np.pi
 
 
-def torus_responses(
-    patches: Patches, cutter: Cutter, feed: FloatArray, lag: FloatArray, angle: FloatArray, taper: float
+def torus_mean(
+    patches: Patches, cutter: Cutter, feed: FloatArray, lag: FloatArray, taper: float, values: FloatArray
 ) -> FloatArray:
-    """(p, a, 3, 6) forces per coefficient of each patch at angles (p, a) of flute 0; all flutes.
-
-    `feed` (p, 2) m per tooth along x and z, `lag` (p,) rad/m, `taper` m.
-    """
-    total = np.zeros((*angle.shape, 3, 6))
-    low, high, (entry, leave) = patches.low[:, None], patches.high[:, None], _arc(patches, feed)
-    slope, radius = lag[:, None], cutter.corner_radius
-    largest = np.where(slope > 0.0, low, high)  # the height where the angle of the edge is largest
-    nodes, weights = np.polynomial.legendre.leggauss(FINE if cutter.run_out or feed[:, 1].any() else SLICES)
-    for flute, gaps in enumerate(flute_gaps(cutter)):
-        tip = angle - TURN * flute / cutter.flutes
-        tip = tip - TURN * np.floor((tip - slope * largest) / TURN)
-        for turn in (0.0, TURN):
-            ends = np.sort([(tip + turn - leave) / slope, (tip + turn - entry) / slope], axis=0)
-            ends = np.clip(ends, low, high)
-            if not (ends[1] > ends[0]).any():
-                continue
-            first, last = np.arccos(np.clip(1.0 - ends / radius, -1.0, 1.0))
-            half, middle = 0.5 * (last - first), 0.5 * (last + first)
-            for node, weight in zip(nodes, weights, strict=True):
-                kappa = middle + half * node
-                phi = tip - slope * radius * (1.0 - np.cos(kappa))
-                _add_slices(total, phi, kappa, weight * half * radius, _chip(phi, kappa, feed, gaps), taper)
+    """(n, 3, k) forces, mean over a turn."""
+    layers = _layers(patches, cutter, feed)
+    nodes, weights = np.polynomial.legendre.leggauss(ANGLES)
+    layer, arc = np.repeat(np.arange(len(layers.low)), ANGLES), layers.exit - layers.entry
+    across = _direction((layers.entry[:, None] + arc[:, None] * (0.5 + 0.5 * nodes)).ravel())
+    share = ((layers.high - layers.low)[:, None] * 0.5 * arc[:, None] * weights / TURN).ravel()
+    station = layers.station[layer]
+    motion = np.take(_motion(feed, lag), station, axis=1)
+    total = np.zeros((len(feed), 3, values.shape[1]))
+    for node, weight in NODES:
+        kappa = layers.low + node * (layers.high - layers.low)
+        normal = np.take(_direction(kappa), layer, axis=1)
+        for gaps, flutes in flute_laws(cutter):
+            length = flutes * weight * cutter.corner_radius * share
+            force = _edge_forces(across, normal, length, motion, np.append(taper, gaps), values)
+            total += _summed(force, station, len(feed))
     return total
 
 
-def mean_torus_responses(patches: Patches, cutter: Cutter, feed: FloatArray, taper: float) -> FloatArray:
-    """(p, 3, 6) mean forces over a turn per coefficient of each patch; arguments as `torus_responses`."""
+def torus_around(
+    patches: Patches,
+    cutter: Cutter,
+    feed: FloatArray,
+    lag: FloatArray,
+    taper: float,
+    values: FloatArray,
+    steps: int,
+) -> FloatArray:
+    """(n, steps, 3, k) forces with flute 0 at even steps of a tooth's pitch; with run-out of a turn."""
+    layers = _layers(patches, cutter, feed)
+    laws = flute_laws(cutter)
+    step = TURN * len(laws) / cutter.flutes / steps
+    motion = _motion(feed, lag)
+    total = np.zeros((len(feed) * steps, 3, values.shape[1]))
+    for node, weight in NODES:
+        kappa = layers.low + node * (layers.high - layers.low)
+        normal = _direction(kappa)
+        behind = lag[layers.station] * cutter.corner_radius * (1.0 - normal[1])
+        for flute, (gaps, _) in enumerate(laws):
+            late = behind + TURN * flute / cutter.flutes
+            first = np.ceil((layers.entry + late) / step).astype(np.int64)
+            count = np.floor((layers.exit + late) / step).astype(np.int64) - first + 1
+            layer, place = _repeated(np.maximum(count, 0))
+            place += first[layer]
+            phi, station = place * step - late[layer], layers.station[layer]
+            length = weight * cutter.corner_radius * (layers.high - layers.low)[layer]
+            given = (np.take(normal, layer, axis=1), length, np.take(motion, station, axis=1), np.append(taper, gaps))
+            force = _edge_forces(_direction(phi), *given, values)
+            total += _summed(force, station * steps + place % steps, len(total))
+    return total.reshape(len(feed), steps, *total.shape[1:])
+
+
+def torus_forces(
+    patches: Patches,
+    cutter: Cutter,
+    feed: FloatArray,
+    lag: FloatArray,
+    angle: FloatArray,
+    taper: float,
+    values: FloatArray,
+) -> FloatArray:
+    """(n, a, 3, k) forces with flute 0 at angles (n, a); all flutes."""
+    layers = _layers(patches, cutter, feed)
+    slope, radius, count = lag[layers.station][:, None], cutter.corner_radius, angle.shape[1]
+    low, high = (radius * (1.0 - np.cos(kappa))[:, None] for kappa in (layers.low, layers.high))
+    entry, leave = layers.entry[:, None], layers.exit[:, None]
+    motion = _motion(feed, lag)
+    largest = np.where(slope > 0.0, low, high)  # the height where the angle of the edge is largest
+    total = np.zeros((angle.size, 3, values.shape[1]))
+    for flute, gaps in enumerate(flute_gaps(cutter)):
+        tip = angle[layers.station] - TURN * flute / cutter.flutes
+        tip -= TURN * np.floor((tip - slope * largest) / TURN)
+        for turn in (0.0, TURN):
+            first, last = (tip + turn - leave) / slope, (tip + turn - entry) / slope
+            first, last = np.maximum(np.minimum(first, last), low), np.minimum(np.maximum(first, last), high)
+            layer, column = np.nonzero(last > first)
+            ends = np.arccos(np.clip(1.0 - np.stack([first, last])[:, layer, column] / radius, -1.0, 1.0))
+            station = layers.station[layer]
+            for node, weight in NODES:
+                kappa = ends[0] + node * (ends[1] - ends[0])
+                normal, length = _direction(kappa), weight * radius * (ends[1] - ends[0])
+                phi = tip[layer, column] - slope[layer, 0] * radius * (1.0 - normal[1])
+                force = _edge_forces(
+                    _direction(phi), normal, length, np.take(motion, station, axis=1), np.append(taper, gaps), values
+                )
+                total += _summed(force, station * count + column, len(total))
+    return total.reshape(*angle.shape, *total.shape[1:])
+
+
+def _layers(patches: Patches, cutter: Cutter, feed: FloatArray) -> Patches:
+    """The patches in layers of kappa, which their `low` and `high` are; on the level an edge cuts only ahead."""
     first, last = (np.arccos(1.0 - height / cutter.corner_radius) for height in (patches.low, patches.high))
-    nodes, weights = np.polynomial.legendre.leggauss(ANGLES)
-    entry, leave = _arc(patches, feed)
-    phi = 0.5 * (entry + leave) + 0.5 * (leave - entry) * nodes
-    share = 0.5 * (leave - entry) * weights / TURN
-    total = np.zeros((*phi.shape, 3, 6))
-    for node, weight in zip(*np.polynomial.legendre.leggauss(SLICES), strict=True):
-        kappa = np.broadcast_to((0.5 * (first + last) + 0.5 * (last - first) * node)[:, None], phi.shape)
-        length = share * (0.5 * weight * cutter.corner_radius * (last - first))[:, None]
-        for gaps, count in flute_laws(cutter):
-            _add_slices(total, phi, kappa, count * length, _chip(phi, kappa, feed, gaps), taper)
-    return np.asarray(total.sum(axis=1))
+    count = np.ceil((last - first) / WIDEST).astype(np.int64)
+    row, place = _repeated(count)
+    width = (last - first)[row] / count[row]
+    end = np.where(feed[patches.station, 1] == 0.0, np.pi, TURN)
+    ahead = replace(patches, entry=np.minimum(patches.entry, end), exit=np.minimum(patches.exit, end)).take(row)
+    return replace(ahead, low=first[row] + place * width, high=first[row] + (place + 1) * width)
 
 
-def _arc(patches: Patches, feed: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(p, 1) rad, where edges may cut from and to: on the level only ahead of the axis."""
-    end = np.where(feed[:, 1] == 0.0, np.pi, TURN)
-    return np.minimum(patches.entry, end)[:, None], np.minimum(patches.exit, end)[:, None]
+def _repeated(count: IntArray) -> tuple[IntArray, IntArray]:
+    """Each place as many times as counted, and 0, 1 ... within it."""
+    place = np.repeat(np.arange(len(count)), count)
+    return place, np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
 
 
-def _chip(phi: FloatArray, kappa: FloatArray, feed: FloatArray, gaps: FloatArray) -> FloatArray:
-    """(p, a) m, the chip square to the envelope; the feed along z of a ramp cuts at the lower end, ahead and behind."""
-    u = feed[:, :1] * np.sin(phi) * np.sin(kappa) - feed[:, 1:] * np.cos(kappa)
-    if not gaps.any():
-        return np.maximum(u, 0.0)
-    chips = [m * u + gap * np.sin(kappa) for m, gap in enumerate(gaps, 1)]
-    return np.asarray(np.maximum(np.minimum.reduce(chips), 0.0))
+def _edge_forces(
+    across: FloatArray, normal: FloatArray, length: FloatArray, motion: FloatArray, law: FloatArray, values: FloatArray
+) -> FloatArray:
+    """(3, k, q) forces of slices of an edge, of such lengths.
+
+    Parameters
+    ----------
+    across, normal
+        (2, q) sine and cosine of the angle of the edge, and of kappa.
+    motion
+        (3, q) m per tooth along x and z, hand.
+    law
+        (1 + flutes,) m of taper, then how far the flute stands out beyond those before it.
+    """
+    (sine, cosine), (out, up) = across, normal
+    # Square to the envelope; the feed along z of a ramp cuts at the lower end, ahead and behind.
+    chip = motion[0] * sine * out - motion[1] * up
+    if law[1:].any():
+        chip = np.minimum.reduce([m * chip + gap * out for m, gap in enumerate(law[1:], 1)])
+    chip = np.maximum(chip, 0.0)
+    edge = length * (np.minimum(chip / law[0], 1.0) if law[0] else chip > 0.0)
+    chip *= length
+    tangential, radial, axial = (values[i, :, None] * chip + values[i + 3, :, None] * edge for i in range(3))
+    axial *= motion[2]
+    outward = radial * out + axial * up
+    force = np.empty((3, *outward.shape))
+    force[0] = -tangential * cosine - outward * sine
+    force[1] = tangential * sine - outward * cosine
+    force[2] = radial * up - axial * out
+    return force
 
 
-def _add_slices(
-    total: FloatArray, phi: FloatArray, kappa: FloatArray, length: FloatArray, chip: FloatArray, taper: float
-) -> None:
-    """Add forces per coefficient of slices (p, a) of an edge of such lengths, in place."""
-    edge = np.minimum(chip / taper, 1.0) if taper else (chip > 0.0).astype(float)
-    sine, cosine, out, up = np.sin(phi), np.cos(phi), np.sin(kappa), np.cos(kappa)
-    for column, weight in ((0, chip * length), (3, edge * length)):
-        along, across = weight * sine, weight * cosine
-        total[..., 0, column] -= across
-        total[..., 1, column] += along
-        total[..., 0, column + 1] -= along * out
-        total[..., 1, column + 1] -= across * out
-        total[..., 2, column + 1] += weight * up
-        total[..., 0, column + 2] -= along * up
-        total[..., 1, column + 2] -= across * up
-        total[..., 2, column + 2] -= weight * out
+def _direction(angle: FloatArray) -> FloatArray:
+    """(2, q) sine and cosine."""
+    return np.stack([np.sin(angle), np.cos(angle)])
+
+
+def _motion(feed: FloatArray, lag: FloatArray) -> FloatArray:
+    """(3, n) of `_edge_forces`."""
+    return np.stack([feed[:, 0], feed[:, 1], np.sign(lag)])
+
+
+def _summed(forces: FloatArray, place: IntArray, count: int) -> FloatArray:
+    """(count, 3, k) sums of forces (3, k, q) by their places (q,)."""
+    sums = np.zeros((count, *forces.shape[:2]))
+    for row, column in np.ndindex(*forces.shape[:2]):
+        sums[:, row, column] = np.bincount(place, forces[row, column], minlength=count)
+    return sums

@@ -8,6 +8,8 @@ time. So neither levels nor passes lengthen a query, and there is no grid on whi
 import importlib.util
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from types import ModuleType
 
 import numpy as np
 
@@ -18,11 +20,13 @@ from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.sweeps import FIELDS, PIECE, heights_above, nearest, rise, sweeps_of
 from toolpath_stiff.nc.moves import Moves
 
-CELL = 0.3  # radii of the smallest cutter, size of a cell of the index
+CELL, COMPILED_CELL = 0.3, 0.12  # radii of the smallest cutter, size of a cell of the index
 MANY = 5_000  # pieces from where on it pays to import numba: half a second
 CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
 MOST_ENTRIES = 60_000_000  # of the index; larger cells beyond
 OFFSET = np.array([0.3819e-3, 0.2764e-3])  # m: walls at round coordinates shall not run along borders of cells
+
+Index = tuple[IntArray, IntArray, IntArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -37,10 +41,11 @@ class Workpiece:
         (m,) of `sweeps.PIECE`; (moves + 1,) the first piece of each move.
     corner, size, columns
         (2,) m of the lowest cell; m; number of cells along y.
-    key, counts_from
-        (e,) cell * m + piece of each entry, ascending; (e,) the first entry of its cell that counts after it.
-    below, compiled
-        (e,) m, no less than the piece leaves anywhere in the cell; whether numba looks up.
+    index
+        (cells + 1,) first entry of each cell; (e,) piece of each entry, ascending in a cell; (e,) the first of its
+        entries that counts after it; (e,) m, the piece leaves no less anywhere in the cell.
+    compiled
+        Whether numba looks up.
     """
 
     stock: Stock
@@ -49,15 +54,14 @@ class Workpiece:
     corner: FloatArray
     size: float
     columns: int
-    key: IntArray
-    counts_from: IntArray
-    below: FloatArray
+    index: Index
     compiled: bool
 
-    @property
-    def table(self) -> FloatArray:
-        """(m, fields) of the pieces as numbers."""
-        return np.asarray(self.pieces.view(np.float64).reshape(len(self.pieces), len(FIELDS)))
+    @cached_property
+    def key(self) -> IntArray:
+        """(e,) cell * m + piece, ascending."""
+        starts, piece = self.index[:2]
+        return np.repeat(np.arange(len(starts) - 1), np.diff(starts)) * len(self.pieces) + piece
 
     def tops(
         self,
@@ -72,23 +76,22 @@ class Workpiece:
         The pieces are first <= piece < last of `window`, (n,) each. Of those from `slack_from` (n,) on the cutter is
         taken for smaller and higher by `slack`, m.
         """
-        top, owner = self.stock.heights(x, y)[0], np.full(len(x), -1)
-        low, high = self._entries(x, y, window)
+        top, owner = self.stock.tops(x, y), np.full(len(x), -1)
         if self.compiled:
-            from toolpath_stiff.cutting.compiled_sweeps import lowest
-
-            late = every(len(x), len(self.pieces)) if slack_from is None else slack_from
-            lowest(self.table, self.key, self.below, x, y, low, high, late, slack, CLEAR, top, owner)
+            late = np.full(len(x), len(self.pieces)) if slack_from is None else slack_from
+            cells, index = (self.corner, self.size, self.columns, CLEAR), self.index
+            _compiled().lowest(_table(self.pieces), cells, index, (x, y), window, (late, slack), (top, owner))
             return top, owner
+        low, high = self._entries(x, y, window)
         counts = high - low
         for rows in portions(counts):
             some = counts[rows]
             point = np.repeat(np.arange(rows.start, rows.stop), some)
             entry = np.arange(len(point)) + np.repeat(low[rows] - np.cumsum(some) + some, some)
-            piece = self.key[entry] % len(self.pieces)
-            late = np.zeros(len(point)) if slack_from is None else np.where(piece >= slack_from[point], slack, 0.0)
-            part = np.take(self.table, piece, axis=0).view(PIECE)[:, 0]
-            height = heights_above(part, x[point], y[point], late)
+            piece = self.index[1][entry]
+            smaller = np.zeros(len(point)) if slack_from is None else np.where(piece >= slack_from[point], slack, 0.0)
+            part = np.take(_table(self.pieces), piece, axis=0).view(PIECE)[:, 0]
+            height = heights_above(part, x[point], y[point], smaller)
             hit = np.flatnonzero(some)
             if not len(hit):
                 continue
@@ -106,18 +109,13 @@ class Workpiece:
         i = np.floor((x - self.corner[0]) / self.size).astype(np.int64)
         j = np.floor((y - self.corner[1]) / self.size).astype(np.int64)
         cell = np.where((i >= 0) & (j >= 0) & (j < self.columns), i * self.columns + j, -1) * len(self.pieces)
-        low, high = np.searchsorted(self.key, cell + window[0]), np.searchsorted(self.key, cell + window[1])
+        low, high = (np.searchsorted(self.key, cell + piece) for piece in window)
         last = np.maximum(high - 1, 0)
         since = (window[0] == 0) & (high > low)
-        low[since] = np.maximum(low[since], self.counts_from[last[since]])
+        low[since] = np.maximum(low[since], self.index[2][last[since]])
         none = cell < 0
         low[none] = high[none] = 0
         return low, np.maximum(high, low)
-
-
-def every(n: int, value: int) -> IntArray:
-    """(n,) of a number."""
-    return np.full(n, value, dtype=np.int64)
 
 
 def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> Workpiece:
@@ -125,14 +123,33 @@ def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> W
     pieces, first = sweeps_of(moves, cutters)
     if not len(pieces):
         none = np.zeros(0, dtype=np.int64)
-        return Workpiece(stock, np.zeros(1, PIECE), first, np.zeros(2), 1.0, 0, none, none, np.zeros(0), False)
+        index = np.zeros(1, dtype=np.int64), none, none, np.zeros(0)
+        return Workpiece(stock, np.zeros(1, PIECE), first, np.zeros(2), 1.0, 0, index, False)
     compiled = len(pieces) >= MANY and importlib.util.find_spec("numba") is not None
     low, high = _boxes(pieces)
-    size = CELL * float(pieces["reach"].min())
+    size = (COMPILED_CELL if compiled else CELL) * float(pieces["reach"].min())
     while float((np.ceil((high - low) / size) + 1.0).prod(axis=1).sum()) > MOST_ENTRIES:
         size *= 1.5
     corner = low.min(axis=0) - OFFSET - size
     low, high = (np.floor((ends - corner) / size).astype(np.int64) for ends in (low, high))
+    columns = int(high[:, 1].max()) + 1
+    if compiled:
+        cells = corner, size, columns, CLEAR
+        index = _compiled().index_of(_table(pieces), low, high, _half(size), cells)
+    else:
+        index = _index(pieces, low, high, corner, size)
+    return Workpiece(stock, pieces, first, corner, size, columns, index, compiled)
+
+
+def _compiled() -> ModuleType:
+    """The compiled loops. numba comes with them: half a second, and some seconds to compile the first time."""
+    from toolpath_stiff.cutting import compiled_sweeps
+
+    return compiled_sweeps
+
+
+def _index(pieces: AnyArray, low: IntArray, high: IntArray, corner: FloatArray, size: float) -> Index:
+    """The index of the pieces between cells `low` and `high` (m, 2)."""
     columns = int(high[:, 1].max()) + 1
     parts = list(_rasters(pieces, low, high, corner, size))
     cell, piece, below, above = (np.concatenate([part[k] for part in parts]) for k in range(4))
@@ -140,8 +157,18 @@ def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> W
     order = np.argsort(cell, kind="stable")
     cell, piece, below, outdone = _without_outdone(cell[order], piece[order], below[order], above[order])
     counts_from = np.searchsorted(np.maximum.accumulate(outdone), np.arange(len(cell)), side="right")
-    key = cell * len(pieces) + piece
-    return Workpiece(stock, pieces, first, corner, size, columns, key, counts_from, below, compiled)
+    starts = np.searchsorted(cell, np.arange((int(cell[-1]) // columns + 1) * columns + 1))
+    return starts, piece, counts_from, below
+
+
+def _table(pieces: AnyArray) -> FloatArray:
+    """(m, fields) of the pieces as numbers."""
+    return np.asarray(pieces.view(np.float64).reshape(len(pieces), len(FIELDS)))
+
+
+def _half(size: float) -> float:
+    """Half of a cell's diagonal, m, and a little for rounding."""
+    return float(size / np.sqrt(2.0)) + 1e-6
 
 
 def _boxes(pieces: AnyArray) -> tuple[FloatArray, FloatArray]:
@@ -164,7 +191,7 @@ def _rasters(
     pieces: AnyArray, low: IntArray, high: IntArray, corner: FloatArray, size: float
 ) -> Iterator[tuple[IntArray, IntArray, FloatArray, FloatArray]]:
     """(k, 2) cells that pieces pass, in portions, (k,) the piece, and m, bounds of the height that it leaves there."""
-    half = size / np.sqrt(2.0) + 1e-6
+    half = _half(size)
     for piece, cell in cells_of_boxes(low, high):
         part, middle = pieces[piece], corner + (cell + 0.5) * size
         place, distance = nearest(part, middle[:, 0], middle[:, 1])

@@ -430,7 +430,8 @@ def put_to_vote(
     if top is None:
         beside = tuple(dict.fromkeys([*explanations, NONE]))
         return ("ambiguous", beside, {}) if gates.none_stands else ("unexplained", (), {})
-    ballots = votes(problem, fits[top], {NONE: base} | rivals_of(fits[top], fits))
+    rivals = ({NONE: base} if gates.none_stands else {}) | rivals_of(fits[top], fits)
+    ballots = votes(problem, fits[top], rivals)
     ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
     open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
     return ("ambiguous" if open_rivals else verdict), left_open(top, standing, open_rivals, ballots), ballots

@@ -38,7 +38,7 @@ def fitted_nuisances(fit: Fit, noise: Noise) -> list[Document]:
         own, values = spread[np.ix_(rows, rows)], fitted[rows]
         squares = float(values @ np.linalg.pinv(own, hermitian=True) @ values)
         chance = min(1.0, len(blocks) * float(gammaincc(0.5 * len(rows), 0.5 * squares)))
-        sigma = -float(ndtri(0.5 * max(chance, 1e-300)))
+        sigma = round(-float(ndtri(0.5 * max(chance, 1e-300))), 3) + 0.0
         entries.append(
             {
                 "nuisance": "joint" if k >= STRUTS else "strut",

@@ -33,6 +33,7 @@ from toolpath_stiff.stiffness.contract import SETUP, Effect
 SMALL = 4.0
 CHANCE = 0.05  # one-sided
 DRAWS = 2000
+CERTAIN = 4  # decimals of a vote on which all processors agree
 UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
 MOST_OPEN = 3  # explanations that a verdict lists for their votes; all votes are in the document
 FEWEST_POSES = 6  # below, no spread over poses can be told
@@ -56,7 +57,8 @@ def votes(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, Fl
             precision = given.widened(rows, scatter.widening[rows]).precision
             mine[wild] = precision, _log_predictive(fit, precision, points)
         precision, density = mine[wild]
-        against[name] = density - _log_predictive(rival, precision, points)
+        # Rounded: which of two rivals that do the same is the closer would be the processor's.
+        against[name] = np.round(density - _log_predictive(rival, precision, points), CERTAIN) + 0.0
     return closest(against)
 
 
@@ -126,7 +128,7 @@ def closest(*ballots: Votes) -> dict[str, FloatArray]:
     strongest = {
         name: min((votes_for[name] for votes_for in ballots if name in votes_for), key=np.sum) for name in sorted(names)
     }
-    return dict(sorted(strongest.items(), key=lambda item: (float(item[1].sum()), item[0])))
+    return dict(sorted(strongest.items(), key=lambda item: (round(float(item[1].sum()), CERTAIN - 1), item[0])))
 
 
 def left_open(first: str, standing: Sequence[str], rivals: Sequence[str], against: Votes) -> tuple[str, ...]:
@@ -146,7 +148,7 @@ def left_open(first: str, standing: Sequence[str], rivals: Sequence[str], agains
     if better := bool(closest_rival.sum() < 0.0):
         kept = [n for n in kept if n in rivals[:1] or n not in against or not outvoted(against[n] - closest_rival)]
     new = [name for name in rivals if name not in standing][: max(MOST_OPEN - 1 - len(kept), int(better))]
-    gains = {name: float(np.sum(against.get(name, 0.0))) for name in (*kept, *new)}
+    gains = {name: round(float(np.sum(against.get(name, 0.0))), CERTAIN - 1) for name in (*kept, *new)}
     return first, *sorted(gains, key=lambda name: (gains[name], name))
 
 

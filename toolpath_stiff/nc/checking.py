@@ -14,7 +14,7 @@ from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
-from toolpath_stiff.nc.languages import CUTTER_LOCATION_FILE, Recognised, foreign_program, recognise, refused_program
+from toolpath_stiff.nc.languages import CUTTER_LOCATION_FILE, foreign_program, recognise, refused_program
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
@@ -146,18 +146,18 @@ def check(request: Request) -> Checked:
         raise ProgramError(f"interpreter {request.interpreter!r}", expected=", ".join(INTERPRETERS))
     if not any(line.strip() for line in request.lines):
         raise ProgramError("the program is empty", expected="an NC program", file=request.name)
-    language = recognise(request.lines, request.name, request.controller.dialect)
-    return replace(_checked(request, language), language=str(language))
+    language, sign = recognise(request.lines, request.name, request.controller.dialect)
+    return replace(_checked(request, language), language=f"{language} ({sign})")
 
 
-def _checked(request: Request, language: Recognised) -> Checked:
+def _checked(request: Request, language: str) -> Checked:
     if request.interpreter == "linuxcnc":
         return _check_by_linuxcnc(request)
-    if language.language == CUTTER_LOCATION_FILE:
+    if language == CUTTER_LOCATION_FILE:
         return _check_cutter_location(request)
-    if language.dialect:
+    if language in LANGUAGE_RUNS:
         request = in_language(request, language)
-        return _check_built_in(request, LANGUAGE_RUNS[language.dialect](request, Tally()))
+        return _check_built_in(request, LANGUAGE_RUNS[language](request, Tally()))
     ours = _check_built_in(request, ProgramRun(request, Tally()))
     if request.interpreter == "builtin" or ours.complete or not request.controller.plain:
         return ours

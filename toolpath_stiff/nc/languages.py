@@ -6,7 +6,6 @@ Cutter-location files and the languages of `READ` have readers; others, and prog
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
-from typing import NamedTuple
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import LANGUAGES, Dialect
@@ -88,42 +87,26 @@ def language_of(line: str) -> str | None:
     return next((what for what, pattern in _PATTERNS if pattern.match(head)), None)
 
 
-class Recognised(NamedTuple):
-    """The language of a program: its name, the line (from 1; 0: none) and the sign by which it is recognised."""
-
-    language: str
-    line: int
-    sign: str
-
-    @property
-    def dialect(self) -> str | None:
-        """The dialect whose reader reads it; None: G code's or the cutter-location files', or there is none."""
-        return READ.get(self.language)
-
-    def __str__(self) -> str:
-        return f"{self.language} ({f'line {self.line}: ' if self.line else ''}{self.sign})"
-
-
-def recognise(lines: tuple[str, ...], name: str, dialect: Dialect) -> Recognised:
-    """The language of a program, by its first lines unless the dialect says so.
+def recognise(lines: tuple[str, ...], name: str, dialect: Dialect) -> tuple[str, str]:
+    """The language of a program and by what it is recognised: its first lines, unless the dialect says so.
 
     Examples
     --------
     >>> from toolpath_stiff.nc.controller import GENERIC
-    >>> print(recognise(("0 BEGIN PGM PLATE MM", "1 L X+10 FMAX"), "plate.h", GENERIC))
-    Heidenhain's conversational language (line 1: '0 BEGIN PGM PLATE MM')
-    >>> print(recognise(("G21", "G1 X1 F100"), "plate.nc", GENERIC))
-    G code (no sign of another language)
+    >>> recognise(("0 BEGIN PGM PLATE MM", "1 L X+10 FMAX"), "plate.h", GENERIC)
+    ("Heidenhain's conversational language", "line 1: '0 BEGIN PGM PLATE MM'")
+    >>> recognise(("G21", "G1 X1 F100"), "plate.nc", GENERIC)
+    ('G code', 'no sign of another language')
     """
     if dialect.name in LANGUAGES:
-        return Recognised(LANGUAGES[dialect.name], 0, f"as asked for: --dialect {dialect.name}")
+        return LANGUAGES[dialect.name], f"as asked for: --dialect {dialect.name}"
     if looks_like_cutter_location(lines, name):
-        return Recognised(CUTTER_LOCATION_FILE, 0, "its ending, or statements such as GOTO/")
+        return CUTTER_LOCATION_FILE, "its ending, or statements such as GOTO/"
     for index, line in enumerate(lines[:LATHE_LINES]):
         language = language_of(line) if index < HEAD_LINES else _HEIDENHAIN if PLAIN_LANGUAGE.match(line) else None
         if language is not None:
-            return Recognised(language, index + 1, repr(line.strip()[:40]))
-    return Recognised(G_CODE, 0, "no sign of another language")
+            return language, f"line {index + 1}: {line.strip()[:40]!r}"
+    return G_CODE, "no sign of another language"
 
 
 def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = None) -> InputError | None:

@@ -186,7 +186,7 @@ class ReadProgram:
     parametric
         Whether variables, expressions or loops made the moves.
     stock
-        (2, 3) m, the smallest and the largest corner of the blank in the set-up frame, where the program says (BLK FORM).
+        (2, 3) m, smallest and largest corner of the blank in the set-up frame; None where the program says none.
 
     Examples
     --------

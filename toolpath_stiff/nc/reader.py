@@ -7,12 +7,12 @@ from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.increments import point_warning
-from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.controller import DIALECTS, LANGUAGES, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.cutter_location import reader as cutter_location
 from toolpath_stiff.nc.heidenhain.run import HeidenhainRun
 from toolpath_stiff.nc.languages import (
     CUTTER_LOCATION_FILE,
-    Recognised,
+    READ,
     foreign_program,
     lathe_warning,
     recognise,
@@ -32,7 +32,7 @@ from toolpath_stiff.poses import Pose, pose_in_si
 from toolpath_stiff.units import m_from_mm, mm_per_min_from_m_per_s
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
-LANGUAGE_RUNS: dict[str, type[ProgramRun]] = {"heidenhain": HeidenhainRun}  # by the dialect of the language
+LANGUAGE_RUNS: dict[str, type[ProgramRun]] = {LANGUAGES["heidenhain"]: HeidenhainRun}
 
 
 def read_program(
@@ -104,15 +104,16 @@ def read(request: Request) -> ReadProgram:
         raise ProgramError(f"interpreter {request.interpreter!r}", expected=", ".join(INTERPRETERS))
     if not any(line.strip() for line in lines):
         raise ProgramError("the program is empty", expected="an NC program", file=name)
-    native, language = request.interpreter == "linuxcnc", recognise(lines, name, request.controller.dialect)
-    if native and (language.language == CUTTER_LOCATION_FILE or language.dialect):
-        problem = f"LinuxCNC's interpreter does not read this: {language}"
+    native, (language, sign) = request.interpreter == "linuxcnc", recognise(lines, name, request.controller.dialect)
+    if native and (language == CUTTER_LOCATION_FILE or language in LANGUAGE_RUNS):
+        what = "cutter-location files" if language == CUTTER_LOCATION_FILE else f"{language} ({sign})"
+        problem = f"LinuxCNC's interpreter reads no {what}"
         raise ProgramError(problem, expected="--interpreter builtin", file=name)
-    if language.language == CUTTER_LOCATION_FILE:
+    if language == CUTTER_LOCATION_FILE:
         return _with_feed(cutter_location.read(request), request)
-    if language.dialect:
+    if language in LANGUAGE_RUNS:
         request = in_language(request, language)
-        return _finished(request, LANGUAGE_RUNS[language.dialect](request))
+        return _finished(request, LANGUAGE_RUNS[language](request))
     refused = foreign_program(lines, name) if native else refused_program(lines, name, request.controller.dialect)
     if refused is not None:
         raise refused
@@ -140,10 +141,9 @@ def read(request: Request) -> ReadProgram:
             ) from None
 
 
-def in_language(request: Request, language: Recognised) -> Request:
+def in_language(request: Request, language: str) -> Request:
     """The request with the dialect of the program's language, which has a reader."""
-    assert language.dialect is not None
-    return replace(request, controller=replace(request.controller, dialect=DIALECTS[language.dialect]))
+    return replace(request, controller=replace(request.controller, dialect=DIALECTS[READ[language]]))
 
 
 def _read_built_in(request: Request) -> ReadProgram:

@@ -165,9 +165,11 @@ class Conversational:
     pole, heading
         Circle centre (CC) and the direction in which the last contour element ended, in the plane; None: not known.
     held, corner
-        A contour element that waits for the corner behind it, with its end and feed, and that corner's statement (CHF, RND).
+        A contour element that waits for the corner behind it, with its feed, and that corner's statement (CHF, RND).
     approach
-        The contour point of an APPR, and what it does once the first element's direction is known; `fast`: the last positioning was a rapid.
+        The contour point of an APPR, and what it does once the direction of the first element is known.
+    fast
+        Whether the last positioning was a rapid.
     to_corner
         Whether the next statement is a corner.
     cycle, modal

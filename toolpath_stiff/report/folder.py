@@ -40,7 +40,10 @@ def names(shown_by: str, plots: bool = True, omit: Collection[str] = ()) -> tupl
     """Names of the files that `files` may make."""
     view = view_of(shown_by)
     data = tuple(name for name in view.DATA if name not in omit)
-    return (*data, *pictures_of(shown_by), *filter(None, [getattr(view, "PAGE", "")])) if plots else data
+    if not plots:
+        return data
+    pictures = (name for name in pictures_of(shown_by) if name not in omit)
+    return (*data, *pictures, *filter(None, [getattr(view, "PAGE", "")]))
 
 
 def files(

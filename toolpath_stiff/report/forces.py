@@ -18,8 +18,8 @@ def text(fit: CoefficientFit) -> str:
     """Coefficients with their intervals, how far the slots are off, run-out, what the records do not tell."""
     values, half = fit.coefficients.values * SHOWN, fit.coefficients.deviation * SHOWN * fit.reach
     rows = [
-        (symbol, f"{value:.4g}", f"+- {reach:.2g}" if known else "not told", unit)
-        for symbol, value, reach, known, unit in zip(SYMBOLS, values, half, fit.told, UNITS, strict=True)
+        (symbol, f"{value:.4g}", f"+- {reach:.2g}" if known else "not determined", unit)
+        for symbol, value, reach, known, unit in zip(SYMBOLS, values, half, fit.determined, UNITS, strict=True)
     ]
     name = f"{fit.coefficients.material}: " if fit.coefficients.material else ""
     lines = [f"{name}{len(fit.records)} slots, coefficients with intervals of 95 %", ""]

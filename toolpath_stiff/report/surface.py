@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray, IntArray, product
 from toolpath_stiff.cutting.cut import Cut
+from toolpath_stiff.cutting.cutters import radii_of
 from toolpath_stiff.cutting.final_surface import finished_surface
 from toolpath_stiff.rotations import rotation_matrices
 
@@ -59,9 +60,7 @@ def _walls(cut: Cut, side: int, most: int) -> Quads:
 
 def _foot_and_top(cut: Cut, side: int, rows: IntArray) -> tuple[FloatArray, FloatArray]:
     """(k, 3) m, lowest and highest point of the wall beside some samples."""
-    samples, radius = cut.samples, np.zeros(len(rows))
-    for number, cutter in cut.cutters.items():
-        radius[samples.tool[rows] == number] = cutter.radius
+    samples, radius = cut.samples, radii_of(cut.cutters, cut.samples.tool[rows])
     along = samples.tangent[rows, :2] / np.linalg.norm(samples.tangent[rows, :2], axis=1)[:, None]
     points = samples.position[rows].copy()
     points[:, :2] += ((1.0, -1.0)[side] * radius)[:, None] * np.stack([-along[:, 1], along[:, 0]], axis=1)

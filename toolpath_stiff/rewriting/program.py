@@ -27,6 +27,7 @@ from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
+from toolpath_stiff.rewriting.plain_language import write_placed
 from toolpath_stiff.rewriting.side_shift import Course
 from toolpath_stiff.rewriting.turn import Turn
 from toolpath_stiff.units import mm_from_m
@@ -130,8 +131,13 @@ def rewrite_program(
     X100 Y40
     M30
     """
-    check_rewritable(program)
     placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
+    if program.dialect == "heidenhain" and not program.kinematics:
+        text, encoding = _text(program)
+        turn = Turn(placement, original)
+        written = text if placement == original else write_placed(program, text, turn, decimals, control)
+        return RewrittenProgram(program.name, written, encoding, [])
+    check_rewritable(program)
     if placement == original:
         return RewrittenProgram(program.name, *_text(program), [])
     controls = _controls(program, control, placement, original, decimals)

@@ -176,6 +176,8 @@ def draw_case(
     """
     if seed < 0:
         raise InputError(f"seed {seed}", expected="0 or more")
+    if built not in BUILT:
+        raise InputError(f"a machine built {built!r}", expected=", ".join(BUILT))
     nuisances = noise if isinstance(noise, Nuisances) else Nuisances(repeat=noise)
     if not 0.0 <= nuisances.repeat <= 0.5:
         raise InputError(f"repeat noise of {100.0 * nuisances.repeat:g} %", expected="0 to 50 %")

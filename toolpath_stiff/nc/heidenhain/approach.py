@@ -11,7 +11,8 @@ from functools import partial
 
 from toolpath_stiff.nc.codes.cutter import switch_off
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import SIDES, begin_compensation, feed, go, in_plane, named, present
+from toolpath_stiff.nc.heidenhain.contour import SIDES, begin_compensation, go
+from toolpath_stiff.nc.heidenhain.points import feed, in_plane, named, present
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
@@ -41,14 +42,14 @@ def begin_contour(
     code: str,
     there: dict[int, float],
     modal: float | None,
-    own: float | None,
+    rate: float | None,
     heading: complex,
 ) -> None:
-    """Carry out an APPR, now that the direction of the first contour element is known; feeds before it, and its own."""
+    """Carry out an APPR, now that the direction of the first contour element is known; feeds before and in it."""
     state.plain.approach, (first, second, normal), after = None, PLANES[state.plane], state.feed
     start, depth, apex = in_plane(state, present(state)), there.get(normal), complex(there[first], there[second])
     rapid = state.plain.fast and code != "APPR LCT"
-    state.feed = own if code == "APPR LCT" else modal
+    state.feed = rate if code == "APPR LCT" else modal
     side = next((word for word in ("R0", "RL", "RR") if block.take(word) is not None), "R0")
     block.refuse_if(side == "R0" and code != "APPR LT", None, f"{code} without a side", "RL or RR")
     length = size_of(state, block, "LEN") if code in ("APPR LT", "APPR LN") else 0.0
@@ -75,7 +76,7 @@ def begin_contour(
     go(state, block, {first: place.real, second: place.imag}, rapid=rapid)
     if depth is not None:
         go(state, block, {normal: depth}, rapid=rapid)
-    state.cutter, state.feed = cutter, own
+    state.cutter, state.feed = cutter, rate
     if turn == 0 or abs(apex - place) > NO_ARC_MM:
         go(state, block, {first: apex.real, second: apex.imag}, center, turn)
     unused = next(iter(block.free), None)

@@ -1,8 +1,7 @@
 """Contour statements: L, LP, LN, CC, C, CP, CR, CT, CTP, and the corners CHF and RND. mm and degrees, in program axes.
 
 HEIDENHAIN, user's manuals of the TNC 426, the iTNC 530 and the TNC 640, "Programming contours" ("Path contours:
-Cartesian coordinates", "Polar coordinates"), "Tool compensation". A statement becomes the words of G0 to G3 and moves
-as these do (`codes.motion`).
+Cartesian coordinates", "Polar coordinates"), "Tool compensation". Moves are recorded as those of G0 to G3.
 """
 
 import cmath
@@ -10,77 +9,20 @@ import math
 
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.cutter import LEFT, RIGHT, switch_off
-from toolpath_stiff.nc.codes.feeds import SLOWEST
 from toolpath_stiff.nc.codes.motion import machine_move, record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
 from toolpath_stiff.nc.compensation import Cutter
 from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
 from toolpath_stiff.nc.geometry import PLANES, ArcError
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc
+from toolpath_stiff.nc.heidenhain.points import ON_CIRCLE_MM, feed, in_plane, inch_tenths, named, polar, present
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, Word
-from toolpath_stiff.units import MM_PER_INCH
 
 MANUAL = "HEIDENHAIN, user's manual of the iTNC 530"
 PATHS, POLAR = f"{MANUAL}, Path contours: Cartesian coordinates", f"{MANUAL}, Path contours: Polar coordinates"
 SIDES = {"RL": LEFT, "RR": RIGHT}
-WORDS_OF_AXES = {f"{step}{letter}": axis for axis, letter in enumerate(AXES) for step in ("", "I")}
-ON_CIRCLE_MM = 0.016  # how far an end may lie off its circle (user's manual, "Circular path C")
-
-
-def present(state: State) -> list[float]:
-    """The programmed point in program axes: of an element that waits the end, of an APPR the contour point."""
-    frames, plain = state.frames, state.plain
-    point = frames.position, frames.g92, frames.linear
-    if any(kept is not part for kept, part in zip(plain.kept[0], point, strict=True)):
-        plain.kept = point, frames.to_program(frames.position)
-    here = list(plain.kept[1])
-    if plain.held is not None:
-        first, second, _ = PLANES[state.plane]
-        here[first], here[second] = plain.held[1].end.real, plain.held[1].end.imag
-    elif plain.approach is not None:
-        here = [plain.approach[0].get(axis, value) for axis, value in enumerate(here)]
-    return here
-
-
-def in_plane(state: State, point: list[float]) -> complex:
-    """A point's two coordinates of the plane."""
-    first, second, _ = PLANES[state.plane]
-    return complex(point[first], point[second])
-
-
-def named(state: State, block: CurrentBlock) -> dict[int, float]:
-    """Axis -> coordinate of the axis words, steps added to the present point; they then count as used."""
-    words = block.free & WORDS_OF_AXES.keys()
-    here, there = present(state), dict[int, float]()
-    for letter in sorted(words):
-        axis, value = WORDS_OF_AXES[letter], block.values[letter].value
-        value = value * state.length_scale if axis < 3 else value
-        block.refuse_if(axis in there, letter, "and its step are both given", "one of them")
-        there[axis] = here[axis] + value if letter[0] == "I" else value
-        if letter[0] != "I" and axis > 2 and state.plain.shorter:  # M126
-            there[axis] = here[axis] + math.remainder(value - here[axis], 360.0)
-    block.free -= words
-    return there
-
-
-def polar(state: State, block: CurrentBlock) -> dict[int, float]:
-    """Axis -> coordinate of PR and PA about the pole, and of the other axis words."""
-    if state.plain.pole is None:
-        raise block.fail(None, "without a pole, or after a change of the coordinates", "CC before it")
-    pole = complex(*state.plain.pole)
-    here = in_plane(state, present(state)) - pole
-    radius, step = block.take("PR"), block.take("IPR")
-    angle, turn = block.take("PA"), block.take("IPA")
-    size = abs(here) if radius is None else radius * state.length_scale
-    size += (step or 0.0) * state.length_scale
-    lost = abs(here) < ON_CIRCLE_MM and angle is None
-    block.refuse_if(lost, None, "takes the polar angle of the pole itself", "PA")
-    heading = (math.degrees(cmath.phase(here)) if angle is None else angle) + (turn or 0.0)
-    place = pole + cmath.rect(size, math.radians(heading))
-    first, second, _ = PLANES[state.plane]
-    return named(state, block) | {first: place.real, second: place.imag}
 
 
 def pole(state: State, block: CurrentBlock, code: str) -> None:
@@ -90,24 +32,6 @@ def pole(state: State, block: CurrentBlock, code: str) -> None:
     block.refuse_if(len(point.keys() & {first, second}) == 1, code, "with one coordinate", "both, or none")
     state.plain.pole = (point.pop(first, here[first]), point.pop(second, here[second]))
     block.refuse_if(point, code, f"with a coordinate off the plane {state.plane}", "two of it")
-
-
-def feed(state: State, block: CurrentBlock) -> bool:
-    """Take F; whether it is FMAX, which holds for its statement alone."""
-    value, rapid = block.take("F"), "FMAX" in block.values
-    block.take("FMAX")
-    if value is not None:
-        state.feed = value * inch_tenths(state)
-        block.refuse_if(not state.feed >= SLOWEST, "F", "is no feed that moves", "F above 0")
-    if block.take("FAUTO") is not None:
-        block.refuse_if(state.plain.tool_feed is None, "FAUTO", "without F in TOOL CALL", "F with a number")
-        state.feed = state.plain.tool_feed
-    return rapid
-
-
-def inch_tenths(state: State) -> float:
-    """mm/min of F 1: in inch programs a tenth of an inch a minute (user's manual, "Feed rate F")."""
-    return MM_PER_INCH / 10.0 if state.inch else 1.0
 
 
 def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:
@@ -163,13 +87,13 @@ def go(
         off = abs(abs(begin - center) - abs(end - center))
         block.refuse_if(off > ON_CIRCLE_MM, None, f"ends {off:.4f} mm off its circle", f"at most {ON_CIRCLE_MM} mm")
     if plain.held is not None:
-        _cut_corner(state, block, Element(begin, end, center, turn), there, rapid)
+        _cut_corner(state, block, (begin, end, center, turn), there, rapid)
     ahead = end - begin if center is None else turn * 1j * (end - center)
     flat = abs(ahead) > 0.0 and not there.keys() - {first, second}
     plain.heading, plain.fast = ((ahead.real, ahead.imag) if flat else None), rapid
     if plain.to_corner:
         block.refuse_if(rapid or turns > 1 or there.keys() - {first, second}, None, *_NO_CORNER)
-        plain.held = (block, Element(begin, end, center, turn), state.feed)
+        plain.held = (block, (begin, end, center, turn), state.feed)
     else:
         move(state, block, there, center, turn, turns, rapid)
 
@@ -221,14 +145,13 @@ _NO_CORNER = ("before a corner (CHF, RND) moves out of the plane, or at FMAX", "
 def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapid: bool) -> None:
     """Refuse a cut from a point that is not known, and moves in coordinates whose order is uncertain."""
     plain = state.plain
-    lost = plain.unknown - there.keys() if rapid else plain.unknown
-    block.refuse_if(
-        plain.unknown and not rapid, None, "is a cut from where the tool's place is not known (after PLANE, cycle 19 or M140)",
-        f"{' '.join(AXES[axis] for axis in sorted(plain.unknown))} in a statement with FMAX before it",
-    )  # fmt: skip
-    plain.unknown = set(lost)
+    problem = "is a cut from where the tool's place is not known (after PLANE, cycle 19, M140 or M92)"
+    axes = " ".join(AXES[axis] for axis in sorted(plain.unknown))
+    block.refuse_if(plain.unknown and not rapid, None, problem, f"{axes} in a statement with FMAX before it")
+    plain.unknown = plain.unknown - there.keys()
     inner = plain.angle != 0.0, bool(plain.mirrored), plain.scale != 1.0
-    block.refuse_if(plain.doubt and any(inner), None, plain.doubt, "cycle 7 first, then 8, 10 or 11")
+    uncertain = plain.doubt and (any(inner) or plain.tilt is not None)
+    block.refuse_if(uncertain, None, plain.doubt, "cycle 7 first, then PLANE, then 8, 10 or 11")
     plain.doubt = ""
     block.refuse_if(all(inner[:2]), None, "under cycle 8 and cycle 10: their order decides the path", "one of them")
     if plain.held_tip and state.frames.posted is None:
@@ -239,6 +162,22 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
 def line(state: State, block: CurrentBlock, code: str) -> None:
     """L, LP: straight to a point. In machine coordinates under M91."""
     plain, there, rapid = state.plain, polar(state, block) if code == "LP" else named(state, block), feed(state, block)
+    if plain.tilt is not None and there.keys() & {3, 4, 5}:
+        block.refuse_if(
+            there.keys() & {0, 1, 2} and not rapid, None, "turns rotary axes in a tilted plane", "FMAX, or no A, B, C"
+        )
+        for axis in there.keys() & {3, 4, 5}:
+            word = block.values.get(AXES[axis]) or block.values[f"I{AXES[axis]}"]
+            state.note(block.line, word, "turns the machine's axes to the tilted plane, which gives the tool's axis")
+            del there[axis]
+    if block.take("M92") is not None:
+        block.refuse_if(not rapid, "M92", "in a cut: the machine builder says where its points are", "FMAX")
+        state.warnings.append(
+            Remark("M92 goes to points that the machine builder sets: left out of the path", block.line)
+        )
+        plain.unknown |= there.keys() & {0, 1, 2}
+        block.take("R0")
+        return
     if block.take("M91") is not None:
         block.refuse_if(
             state.cutter or plain.held or plain.to_corner, "M91", "beside a contour with compensation or a corner"
@@ -251,17 +190,9 @@ def line(state: State, block: CurrentBlock, code: str) -> None:
         values = {AXES[a]: Word(AXES[a], v / unit if a < 3 else v, 1, AXES[a]) for a, v in there.items()}
         current = CurrentBlock(block.name, block.block, {"G53": block.values["M91"]}, {}, values, set(values))
         state.motion, plain.heading, plain.pole = "G0" if rapid else "G1", None, None
-        plain.unknown -= there.keys()
+        plain.unknown -= there.keys() if plain.tilt is None else set()
         machine_move(state, current, "G53")
         return
-    if plain.tilt is not None and there.keys() & {3, 4, 5}:
-        block.refuse_if(
-            there.keys() & {0, 1, 2} and not rapid, None, "turns rotary axes in a tilted plane", "FMAX, or no A, B, C"
-        )
-        for axis in there.keys() & {3, 4, 5}:
-            word = block.values.get(AXES[axis]) or block.values[f"I{AXES[axis]}"]
-            state.note(block.line, word, "turns the machine's axes to the tilted plane, which gives the tool's axis")
-            del there[axis]
     compensate(state, block, there)
     if there:
         go(state, block, there, rapid=rapid)
@@ -340,9 +271,9 @@ def corner(state: State, block: CurrentBlock, code: str) -> None:
     """CHF, RND: the corner between the contour elements before and behind it is cut off, or rounded."""
     block.refuse_if(state.plain.held is None, None, "without a contour element before it", "L, C, CR or CT before it")
     size = block.take("#") if code == "CHF" and block.has("#") else block.take("R")
-    own = block.take("F")
-    if own is not None:  # holds for the corner alone
-        block.values["own"] = Word("F", own * inch_tenths(state), 1, "F")
+    rate = block.take("F")
+    if rate is not None:  # holds for the corner alone
+        block.values["F alone"] = Word("F", rate * inch_tenths(state), 1, "F")
     block.refuse_if(not size or size < 0.0, None, "without its size", "RND R5, CHF 2")
     block.values["size"] = Word("R", (size or 0.0) * state.length_scale, 1, "R")
     state.plain.corner = block
@@ -352,21 +283,22 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     """Carry out the element that waited, shortened, and its corner; the tool then stands where the next one begins."""
     (block, held, rate), corner_block, modal = state.plain.held or (None, None, None), state.plain.corner, state.feed
     state.plain.held = state.plain.corner = None
-    assert block is not None and held is not None and corner_block is not None
+    if block is None or held is None or corner_block is None:  # in a check, after the corner's own error
+        raise after.fail(None, "follows a corner (CHF, RND) that was not read", "a corner that fits")
     first, second, _ = PLANES[state.plane]
     size, rounded = corner_block.values["size"].value, corner_block.block.words[0].text == "RND"
     after.refuse_if(rapid or there.keys() - {first, second}, None, *_NO_CORNER)
-    lines = held.center is None and element.center is None
+    lines = held[2] is None and element[2] is None
     corner_block.refuse_if(not rounded and not lines, None, "beside an arc", "CHF between two lines")
     try:
         cut = cut_off(held, element, size, rounded)
     except ArcError as error:
         raise corner_block.fail(None, error.found, error.expected) from None
-    begin, end, center, turn = cut or (held.end, held.end, None, 0)
+    begin, end, center, turn = cut or (held[1], held[1], None, 0)
     state.feed = rate
-    move(state, block, {first: begin.real, second: begin.imag}, held.center, held.turn)
-    own = corner_block.values.get("own")
-    state.feed = own.value if own else rate
+    move(state, block, {first: begin.real, second: begin.imag}, held[2], held[3])
+    alone = corner_block.values.get("F alone")
+    state.feed = alone.value if alone else rate
     if cut is not None:
         move(state, corner_block, {first: end.real, second: end.imag}, center, turn)
     state.feed = modal

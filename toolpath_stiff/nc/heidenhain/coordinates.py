@@ -1,9 +1,9 @@
-"""Coordinates of the plain language: cycles 7, 8, 10, 11, 19 and 247, PLANE, M128 and FUNCTION TCPM; tools, BLK FORM.
+"""Coordinates of the plain language: cycles 7, 8, 10, 11, 19 and 247, PLANE, M128 and FUNCTION TCPM.
 
 HEIDENHAIN, user's manual "Cycles" of the iTNC 530, "Coordinate transformation cycles"; user's manual of the iTNC 530,
 "The PLANE function". Whatever is in force becomes the frames' linear part and shift: first cycle 7, then the tilting,
-cycle 7 in the tilted plane, then mirror image or rotation, and the scale. Where the order of programming is another one,
-moves are refused. mm, degrees.
+cycle 7 in the tilted plane, then mirror image or rotation, and the scale. Where the order of programming is another
+one, moves are refused. mm, degrees.
 """
 
 import math
@@ -11,15 +11,11 @@ import math
 from toolpath_stiff.nc.codes import tools
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.geometry import PLANES, roll_pitch_of_axis
-from toolpath_stiff.nc.heidenhain.contour import inch_tenths
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.tables import ToolEntry, tool_of
 from toolpath_stiff.nc.words import AXES
 
 Matrix = list[list[float]]
-TOOL_PLANES = {"X!": "G19", "Y!": "G18", "Z!": "G17"}
-FIRST_NAMED = 10_001  # the number of the first tool that the program calls by its name
 TIP_TURNS = "PLANE and cycle 19 turn the tool about its tip where it stands: how the machine's axes turn is not known"
 SPATIAL = "the angles of cycle 19 are spatial angles, not positions of the machine's axes"
 
@@ -59,26 +55,33 @@ def apply(state: State, block: CurrentBlock) -> None:
     frames.linear = None if inner == unit else inner
     frames.g92 = [*(a + b for a, b in zip(plain.outer, shift, strict=True)), 0.0, 0.0, 0.0]
     plain.pole = plain.heading = None
-    plain.doubt = plain.doubt if plain.angle or plain.mirrored or plain.scale != 1.0 else ""
+    settled = not plain.angle and not plain.mirrored and plain.scale == 1.0 and plain.tilt is None
+    plain.doubt = "" if settled else plain.doubt
 
 
 def shift(state: State, block: CurrentBlock, code: str) -> None:
     """CYCL DEF 7.1 and on: the datum, absolute or by a step; in a tilted plane along its axes."""
-    plain, values = state.plain, list(state.plain.shift)
+    plain = state.plain
+    values, outer = list(plain.shift), list(plain.outer)
+    if block.has("TABLE"):
+        datum(state, block, code)
     for axis, letter in enumerate(AXES[:3]):
         value, step = block.take(letter), block.take(f"I{letter}")
         if value is not None:
-            values[axis] = value * state.length_scale
+            values[axis], outer[axis] = value * state.length_scale, outer[axis] if value else 0.0
         if step is not None:
             values[axis] += step * state.length_scale
-    for letter in "ABC":
-        block.refuse_if(block.take(letter), letter, "shifts a rotary axis", "X, Y, Z")
+    turned = next((letter for letter in "ABC" if block.take(letter)), None)
+    block.refuse_if(turned, turned, "shifts a rotary axis", "X, Y, Z")
+    above = plain.tilt is not None and any(plain.outer)
     block.refuse_if(
-        plain.tilt is not None and any(plain.outer), None, "shifts a datum that was shifted before the tilting"
+        above and any(values), None, "shifts a datum that was shifted before the tilting", "PLANE RESET first"
     )
-    if values != plain.shift and (plain.angle or plain.mirrored or plain.scale != 1.0):
-        plain.doubt = f"after {code} under cycle 8, 10 or 11: their order decides where the datum is"
-    plain.shift = values
+    if above or (values != plain.shift and (plain.angle or plain.mirrored or plain.scale != 1.0)):
+        plain.doubt = (
+            f"after {code} in a tilted plane, or under cycle 8, 10 or 11: the order decides where the datum is"
+        )
+    plain.shift, plain.outer = values, outer if above else plain.outer
     apply(state, block)
 
 
@@ -155,85 +158,15 @@ def tilt(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def datum(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCL DEF 247: the datum of the preset table; the program's first is its zero."""
-    number, plain = block.take("Q339"), state.plain
+    """CYCL DEF 247 and 7.1 #: the datum of a table; the program's first is its zero."""
+    number, plain = block.take("TABLE" if block.has("TABLE") else "Q339"), state.plain
     other = plain.preset not in (None, number) or (plain.preset is None and len(state.recorder) > 0)
-    problem = "another datum than before: where it is stands in the control's preset table"
+    problem = "another datum than before: where it is stands in a table of the control"
     block.refuse_if(
         other or any(plain.shift) or plain.tilt is not None, None, problem, "one datum, and cycle 7 for others"
     )
     plain.preset = number
-    state.assume("the datum of the preset table that the program calls (cycle 247) is program zero (G54)")
-
-
-def tool_call(state: State, block: CurrentBlock, code: str) -> None:
-    """TOOL CALL: the tool with its length and radius, its axis, S and F; DL and DR add to the table's."""
-    plain = state.plain
-    waits = state.cutter is not None or plain.held is not None or plain.approach is not None
-    block.refuse_if(waits, None, "inside a contour", "R0 and a positioning before it")
-    plane = next((TOOL_PLANES[letter] for letter in TOOL_PLANES if block.take(letter) is not None), None)
-    if plane is not None and plane != state.plane:
-        block.refuse_if(plain.tilt is not None or plain.angle, None, "takes another tool axis under PLANE or cycle 10")
-        state.plane, plain.pole, plain.heading = plane, None, None
-    speed, rate = block.take("S"), block.take("F")
-    state.speed = state.speed if speed is None else speed
-    if rate is not None:
-        state.feed = plain.tool_feed = rate * inch_tenths(state) or None
-    number = tool_number(state, block)
-    longer, wider = ((block.take(word) or 0.0) * state.length_scale for word in ("DL", "DR"))
-    block.take("DR2")
-    if number is None:
-        block.refuse_if(longer or wider, None, "changes the tool in the spindle", "its number beside it")
-        return
-    state.selected = number
-    tools.change_tool(state, block, "M6")
-    entry = tool_of(state.tools, number)
-    plain.radius = entry.diameter / 2.0 + wider
-    frames, length = state.frames, entry.length + longer
-    state.tool_length = length
-    block.refuse_if(
-        plain.tilt is not None and not math.isnan(length), None, "in a tilted plane", "PLANE RESET before it"
-    )
-    frames.set_tool(0.0 if math.isnan(length) else length)
-    plain.heading = None
-
-
-def tool_number(state: State, block: CurrentBlock) -> int | None:
-    """The tool that a statement names: by its number, or by its name in the tool table (or as it comes)."""
-    name, value = block.values.get('"'), block.take("#")
-    if block.take('"') is None or name is None:
-        block.refuse_if(value is not None and (value != int(value) or value < 0), "#", "is no tool", "a whole number")
-        return None if value is None else int(value)
-    table = {entry.remark.upper(): number for number, entry in (state.tools or {}).items()}
-    names = state.plain.names
-    number = table.get(name.text) or names.setdefault(name.text, FIRST_NAMED + len(names))
-    if name.text not in table:
-        state.assume(f'the tool "{name.text}" has the number {number} here')
-    return number
-
-
-def tool_definition(state: State, block: CurrentBlock, code: str) -> None:
-    """TOOL DEF: length and radius of a tool; without them it is the next one of the magazine."""
-    number, length, radius = tool_number(state, block), block.take("L"), block.take("R")
-    if number is None or (length is None and radius is None):
-        return
-    state.tools = {} if state.tools is None else state.tools
-    entry = state.tools.setdefault(number, ToolEntry(number))
-    entry.length = entry.length if length is None else length * state.length_scale
-    entry.diameter = entry.diameter if radius is None else 2.0 * radius * state.length_scale
-
-
-def blank(state: State, block: CurrentBlock, code: str) -> None:
-    """BLK FORM 0.1 and 0.2: the smallest and the largest corner of the blank, along the axes."""
-    stock, scale = state.plain.stock, state.length_scale
-    for letter in TOOL_PLANES:
-        block.take(letter)
-    lower = stock.get("BLK FORM 0.1", [math.nan] * 3)
-    corner = []
-    for axis, letter in enumerate(AXES[:3]):
-        value, step = block.take(letter), block.take(f"I{letter}")
-        corner.append(lower[axis] + step * scale if step is not None else math.nan if value is None else value * scale)
-    stock[code] = corner
+    state.assume("the datum of the control's table that the program calls (cycle 247, 7.1 #) is program zero (G54)")
 
 
 def hold_tip(state: State, block: CurrentBlock, code: str) -> None:

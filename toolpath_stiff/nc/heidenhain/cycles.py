@@ -10,7 +10,8 @@ from collections.abc import Iterator
 
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import check_known, go, inch_tenths, named
+from toolpath_stiff.nc.heidenhain.contour import check_known, go
+from toolpath_stiff.nc.heidenhain.points import inch_tenths, named
 from toolpath_stiff.nc.moves import CYCLE, RAPID
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
@@ -120,8 +121,7 @@ def strokes(number: int, values: Values, speed: float) -> Iterator[Stroke]:
     out: float | None = None if number in (200, 205, 240) else back if number in (201, 202, 203) else down
     yield clear, None, 0.0
     if number in (200, 203, 205):
-        for depth, way, pause in _pecks(number, values, out):
-            yield depth, way, pause
+        yield from _pecks(number, values, out)
     if number in (207, 209):
         down = out = abs(values["Q239"]) * speed
     if number == 209:
@@ -169,7 +169,7 @@ def _broken_taps(values: Values, rate: float) -> Iterator[Stroke]:
 
 
 def _pattern(state: State, block: CurrentBlock, number: int, values: Values) -> None:
-    """220: points on a circle; 221: on lines to and fro; the tool goes there at the set-up clearance, or the second one."""
+    """220: points on a circle; 221: on lines to and fro; between them at the set-up clearance, or the second one."""
     plain, unit, normal = state.plain, state.length_scale, PLANES[state.plane][2]
     if plain.cycle is None:
         raise block.fail(None, "without a cycle to call", "CYCL DEF before it")

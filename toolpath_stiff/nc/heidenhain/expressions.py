@@ -1,8 +1,8 @@
 """Q parameters: formulas (`Q5 = 3 * (SIN Q1 - 2)`) and the functions FN 0 to FN 13, worked out by one grammar.
 
 HEIDENHAIN, user's manual of the iTNC 530, "Programming: Q parameters" ("Basic arithmetic", "Trigonometric functions",
-"Entering formulas directly"). Functions bind tightest, then ^, * and / (DIV), + and -; LEN is the root of the sum of two
-squares, ANG the angle of two sides from 0 to 360 degrees; angles are in degrees.
+"Entering formulas directly"). Functions bind tightest, then ^, * and / (DIV), + and -; LEN is the root of the sum of
+two squares, ANG the angle of two sides from 0 to 360 degrees; angles are in degrees.
 """
 
 import math
@@ -15,6 +15,10 @@ from toolpath_stiff.nc.place import Place
 _TOKEN = re.compile(rf"\s*({NUMBER}|Q[LR]?\d+|DIV|LEN|ANG|[A-Z]+|[-+*/^()])")
 _RANKS = {"+": 1, "-": 1, "*": 2, "/": 2, "DIV": 2, "^": 3, "LEN": 1, "ANG": 1}
 _DEEPEST = 50
+_ASSIGNED = re.compile(r"\s*(Q[LR]?\d+)?\s*=\s*(.+)$")
+_JUMP = re.compile(r'\s*IF\s*(.+?)\s*(EQU|NE|GT|LT)\s*(.+?)\s*GOTO\s*LBL\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*$')
+CONDITIONS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
+EQUAL = 1e-9
 
 
 def _whole(value: float) -> float:
@@ -31,13 +35,35 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
     "TAN": lambda v: math.tan(math.radians(v)), "ASIN": lambda v: _trimmed(math.degrees(math.asin(v))),
     "ACOS": lambda v: _trimmed(math.degrees(math.acos(v))), "ATAN": lambda v: _trimmed(math.degrees(math.atan(v))),
     "SQRT": math.sqrt, "SQ": lambda v: v * v, "LN": math.log, "LOG": math.log10, "EXP": math.exp,
-    "NEG": lambda v: -v, "ABS": abs, "INT": _whole, "FRAC": lambda v: v - _whole(v), "SGN": lambda v: float((v > 0) - (v < 0)),
+    "NEG": lambda v: -v, "ABS": abs, "INT": _whole, "FRAC": lambda v: v - _whole(v),
+    "SGN": lambda v: float((v > 0) - (v < 0)),
 }  # fmt: skip
 OPERATORS: dict[str, Callable[[float, float], float]] = {
     "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "/": lambda a, b: a / b,
     "DIV": lambda a, b: a / b, "^": math.pow, "LEN": math.hypot,
     "ANG": lambda a, b: _trimmed(math.degrees(math.atan2(a, b)) % 360.0),
 }  # fmt: skip
+
+
+def assigned(head: str, rest: str, parameter: Callable[[str], float], place: Place) -> tuple[str, float]:
+    """Name and value of an assignment: `Q5 = ...`, with the name as its head, or `FN 1: Q5 = ...`."""
+    formula = _ASSIGNED.match(rest)
+    if formula is None or not (formula[1] or head[0] == "Q"):
+        raise place.fail(f"{head}{rest[:40]} is no assignment", "Q5 = +10")
+    return formula[1] or head, work_out(formula[2], parameter, place)
+
+
+def condition(
+    head: str, rest: str, parameter: Callable[[str], float], place: Place
+) -> tuple[bool, str | None, str | None]:
+    """Whether the condition of FN 9 to FN 12 holds, and the label to which it then goes: a number, or a name."""
+    jump = _JUMP.match(rest)
+    if jump is None or jump[2] != CONDITIONS[head]:
+        raise place.fail(f"{head}:{rest[:40]} is no condition", f"IF +Q1 {CONDITIONS[head]} +5 GOTO LBL 2")
+    left, right = (work_out(jump[part], parameter, place) for part in (1, 3))
+    same = abs(left - right) <= EQUAL
+    holds = {"EQU": same, "NE": not same, "GT": left > right and not same, "LT": left < right and not same}
+    return holds[jump[2]], jump[4], jump[5]
 
 
 def work_out(text: str, parameter: Callable[[str], float], place: Place) -> float:

@@ -1,6 +1,6 @@
-"""Miscellaneous functions (M) of Heidenhain's controls, tool vectors (LN), pauses, and statements that change no path.
+"""Miscellaneous functions (M) of Heidenhain's controls, tool vectors (LN), and statements that change no path.
 
-HEIDENHAIN, user's manual of the iTNC 530, "Programming: miscellaneous functions", "Three-dimensional tool compensation".
+HEIDENHAIN, user's manual of the iTNC 530, "Programming: miscellaneous functions", "Three-dimensional compensation".
 """
 
 import math
@@ -9,36 +9,36 @@ from toolpath_stiff.nc.codes.feeds import feed_mode
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle, unit_axis
 from toolpath_stiff.nc.geometry import PLANES, ArcError, Vector
-from toolpath_stiff.nc.heidenhain.contour import compensate, feed, go, named, present
+from toolpath_stiff.nc.heidenhain.contour import compensate, go
 from toolpath_stiff.nc.heidenhain.coordinates import hold_tip
+from toolpath_stiff.nc.heidenhain.points import feed, named, present
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.state import CurrentBlock, Flow, State
+from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import SECONDS_PER_DAY
 
 # M functions that are those of the one table of codes.
 SHARED = ("M0", "M1", "M2", "M3", "M4", "M5", "M7", "M8", "M9", "M19", "M30")
-# Others that leave the programmed path alone: what they do.
+SPINDLE = {"M13": "M3", "M14": "M4"}  # with coolant
+# Others that leave the programmed path alone, and those that do not: by what they do.
 PASSIVE = {
-    "M6": "tool change by hand: TOOL CALL is what counts",
-    "M13": "spindle on, coolant on",
-    "M14": "spindle on, reversed, coolant on",
-    "M90": "how the control plans ahead: the path is taken as programmed",
-    "M101": "replacement tools", "M102": "replacement tools", "M107": "replacement tools", "M108": "replacement tools",
-    "M103": "a slower feed when plunging", "M109": "feed of arcs at the cutting edge", "M110": "feed of arcs at the cutting edge",
-    "M111": "feed of arcs of the path", "M112": "how the control plans ahead", "M113": "how the control plans ahead",
-    "M116": "feed of rotary axes in mm", "M117": "feed of rotary axes in degrees",
-    "M118": "moves by the handwheel", "M120": "look-ahead", "M124": "how the control plans ahead",
-    "M127": "rotary axes go the programmed way", "M131": "feed per tooth off", "M132": "smooth jerk", "M133": "smooth jerk off",
-    "M134": "exact stop at rotary axes", "M135": "exact stop off",
-    "M138": "which axes tilt", "M141": "probe monitoring", "M142": "modal program data deleted",
-    "M145": "machine compensation off", "M148": "lift-off at a stop", "M149": "no lift-off at a stop", "M150": "limit switch message off",
-}  # fmt: skip
+    name: what
+    for what, names in {
+        "tool change by hand: TOOL CALL is what counts": "M6",
+        "how the control plans ahead: the path is taken as programmed": "M90 M112 M113 M120 M124 M132 M133 M134 M135",
+        "replacement tools": "M101 M102 M107 M108",
+        "feeds in plunging, on arcs, of rotary axes": "M103 M109 M110 M111 M116 M117 M131",
+        "moves by the handwheel": "M118",
+        "which axes tilt": "M138",
+        "monitoring, data of the program, lift-off at a stop": "M141 M142 M145 M148 M149 M150",
+    }.items()
+    for name in names.split()
+}
 REFUSED = {
-    "M92": "points of the machine builder's", "M94": "other numbers of the rotary axes", "M97": "small contour steps",
-    "M98": "open contour corners", "M104": "the datum set last", "M105": "another feedback", "M114": "compensation for tilting axes",
-    "M130": "points in the untilted system", "M136": "feed per revolution", "M143": "basic rotation deleted",
-    "M144": "compensation of the machine's kinematics", "M146": "the same", "M197": "corner rounding",
+    "M94": "other numbers of the rotary axes", "M97": "small contour steps", "M98": "open contour corners",
+    "M104": "the datum set last", "M114": "compensation for tilting axes", "M130": "points in the untilted system",
+    "M136": "feed per revolution", "M143": "a basic rotation deleted", "M144": "compensation of the kinematics",
+    "M197": "corner rounding",
 }  # fmt: skip
 RETRACT = (
     "M140 MB MAX retracts the tool to the end of its travel, which the program does not say: it is left out of the path"
@@ -50,7 +50,7 @@ def miscellaneous(state: State, block: CurrentBlock) -> None:
     """The M functions of a statement that act at its beginning, or leave the path alone."""
     for letter in [letter for letter in block.values if letter[0] == "M" and letter[1:].isdigit()]:
         word = block.values[letter]
-        if letter in ("M91", "M89", "M99", "M140"):
+        if letter in ("M89", "M91", "M92", "M99", "M140"):
             continue
         block.take(letter)
         block.refuse_if(
@@ -60,13 +60,15 @@ def miscellaneous(state: State, block: CurrentBlock) -> None:
             state.plain.shorter = letter == "M126"
         elif letter in ("M128", "M129"):
             hold_tip(state, block, letter)
-        elif letter in ("M2", "M30"):
-            block.flow = Flow.END
         elif letter == "M137":
             feed_mode(state, block, "G94")
         elif letter in SHARED:
+            CODES[letter].act(state, block, letter)
             if CODES[letter].listed:
                 state.note(block.line, word, CODES[letter].listed)
+        elif letter in SPINDLE:
+            CODES[SPINDLE[letter]].act(state, block, SPINDLE[letter])
+            state.note(block.line, word, CODES["M8"].listed)
         elif letter in PASSIVE or letter in REFUSED:
             state.note(block.line, word, PASSIVE.get(letter) or REFUSED[letter])
             if letter in ("M103", "M112", "M118", "M120", "M124", "M101"):

@@ -6,19 +6,22 @@ straight statements, most of a CAM system's program, are written as G0 and G1 an
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.heidenhain.contour import ON_CIRCLE_MM, WORDS_OF_AXES
 from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX, call
-from toolpath_stiff.nc.heidenhain.expressions import work_out
+from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, assigned, condition
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
-from toolpath_stiff.nc.heidenhain.statements import Statement, code_text, read_statement
+from toolpath_stiff.nc.heidenhain.plain_statements import EMPTY, as_g_code, corner_follows
+from toolpath_stiff.nc.heidenhain.points import WORDS_OF_AXES
+from toolpath_stiff.nc.heidenhain.statements import Statement, labels, read_statement
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up, meaning_of, refusal_of
 from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Remark
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.program_run import DEEPEST, ProgramRun, Tally, beyond_the_end
@@ -28,47 +31,11 @@ from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 
 MOST_STEPS = 1_000_000  # statements that run, all repeats counted
 MOST_IDLE = 100_000  # of them without a move between
-_NUMBER = r"[+-]?\d{1,6}(?:\.\d{0,6})?"
-PLAIN = re.compile(
-    rf"\s*\d*\s*(?P<head>L|C)(?P<axes>(?:\s*I?[XYZ]{_NUMBER})+)(?:\s*DR(?P<turn>[+-]))?(?:\s*R0)?"
-    r"(?:\s*F\s*(?:(?P<max>MAX)|(?P<feed>\d{1,6}(?:\.\d*)?)))?(?P<m>(?:\s*M0?(?:[345789]|1[34]))*)\s*",
-    re.IGNORECASE,
-)
-CENTER = re.compile(rf"\s*\d*\s*CC\s*X\s*({_NUMBER})\s*Y\s*({_NUMBER})\s*", re.IGNORECASE)
-AXIS = re.compile(rf"(I?)([XYZ])({_NUMBER})", re.IGNORECASE)
-HEAD = re.compile(r"\s*\d*\s*([A-Z]+)", re.IGNORECASE)
-EMPTY = re.compile(r"\s*\d*\s*(?:[;*].*)?")
-CORNER = re.compile(r"\s*/?\s*(?:N?\d+\s)?\s*(?:RND|CHF)\b", re.IGNORECASE)
-INCH = re.compile(r"\s*(?:N?\d+\s+)?BEGIN\s+PGM\b.*\bINCH\s*(?:;.*)?$", re.IGNORECASE)
-LABEL = re.compile(r"\s*(?:N?\d+\s+)?LBL\s*(?:(\d+)|\"([^\"]*)\")\s*$", re.IGNORECASE)
 CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*\d+)?)?\s*$')
-JUMP = re.compile(r'\s*IF\s*(.+?)\s*(EQU|NE|GT|LT)\s*(.+?)\s*GOTO\s*LBL\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*$')
-ASSIGNED = re.compile(r"\s*(Q[LR]?\d+)?\s*=\s*(.+)$")
 SPECIAL = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
-KINDS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
-EQUAL = 1e-9
+CONTOUR = frozenset(("RND", "CHF", "L", "LP", "C", "CP", "CR", "CT", "CTP", "LN"))
+FORMULAS = ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
 TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control works out for a tilted plane
-SUFFIXES = (".h", ".H", "")
-
-
-def _followed(here: dict[str, float], axes: str) -> tuple[dict[str, float], str]:
-    """Where axis words lead as far as that is known, and the words as they name that point; none where it is not."""
-    there, words = dict(here), dict[str, str]()
-    for step, letter, digits in AXIS.findall(axes):
-        if letter in words or (step and letter not in here):
-            return {key: value for key, value in there.items() if key not in axes}, ""
-        there[letter] = round(here[letter] + float(digits), 6) if step else float(digits)
-        words[letter] = f"{there[letter]:.6f}" if step else digits
-    return there, "".join(letter + words[letter] for letter in "XYZ" if letter in words)
-
-
-def _center_words(here: dict[str, float], there: dict[str, float], center: tuple[float, float] | None) -> str:
-    """I and J of an arc in the plane whose start and centre are known; "" where they are not, or do not fit."""
-    if center is None or not here.keys() >= {"X", "Y"} or here.get("Z") != there.get("Z"):
-        return ""
-    (x, y), start, end = center, math.dist(center, (here["X"], here["Y"])), math.dist(center, (there["X"], there["Y"]))
-    fits = min(start, end) > ON_CIRCLE_MM and abs(start - end) < ON_CIRCLE_MM / 2.0
-    return f"I{x - here['X']:.9f}J{y - here['Y']:.9f}" if fits else ""
 
 
 class HeidenhainRun(ProgramRun):
@@ -80,83 +47,48 @@ class HeidenhainRun(ProgramRun):
     def __init__(self, request: Request, tally: Tally | None = None) -> None:
         super().__init__(request, tally, fast=False)
         self.folder = request.controller.subprograms
-        self._poles: dict[int, tuple[float, float]] = {}  # centres of CC by line, of plain statements
-        self._inch = any(INCH.match(line) for line in self.lines[:100])
-        self._lexer: PlainRun | None = PlainRun(self.state, self._as_g_code(), self.name)
-        self._plain = self._lexer
+        self._lex()
         self._main_lines = len(self.lines)
         self._statements: dict[int, Statement] = {}
-        self._labels: dict[tuple[int, str], int] | None = None
+        self._labels: dict[int, dict[str, list[int]]] = {}  # by the first line of their program
         self._files: list[tuple[int, int, str]] = []  # first line, line after the last, name
-        self._returns: list[
-            tuple[int, int]
-        ] = []  # calls that run: the line after, and the label's line (-1: a program)
+        self._returns: list[tuple[int, int]] = []  # of calls: the line after, and the label's line (-1: a program)
         self._repeats: dict[tuple[int, int], int] = {}
         self._locals: list[dict[str, float]] = [{}]
         self._steps = 0
+        self._passes: dict[int, str] = {}  # what a condition found when it went back last
         self._moved = (0, 0)
         self._row = 0
 
-    def _as_g_code(self) -> list[str]:
-        """Plain statements as G0 to G3; "?", which no run of plain lines takes, for all others.
-
-        Where the tool stands is followed as far as plain statements say: arcs get their centre from it.
-        """
-        lines, self._poles = list[str](), dict[int, tuple[float, float]]()
-        self._to_corner = [self._corner_follows(row + 1) for row in range(len(self.lines))]
-        here, center = dict[str, float](), None
-        for row, line in enumerate(self.lines):
-            if EMPTY.fullmatch(line):
-                lines.append("")
-                continue
-            text, plain, pole = "?", PLAIN.fullmatch(line), CENTER.fullmatch(line)
-            if pole is not None:
-                center = self._poles[row] = (float(pole[1]), float(pole[2]))
-                text = ""
-            elif plain is not None and (plain["head"] in "cC") == (plain["turn"] is not None):
-                there, axes = _followed(here, plain["axes"].upper())
-                code, middle = "G0" if plain["max"] else "G1", ""
-                if plain["turn"]:
-                    code, middle = "G3" if plain["turn"] == "+" else "G2", _center_words(here, there, center)
-                feed = plain["feed"] or ""
-                slow = plain["m"] or (feed and (self._inch or not feed.strip("0."))) or (plain["turn"] and not middle)
-                text, here = f"{code}{axes}{middle}{'F' if feed else ''}{feed}" if axes and not slow else "?", there
-            else:
-                here, center = {}, None
-            lines.append("?" if self._to_corner[row] else text)
-        return lines
+    def _lex(self) -> None:
+        """Write plain statements as G code."""
+        self._to_corner = [corner_follows(self.lines, row + 1) for row in range(len(self.lines))]
+        texts, self._poles = as_g_code(self.lines, self._to_corner)
+        self._plain = self._lexer = PlainRun(self.state, texts, self.name)
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
         """Count plain statements; circle centre and direction as the last ones left them."""
-        plain, last, unit = self.state.plain, len(words.code) - 1, self.state.length_scale
-        centers = [row for row in range(first, first + last + 1) if row in self._poles]
+        plain, rows, unit = self.state.plain, words.count.nonzero()[0] + first, self.state.length_scale
+        centers = [row for row in range(first, first + len(words.code)) if row in self._poles]
         if centers:
             x, y = self._poles[centers[-1]]
             plain.pole = (x * unit, y * unit)
-        moves = self.state.recorder.parts[-1] if self.state.recorder.parts else None
-        if moves is not None and first < moves.line[-1] <= first + last + 1:
-            plain.fast = bool(moves.motion[-1] == 0)
-            ahead = moves.end[-1] - moves.start[-1]
-            flat = not ahead[2] and not self.lines[moves.line[-1] : first + last + 1].count("L")
-            if moves.arc_sweep[-1]:
-                out = (moves.end[-1, :3] - moves.arc_center[-1]) * np.sign(
-                    moves.arc_sweep[-1] * moves.arc_normal[-1, 2]
-                )
-                ahead = np.array([-out[1], out[0]])
-            plain.heading = (float(ahead[0]), float(ahead[1])) if flat and (ahead[0] or ahead[1]) else None
-        if self.tally is not None:
-            for row in range(first, first + last + 1):
-                if self.lines[row] and not EMPTY.fullmatch(self.lines[row]):
-                    head = HEAD.match(self.lines[row])
-                    name = head[1].upper() if head else ""
-                    self.tally.first.setdefault(name, (row + 1, (head.start(1) if head else 0) + 1))
-                    self.tally.count[name] += 1
+        if len(rows):
+            plain.heading, last = None, self.state.recorder.parts[-1] if self.state.recorder.parts else None
+            plain.fast = bool(words.code[rows[-1] - first] == 0)
+            if last is not None and last.line[-1] == rows[-1] + 1 and last.end[-1, 2] == last.start[-1, 2]:
+                ahead = last.end[-1] - last.start[-1]
+                if last.arc_sweep[-1]:
+                    ahead = np.cross(last.arc_sweep[-1] * last.arc_normal[-1], last.end[-1, :3] - last.arc_center[-1])
+                plain.heading = (float(ahead[0]), float(ahead[1])) if ahead[0] or ahead[1] else None
+        for row in [*rows.tolist(), *centers] if self.tally is not None else ():
+            statement = self._statement(row)
+            self._count(statement)
 
-    def _place_name(self, row: int) -> tuple[str, int]:
-        for first, stop, name in self._files:
-            if first <= row < stop:
-                return name, row - first + 1
-        return self.name, row + 1
+    def _place(self, row: int) -> Place:
+        """File and line (from 1) of a line that is read."""
+        in_files = (Place(name, row - first + 1) for first, stop, name in self._files if first <= row < stop)
+        return next(in_files, super()._place(row))
 
     @staticmethod
     def meaning(code: str) -> str:
@@ -177,7 +109,14 @@ class HeidenhainRun(ProgramRun):
             self._moved = (moves, self._steps)
         if self._steps > MOST_STEPS or self._steps - self._moved[1] > MOST_IDLE:
             raise self._fail(row, "a loop that never ends, or never moves", f"at most {MOST_STEPS} statements")
-        statement = self._statement(row)
+        try:
+            return self._carried_out(row, self._statement(row))
+        except InputError as error:
+            if row >= self._main_lines:  # its block stands on the line that calls its file
+                error.file, error.line, _ = self._place(row)
+            raise
+
+    def _carried_out(self, row: int, statement: Statement) -> int:
         if not statement.head or (statement.optional and 1 in self.switches):
             return statement.after
         if self.tally is not None:
@@ -210,35 +149,9 @@ class HeidenhainRun(ProgramRun):
         if code is None:
             problem, hint = refusal_of(head)
             raise self._fail(row, f"{head} {problem}", "", hint, statement.column)
-        block = CurrentBlock(self.name, statement.block(lambda *word: self._word_value(row, *word)))
-        for word in block.block.words[1:]:
-            if word.letter in block.values:
-                raise block.fail(word, f"repeats the word {word.letter} of its statement", "each word once")
-            largest = LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD
-            block.refuse_if(
-                abs(word.value) > largest, word, "is beyond 100 m, or any number of a control", f"{largest:g}"
-            )
-            block.values[word.letter] = word
-        block.free = set(block.values)
+        block = self._block_of(row, statement)
         self.state.plain.to_corner = self._to_corner[statement.after - 1]
-        if head == "BEGIN PGM":
-            block.free = {"INCH"} if re.search(r"\bINCH\s*$", statement.rest) else set()
-            block.values |= {"INCH": block.block.words[0]}
-        elif head == "CYCL DEF 9.1":
-            block.values["#"] = block.block.words[0]._replace(value=self._dwell(row, statement.rest))
-            block.free = {"#"}
-        waits = self.state.plain.held is not None and head not in (
-            "RND",
-            "CHF",
-            "L",
-            "LP",
-            "C",
-            "CP",
-            "CR",
-            "CT",
-            "CTP",
-            "LN",
-        )
+        waits = self.state.plain.held is not None and head not in CONTOUR
         if waits and not head.startswith("DEP"):
             raise block.fail(None, "stands between a corner (CHF, RND) and the element behind it", "the element")
         miscellaneous(self.state, block)
@@ -249,12 +162,13 @@ class HeidenhainRun(ProgramRun):
         try:
             code.act(self.state, block, head)
         except InputError as error:
-            if error.column == statement.column and not error.found.startswith(head):
-                error.found = f"{head}: {error.found}"
-            raise
+            if error.column != statement.column or str(error.found).startswith(head):
+                raise
+            place = Place(error.file or self.name, error.line or 0, error.column)
+            raise place.fail(f"{head}: {error.found}", error.expected or "", error.hint or "") from None
         plain = self.state.plain
         unused = next((letter for letter in block.values if letter in block.free), None)
-        if unused is not None and not head.startswith("APPR") and head not in ("RND", "CHF"):
+        if unused is not None and not head.startswith("APPR"):
             raise block.fail(unused, f"is no word of {head}", "its own words")
         positioned = head in ("L", "LP") and (len(self.state.recorder) > before or bool(block.values.keys() & {*"XYZ"}))
         if once is not None or ((modal is not None or plain.modal) and positioned):
@@ -263,21 +177,23 @@ class HeidenhainRun(ProgramRun):
         flow = self._flow(row, statement)
         return len(self.lines) if block.flow is Flow.END or flow is None else flow
 
-    def _corner_follows(self, row: int) -> bool:
-        while row < len(self.lines) and EMPTY.fullmatch(self.lines[row]):
-            row += 1
-        return row < len(self.lines) and CORNER.match(self.lines[row]) is not None
-
-    def _dwell(self, row: int, rest: str) -> float:
-        number = re.search(r"(\d+(?:[.,]\d+)?|Q[LR]?\d+)\s*$", rest)
-        if number is None:
-            raise self._fail(row, "CYCL DEF 9.1 without its time", "CYCL DEF 9.1 DWELL 1.5")
-        return self._value(row, number[1].replace(",", "."), 1)
+    def _block_of(self, row: int, statement: Statement) -> CurrentBlock:
+        """The statement with the numbers of its words."""
+        words = statement.block(lambda *word: self._word_value(row, *word))
+        calls = [back for back, label in self._returns if label < 0]  # the first is of the main program
+        block = CurrentBlock(self.name, replace(words, line=calls[0]) if calls else words)
+        for word in words.words[1:]:
+            block.refuse_if(word.letter in block.values, word, "repeats a word of its statement", "each word once")
+            largest = LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD
+            block.refuse_if(abs(word.value) > largest, word, "is beyond 100 m, or any number of a control")
+            block.values[word.letter] = word
+        block.free = set(block.values)
+        return block
 
     def _word_value(self, row: int, key: str, text: str, column: int) -> float:
-        """The number of a word; of rotary axes in a tilted plane, which the control works out, none that counts."""
-        tilted = self.state.plain.tilt is not None and key in ("A", "B", "C")
-        return 0.0 if tilted and text.lstrip("+-") in TILTING else self._value(row, text, column)
+        """The number of a word; of axes that the control turns to a plane 0, which counts in an untilted one alone."""
+        turns = key in ("A", "B", "C") and text.lstrip("+-") in TILTING
+        return 0.0 if turns else self._value(row, text, column)
 
     def _value(self, row: int, text: str, column: int) -> float:
         """The number of a word: as written, or of a Q parameter."""
@@ -296,7 +212,7 @@ class HeidenhainRun(ProgramRun):
         if name in values:
             return values[name]
         known = {"Q108": self.state.plain.radius, "Q113": float(self.state.inch)}.get(name)
-        if known is None or known != known:
+        if known is None or math.isnan(known):
             reason = "a control keeps it from earlier programs, or works it out itself"
             raise self._fail(self._row, f"{name} is read before it is set: {reason}", f"FN 0: {name} = ... before")
         return known
@@ -311,14 +227,15 @@ class HeidenhainRun(ProgramRun):
             for key, written, column, _ in statement.words:
                 if key[0] == "Q" and written not in SPECIAL and written != "PREDEF":
                     self._assign(row, key, self._value(row, written, column))
-        elif head in KINDS:
-            return self._condition(row, statement)
+        elif head in CONDITIONS:
+            holds, number, name = condition(head, rest, self._parameter, self._place(row))
+            return self._condition_jump(row, self._label(row, number, name)) if holds else after
+        elif head == "FUNCTION MODE" and rest.split() != ["MILL"]:
+            raise self._fail(row, f"{head}{rest}: turning is not supported", "FUNCTION MODE MILL")
         elif head == "FN14":
             raise self._fail(row, f"the program stops with its error {rest.strip()}", "a program that runs through")
-        elif (
-            head.startswith("FN") and head in ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
-        ) or head[0] == "Q":
-            self._formula(row, statement)
+        elif head[0] == "Q" or head in FORMULAS:
+            self._assign(row, *assigned(head, rest, self._parameter, self._place(row)))
         elif head == "LBL":
             return self._end_of_subprogram(row, statement)
         elif head == "CALL LBL":
@@ -335,43 +252,27 @@ class HeidenhainRun(ProgramRun):
             return None
         return after
 
-    def _formula(self, row: int, statement: Statement) -> None:
-        formula = ASSIGNED.match(statement.rest)
-        name = formula and (formula[1] or statement.head)
-        if formula is None or not name or name.startswith("QS"):
-            raise self._fail(
-                row, f"{statement.head}{statement.rest} is no assignment", "Q5 = +10", column=statement.column
-            )
-        self._assign(row, name, work_out(formula[2], self._parameter, self._place(row)))
-
-    def _condition(self, row: int, statement: Statement) -> int:
-        jump = JUMP.match(statement.rest)
-        if jump is None or jump[2] not in (
-            KINDS[statement.head],
-            "EQU" if statement.head == "FN9" else KINDS[statement.head],
-        ):
-            raise self._fail(row, f"{statement.head}:{statement.rest[:40]} is no condition", "IF Q1 EQU 5 GOTO LBL 2")
-        left, right = (work_out(jump[part], self._parameter, self._place(row)) for part in (1, 3))
-        same = abs(left - right) <= EQUAL
-        true = {"EQU": same, "NE": not same, "GT": left > right and not same, "LT": left < right and not same}[jump[2]]
-        return self._jump(row, self._label(row, jump[4], jump[5])) if true else statement.after
+    def _condition_jump(self, row: int, to: int) -> int:
+        """Go to a label; back to it only if anything has changed since the last time."""
+        frames = self.state.frames
+        kept = self.state.plain.parameters, self._locals[-1], frames.position, frames.g92, frames.linear
+        now = repr((len(self.state.recorder), kept))
+        if to <= row and self._passes.get(row) == now:
+            raise self._fail(row, "a loop that never ends: no parameter or position changes", "one that ends")
+        self._passes[row] = now
+        return self._jump(row, to)
 
     def _label(self, row: int, number: str | None, name: str | None) -> int:
         """The line of a label in the program that runs. Raises `InputError` unless there is one."""
-        if self._labels is None:
-            self._labels = {}
-            for index, line in enumerate(self.lines):
-                label = LABEL.match(code_text(line)) if "LBL" in line.upper() else None
-                key = (self._program_of(index), f"{int(label[1])}" if label[1] else label[2]) if label else None
-                if key is not None and key[1] != "0":
-                    self._labels[key] = -1 if key in self._labels else index
+        program = self._program_of(row)
+        if program not in self._labels:
+            stop = next((stop for first, stop, _ in self._files if first == program), self._main_lines)
+            self._labels[program] = labels(self.lines, program, stop)
         shown = name if name is not None else f"{self._value(row, number or '', 1):g}"
-        line_of = self._labels.get((self._program_of(row), shown))
-        if line_of is None or line_of < 0:
-            raise self._fail(
-                row, f"LBL {shown}: the program has {'none' if line_of is None else 'several'}", "one label"
-            )
-        return line_of
+        places = self._labels[program].get(shown, [])
+        if len(places) != 1:
+            raise self._fail(row, f"LBL {shown}: the program has {'several' if places else 'none'}", "one label")
+        return places[0]
 
     def _program_of(self, row: int) -> int:
         return next((first for first, stop, _ in self._files if first <= row < stop), 0)
@@ -379,9 +280,7 @@ class HeidenhainRun(ProgramRun):
     def _end_of_subprogram(self, row: int, statement: Statement) -> int:
         if not re.match(r"\s*0+\s*$", statement.rest) or not self._returns or self._returns[-1][1] < 0:
             return statement.after
-        back, _ = self._returns.pop()
-        self._locals.pop()
-        return self._jump(row, back)
+        return self._jump(row, self._returns.pop()[0])
 
     def _call(self, row: int, statement: Statement) -> int:
         called = CALLED.match(statement.rest)
@@ -409,7 +308,8 @@ class HeidenhainRun(ProgramRun):
         if len(self._returns) >= DEEPEST:
             raise self._fail(row, f"more than {DEEPEST} calls within each other", "calls that end")
         self._returns.append((back, label))
-        self._locals.append({})
+        if label < 0:  # QL parameters belong to a program
+            self._locals.append({})
 
     def _program(self, row: int, statement: Statement) -> int:
         """Read the file of a program that is called, unless it is there; its lines follow those that are read."""
@@ -417,20 +317,16 @@ class HeidenhainRun(ProgramRun):
         stem = name.removesuffix(".H")
         known = next((first for first, _, file in self._files if Path(file).stem.upper() == stem), None)
         if known is None:
-            folder = Path(self.folder) if self.folder else None
-            files = (
-                []
-                if folder is None or not stem
-                else [f for f in sorted(folder.iterdir()) if f.suffix.upper() in (".H", "")]
-            )
-            file = next((file for file in files if file.stem.upper() == stem and file.is_file()), None)
+            files = sorted(Path(self.folder).iterdir()) if self.folder and stem else []
+            named = (file for file in files if file.suffix.upper() in (".H", "") and file.stem.upper() == stem)
+            file = next((file for file in named if file.is_file()), None)
             if file is None:
                 problem = f"CALL PGM {name}: no folder of programs has it"
                 raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=statement.column)
             known = len(self.lines) + 1
             self.lines = (*self.lines, "END PGM", *read_lines(file))  # which ends what has no END PGM before it
             self._files.append((known, len(self.lines), file.name))
-            self._labels, self._lexer = None, PlainRun(self.state, self._as_g_code(), self.name)
+            self._lex()
         self._enter_call(row, statement.after, -1)
         return known
 

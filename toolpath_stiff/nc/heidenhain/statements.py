@@ -1,8 +1,8 @@
 """Lines of the plain language to statements: a head, and words with their columns.
 
-A statement is a line, `~` at its end continues it; `;` begins a comment, `*` a heading, `/` a statement that may be left
-out. Cycles from 200 on have their parameters in lines that follow (HEIDENHAIN, user's manuals of the iTNC 530 and the
-TNC 640, "Programming fundamentals", "Structuring programs", "Fixed cycles").
+A statement is a line, `~` at its end continues it; `;` begins a comment, `*` a heading, `/` a statement that may be
+left out. Cycles from 200 on have their parameters in lines that follow (HEIDENHAIN, user's manuals of the iTNC 530 and
+the TNC 640, "Programming fundamentals", "Structuring programs", "Fixed cycles").
 """
 
 import re
@@ -28,12 +28,18 @@ _WORD = re.compile(
     rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
     rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
     r"|([XYZABCUVW])(?![A-Z])"
-    rf"|({VALUE})|\"([^\"]*)\"",
+    rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"",
 )
+_LABEL = re.compile(r'\s*/?\s*(?:N?\d+\s+)?/?\s*LBL\s*(?:0*(\d+)|"([^"]*)")\s*$')
 PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
+_SPECIAL = {
+    "BEGIN PGM": re.compile(r"\b(INCH)()\s*$"),
+    "CYCL DEF 9.1": re.compile(rf"()({NUMBER}|Q[LR]?\d+)\s*$"),
+}
 # Heads whose rest has another form, or does not matter.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\.|TCH|FUNCTION MODE"
+    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
+    r"|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 
 
@@ -67,6 +73,16 @@ def code_text(line: str) -> str:
     return text.rstrip().rstrip("~").rstrip().upper()
 
 
+def labels(lines: Sequence[str], first: int, stop: int) -> dict[str, list[int]]:
+    """Label -> the lines where it stands between two lines (from 0), LBL 0 apart."""
+    places = dict[str, list[int]]()
+    for row in range(first, stop):
+        label = _LABEL.match(code_text(lines[row])) if "LBL" in lines[row].upper() else None
+        if label is not None and label[1] != "0":
+            places.setdefault(label[1] or label[2], []).append(row)
+    return places
+
+
 def read_statement(lines: Sequence[str], row: int, name: str) -> Statement:
     """The statement that begins in a line (from 0), with what continues it. Raises `InputError`."""
     text, after, place = code_text(lines[row]), row + 1, Place(name, row + 1)
@@ -90,6 +106,9 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> Statement:
             while after < len(lines) and PARAMETER.match(lines[after]):
                 words += _words(code_text(lines[after]), 0, Place(name, after + 1), shown)
                 after += 1
+    special = _SPECIAL[shown].search(text, end) if shown in _SPECIAL else None
+    if special is not None:  # a unit, or a time behind its name in the control's language
+        words = [(special[1] or "#", (special[2] or "").replace(",", "."), special.start() + 1, special[0].strip())]
     return Statement(row + 1, shown, head.start() + 1, tuple(words), rest, optional, after)
 
 
@@ -109,9 +128,13 @@ def _words(text: str, position: int, place: Place, head: str) -> list[tuple[str,
         match = _WORD.match(text, position)
         if match is None:
             raise place.fail(f"{text[position : position + 12]!r} is no word of {head}", "", "", position + 1)
-        flag, key, value, parameter, given, axis, bare, quoted = match.groups()
-        key = "".join(flag.split()) if flag else key or parameter or (f"{axis}!" if axis else "#" if bare else '"')
-        written = "".join((value or given or bare or "").split()).replace(",", ".")
+        flag, key, value, parameter, given, axis, table, bare, quoted = match.groups()
+        key = (
+            "".join(flag.split())
+            if flag
+            else key or parameter or (f"{axis}!" if axis else "TABLE" if table else "#" if bare else '"')
+        )
+        written = "".join((value or given or bare or (table or "")[1:]).split()).replace(",", ".")
         if sum(map(str.isdigit, written)) > 2 * MOST_DIGITS:
             raise place.fail(f"a number of {len(written)} characters", "", "", position + 1)
         if key == "M":

@@ -4,9 +4,9 @@ The functions are in `contour`, `approach`, `coordinates`, `cycles`, `functions`
 FN). M functions that mean what they mean in G code are the one table's (`codes.registry`).
 """
 
-from toolpath_stiff.nc.codes.code import Code, Refused, holds_anyway
+from toolpath_stiff.nc.codes.code import Act, Code, Refused, holds_anyway
 from toolpath_stiff.nc.codes.registry import code_meaning
-from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, functions
+from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, functions, tools
 from toolpath_stiff.nc.heidenhain.contour import MANUAL, PATHS, POLAR
 from toolpath_stiff.nc.state import Group
 
@@ -20,20 +20,11 @@ _Q, _BASICS = f"{MANUAL}, Programming: Q parameters", f"{MANUAL}, Fundamentals o
 _SPECIAL = f"{_CYCLES}, Special cycles"
 
 
-def _rows(group: Group, source: str, *rows: tuple[str, object, str]) -> tuple[Code, ...]:
-    return tuple(
-        Code(name, group, act, meaning, source, CONTROLS)  # type: ignore[arg-type]
-        for names, act, meaning in rows
-        for name in names.split("|")
-    )
-
-
-TABLE = (
-    *_rows("units", _BASICS, ("BEGIN PGM", functions.units, "begin, with the unit of length")),
-    *_rows("M stop", _BASICS, ("END PGM", functions.nothing, "end")),
-    *_rows("non-modal", _BASICS, ("BLK FORM 0.1|BLK FORM 0.2", coordinates.blank, "corner of the blank")),
-    *_rows(
-        "motion", PATHS,
+_SILENT, _LISTED = functions.nothing, functions.listed
+# Modal group, source, and names with function and meaning.
+_ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
+    ("units", _BASICS, (("BEGIN PGM", functions.units, "begin, with the unit of length"),)),
+    ("motion", PATHS, (
         ("L", contour.line, "straight"),
         ("CC", contour.pole, "circle centre, pole"),
         ("C", contour.circle, "arc about CC"),
@@ -41,42 +32,40 @@ TABLE = (
         ("CT", contour.tangent_circle, "arc that goes on smoothly"),
         ("CHF", contour.corner, "chamfer of the corner to the next element"),
         ("RND", contour.corner, "rounding of the corner to the next element"),
-    ),
-    *_rows(
-        "motion", POLAR,
+    )),
+    ("motion", POLAR, (
         ("LP", contour.line, "straight, in polar coordinates"),
         ("CP", contour.circle, "arc about CC by a polar angle, helix"),
         ("CTP", contour.tangent_circle, "arc that goes on smoothly, in polar coordinates"),
-    ),
-    *_rows("motion", f"{MANUAL}, Three-dimensional tool compensation", ("LN", functions.vectors, "straight, with a tool axis")),
-    *_rows(
-        "motion", _APPROACH,
+    )),
+    ("motion", f"{MANUAL}, Three-dimensional tool compensation", (
+        ("LN", functions.vectors, "straight, with a tool axis"),
+    )),
+    ("motion", _APPROACH, (
         ("APPR LT|APPR LN|APPR CT|APPR LCT", approach.approach, "approach of a contour"),
         ("DEP LT|DEP LN|DEP CT|DEP LCT", approach.depart, "departure from a contour"),
-    ),
-    *_rows(
-        "M tool change", _TOOLS,
-        ("TOOL CALL", coordinates.tool_call, "tool, tool axis, speed, feed"),
-        ("TOOL DEF", coordinates.tool_definition, "length and radius of a tool, or the next tool"),
-    ),
-    *_rows(
-        "dynamic offset", _TRANSFORM,
-        ("|".join(f"CYCL DEF 7.{n}" for n in range(1, 7)), coordinates.shift, "datum shift"),
+    )),
+    ("M tool change", _TOOLS, (
+        ("TOOL CALL", tools.tool_call, "tool, tool axis, speed, feed"),
+        ("TOOL DEF", tools.tool_definition, "length and radius of a tool, or the next tool"),
+    )),
+    ("dynamic offset", _TRANSFORM, (
+        ("CYCL DEF 7.1|CYCL DEF 7.2|CYCL DEF 7.3|CYCL DEF 7.4|CYCL DEF 7.5|CYCL DEF 7.6", coordinates.shift, "shift"),
         ("CYCL DEF 8.1", coordinates.mirror, "mirror image"),
         ("CYCL DEF 10.1", coordinates.rotation, "rotation"),
         ("CYCL DEF 11.1", coordinates.scale, "scale"),
         ("CYCL DEF 19.1", coordinates.tilt, "tilted plane"),
         ("CYCL DEF 247", coordinates.datum, "datum of the preset table"),
-        ("CYCL DEF 7.0|CYCL DEF 8.0|CYCL DEF 10.0|CYCL DEF 11.0|CYCL DEF 19.0", functions.nothing, "heading of its cycle"),
-    ),
-    *_rows("dynamic offset", _PLANE, ("PLANE SPATIAL", coordinates.tilt, "tilted plane by spatial angles")),
-    *_rows("dynamic offset", _PLANE, ("PLANE RESET", coordinates.tilt, "no tilted plane")),
-    *_rows(
-        "tool length", f"{MANUAL}, FUNCTION TCPM",
+        ("CYCL DEF 7.0|CYCL DEF 8.0|CYCL DEF 10.0|CYCL DEF 11.0|CYCL DEF 19.0", _SILENT, "heading of its cycle"),
+    )),
+    ("dynamic offset", _PLANE, (
+        ("PLANE SPATIAL", coordinates.tilt, "tilted plane by spatial angles"),
+        ("PLANE RESET", coordinates.tilt, "no tilted plane"),
+    )),
+    ("tool length", f"{MANUAL}, FUNCTION TCPM", (
         ("FUNCTION TCPM|FUNCTION RESET TCPM", coordinates.hold_tip, "tool centre point control"),
-    ),
-    *_rows(
-        "motion", _DRILLING,
+    )),
+    ("motion", _DRILLING, (
         ("CYCL DEF 200", cycles.define, "drilling, with pecks"),
         ("CYCL DEF 201", cycles.define, "reaming"),
         ("CYCL DEF 202", cycles.define, "boring"),
@@ -84,32 +73,45 @@ TABLE = (
         ("CYCL DEF 205", cycles.define, "deep drilling"),
         ("CYCL DEF 240", cycles.define, "centring"),
         ("CYCL CALL|CYCL CALL POS", cycles.call_statement, "carries out the cycle"),
-    ),
-    *_rows("motion", _TAPPING, ("CYCL DEF 206|CYCL DEF 207|CYCL DEF 209", cycles.define, "tapping")),
-    *_rows("motion", _PATTERNS, ("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle at points on a circle, on lines")),
-    *_rows("dwell", _SPECIAL, ("CYCL DEF 9.1", functions.dwell, "dwell")),
-    *_rows(
-        "path control", _SPECIAL,
-        ("CYCL DEF 9.0|CYCL DEF 13.0|CYCL DEF 13.1|CYCL DEF 32.0|CYCL DEF 32.1|CYCL DEF 32.2|CYCL DEF 32.3", functions.listed,
+    )),
+    ("motion", _TAPPING, (("CYCL DEF 206|CYCL DEF 207|CYCL DEF 209", cycles.define, "tapping"),)),
+    ("motion", _PATTERNS, (("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),)),
+    ("dwell", _SPECIAL, (("CYCL DEF 9.1", functions.dwell, "dwell"),)),
+    ("path control", _SPECIAL, (
+        ("CYCL DEF 9.0|CYCL DEF 13.0|CYCL DEF 13.1|CYCL DEF 32.0|CYCL DEF 32.1|CYCL DEF 32.2|CYCL DEF 32.3", _LISTED,
          "dwell, spindle angle, tolerance: changes no path"),
-    ),
-    *_rows("M subprogram", _FLOW, ("LBL", functions.nothing, "label"), ("CALL LBL|CALL PGM", functions.nothing, "call")),
-    *_rows("M stop", _BASICS, ("STOP|M", holds_anyway, "M functions alone")),
-    *_rows("non-modal", _Q, ("Q|FN0|FN1|FN2|FN3|FN4|FN5|FN6|FN7|FN8|FN13", functions.nothing, "Q parameter")),
-    *_rows("non-modal", _Q, ("FN9|FN10|FN11|FN12", functions.nothing, "jump on a condition")),
-    *_rows("non-modal", _Q, ("FN14", functions.nothing, "error: the program stops")),
-    *_rows("non-modal", _Q, ("FN15|FN16|FN19|FN20|FN29|FN37|FN38", functions.listed, "message, PLC: changes no path")),
-    *_rows(
-        "non-modal", _BASICS,
+    )),
+    ("M subprogram", _FLOW, (("LBL", _SILENT, "label"), ("CALL LBL|CALL PGM", _SILENT, "call"))),
+    ("M stop", _BASICS, (("STOP|M", holds_anyway, "M functions alone"), ("END PGM", _SILENT, "end"))),
+    ("non-modal", _Q, (
+        ("Q|FN0|FN1|FN2|FN3|FN4|FN5|FN6|FN7|FN8|FN13", _SILENT, "Q parameter"),
+        ("FN9|FN10|FN11|FN12", _SILENT, "jump on a condition"),
+        ("FN14", _SILENT, "error: the program stops"),
+        ("FN15|FN16|FN19|FN20|FN29|FN37|FN38", _LISTED, "message, PLC: changes no path"),
+    )),
+    ("non-modal", _BASICS, (
+        ("BLK FORM 0.1|BLK FORM 0.2", tools.blank, "corner of the blank"),
         ("BLK FORM CYLINDER|BLK FORM ROTATION|BLK FORM FILE|FUNCTION MODE|SEL TABLE|FUNCTION FEED|FUNCTION SPINDLE",
-         functions.listed, "changes no path"),
-    ),
+         _LISTED, "changes no path"),
+    )),
 )  # fmt: skip
-STATEMENTS: dict[str, Code] = {row.name: row for row in TABLE}
+STATEMENTS: dict[str, Code] = {
+    name: Code(name, group, act, meaning, source, CONTROLS)
+    for group, source, rows in _ROWS
+    for names, act, meaning in rows
+    for name in names.split("|")
+}
+OWN = {
+    "M13": "spindle on, coolant", "M14": "spindle on, reversed, coolant",
+    "M89": "the cycle after each positioning", "M99": "the cycle here", "M91": "machine coordinates",
+    "M92": "points of the machine builder", "M126": "rotary axes go the shorter way", "M127": "they go as programmed",
+    "M128": "tool centre point control", "M129": "tool centre point control off", "M140": "retract along the tool",
+}  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
 _REFUSED = (
     ("FL FLT FC FCT FPOL FSELECT FCTP FLP", "free contour programming (FK)", "post lines and arcs", f"{MANUAL}, FK"),
-    ("APPR-PLT APPR-PLN APPR-PCT APPR-PLCT DEP-PLCT", "an approach in polar coordinates", "APPR and DEP with X and Y", _APPROACH),
+    ("APPR-PLT APPR-PLN APPR-PCT APPR-PLCT DEP-PLCT",
+     "an approach in polar coordinates", "APPR and DEP with X and Y", _APPROACH),
     ("PLANE-PROJECTED PLANE-EULER PLANE-VECTOR PLANE-POINTS PLANE-RELATIV PLANE-RELATIVE PLANE-AXIAL",
      "a tilted plane given otherwise", "PLANE SPATIAL", _PLANE),
     ("CYCL-DEF-204", "back boring", _BY_MOVES, _DRILLING),
@@ -146,14 +148,11 @@ def meaning_of(name: str) -> str:
 
     Examples
     --------
-    >>> meaning_of("CR"), meaning_of("M13"), meaning_of("FC")
-    ('arc of a radius', 'spindle on, coolant on: not acted upon', 'is free contour programming (FK), which is not supported')
+    >>> meaning_of("CR"), meaning_of("M118")
+    ('arc of a radius', 'moves by the handwheel: not acted upon')
     """
     if name[0] == "M" and name[1:].isdigit():
-        special = {"M89": "the cycle after each positioning", "M99": "the cycle here", "M91": "machine coordinates",
-                   "M126": "rotary axes go the shorter way", "M128": "tool centre point control",
-                   "M129": "tool centre point control off", "M140": "retract along the tool"}  # fmt: skip
         passive = functions.PASSIVE.get(name)
-        return special.get(name) or (f"{passive}: not acted upon" if passive else code_meaning(name))
+        return OWN.get(name) or (f"{passive}: not acted upon" if passive else code_meaning(name))
     row = look_up(name)
     return row.meaning if row is not None else refusal_of(name)[0]

@@ -1,0 +1,169 @@
+"""Votes of left-out poses, fair forms, and what the nuisances have taken up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.stiffness.cases import nist
+from tests.updating.cases import campaign, diagnosed, examined, judged
+from toolpath_stiff.correction.task import MACHINE, UpdateTask
+from toolpath_stiff.correction.update import build_ladder
+from toolpath_stiff.inference.fair_forms import fair_rivals
+from toolpath_stiff.inference.noise import REST_COLUMNS
+from toolpath_stiff.inference.nuisances import findings, fitted_nuisances, nuisance_words
+from toolpath_stiff.inference.size_priors import EXPECTED
+from toolpath_stiff.inference.votes import (
+    SMALL,
+    chance_of_losing,
+    closest,
+    left_open,
+    outvoted,
+    standard_error,
+    vote_words,
+    votes,
+)
+from toolpath_stiff.stiffness.active import ActiveEffect
+from toolpath_stiff.stiffness.catalogue import find_effect
+
+STRONG = 0.1
+
+
+def test_a_rival_is_outvoted_by_all_poses_not_by_one():
+    rng = np.random.default_rng(0)
+    even = 1.0 + 0.2 * rng.standard_normal(20)
+    assert outvoted(even) and not outvoted(-even)
+    assert not outvoted(0.1 * even)  # sure, and too little to say anything (Sivula and others)
+    alone = np.zeros(20)
+    alone[3] = 20.0
+    assert (alone - 0.3).sum() > SMALL and not outvoted(alone - 0.3)
+    assert not outvoted(even[:5] * 10.0)  # five poses have no spread that means anything
+    assert standard_error(even) == pytest.approx(np.sqrt(20) * even.std(ddof=1))
+    # Of normal votes the Bayesian bootstrap gives what a normal mean would.
+    from scipy.stats import norm
+
+    assert chance_of_losing(even - 0.95) == pytest.approx(norm.sf((even - 0.95).sum() / standard_error(even)), abs=0.03)
+    assert "worse by" in vote_words("x", even) and "better by" in vote_words("x", -even)
+
+
+def test_a_vote_is_the_density_of_a_left_out_pose_given_the_others():
+    """By the joint normal density of all readings, marginalised by hand with dense matrices."""
+    judgement = judged(7, "paper", "weak_strut", STRONG)
+    problem, base = judgement.problem, judgement.base
+    fit = judgement.fits["weak_strut"]
+    given = problem.scatter.covariance
+    point = problem.predictor.data.point
+
+    def density(one) -> np.ndarray:
+        prior = np.diag([0.2**2] * 2 + [EXPECTED[1] ** 2 / np.mean(c**2) for c in one.jacobian[:, 2:].T])
+        shared = given.shared[:-REST_COLUMNS]
+        dense = np.diag(given.own_variance) + shared.T @ shared + one.jacobian @ prior @ one.jacobian.T
+        dense += given.common * (given.groups.of[:, None] == given.groups.of)
+        wild = sorted({*fit.scatter.wild, *base.scatter.wild})
+        dense[wild, wild] += problem.scatter.widening[wild]
+        found = []
+        for label in np.unique(point):
+            out = point == label
+            gain = np.linalg.solve(dense[np.ix_(~out, ~out)], dense[np.ix_(~out, out)]).T
+            left = one.residual[out] - gain @ one.residual[~out]
+            spread = dense[np.ix_(out, out)] - gain @ dense[np.ix_(~out, out)]
+            found.append(-0.5 * (left @ np.linalg.solve(spread, left) + np.linalg.slogdet(spread)[1]))
+        return np.array(found)
+
+    expected = density(fit) - density(base)
+    assert votes(problem, fit, {"none": base})["none"] == pytest.approx(expected, abs=2e-3)
+
+
+def test_a_name_has_outvoted_every_rival_and_says_by_how_much():
+    found = diagnosed(7, "paper", "weak_strut", STRONG)
+    assert found.verdict == "identified" and all(outvoted(each) for each in found.main.votes.values())
+    document = found.to_dict()
+    assert document["votes"][0]["rival"] == next(iter(found.main.votes)) and document["votes"][0]["outvoted"]
+    assert f"{document['votes'][0]['rival']} foretells left-out poses worse by" in document["text"]
+    rivals = {entry["effect"]: entry["vote"] for entry in document["candidates"]}
+    assert rivals["weak_strut"] is None and rivals["table_compliance"]["gain"] > SMALL
+
+
+def test_untilted_a_table_is_a_tool_whose_axes_differ():
+    """The same readings to the last digit: the form that is fair to the tool foretells as well as the table."""
+    judgement = judged(7, "paper", "table_compliance", STRONG)
+    rivals = fair_rivals(judgement.problem, judgement.fits["table_compliance"], judgement.base)
+    against = votes(judgement.problem, judgement.fits["table_compliance"], rivals)
+    assert abs(against["spindle_compliance"].sum()) < 1.0
+    assert judgement.verdict == "ambiguous" and "spindle_compliance" in judgement.explanations
+
+
+def test_explanations_left_open():
+    against = {"b": np.full(9, -1.0), "c": np.full(9, 0.1), "d": np.full(9, 1.0), "e": np.full(9, 0.2)}
+    assert left_open("a", ["a"], [], against) == ("a",)
+    # b foretells better than a and has outvoted c, which stood by its probability.
+    assert left_open("a", ["a", "c"], ["b", "c", "e"], against) == ("a", "b", "e")
+    assert left_open("a", ["a", "c", "f"], ["c"], {"c": against["c"]}) == ("a", "f", "c")
+    assert list(closest({"x": np.ones(3)}, {"x": np.zeros(3), "w": np.full(3, 2.0)})) == ["x", "w"]
+
+
+def displaced(millimetres: float):
+    """A sound tilted campaign, as machine file `nist` reads it if a joint of the platform stands off its place."""
+    data = campaign(100, "tilted", "none")[0]
+    problem = judged(100).problem
+    off = ActiveEffect(find_effect("joint_offset"), {"joint": 9, "x": 0.0, "y": 0.0, "z": millimetres / 1e3})
+    change = problem.predictor.log_stiffness((0.0, 0.0), [off]) - problem.predictor.log_stiffness()
+    return examined(nist(), replace(data, stiffness=data.stiffness * np.exp(change)))
+
+
+def test_a_joint_off_its_place_is_told():
+    found = displaced(11.0)
+    entry = fitted_nuisances(found.main.base, found.noise)[0]
+    assert (entry["nuisance"], entry["end"]) == ("joint", "platform") and entry["sigma"] > 3.0
+    assert found.verdict != "adequate" and "joint_offset" in found.plausible
+    fit = found.fits["joint_offset"]
+    assert dict(fit.candidates[0].choice) == {"joint": 9}
+    assert abs(fit.sizes[0][2] - 0.011) < 3.3 * fit.deviation(2)
+    if found.verdict == "identified":
+        assert found.to_dict()["text"].startswith("The joint of strut 3 on the platform stands off its place by about")
+
+
+def test_sound_joints_are_no_finding():
+    """Bonferroni's price of 18: at three standard deviations one sound campaign in 370 has a finding."""
+    for seed in (100, 101, 102):
+        judgement = judged(seed)
+        entries = fitted_nuisances(judgement.base, judgement.noise)
+        assert len(entries) == 18 and not findings(entries)
+        assert "too" in nuisance_words({**entries[0], "nuisance": "strut", "stiffness_percent": -1.0})
+
+
+def test_what_an_instrument_shows_as_well_is_not_written_into_a_machine():
+    """A frame that sways is a stand that gives: refused, with the reading that tells, unless the user believes it."""
+    data = campaign(100, "tilted", "none")[0]
+    problem = judged(100).problem
+    sways = ActiveEffect(find_effect("frame_sway"), {"sideways": 4e-9, "vertical": 2e-9, "rocking": 0.0})
+    change = problem.predictor.log_stiffness((0.0, 0.0), [sways]) - problem.predictor.log_stiffness()
+    swaying = replace(data, stiffness=data.stiffness * np.exp(change))
+    refused = build_ladder(UpdateTask(nist(), swaying, ("frame_sway",)))
+    assert refused.verdict == "refused" and "stand_compliance" in refused.supports[0].instruments
+    assert "an indicator on another stand" in refused.text and "--believe machine" in refused.text
+    believed = build_ladder(UpdateTask(nist(), swaying, ("frame_sway",), believe=MACHINE))
+    assert believed.verdict == "updated" and believed.supports[0].instruments
+    # A weak strut looks like no instrument, and an instrument is no machine.
+    weak = build_ladder(UpdateTask(nist(), campaign(7, "paper", "weak_strut", STRONG)[0], ("weak_strut",)))
+    assert weak.verdict == "updated" and not weak.supports[0].instruments
+
+
+def test_of_a_pair_each_effect_is_replaced_in_turn():
+    found = diagnosed(7, "tilted", "weak_strut,gauge_scale", STRONG)
+    assert found.verdict == "identified" and set(found.alike) <= {"weak_strut", "gauge_scale"}
+    document = found.to_dict()["looks_the_same"]
+    assert (document is None) == (not found.alike)
+    for entry in (document or {"terms": []})["terms"]:
+        assert entry["effect"] in found.alike
+
+
+def test_a_size_beyond_the_usual_is_said_in_the_first_sentence():
+    found = diagnosed(7, "paper", "weak_strut", STRONG)
+    assert "more than is usual" not in found.to_dict()["text"]
+    fit = found.fits["weak_strut"]
+    softer = replace(found, fits={**found.fits, "weak_strut": replace(fit, sizes=(np.array([-0.65]),))})
+    first = softer.to_dict()["text"].split(". ")[0]
+    assert first.startswith("Strut 1 is about 65 % too soft, more than is usual (factor 0.4 to 0.9) (weak_strut, prob")

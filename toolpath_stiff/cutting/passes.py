@@ -1,0 +1,84 @@
+"""Walls that several passes make: at each height stays what the deepest of them leaves.
+
+The second level of a pocket passes the wall of the first along all of its height. Where the first left material, the
+second takes it off as far as it stands aside itself; where the first cut too deep, nothing puts it back. So the error of
+a wall is the least of those of all passes that come as close to the part; the last one owns it.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.cutting.cutters import Cutter, radii_of
+from toolpath_stiff.cutting.surface_error import HEIGHTS, shares
+from toolpath_stiff.path.sampling import Samples
+
+MOST_PASSES = 8  # places of earlier passes beside one of the last that are looked at
+ALIKE = 10.0  # steps along the wall that a turn of its normal by a radian counts
+SAME = 1e-7  # m, ranges of height closer than this are one
+
+
+def walls_of_all_passes(
+    samples: Samples,
+    cutters: Mapping[int, Cutter],
+    made: FloatArray,
+    own: FloatArray,
+    profiles: FloatArray,
+    step: float,
+) -> FloatArray:
+    """(n, 2, HEIGHTS) m, errors of the walls that stay, from the lower to the upper end of each; nan: no wall.
+
+    Parameters
+    ----------
+    samples, cutters, step
+        In the set-up frame, at most `step` (m) apart.
+    made, own
+        (n, 2, 2) m above the tip: walls that a pass makes, whether or not a later one comes as close; those that it owns.
+    profiles
+        (n, 2, HEIGHTS) m, errors of what each pass makes, from its lower to its upper end.
+    """
+    nodes = shares()[0]
+    heights = own[..., :1] + (own[..., 1:] - own[..., :1]) * nodes
+    owners, walls = np.nonzero(np.isfinite(own).all(axis=2))
+    values = np.full((*own.shape[:2], HEIGHTS), np.nan)
+    values[owners, walls] = _at(profiles[owners, walls], made[owners, walls], heights[owners, walls])
+    shared = np.isfinite(made).all(axis=2) & ~(np.abs(made - own).max(axis=2) <= SAME)
+    rows, sides = np.nonzero(shared)
+    if not len(rows) or not len(owners):
+        return values
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(_places(samples, cutters, rows, sides, step))
+    places = _places(samples, cutters, owners, walls, step)
+    near: IntArray = np.asarray(tree.query(places, MOST_PASSES, distance_upper_bound=step)[1])
+    apart = 2.0 * max(cutter.radius for cutter in cutters.values())
+    for column in near.T:
+        known = np.flatnonzero(column < len(rows))
+        known = known[samples.s[owners[known]] - samples.s[rows[column[known]]] > apart]
+        last, wall, earlier, side = owners[known], walls[known], rows[column[known]], sides[column[known]]
+        climb = samples.position[last, 2] - samples.position[earlier, 2]
+        left = _at(profiles[earlier, side], made[earlier, side], heights[last, wall] + climb[:, None])
+        values[last, wall] = np.fmin(values[last, wall], left)
+    return values
+
+
+def _at(profiles: FloatArray, ranges: FloatArray, heights: FloatArray) -> FloatArray:
+    """(m, HEIGHTS) errors at heights (m, HEIGHTS), from profiles over ranges (m, 2); nan beyond."""
+    nodes, low, span = shares()[0], ranges[:, :1], np.maximum(ranges[:, 1:] - ranges[:, :1], SAME)
+    share = (heights - low) / span
+    place = np.clip(np.searchsorted(nodes, share) - 1, 0, HEIGHTS - 2)
+    part = (share - nodes[place]) / (nodes[place + 1] - nodes[place])
+    first, second = (np.take_along_axis(profiles, at, axis=1) for at in (place, place + 1))
+    within = np.abs(heights - low - 0.5 * span) <= 0.5 * span + SAME
+    return np.where(within, first + np.clip(part, 0.0, 1.0) * (second - first), np.nan)
+
+
+def _places(
+    samples: Samples, cutters: Mapping[int, Cutter], rows: IntArray, sides: IntArray, step: float
+) -> FloatArray:
+    """(m, 4) m, foot of the wall beside samples and its outward normal, weighed so that other walls are far."""
+    along = samples.tangent[rows, :2] / np.linalg.norm(samples.tangent[rows, :2], axis=1)[:, None]
+    outward = np.stack([-along[:, 1], along[:, 0]], axis=1) * np.where(sides == 0, 1.0, -1.0)[:, None]
+    foot = samples.position[rows, :2] + radii_of(cutters, samples.tool[rows])[:, None] * outward
+    return np.concatenate([foot, ALIKE * step * outward], axis=1)

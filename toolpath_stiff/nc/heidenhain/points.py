@@ -1,0 +1,91 @@
+"""Points and feeds that the words of a plain statement name: axis words and their steps, polar words, F. mm, degrees.
+
+HEIDENHAIN, user's manual of the iTNC 530, "Fundamentals of positioning", "Polar coordinates", "Feed rate F".
+"""
+
+import cmath
+import math
+
+from toolpath_stiff.nc.codes.feeds import SLOWEST
+from toolpath_stiff.nc.geometry import PLANES
+from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.words import AXES
+from toolpath_stiff.units import MM_PER_INCH
+
+WORDS_OF_AXES = {f"{step}{letter}": axis for axis, letter in enumerate(AXES) for step in ("", "I")}
+ROTARY = "A, B, C are roll, pitch and yaw of the platform: where they are another machine's axes, [kinematics] says so"
+ON_CIRCLE_MM = 0.016  # how far an end may lie off its circle (user's manual, "Circular path C")
+
+
+def present(state: State) -> list[float]:
+    """The programmed point in program axes: of an element that waits the end, of an APPR the contour point."""
+    frames, plain = state.frames, state.plain
+    point = frames.position, frames.g92, frames.linear
+    if any(kept is not part for kept, part in zip(plain.kept[0], point, strict=True)):
+        plain.kept = point, frames.to_program(frames.position)
+    here = list(plain.kept[1])
+    if plain.held is not None:
+        first, second, _ = PLANES[state.plane]
+        here[first], here[second] = plain.held[1][1].real, plain.held[1][1].imag
+    elif plain.approach is not None:
+        here = [plain.approach[0].get(axis, value) for axis, value in enumerate(here)]
+    return here
+
+
+def in_plane(state: State, point: list[float]) -> complex:
+    """A point's two coordinates of the plane."""
+    first, second, _ = PLANES[state.plane]
+    return complex(point[first], point[second])
+
+
+def named(state: State, block: CurrentBlock) -> dict[int, float]:
+    """Axis -> coordinate of the axis words, steps added to the present point; they then count as used."""
+    words = block.free & WORDS_OF_AXES.keys()
+    here, there = present(state), dict[int, float]()
+    for letter in sorted(words):
+        axis, value = WORDS_OF_AXES[letter], block.values[letter].value
+        value = value * state.length_scale if axis < 3 else value
+        block.refuse_if(axis in there, letter, "and its step are both given", "one of them")
+        there[axis] = here[axis] + value if letter[0] == "I" else value
+        if axis > 2 and value and state.frames.posted is None and state.plain.tilt is None:
+            state.assume(ROTARY)
+        if letter[0] != "I" and axis > 2 and state.plain.shorter:  # M126
+            there[axis] = here[axis] + math.remainder(value - here[axis], 360.0)
+    block.free -= words
+    return there
+
+
+def polar(state: State, block: CurrentBlock) -> dict[int, float]:
+    """Axis -> coordinate of PR and PA about the pole, and of the other axis words."""
+    if state.plain.pole is None:
+        raise block.fail(None, "without a pole, or after a change of the coordinates", "CC before it")
+    pole = complex(*state.plain.pole)
+    here = in_plane(state, present(state)) - pole
+    radius, step = block.take("PR"), block.take("IPR")
+    angle, turn = block.take("PA"), block.take("IPA")
+    size = abs(here) if radius is None else radius * state.length_scale
+    size += (step or 0.0) * state.length_scale
+    lost = abs(here) < ON_CIRCLE_MM and angle is None
+    block.refuse_if(lost, None, "takes the polar angle of the pole itself", "PA")
+    heading = (math.degrees(cmath.phase(here)) if angle is None else angle) + (turn or 0.0)
+    place = pole + cmath.rect(size, math.radians(heading))
+    first, second, _ = PLANES[state.plane]
+    return named(state, block) | {first: place.real, second: place.imag}
+
+
+def feed(state: State, block: CurrentBlock) -> bool:
+    """Take F; whether it is FMAX, which holds for its statement alone."""
+    value, rapid = block.take("F"), "FMAX" in block.values
+    block.take("FMAX")
+    if value is not None:
+        state.feed = value * inch_tenths(state)
+        block.refuse_if(not state.feed >= SLOWEST, "F", "is no feed that moves", "F above 0")
+    if block.take("FAUTO") is not None:
+        block.refuse_if(state.plain.tool_feed is None, "FAUTO", "without F in TOOL CALL", "F with a number")
+        state.feed = state.plain.tool_feed
+    return rapid
+
+
+def inch_tenths(state: State) -> float:
+    """mm/min of F 1: in inch programs a tenth of an inch a minute (user's manual, "Feed rate F")."""
+    return MM_PER_INCH / 10.0 if state.inch else 1.0
