@@ -239,8 +239,8 @@ class Compensation(Result):
         """The JSON document of the command."""
         names = ("turns", "contraction", "course_error_um", "notes")
         rows = [dict(zip(self.lines, row, strict=True)) for row in zip(*self.lines.values(), strict=True)]
-        own = {"program": self.rewritten.name, "changed": self.changed, "walls": self.walls, "lines": rows}
-        return dict(certain(without_nan(to_dict(own | {name: getattr(self, name) for name in names}))))
+        document = {"program": self.rewritten.name, "changed": self.changed, "walls": self.walls, "lines": rows}
+        return dict(certain(without_nan(to_dict(document | {name: getattr(self, name) for name in names}))))
 
     def to_frame(self) -> pd.DataFrame:
         """A row a line and side, as `lines`."""
@@ -340,10 +340,10 @@ def _spoilt(before: Walls, after: Walls, moves: Moves) -> set[int]:
     A move is a wall; moves shorter than `SHORT` that follow each other, as chords do, are one together.
     """
     short = move_lengths(moves) < SHORT
-    wall = np.cumsum(~(short & np.roll(short, 1)))
+    wall = np.cumsum(np.where(short & np.roll(short, 1), 0, 1))
     was, now = (figures_of_walls(replace(walls, row=wall[walls.row]), int(wall[-1]) + 1) for walls in (before, after))
     grown = [now[name] - np.where(was["length"] > 0.0, was[name], np.nanmax(was[name])) for name in ("size", "rms")]
-    worse = (np.fmax(*grown) > SAME).any(axis=1)
+    worse = np.asarray((np.fmax(*grown) > SAME).any(axis=1))
     return set(np.unique(before.row[worse[wall[before.row]]]).tolist())
 
 
