@@ -1,7 +1,5 @@
 """Doubts about the data: whether they are of this machine at all, and whether a stated noise fits what they leave."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from toolpath_stiff.inference.discrepancies import discrepancy_forms

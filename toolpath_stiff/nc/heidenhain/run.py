@@ -17,7 +17,7 @@ from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, assigned, condi
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
 from toolpath_stiff.nc.heidenhain.plain_statements import EMPTY, as_g_code, corner_follows
 from toolpath_stiff.nc.heidenhain.points import WORDS_OF_AXES
-from toolpath_stiff.nc.heidenhain.statements import Statement, labels, read_statement
+from toolpath_stiff.nc.heidenhain.statements import PlainStatement, labels, read_statement
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up, meaning_of, refusal_of
 from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Remark
@@ -49,7 +49,7 @@ class HeidenhainRun(ProgramRun):
         self.folder = request.controller.subprograms
         self._lex()
         self._main_lines = len(self.lines)
-        self._statements: dict[int, Statement] = {}
+        self._statements: dict[int, PlainStatement] = {}
         self._labels: dict[int, dict[str, list[int]]] = {}  # by the first line of their program
         self._files: list[tuple[int, int, str]] = []  # first line, line after the last, name
         self._returns: list[tuple[int, int]] = []  # of calls: the line after, and the label's line (-1: a program)
@@ -95,7 +95,7 @@ class HeidenhainRun(ProgramRun):
         """What a statement, or an M function, is taken for."""
         return meaning_of(code)
 
-    def _statement(self, row: int) -> Statement:
+    def _statement(self, row: int) -> PlainStatement:
         if row not in self._statements:
             self._statements[row] = read_statement(self.lines, row, self.name)
         return self._statements[row]
@@ -116,7 +116,7 @@ class HeidenhainRun(ProgramRun):
                 error.file, error.line, _ = self._place(row)
             raise
 
-    def _carried_out(self, row: int, statement: Statement) -> int:
+    def _carried_out(self, row: int, statement: PlainStatement) -> int:
         if not statement.head or (statement.optional and 1 in self.switches):
             return statement.after
         if self.tally is not None:
@@ -135,7 +135,7 @@ class HeidenhainRun(ProgramRun):
         self._plain = None if waits else self._lexer
         return after
 
-    def _count(self, statement: Statement) -> None:
+    def _count(self, statement: PlainStatement) -> None:
         assert self.tally is not None
         name = statement.head if look_up(statement.head) is None or statement.head[0] != "Q" else "Q"
         ms = [word for word in statement.words if word[0][0] == "M" and word[0][1:].isdigit()]
@@ -144,7 +144,7 @@ class HeidenhainRun(ProgramRun):
                 self.tally.first.setdefault(code, (statement.line, column))
                 self.tally.count[code] += 1
 
-    def _acted(self, row: int, statement: Statement) -> int:
+    def _acted(self, row: int, statement: PlainStatement) -> int:
         head, code = statement.head, look_up(statement.head)
         if code is None:
             problem, hint = refusal_of(head)
@@ -177,7 +177,7 @@ class HeidenhainRun(ProgramRun):
         flow = self._flow(row, statement)
         return len(self.lines) if block.flow is Flow.END or flow is None else flow
 
-    def _block_of(self, row: int, statement: Statement) -> CurrentBlock:
+    def _block_of(self, row: int, statement: PlainStatement) -> CurrentBlock:
         """The statement with the numbers of its words."""
         words = statement.block(lambda *word: self._word_value(row, *word))
         calls = [back for back, label in self._returns if label < 0]  # the first is of the main program
@@ -220,7 +220,7 @@ class HeidenhainRun(ProgramRun):
     def _assign(self, row: int, name: str, value: float) -> None:
         (self._locals[-1] if name.startswith("QL") else self.state.plain.parameters)[name] = value
 
-    def _flow(self, row: int, statement: Statement) -> int | None:
+    def _flow(self, row: int, statement: PlainStatement) -> int | None:
         """Where the run goes on after a statement, whose parameters and jumps are carried out; None: nowhere."""
         head, rest, after = statement.head, statement.rest, statement.after
         if head.startswith("CYCL DEF 2") and "." not in head:
@@ -277,12 +277,12 @@ class HeidenhainRun(ProgramRun):
     def _program_of(self, row: int) -> int:
         return next((first for first, stop, _ in self._files if first <= row < stop), 0)
 
-    def _end_of_subprogram(self, row: int, statement: Statement) -> int:
+    def _end_of_subprogram(self, row: int, statement: PlainStatement) -> int:
         if not re.match(r"\s*0+\s*$", statement.rest) or not self._returns or self._returns[-1][1] < 0:
             return statement.after
         return self._jump(row, self._returns.pop()[0])
 
-    def _call(self, row: int, statement: Statement) -> int:
+    def _call(self, row: int, statement: PlainStatement) -> int:
         called = CALLED.match(statement.rest)
         if called is None:
             raise self._fail(
@@ -311,7 +311,7 @@ class HeidenhainRun(ProgramRun):
         if label < 0:  # QL parameters belong to a program
             self._locals.append({})
 
-    def _program(self, row: int, statement: Statement) -> int:
+    def _program(self, row: int, statement: PlainStatement) -> int:
         """Read the file of a program that is called, unless it is there; its lines follow those that are read."""
         name = Path(statement.rest.strip().strip('"').replace("\\", "/")).name
         stem = name.removesuffix(".H")

@@ -44,7 +44,7 @@ _OTHERWISE = re.compile(
 
 
 @dataclass(frozen=True)
-class Statement:
+class PlainStatement:
     """A statement: its head, the words (key, value as written, column, text), its rest as text, and the line after it.
 
     A word of no value has "" as one; of a bare axis letter the key is "X!", of a bare number "#", of a name `"`.
@@ -83,14 +83,14 @@ def labels(lines: Sequence[str], first: int, stop: int) -> dict[str, list[int]]:
     return places
 
 
-def read_statement(lines: Sequence[str], row: int, name: str) -> Statement:
+def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
     """The statement that begins in a line (from 0), with what continues it. Raises `InputError`."""
     text, after, place = code_text(lines[row]), row + 1, Place(name, row + 1)
     begin = _BEGIN.match(text)
     assert begin is not None
     head = _HEAD.match(text, begin.end())
     if begin.end() == len(text) or text[begin.end()] in "*(":
-        return Statement(row + 1, "", 1, (), "", False, after)
+        return PlainStatement(row + 1, "", 1, (), "", False, after)
     if head is None:
         raise place.fail(
             f"{text[begin.end() :][:20]!r} is no statement", "Heidenhain's plain language", "", begin.end() + 1
@@ -109,7 +109,7 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> Statement:
     special = _SPECIAL[shown].search(text, end) if shown in _SPECIAL else None
     if special is not None:  # a unit, or a time behind its name in the control's language
         words = [(special[1] or "#", (special[2] or "").replace(",", "."), special.start() + 1, special[0].strip())]
-    return Statement(row + 1, shown, head.start() + 1, tuple(words), rest, optional, after)
+    return PlainStatement(row + 1, shown, head.start() + 1, tuple(words), rest, optional, after)
 
 
 def _words(text: str, position: int, place: Place, head: str) -> list[tuple[str, str, int, str]]:
