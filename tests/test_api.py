@@ -140,7 +140,7 @@ def test_path_is_its_function(here, capsys):
     assert main(["path", "slot.nc", "--step", "5", "--csv"]) == 0
     found = tps.sample_path("slot.nc", step_mm=5)
     assert capsys.readouterr().out == str(found)
-    assert list(found.to_dict())[-1] == "feed_mm_per_min"
+    assert list(found.to_dict())[-2:] == ["feed_mm_per_min", "spindle_rpm"]
 
 
 def test_a_saved_folder_is_the_command_s(here):

@@ -236,3 +236,19 @@ def test_no_cut_is_an_error():
 def test_every_word_is_in_the_table_once_with_its_meaning_and_source():
     assert all(word.meaning and word.source for word in WORDS.values())
     assert len(WORDS) == len(TABLE)
+
+
+@pytest.mark.parametrize(
+    ("words", "per_minute"),
+    [
+        ("SPINDL/RPM,2000,CLW", 2000),
+        ("SPINDL/2000,CCLW", -2000),
+        ("SPINDL/2000,CCLW\nSPINDL/OFF\nSPINDL/ON", -2000),
+        ("SPINDL/2000\nSPINDL/OFF", 0),
+        ("SPINDL/SMM,120", math.nan),
+        ("", 0),
+    ],
+)
+def test_the_spindle_turns_as_the_file_says(words, per_minute):
+    moves = read(f"{START}{words}\nGOTO/0,0,0\nGOTO/1,0,0\n").moves
+    np.testing.assert_allclose(moves.spindle, per_minute * np.pi / 30.0)

@@ -1,11 +1,11 @@
 """Forces on a cutter from where it touches the stock: at an angle of the spindle, their mean and peak over a turn.
 
-All is linear in the six coefficients (tangential, radial, axial; of the chip and of the edge): `responses` are forces
-per coefficient. Along the cylinder of a cutter the integral over the height is one over the angle, as a flute lags by
-tan(helix) / R, and has a closed antiderivative (`chips`); round a corner radius or a ball it is taken by Gauss's rule
-(`torus`). Altintas, Manufacturing Automation, 2nd ed., chapter 2; Budak, Altintas, Armarego, Journal of Manufacturing
-Science and Engineering 118 (1996) 216; Engin, Altintas, International Journal of Machine Tools and Manufacture 41
-(2001) 2195.
+All is linear in the six coefficients (tangential, radial, axial; of the chip and of the edge): with `EACH` as sets of
+values forces come per coefficient. Along the cylinder of a cutter the integral over the height is one over the angle,
+as a flute lags by tan(helix) / R, and has a closed antiderivative (`chips`); round a corner radius or a ball it is
+taken by Gauss's rule (`torus`). Altintas, Manufacturing Automation, 2nd ed., chapter 2; Budak, Altintas, Armarego,
+Journal of Manufacturing Science and Engineering 118 (1996) 216; Engin, Altintas, International Journal of Machine
+Tools and Manufacture 41 (2001) 2195.
 
 Frame: x along the horizontal feed, y to its left, z along the tool, up. Angles count clockwise seen from above from the
 left of the feed. Forces act on the tool. A spindle that turns the other way (M4) is the mirror image across the feed;
@@ -49,7 +49,7 @@ def mean_force(
     """
     force, values = np.zeros((len(feed), 3)), coefficients.values[:, None]
     for block, part in blocks(patches, cutter, len(feed)):
-        mean = _mean(part, cutter, feed[block], turning[block], coefficients.taper, values)
+        mean = mean_forces_of_sets(part, cutter, feed[block], turning[block], coefficients.taper, values)
         force[block] = _sideways(mean, turning[block])
     return force
 
@@ -88,7 +88,9 @@ def force_at(
     With a spindle that turns counter-clockwise the angles count counter-clockwise from the right of the feed.
     """
     values = coefficients.values[:, None]
-    return _sideways(_at(patches, cutter, feed, turning, angle, coefficients.taper, values), turning[:, None])
+    return _sideways(
+        forces_of_sets(patches, cutter, feed, turning, angle, coefficients.taper, values), turning[:, None]
+    )
 
 
 def _sideways(force: FloatArray, turning: FloatArray) -> FloatArray:
@@ -97,19 +99,7 @@ def _sideways(force: FloatArray, turning: FloatArray) -> FloatArray:
     return force[..., 0]
 
 
-def responses(
-    patches: Patches, cutter: Cutter, feed: FloatArray, turning: FloatArray, angle: FloatArray, taper: float
-) -> FloatArray:
-    """(n, a, 3, 6) forces per coefficient at angles (n, a) of flute 0; mirrored where the spindle turns so."""
-    return _at(patches, cutter, feed, turning, angle, taper, EACH)
-
-
-def mean_responses(patches: Patches, cutter: Cutter, feed: FloatArray, turning: FloatArray, taper: float) -> FloatArray:
-    """(n, 3, 6) mean forces over a turn per coefficient; mirrored as `responses`."""
-    return _mean(patches, cutter, feed, turning, taper, EACH)
-
-
-def _at(
+def forces_of_sets(
     patches: Patches,
     cutter: Cutter,
     feed: FloatArray,
@@ -118,7 +108,10 @@ def _at(
     taper: float,
     values: FloatArray,
 ) -> FloatArray:
-    """(n, a, 3, k) forces of k sets of coefficients, values (6, k)."""
+    """(n, a, 3, k) forces at angles (n, a) of k sets of coefficients, values (6, k).
+
+    Mirrored across the feed where the spindle turns counter-clockwise.
+    """
     patches, lag = _seen_clockwise(patches, cutter, feed, turning)
     force = _cylinder_forces(patches, cutter, feed, lag, angle, taper, values)
     if cutter.corner_radius:
@@ -126,10 +119,10 @@ def _at(
     return force
 
 
-def _mean(
+def mean_forces_of_sets(
     patches: Patches, cutter: Cutter, feed: FloatArray, turning: FloatArray, taper: float, values: FloatArray
 ) -> FloatArray:
-    """(n, 3, k) mean forces of k sets of coefficients, values (6, k)."""
+    """(n, 3, k) mean forces over a turn of k sets of coefficients, values (6, k); mirrored as `forces_of_sets`."""
     patches, lag = _seen_clockwise(patches, cutter, feed, turning)
     straight = _above(patches, cutter.corner_radius)
     rows, arcs = straight.station, np.stack([straight.entry, straight.exit], axis=1)

@@ -1,7 +1,7 @@
 """Coefficients of the cutting force from mean forces of slots at several feeds, by least squares.
 
-Mean forces are linear in the coefficients (`forces.mean_responses`; for a flat end mill the straight lines over the
-feed of Altintas, Manufacturing Automation, 2nd ed., section 2.8.1). Each direction of force has a scatter of its own.
+Mean forces are linear in the coefficients (`forces.mean_forces_of_sets`; of a flat end mill the straight lines over
+the feed of Altintas, Manufacturing Automation, 2nd ed., section 2.8.1). Each direction of force has its own scatter.
 """
 
 from dataclasses import replace
@@ -11,7 +11,7 @@ import numpy as np
 from toolpath_stiff.arrays import BoolArray, FloatArray, product
 from toolpath_stiff.cutting.coefficients import TAPER, UNKNOWN
 from toolpath_stiff.cutting.cutters import Cutter
-from toolpath_stiff.cutting.forces import mean_responses
+from toolpath_stiff.cutting.forces import EACH, mean_forces_of_sets
 from toolpath_stiff.cutting.patches import Patches
 from toolpath_stiff.errors import MeasurementError
 
@@ -35,7 +35,7 @@ def slot_responses(cutter: Cutter, feed: FloatArray, depth: FloatArray, angle: F
     angles = np.full(len(feed), cutter.run_out_angle) if angle is None else angle
     return np.concatenate(
         [
-            mean_responses(slot_patches(row[None]), replace(cutter, run_out_angle=to), fed, ONE, TAPER)
+            mean_forces_of_sets(slot_patches(row[None]), replace(cutter, run_out_angle=to), fed, ONE, TAPER, EACH)
             for row, fed, to in zip(depth, across, angles.tolist(), strict=True)
         ]
     )
@@ -58,15 +58,15 @@ def least_squares(response: FloatArray, force: FloatArray) -> tuple[FloatArray, 
     """
     recorded = np.isfinite(force).all(axis=0)
     design = response[:, recorded]
-    told = np.abs(design).max(axis=(0, 1)) > 0.0
-    design, measured = design[..., told], force[:, recorded]
+    determined = np.abs(design).max(axis=(0, 1)) > 0.0
+    design, measured = design[..., determined], force[:, recorded]
     freedom = len(force) - 2  # a straight line each
     deviation = np.ones(measured.shape[1])
     size = np.sqrt((design**2).sum(axis=(0, 1)))  # of columns: N per N/m2 beside N per N/m
     for _ in range(2):  # the first fit gives the scatter of each direction, the second weighs by it
-        rows = (design / size / deviation[:, None]).reshape(-1, told.sum())
+        rows = (design / size / deviation[:, None]).reshape(-1, determined.sum())
         solved, _, rank, _ = np.linalg.lstsq(rows, (measured / deviation).ravel(), rcond=1e-12)
-        if rank < told.sum() or freedom < 1:
+        if rank < determined.sum() or freedom < 1:
             raise MeasurementError(
                 "these slots do not tell the coefficients apart",
                 expected="slots at 3 different feeds or more, forces along x, y and, of a corner radius, z",
@@ -76,12 +76,12 @@ def least_squares(response: FloatArray, force: FloatArray) -> tuple[FloatArray, 
         deviation = np.sqrt((residual**2).sum(axis=0) / freedom)
         deviation = np.maximum(deviation, LEAST_SCATTER * np.abs(measured).max())
     coefficients, covariance = np.zeros(6), np.zeros((6, 6))
-    coefficients[told] = values
-    rows = (design / size / deviation[:, None]).reshape(-1, told.sum())
-    covariance[np.ix_(told, told)] = np.linalg.inv(rows.T @ rows) / size / size[:, None]
+    coefficients[determined] = values
+    rows = (design / size / deviation[:, None]).reshape(-1, determined.sum())
+    covariance[np.ix_(determined, determined)] = np.linalg.inv(rows.T @ rows) / size / size[:, None]
     unknown = np.repeat(coefficients[[0, 3]] * UNKNOWN, 3)
-    covariance[np.diag_indices(6)] += np.where(told, 0.0, unknown) ** 2
-    return coefficients, covariance, told
+    covariance[np.diag_indices(6)] += np.where(determined, 0.0, unknown) ** 2
+    return coefficients, covariance, determined
 
 
 def left_out(response: FloatArray, force: FloatArray, feed: FloatArray) -> FloatArray:

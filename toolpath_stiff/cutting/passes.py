@@ -1,8 +1,8 @@
 """Walls that several passes make: at each height stays what the deepest of them leaves.
 
 The second level of a pocket passes the wall of the first along all of its height. Where the first left material, the
-second takes it off as far as it stands aside itself; where the first cut too deep, nothing puts it back. So the error of
-a wall is the least of those of all passes that come as close to the part; the last one owns it.
+second takes it off as far as it stands aside itself; where the first cut too deep, nothing puts it back. So the error
+of a wall is the least of those of all passes that come as close to the part; the last one owns it.
 """
 
 from collections.abc import Mapping
@@ -34,7 +34,7 @@ def walls_of_all_passes(
     samples, cutters, step
         In the set-up frame, at most `step` (m) apart.
     made, own
-        (n, 2, 2) m above the tip: walls that a pass makes, whether or not a later one comes as close; those that it owns.
+        (n, 2, 2) m above the tip: walls that a pass makes, even if a later one comes as close; those that it owns.
     profiles
         (n, 2, HEIGHTS) m, errors of what each pass makes, from its lower to its upper end.
     """

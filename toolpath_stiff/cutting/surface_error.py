@@ -19,7 +19,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, product
 from toolpath_stiff.cutting.chips import flute_radii
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
-from toolpath_stiff.cutting.forces import TURN, blocks, lag_per_height, responses
+from toolpath_stiff.cutting.forces import EACH, TURN, blocks, forces_of_sets, lag_per_height
 from toolpath_stiff.cutting.patches import Patches
 
 HEIGHTS = 9  # of a wall at which its error is computed, both ends among them
@@ -144,7 +144,7 @@ def _tip_angle(cutter: Cutter, angle: FloatArray, height: FloatArray, turning: F
 
 
 def _pull(normal: FloatArray, compliance: FloatArray, turning: FloatArray) -> FloatArray:
-    """(n, h, 3) m/N of error per force as `forces.responses` counts, by normals (n, h, 3)."""
+    """(n, h, 3) m/N of error per force as `forces.forces_of_sets` counts, by normals (n, h, 3)."""
     pull = product(normal, compliance)
     pull[..., 1] *= turning[:, None]
     return pull
@@ -166,7 +166,7 @@ def _errors(
         passes: list[Passes] = []
         for flute, short in enumerate(radii.max() - radii):
             angle = tip[block] + TURN * flute / cutter.flutes
-            response = responses(part, cutter, feed[block], turning[block], angle, coefficients.taper)
+            response = forces_of_sets(part, cutter, feed[block], turning[block], angle, coefficients.taper, EACH)
             slope = product(pull[block][..., None, :], response)[..., 0, :]
             force = product(response, coefficients.values[:, None])[..., 0]
             passes.append(((pull[block] * force).sum(axis=-1) + short, slope, force))

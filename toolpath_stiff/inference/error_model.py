@@ -16,6 +16,7 @@ scatter, not for the stiffness under it.
 """
 
 from collections.abc import Iterator, Sequence
+from math import erfc
 
 import numpy as np
 
@@ -38,7 +39,7 @@ FEWEST_PLACES, HALVINGS = 8, 2  # poses to be told from each other; regions are 
 MOST_READINGS = 400  # spread over the campaign, from which the sizes are read
 MOST_DIRECTIONS, FORM_IN_AXES = 12, 0.01  # along which a region's errors may be other than scatter; by what form
 TAILS = 4.0  # degrees of freedom of the expected scatter
-ROUNDING = 1e-12
+ROUNDING, BISECTIONS = 1e-12, 25
 
 
 def error_model(fit: Fit, data: Readings, noise: Noise) -> ErrorModel | None:
@@ -148,12 +149,10 @@ def _root(covariance: FloatArray) -> FloatArray:
 
 def _coverage_factor(weights: FloatArray, variances: FloatArray) -> float:
     """Factor on the root of the mean variance at which 95 % of a mixture of normal errors lie within 1.96 of it."""
-    from scipy.optimize import brentq
-    from scipy.special import ndtr
-
     sd, mean = np.sqrt(variances), float(np.sqrt(weights @ variances))
-
-    def outside(factor: float) -> float:
-        return float(weights @ (2.0 * ndtr(-factor * NORMAL_95 * mean / sd))) - 0.05
-
-    return float(brentq(outside, 0.5, 3.0, xtol=1e-6))
+    likely, low, high = weights > weights.max() * ROUNDING, 0.5, 3.0
+    for _ in range(BISECTIONS):
+        factor = 0.5 * (low + high)
+        outside = [erfc(factor * NORMAL_95 * mean / (x * 2.0**0.5)) for x in sd[likely].tolist()]
+        low, high = (factor, high) if weights[likely] @ outside > 0.05 else (low, factor)
+    return factor

@@ -29,9 +29,9 @@ LARGEST_RATIO, ZOOMS = 5.0, 6  # of clamping to repeat noise; ever finer grids o
 # Standard deviations as which a larger deviation counts: how far off the wildest is tells nothing of the others.
 FARTHEST = 1.5 * OUTLIER_WIDTH
 ALIKE = ("position", "angles", "direction", "force", "tool_extension", "setup", "loop")  # columns of repeats
-# Chance at which scatters that are the same would be told apart, by axis and by set-up: were their logarithms normal,
-# which those of a few differences are not; of 60 small sound campaigns 0.001 told one apart.
-DIFFERENT = 1e-4
+# Normal deviate, of 0.01 %, at which scatters that are the same would be told apart by axis or by set-up: were their
+# logarithms normal, which those of a few differences are not; of 60 small sound campaigns 0.1 % told one apart.
+DIFFERENT = 3.719
 WILD = 3.0  # standard deviations beyond which a difference between repeats is set aside
 
 
@@ -122,8 +122,6 @@ def scatter_apart(data: Readings, every: Repeats) -> tuple[float | FloatArray, f
     Beyond chance: the logarithms of their scatters differ by more than their degrees of freedom allow (chi-squared,
     `DIFFERENT`). Readings of one clamping along different axes share no more scatter than the quietest axis has.
     """
-    from scipy.special import chdtrc
-
     main = np.abs(data.direction).argmax(axis=1)
     for kind, labels in (("along", np.array([*"XYZ"])[main]), ("in set-up", data.setup)):
         names, which = np.unique(labels, return_inverse=True)
@@ -132,7 +130,10 @@ def scatter_apart(data: Readings, every: Repeats) -> tuple[float | FloatArray, f
         if len(known) < max(len(parts), 2):
             continue
         logs, weights = np.log([part.total for part in known]), 2.0 * np.array([part.freedom for part in known])
-        if chdtrc(len(known) - 1, float(weights @ (logs - np.average(logs, weights=weights)) ** 2)) > DIFFERENT:
+        squares, freedom = weights @ (logs - np.average(logs, weights=weights)) ** 2, len(known) - 1
+        # Quantile of chi-squared by its cube root (Wilson and Hilferty 1931, PNAS 17, 684).
+        third = 2.0 / (9.0 * freedom)
+        if squares < freedom * (1.0 - third + DIFFERENT * np.sqrt(third)) ** 3:
             continue
         total = np.exp(logs)
         clamping = np.array([part.clamping for part in known])

@@ -54,9 +54,9 @@ def read_records(
             odd = (column[rows] != column[rows[0]]) | (column[rows] <= 0.0)
             if odd.any():
                 row = int(rows[np.argmax(odd)])
-                found, line = f"{setting} = {column[row]:g}", int(lines[row])
+                mistake, line = f"{setting} = {column[row]:g}", int(lines[row])
                 expected = f"above 0 and the same in all rows of a record, {column[rows[0]]:g}"
-                raise MeasurementError(found, expected=expected, file=file, line=line)
+                raise MeasurementError(mistake, expected=expected, file=file, line=line)
         back = np.diff(signal[rows, 0]) <= 0.0
         if back.any():
             line = int(lines[rows[1 + np.argmax(back)]])
@@ -113,8 +113,8 @@ def mean_force(
     remarks = []
     heard = _heard_rate(time, known, rate, cutter.flutes)
     if abs(heard / rate - 1.0) > 0.01:
-        turning, said = (f"{s_from_min(1.0) * value:.0f}" for value in (heard, rate))
-        remarks.append(f"{name}: the teeth pass at {turning} turns a minute, not at {said}")
+        heard_speed, stated = (f"{s_from_min(1.0) * value:.0f}" for value in (heard, rate))
+        remarks.append(f"{name}: the teeth pass at {heard_speed} turns a minute, not at {stated}")
     turn = np.floor(time * heard).astype(int)
     cutting, air = _cut_and_air(turn, known, int(np.ceil(cutter.radius / (feed * cutter.flutes))))
     if len(cutting) < LEAST_TURNS:

@@ -37,7 +37,7 @@ class CoefficientFit(FolderResult):
     ----------
     coefficients
         With their covariance.
-    told
+    determined
         (6,) those that the records tell.
     cutter
         That cut the slots, with the run-out that they tell.
@@ -60,7 +60,7 @@ class CoefficientFit(FolderResult):
     shown_by: ClassVar[str] = "forces"
 
     coefficients: Coefficients
-    told: BoolArray
+    determined: BoolArray
     cutter: Cutter
     records: tuple[str, ...]
     feed: FloatArray
@@ -86,7 +86,7 @@ class CoefficientFit(FolderResult):
         sentences = [
             f"other feeds per tooth than {low:.4g} to {high:.4g} um: thinner chips, as in finishing, are extrapolated"
         ]
-        unknown = [symbol for symbol, known in zip(SYMBOLS, self.told, strict=True) if not known]
+        unknown = [symbol for symbol, known in zip(SYMBOLS, self.determined, strict=True) if not known]
         if unknown:
             sentences.append(f"{', '.join(unknown)}: no such force was recorded; 0 with a wide deviation is assumed")
         feeds = len(np.unique(self.feed))
@@ -101,7 +101,7 @@ class CoefficientFit(FolderResult):
         return sentences
 
     def to_dict(self) -> Document:
-        """Coefficients as a setup file takes them, with their intervals; one entry a record; what is not told."""
+        """Coefficients as a setup file takes them, with their intervals; one entry a record; what is not determined."""
         columns, values = self.columns(), self.coefficients.values * SHOWN
         deviation = self.coefficients.deviation * SHOWN * self.reach
         document = {
@@ -181,7 +181,7 @@ def fit_coefficients(
     for _ in range(ROUNDS):  # with run-out some teeth cut less, which bends the lines a little
         cutter = replace(cutter, run_out=float(np.median(run_out)), run_out_angle=float(angle[0]))
         response = slot_responses(cutter, feed, depth, angle)
-        values, covariance, told = least_squares(response, force)
+        values, covariance, determined = least_squares(response, force)
         if cutter.flutes > 1 and values[0] > 0.0:
             known = Coefficients(values[:3], values[3:], covariance)
             slots = zip(waves, feed, depth, strict=True)
@@ -198,9 +198,8 @@ def fit_coefficients(
     )
     fitted = np.where(np.isnan(force), np.nan, product(response, values[:, None])[..., 0])
     off = left_out(response, force, feed)
-    return CoefficientFit(
-        coefficients, told, cutter, tuple(records), feed, depth, force, fitted, off, run_out, tuple(notes), tuple(files)
-    )
+    columns_of_slots = (tuple(records), feed, depth, force, fitted, off, run_out)
+    return CoefficientFit(coefficients, determined, cutter, *columns_of_slots, tuple(notes), tuple(files))
 
 
 def _rotation(axes: str) -> list[tuple[int, float]]:

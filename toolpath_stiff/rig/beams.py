@@ -30,9 +30,9 @@ def square(side: float) -> Section:
 
 def bending(stiffness: FloatArray, length: FloatArray, soft: FloatArray) -> FloatArray:
     """(..., 4, 4) of displacement and slope at both ends; EI in N m^2, `soft` 12 EI / (G A_s L^2)."""
-    one, half = np.ones_like(length), length / 2.0
-    pushed = np.stack([one, half, -one, half], axis=-1)  # the shear force 12 EI / L^3 per unit of displacement
-    turned = np.stack([0.0 * one, one, 0.0 * one, -one], axis=-1)  # pure bending, EI / L
+    unit, half = np.ones_like(length), length / 2.0
+    pushed = np.stack([unit, half, -unit, half], axis=-1)  # the shear force 12 EI / L^3 per unit of displacement
+    turned = np.stack([0.0 * unit, unit, 0.0 * unit, -unit], axis=-1)  # pure bending, EI / L
     shear = 12.0 * stiffness / (length**3 * (1.0 + soft))
     first = shear[..., None, None] * pushed[..., :, None] * pushed[..., None, :]
     return np.asarray(first + (stiffness / length)[..., None, None] * turned[..., :, None] * turned[..., None, :])
@@ -53,8 +53,8 @@ def spread(along: FloatArray, axial: FloatArray, torsion: FloatArray, bent: Floa
     total = np.zeros((*along.shape[:-1], 12, 12))
     for i, left in enumerate(parts):
         for j, right in enumerate(parts):
-            sum_ = np.swapaxes(left, -1, -2) @ right
-            total[..., 3 * i : 3 * i + 3, 3 * j : 3 * j + 3] = bent[..., i, j, None, None] * sum_
+            turned = np.swapaxes(left, -1, -2) @ right
+            total[..., 3 * i : 3 * i + 3, 3 * j : 3 * j + 3] = bent[..., i, j, None, None] * turned
     for first, spring in ((0, axial), (3, torsion)):
         for i, j, sign in ((0, 0, 1.0), (0, 6, -1.0), (6, 0, -1.0), (6, 6, 1.0)):
             rows, columns = slice(first + i, first + i + 3), slice(first + j, first + j + 3)

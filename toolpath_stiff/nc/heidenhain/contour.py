@@ -283,7 +283,8 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     """Carry out the element that waited, shortened, and its corner; the tool then stands where the next one begins."""
     (block, held, rate), corner_block, modal = state.plain.held or (None, None, None), state.plain.corner, state.feed
     state.plain.held = state.plain.corner = None
-    assert block is not None and held is not None and corner_block is not None
+    if block is None or held is None or corner_block is None:  # in a check, after the corner's own error
+        raise after.fail(None, "follows a corner (CHF, RND) that was not read", "a corner that fits")
     first, second, _ = PLANES[state.plane]
     size, rounded = corner_block.values["size"].value, corner_block.block.words[0].text == "RND"
     after.refuse_if(rapid or there.keys() - {first, second}, None, *_NO_CORNER)

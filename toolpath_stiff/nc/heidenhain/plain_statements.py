@@ -79,7 +79,7 @@ def _followed(here: dict[str, float], axes: str) -> tuple[dict[str, float], str]
 
 def _center_words(here: dict[str, float], there: dict[str, float], center: tuple[float, float] | None) -> str:
     """I and J of an arc in the plane whose start and centre are known; "" where they are not, or do not fit."""
-    if center is None or not here.keys() >= {"X", "Y"} or here.get("Z") != there.get("Z"):
+    if center is None or not here.keys() & there.keys() >= {"X", "Y"} or here.get("Z") != there.get("Z"):
         return ""
     (x, y), start, end = center, math.dist(center, (here["X"], here["Y"])), math.dist(center, (there["X"], there["Y"]))
     fits = min(start, end) > ON_CIRCLE_MM and abs(start - end) < ON_CIRCLE_MM / 2.0
