@@ -182,10 +182,10 @@ def compare_walls(
     if not on.any():
         hint = "points are in program coordinates, mm, their normals point out of the part"
         raise MeasurementError("no measured point lies on a final wall of the program", hint=hint)
-    at = nearest[on]
-    rows, sides = station[at], side[at]
+    chosen = nearest[on]
+    rows, sides = station[chosen], side[chosen]
     return WallComparison(
-        line=samples.line[at],
+        line=samples.line[chosen],
         side=sides,
         measured=np.where(np.isnan(deviation), off, deviation)[on],
         foretold=cut.wall_mean[rows, sides],

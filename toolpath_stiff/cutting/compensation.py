@@ -8,7 +8,7 @@ that of the cut less the shift; what varies over the height no shift removes.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 LARGEST = 1e-4  # m, and half of the width of cut: a line that would be shifted by more is left alone
 SETTLED = 2e-7  # m, largest change of a shift that is worth another turn
-MOST_TURNS = 6
+MOST_TURNS, SWINGING = 6, 0.9
 CONTRACTION = 0.3  # of a turn's change to that of the turn before; a warning beyond
 SHORT = 3e-3  # m of a move, below which it is a part of a wall
 SAME = 1e-7  # m by which the error of a wall may grow: rounding of the numbers written, and of the stock's grid
@@ -129,14 +129,14 @@ def _by_row(walls: Walls) -> Iterator[tuple[int, IntArray]]:
     yield from zip(rows.tolist(), np.split(order, first[1:]), strict=True)
 
 
-def _shifts(walls: Walls, alone: Collection[int]) -> Shifts:
-    """Shifts of moves, mm to the left, by the stations of their walls; 0 of those that are left alone."""
-    shifts, wanted = {}, mm_from_m(walls.wanted)
+def _shifts(walls: Walls, shift: FloatArray) -> dict[int, tuple[FloatArray, FloatArray]]:
+    """Shifts of moves, mm to the left, by those (n,) m of the stations of their walls."""
+    shifts, wanted = {}, mm_from_m(shift)
     for row, some in _by_row(walls):
         shares, which = np.unique(walls.share[some], return_inverse=True)
         means = np.bincount(which, wanted[some]) / np.bincount(which)
         knots = np.union1d(shares, [0.0, 1.0])
-        shifts[row] = (knots, np.interp(knots, shares, 0.0 * means if row in alone else means))
+        shifts[row] = (knots, np.interp(knots, shares, means))
     return shifts
 
 
@@ -239,8 +239,8 @@ class Compensation(Result):
         """The JSON document of the command."""
         names = ("turns", "contraction", "course_error_um", "notes")
         rows = [dict(zip(self.lines, row, strict=True)) for row in zip(*self.lines.values(), strict=True)]
-        own = {"program": self.rewritten.name, "changed": self.changed, "walls": self.walls, "lines": rows}
-        return dict(certain(without_nan(to_dict(own | {name: getattr(self, name) for name in names}))))
+        document = {"program": self.rewritten.name, "changed": self.changed, "walls": self.walls, "lines": rows}
+        return dict(certain(without_nan(to_dict(document | {name: getattr(self, name) for name in names}))))
 
     def to_frame(self) -> pd.DataFrame:
         """A row a line and side, as `lines`."""
@@ -282,24 +282,28 @@ def compensate_program(
     """
     moves = program.moves
     cut = before_cut = evaluate(program)
-    before = walls = walls_of(cut, moves, np.arange(len(moves)), moves)
+    before = walls_of(cut, moves, np.arange(len(moves)), moves)
     if not len(before.row):
         raise ProgramError("no pass makes a wall of the finished part", file=program.name)
     alone = {int(row): "a plunge, or an arc on edge" for row in np.unique(before.row[~movable_rows(moves)[before.row]])}
     alone |= _too_far(before)
     changes, turn, finals = [_quantile(before.wanted)], 0, set(before.row.tolist())
+    shifts = _shifts(before, before.wanted)
     while True:
         turn += 1
-        shifts = _shifts(walls, alone)
+        shifts |= {row: (shifts[row][0], 0.0 * shifts[row][1]) for row in alone.keys() & shifts.keys()}
         side = SideShift(moves, shifts)
         alone |= side.refused
         rewritten, row_of = shift_program(program, origin, side.courses, decimals=decimals, control=control)
         read = reread(rewritten.text)
         cut = evaluate(read)
         after = walls_of(cut, read.moves, np.array(row_of, dtype=np.int64), moves)
-        changes.append(_quantile((after.wanted - _intended(shifts, after))[~np.isin(after.row, list(alone))]))
+        change = after.wanted - _intended(shifts, after)
+        changes.append(_quantile(change[~np.isin(after.row, list(alone))]))
         if changes[-1] > SETTLED and turn < MOST_TURNS:
-            walls = after
+            # Half way where it swings. A wall that another pass has taken over for the moment keeps its shift.
+            back = 0.5 if changes[-1] > SWINGING * changes[-2] else 0.0
+            shifts |= _shifts(after, after.wanted - back * change)
             alone |= _too_far(after)
             continue
         spoilt = _spoilt(before, after, moves)
@@ -336,10 +340,10 @@ def _spoilt(before: Walls, after: Walls, moves: Moves) -> set[int]:
     A move is a wall; moves shorter than `SHORT` that follow each other, as chords do, are one together.
     """
     short = move_lengths(moves) < SHORT
-    wall = np.cumsum(~(short & np.roll(short, 1)))
+    wall = np.cumsum(np.where(short & np.roll(short, 1), 0, 1))
     was, now = (figures_of_walls(replace(walls, row=wall[walls.row]), int(wall[-1]) + 1) for walls in (before, after))
     grown = [now[name] - np.where(was["length"] > 0.0, was[name], np.nanmax(was[name])) for name in ("size", "rms")]
-    worse = (np.fmax(*grown) > SAME).any(axis=1)
+    worse = np.asarray((np.fmax(*grown) > SAME).any(axis=1))
     return set(np.unique(before.row[worse[wall[before.row]]]).tolist())
 
 
