@@ -110,7 +110,7 @@ def test_contact_along_lines_arcs_ramps_and_helices_is_that_of_simulated_discs(c
     within = np.diff(milling.samples.move, prepend=-1) == 0  # a move
     stations = np.flatnonzero((np.bincount(patches.station, minlength=len(within)) > 0) & within)
     wrong = points = 0
-    for station in stations[:: max(len(stations) // 12, 1)]:
+    for station in stations[:: max(len(stations) // 8, 1)]:
         some = patches.take(patches.station == station)
         middle = 0.5 * (some.low + some.high)
         angle = rng.uniform(0.06, np.pi - 0.06, 40 * len(middle))  # off the sides, where the last 0.1 mm cuts
@@ -122,7 +122,7 @@ def test_contact_along_lines_arcs_ramps_and_helices_is_that_of_simulated_discs(c
         inside &= (some.entry <= angle[:, None]) & (angle[:, None] <= some.exit)
         wrong += np.sum(simulated(milling, station, angle, height) != inside.any(axis=1))
         points += len(angle)
-    assert points > 800
+    assert points > 500
     assert wrong <= 0.002 * points
 
 

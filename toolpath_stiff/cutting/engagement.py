@@ -197,7 +197,7 @@ def _above(
 ) -> FloatArray:
     """M of material above points of the envelope; below 0: none there."""
     top, bottom = heights_around(work, stations, radius, angle)
-    return np.where(bottom < height, np.maximum(top - height, -1.0), -1.0)
+    return np.asarray(np.where(bottom < height, np.maximum(top - height, -1.0), -1.0))
 
 
 def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatArray:
@@ -274,7 +274,7 @@ def _ends(
 
     By halving, as a wall has no slope; in turn with the secant where surfaces are smooth.
     """
-    ends = bracket[1].copy()
+    ends: FloatArray = bracket[1].copy()
     moving = np.flatnonzero(bracket[0] != bracket[1])
     some, r, z, (a, b) = stations[moving], radius[moving], height[moving], bracket[:, moving]
     outside, within = np.full((2, len(moving)), np.nan)
@@ -292,7 +292,7 @@ def _ends(
 def _secant(outside: FloatArray, within: FloatArray) -> FloatArray:
     """Share of a bracket where a line through the values at its ends, below and above 0, crosses 0; nan: not known."""
     share = outside / (outside - within)
-    return np.where(np.isnan(share), 0.5, share)
+    return np.asarray(np.where(np.isnan(share), 0.5, share))
 
 
 def _rates(stations: AnyArray, patches: Patches) -> FloatArray:

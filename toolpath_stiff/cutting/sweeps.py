@@ -18,7 +18,7 @@ from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves
 
-SAGITTA = 2e-7  # m, of chords in place of an arc that is not level in the plane
+SAGITTA = 5e-7  # m, of chords in place of an arc that is not level in the plane
 STRAIGHT, ARC_TURN, NARROW_TURN = 4.0, 0.5 * np.pi, np.pi / 60.0  # longest pieces: radii of the cutter; rad
 
 

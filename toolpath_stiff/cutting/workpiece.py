@@ -21,7 +21,7 @@ from toolpath_stiff.cutting.sweeps import FIELDS, PIECE, heights_above, nearest,
 from toolpath_stiff.nc.moves import Moves
 
 CELL, COMPILED_CELL = 0.3, 0.12  # radii of the smallest cutter, size of a cell of the index
-MANY = 5_000  # pieces from where on it pays to import numba: half a second
+MANY = 3_000  # pieces from where on it pays to import numba: half a second
 CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
 MOST_ENTRIES = 60_000_000  # of the index; larger cells beyond
 OFFSET = np.array([0.3819e-3, 0.2764e-3])  # m: walls at round coordinates shall not run along borders of cells
