@@ -184,6 +184,7 @@ MISSING = {
     "teeth and helix": ("flutes = 3\nhelix_deg = 30\n", "", "M3", "flutes, helix_deg not known"),
     "tool": ("number = 1", "number = 2", "M3", "[[tool]] with number = 1"),
     "spindle": ("", "", "M5", "wall.nc:5: a cut while the spindle stands"),
+    "upright tool": ("", "", "M3\nG0 A5", "wall.nc:6: tilted tools"),
     "surface speed": ("", "", "M3 G96", "constant surface speed"),
 }
 

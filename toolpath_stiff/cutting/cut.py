@@ -21,6 +21,7 @@ from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
 from toolpath_stiff.cutting.workpiece import Workpiece, workpiece_of
+from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.poses import Pose
@@ -30,6 +31,7 @@ from toolpath_stiff.units import per_min_from_rad_per_s
 
 BLOCK = 16_384  # stations at a time
 MOST_NAMED = 5  # lines in a warning
+OTHER = 0.1  # of the error of a wall: where a pass has less of it by itself, most is of an earlier one
 ROUNDED = 1e-12  # of a cosine
 TURN = 0.02  # rad between two moves, below which the second begins as the first ends: chords of a curve
 
@@ -142,7 +144,11 @@ def evaluate_cut(
     """
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
     spindle = spindle_of(setup, program, samples)
-    work = workpiece_of(stock_of(setup, program.moves, cutters), program.moves, cutters)
+    stock = stock_of(setup, program.moves, cutters)
+    try:
+        work = workpiece_of(stock, program.moves, cutters)
+    except ProgramError as error:  # which knows no file
+        raise error.in_line(program.name, error.line or 0) from None
     cut = _nothing_cut(samples, cutters, work, setup.coefficients, spindle)
     given, parts, removed = (work, program.moves, samples, cutters), [], np.zeros(len(samples))
     for block, some, volume in engage(*given, progress):
@@ -270,9 +276,12 @@ def _evaluate(
 def _with_walls_of_all_passes(cut: Cut, own: FloatArray, profiles: FloatArray, step: float) -> Cut:
     """The cut with each wall at the pass that owns it; `own` as `Cut.wall_heights`, profiles as of `_evaluate`."""
     values = walls_of_all_passes(cut.samples, cut.cutters, cut.wall_heights, own, profiles, step)
-    before = np.abs(cut.wall_mean)
+    before, deviation = np.abs(cut.wall_mean), cut.deviation[:, :2].copy()
+    share = deviation / np.where(before > 0.0, before, np.nan)  # the coefficients scatter all errors alike
+    usual = float(np.median(share[np.isfinite(share)])) if np.isfinite(share).any() else 0.0
     _enter(cut, np.arange(len(own)), slice(0, 2), values @ shares()[1], values)
-    cut.deviation[:, :2] *= np.abs(cut.wall_mean) / np.where(before > 0.0, before, 1.0)
+    after = np.abs(cut.wall_mean)
+    cut.deviation[:, :2] = after * np.where(before > OTHER * after, share, usual)
     return replace(cut, wall_heights=own)
 
 

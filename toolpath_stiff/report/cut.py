@@ -75,7 +75,7 @@ def tolerance(analysis: Analysis) -> tuple[str, ShownTable]:
     entry, source = analysis.to_dict()["cut"]["tolerance"], analysis.program.source
     beyond, level = entry["beyond"], f"{entry['tolerance_um']:g} um"
     if not beyond:
-        return f"Every surface is within {level}.", ShownTable((), ())
+        return f"Every surface that is finished is within {level}.", ShownTable((), ())
     more = f", the {MOST_ROWS} worst of them here" if len(beyond) > MOST_ROWS else ""
     rows = [
         (
