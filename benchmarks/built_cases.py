@@ -15,7 +15,7 @@ from benchmarks.case_loop import record_of
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.planning.result import plan_csv
 from toolpath_stiff.rig import case as rig
-from toolpath_stiff.rig.campaigns import Table, campaign
+from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text, read_plan
 from toolpath_stiff.rig.fem_faults import faults
@@ -156,7 +156,7 @@ def along_path(diagnosis: tps.Diagnosis, file: Path, path: Mapping[str, Any], fo
     update = updated(diagnosis, file, folder)
     if update is None or not update.accepted:
         return {**error, "after": error["before"], "updated": ""}
-    there, sd = stiffness_along(update.machine, path)
+    there, sd = stiffness_along(update.machine.under(setup=DEFAULT_SETUP), path)
     held = {}
     if np.isfinite(sd).all():
         off = np.abs(true - there) / sd

@@ -18,11 +18,13 @@ from docs.from_code import HUNTED
 from tests.nc.plain_language import random_program
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.heidenhain import functions
 from toolpath_stiff.nc.heidenhain.vocabulary import REFUSED, STATEMENTS
 from toolpath_stiff.nc.reader import parse_program
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import ToolEntry
 from toolpath_stiff.rewriting.program import rewrite_program
 
@@ -327,3 +329,15 @@ def test_what_cannot_be_written_is_refused_by_line(body, placement, line):
     with pytest.raises(InputError) as caught:
         rewrite_program(read(body), placement, (0.0,) * 6, control=TOOLS)
     assert caught.value.line == line and "--write" in str(caught.value)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_mutated_programs_are_read_or_refused(seed):
+    chance = random.Random(seed)
+    bodies = [body for body, _ in PATHS.values()] + list(REFUSALS)
+    text = list("BEGIN PGM T MM\nTOOL CALL 1 Z S9 F200\n" + "\n".join(chance.sample(bodies, 3)) + "\nEND PGM T MM\n")
+    for _ in range(chance.randrange(1, 9)):
+        place = chance.randrange(len(text))
+        text[place : place + chance.randrange(2)] = chance.choice('XYZIQR+-.0123456789\n LCMF=()"~;')
+    checked = check(Request(tuple("".join(text).split("\n")), "t.h", controller=TOOLS))
+    assert checked.complete or any(finding.severity == "error" for finding in checked.findings)

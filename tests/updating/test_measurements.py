@@ -110,6 +110,8 @@ def test_what_these_data_cannot_test(write):
         "contact_nonlinearity": ("force_N",),
         "setup_compliance": ("setup",),
         "thermal_drift": ("time_min",),
+        "load_cell_curvature": ("force_N",),
+        "tool_bending": ("tool_extension_mm",),
     }
 
 

@@ -39,7 +39,7 @@ def naive_gate(seed: int) -> float:
     """The absolute test of one who takes all scatter, of the right total size, for each reading's own."""
     judgement = judged(seed)
     noise = judgement.noise
-    naive = replace(noise, repeat=noise.reading, clamping=0.0, strut_spread=0.0, joint_error=0.0)
+    naive = replace(noise, repeat=noise.reading, clamping=0.0, strut_spread=0.0, joint_error=0.0, rest=0.0)
     predictor = judgement.problem.predictor
     spread = covariance(naive, predictor)
     problem = Problem(predictor, Scatter.of(naive, spread))

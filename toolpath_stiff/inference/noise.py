@@ -77,6 +77,8 @@ class Noise:
         That a stated noise is not what the repeats show; "" where nothing is to be said.
     tip
         (n,) readings of the tip among those of other loops, which are what is told of; None: all.
+    rest
+        Rms change of ln stiffness by each axis of the links that the model takes for rigid, sd.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Noise:
     origin: str
     remark: str = ""
     tip: BoolArray | None = None
+    rest: float = REST
     clampings: FloatArray | None = None
 
     @property
@@ -274,7 +277,7 @@ def _percent(repeat: float, clamping: float) -> str:
 def covariance(noise: Noise, predictor: Predictor) -> Covariance:
     """Of ln readings."""
     shared = [noise.strut_spread * predictor.strut_columns(), noise.joint_error * predictor.joint_columns]
-    shared.append(REST * predictor.rest_columns())
+    shared.append(noise.rest * predictor.rest_columns())
     rows = np.ascontiguousarray(np.concatenate(shared, axis=1).T)
     clamps = Groups.by(predictor.data.clamp)
     common: float | FloatArray = noise.clamping**2

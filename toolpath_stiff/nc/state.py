@@ -182,6 +182,8 @@ class Conversational:
         Axes of the plane whose position is not known until they are named.
     tool_feed, radius, held_tip, shorter
         F of TOOL CALL (mm/min), the tool's radius with its DR, M128 and M126 in force.
+    kept
+        Position, shift and linear part of the frames for which the present point was worked out last, and that point.
     preset, names, stock, parameters
         The datum of cycle 247; numbers given to tools of a name; the corners of BLK FORM; Q parameters.
     """
@@ -211,7 +213,10 @@ class Conversational:
     names: dict[str, int] = field(default_factory=dict)
     stock: dict[str, list[float]] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
-    kept: tuple[tuple[object, ...], list[float]] = ((None, None, None), [])  # the present point, and what it was of
+    kept: tuple[tuple[object, object, object], list[float]] = (
+        (None, None, None),
+        [],
+    )  # the present point, and what it was of
 
 
 @dataclass

@@ -57,7 +57,7 @@ def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: 
         Of the selection.
     """
     count = len(named.candidates)
-    if count > MOST_NAMED:
+    if not 1 <= count <= MOST_NAMED:
         return {}
     bases = [base] if count == 1 else [_without(problem, named, k) for k in range(count)]
     first = Selection(problem, bases[0], noise, seed)

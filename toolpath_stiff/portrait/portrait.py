@@ -13,6 +13,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
+from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.gates import simulate
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
@@ -101,7 +102,11 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portr
     """
     if len(base.residual) > MOST_READINGS:
         return Portrait(look_elsewhere=np.nan, before=base.residual, after=base.residual)
-    selection = Selection(problem, base, noise, seed)
+    # The links taken for rigid are what is to be described: they may give freely, and are no scatter here.
+    noise = replace(noise, rest=0.0)
+    problem = Problem.of(problem.predictor, noise)
+    kept = fit_effects(problem, base.candidates, base.sizes, (), base.law) if base.candidates else problem.score_base()
+    selection = Selection(problem, kept, noise, seed)
     start, points = selection.start, problem.predictor.data.point
     description, leads, chance = choose(selection)
     if description is None:

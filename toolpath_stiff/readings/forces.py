@@ -198,20 +198,8 @@ def fit_coefficients(
     )
     fitted = np.where(np.isnan(force), np.nan, product(response, values[:, None])[..., 0])
     off = left_out(response, force, feed)
-    return CoefficientFit(
-        coefficients,
-        determined,
-        cutter,
-        tuple(records),
-        feed,
-        depth,
-        force,
-        fitted,
-        off,
-        run_out,
-        tuple(notes),
-        tuple(files),
-    )
+    columns_of_slots = (tuple(records), feed, depth, force, fitted, off, run_out)
+    return CoefficientFit(coefficients, determined, cutter, *columns_of_slots, tuple(notes), tuple(files))
 
 
 def _rotation(axes: str) -> list[tuple[int, float]]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.cutting.coefficients import SHOWN, SYMBOLS
 from toolpath_stiff.files import Content
@@ -24,18 +25,18 @@ def text(fit: CoefficientFit) -> str:
     name = f"{fit.coefficients.material}: " if fit.coefficients.material else ""
     lines = [f"{name}{len(fit.records)} slots, coefficients with intervals of 95 %", ""]
     lines += ShownTable(("coefficient", ">value", ">95 %", "unit"), rows).lines(2)
-    off = [f"{_largest(column)} N along {axis}" for axis, column in zip(AXES, (fit.force - fit.fitted).T, strict=True)]
-    left = [f"{_largest(column)} N along {axis}" for axis, column in zip(AXES, fit.left_out.T, strict=True)]
-    lines += ["", f"  largest residual          {', '.join(off)}"]
-    lines += [f"  a feed left out is off by {', '.join(left)}"]
+    lines += ["", f"  largest residual          {_largest(fit.force - fit.fitted)}"]
+    lines += [f"  a feed left out is off by {_largest(fit.left_out)}"]
     if fit.cutter.flutes > 1:
         low, high = (um_from_m(float(end)) for end in (fit.run_out.min(), fit.run_out.max()))
         lines += [f"  run-out, by what differs from tooth to tooth: {low:.1f} to {high:.1f} um"]
     return "\n".join([*lines, "", "  the records do not tell", *(f"    {sentence}" for sentence in fit.silent)])
 
 
-def _largest(column: np.ndarray) -> str:
-    return f"{np.nanmax(np.abs(column)):.2g}" if np.isfinite(column).any() else "-"
+def _largest(forces: FloatArray) -> str:
+    """The largest of forces (n, 3) in each direction that was recorded."""
+    sizes = {axis: np.abs(column) for axis, column in zip(AXES, forces.T, strict=True) if np.isfinite(column).any()}
+    return ", ".join(f"{np.nanmax(size):.2g} N along {axis}" for axis, size in sizes.items()) or "- (too few feeds)"
 
 
 def forces_csv(fit: CoefficientFit) -> str:

@@ -22,6 +22,9 @@ from toolpath_stiff.nc.words import AXES, Word
 
 MANUAL = "HEIDENHAIN, user's manual of the iTNC 530"
 PATHS, POLAR = f"{MANUAL}, Path contours: Cartesian coordinates", f"{MANUAL}, Path contours: Polar coordinates"
+COMPENSATED = (
+    "RL and RR begin and end perpendicular to the first and the last contour element, and round outside corners"
+)
 SIDES = {"RL": LEFT, "RR": RIGHT}
 
 
@@ -59,6 +62,7 @@ def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
     radius = state.plain.radius
     hint = f"give it in a tool table (--tools FILE), or TOOL DEF {state.tool} L.. R.."
     block.refuse_if(math.isnan(radius), side, f"needs the radius of tool {state.tool}", hint=hint)
+    state.assume(COMPENSATED)
     scale = state.plain.scale
     turned = SIDES[side] if radius >= 0.0 else -SIDES[side]
     state.cutter = Cutter(

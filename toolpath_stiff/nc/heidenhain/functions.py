@@ -142,6 +142,8 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
 def units(state: State, block: CurrentBlock, code: str) -> None:
     """BEGIN PGM: mm or inch."""
     state.inch = block.take("INCH") is not None
+    if state.inch:
+        state.assume("F counts tenths of an inch a minute, in cycles too (inch programs of Heidenhain's controls)")
 
 
 def nothing(state: State, block: CurrentBlock, code: str) -> None:

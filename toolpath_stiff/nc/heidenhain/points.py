@@ -20,9 +20,9 @@ ON_CIRCLE_MM = 0.016  # how far an end may lie off its circle (user's manual, "C
 def present(state: State) -> list[float]:
     """The programmed point in program axes: of an element that waits the end, of an APPR the contour point."""
     frames, plain = state.frames, state.plain
-    point = frames.position, frames.g92, frames.linear
-    if any(kept is not part for kept, part in zip(plain.kept[0], point, strict=True)):
-        plain.kept = point, frames.to_program(frames.position)
+    position, shift, linear = plain.kept[0]
+    if position is not frames.position or shift is not frames.g92 or linear is not frames.linear:
+        plain.kept = (frames.position, frames.g92, frames.linear), frames.to_program(frames.position)
     here = list(plain.kept[1])
     if plain.held is not None:
         first, second, _ = PLANES[state.plane]

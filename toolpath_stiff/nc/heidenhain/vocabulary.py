@@ -4,6 +4,8 @@ The functions are in `contour`, `approach`, `coordinates`, `cycles`, `functions`
 FN). M functions that mean what they mean in G code are the one table's (`codes.registry`).
 """
 
+from functools import lru_cache
+
 from toolpath_stiff.nc.codes.code import Act, Code, Refused, holds_anyway
 from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, functions, tools
@@ -128,6 +130,7 @@ REFUSED: dict[str, Refused] = {
 }
 
 
+@lru_cache(256)
 def look_up(head: str) -> Code | None:
     """The row of a statement's head; of Q parameters that of "Q"."""
     return STATEMENTS.get("Q" if (head[0] == "Q" and head[1:2].isdigit()) or head[:2] in ("QL", "QR") else head)

@@ -31,9 +31,11 @@ def lines(fit: CoefficientFit) -> Figure:
             chosen = fit.depth == depth
             axes.plot(um_from_m(fit.feed[chosen]), points[chosen], "o", color=ORANGE, markersize=4.5)
             deep = f"{mm_from_m(float(depth)):.3g} mm deep"
-            axes.annotate(deep, (um_from_m(grid[-1]), line[-1]), fontsize=8, ha="right")
-    for axes, title in zip(panels, TITLES, strict=True):
-        axes.set_title(title)
+            axes.annotate(
+                deep, (um_from_m(grid[0]), line[0]), (6, 0), textcoords="offset points", fontsize=8, va="center"
+            )
+    for axes, title, points in zip(panels, TITLES, fit.force.T, strict=True):
+        axes.set_title(title if np.isfinite(points).any() else f"{title}: not recorded")
         axes.set(xlabel="feed per tooth, \u00b5m", xlim=(0.0, None))
     panels[0].set_ylabel("force, N")
     return figure
