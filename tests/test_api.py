@@ -132,7 +132,7 @@ def test_many_programs_are_their_function_s(here, capsys):
 
 def test_every_command_is_held_to_its_function():
     """What has no JSON of its own: `rig` shares nothing with the library, `studio` serves a page."""
-    alone = {"reduce", "path", "cut", "compensate", "forces"}  # in tests of their own
+    alone = {"reduce", "path", "cut", "compensate"}  # in tests of their own
     assert {line.split()[0] for line in PAIRS} | alone | {"rig", "studio"} == set(COMMANDS)
 
 
