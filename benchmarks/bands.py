@@ -124,10 +124,8 @@ def _judged(job: Job, folder: Path) -> Record:
     if name == "one":
         known = [effect for effect in effects_of_layout("paper") if effect not in SET_ASIDE]
         if job.built == "fem":
-            known = [
-                fault for fault, kind in FAULTS.items()
-                if fault not in SET_ASIDE and kind.names and "instrument" not in kind.links and all(column in table for column in kind.columns)
-            ]  # fmt: skip
+            seen = [fault for fault in FAULTS if fault not in SET_ASIDE and {*FAULTS[fault].columns} <= {*table}]
+            known = [fault for fault in seen if FAULTS[fault].names and "instrument" not in FAULTS[fault].links]
         name = str(rng.choice(known))
     case = draw_case(job.seed, "campaign", name, 0.02, plan=table, built=job.built)
     (folder / "measured.csv").write_text(csv_text(case.rows))

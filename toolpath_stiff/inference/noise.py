@@ -216,19 +216,10 @@ def _noise_of_tip(
         repeat, clamping, words = scatter_apart(data, repeats)
         return (model("measured", repeat, clamping, repeats.freedom, origin + words, remark),)
     if known.any():
-        relative = np.where(known, relative, total)
-        # At most half the variance of a clamping's best reading, so that it counts once in each of them.
-        clamps = Groups.by(data.clamp)
-        least = np.full(clamps.count, CLAMPING * np.sqrt(2.0))
-        np.minimum.at(least, clamps.of, relative)
-        each = least[clamps.of] / np.sqrt(2.0)
-        mean = float(np.sqrt(np.mean(each**2)))
-        origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of which {100 * mean:.2g} % is "
-        origin += "assumed to be clamping: it stands in them and is counted once"
+        repeat, each, origin = _of_stated(np.where(known, relative, total), data, total)
         if not known.all():
             origin += f"; {int((~known).sum())} readings do not state it and are assumed to scatter as the others do"
-        repeat = np.sqrt(relative**2 - each**2)
-        return (model("stated", repeat, each if np.ptp(each) > 0.0 else mean, STATED_FREEDOM, origin),)
+        return (model("stated", repeat, each, STATED_FREEDOM, origin),)
     why = "the repeats agree exactly, as copies do" if copies else "the data hold neither repeats nor sd_N_per_mm"
     clampings = len(np.unique(data.clamp))
     return tuple(
@@ -239,6 +230,21 @@ def _noise_of_tip(
         )
         for name, guess in GUESSES.items()
     )  # fmt: skip
+
+
+def _of_stated(relative: FloatArray, data: Readings, total: float) -> tuple[FloatArray, float | FloatArray, str]:
+    """Repeat noise (n,) and clamping, (n,) where it differs, of readings that scatter by (n,) in all; and the origin.
+
+    At most half the variance of a clamping's best reading is clamping, so that it counts once in each of them.
+    """
+    clamps = Groups.by(data.clamp)
+    least = np.full(clamps.count, CLAMPING * np.sqrt(2.0))
+    np.minimum.at(least, clamps.of, relative)
+    each = least[clamps.of] / np.sqrt(2.0)
+    mean = float(np.sqrt(np.mean(each**2)))
+    origin = f"sd_N_per_mm of the readings, {100 * total:.2g} % in the mean, of which {100 * mean:.2g} % is "
+    origin += "assumed to be clamping: it stands in them and is counted once"
+    return np.sqrt(relative**2 - each**2), each if np.ptp(each) > 0.0 else mean, origin
 
 
 def _hidden(repeat: float, clamping: float, readings: int, clampings: int) -> float:
