@@ -12,7 +12,7 @@ import numpy as np
 
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.heidenhain.plain_statements import in_inches
-from toolpath_stiff.nc.heidenhain.statements import Statement, read_statement
+from toolpath_stiff.nc.heidenhain.statements import PlainStatement, read_statement
 from toolpath_stiff.nc.lines import split_lines
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.place import Place
@@ -77,7 +77,7 @@ def placed_lines(turn: Turn, lines: Sequence[str], name: str, unit: float, decim
 
 def _placed(
     turn: Turn,
-    statement: Statement,
+    statement: PlainStatement,
     words: dict[str, tuple[str, int, str]],
     here: list[float],
     unit: float,
