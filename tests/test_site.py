@@ -149,7 +149,7 @@ def test_the_notebook_goes_round_the_loop(pages):
     text = shown(pages, "docs/notebooks/measuring_loop.html")
     assert "AMBIGUOUS" in text
     assert text.index("AMBIGUOUS") < text.index("IDENTIFIED") < text.index("UPDATED")
-    assert "('right', 'spindle_compliance'" in text
+    assert "('right', 'tool_length_error'" in text
     assert "<Figure" not in text
 
 
