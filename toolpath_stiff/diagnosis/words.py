@@ -39,7 +39,7 @@ def verdict_text(diagnosis: Examination) -> str:
 def doubts(diagnosis: Examination) -> list[str]:
     """What may be wrong with the data instead of the machine: the stated noise, single rows."""
     noise = dict.fromkeys(judgement.doubt for judgement in diagnosis.judgements.values() if judgement.doubt)
-    nuisances = [f"{nuisance_words(entry)}, more than is assumed of any" for entry in findings(diagnosis.nuisances)]
+    nuisances = [f"{nuisance_words(entry)}, more than is assumed of any" for entry in findings(diagnosis.nuisances)[:1]]
     return [*noise, *([] if diagnosis.main.question else nuisances), *(suspect.words for suspect in diagnosis.suspects)]
 
 

@@ -54,8 +54,8 @@ def fitted_nuisances(fit: Fit, noise: Noise) -> list[Document]:
 
 
 def findings(entries: Sequence[Document]) -> list[Document]:
-    """Those that are beyond what they are assumed to be."""
-    return [entry for entry in entries if entry["sigma"] > FINDING]
+    """Those that deviate farther than chance would have it, and than is assumed of them."""
+    return [entry for entry in entries if entry["sigma"] > FINDING and entry["times_assumed"] > 1.0]
 
 
 def nuisance_words(entry: Document) -> str:
