@@ -200,6 +200,7 @@ NO_EXAMPLE = {
     "Effect": {"hooks"},
     "Reduction": {"loops"},
     "Diagnosis": {
+        "nuisances",
         "likeliest",
         "rows",
         "noise",
@@ -216,7 +217,7 @@ NO_EXAMPLE = {
     "Case": {"preview", "record", "next_result"},
     "Update": {  # steps and fits in SI, and what follows from them
         *("described", "last", "changed", "worse", "supported", "verdict", "widening", "corrected", "fitted"),
-        *("document", "noise", "question", "text", "assumptions"),
+        *("document", "noise", "question", "text", "assumptions", "errors"),
     },
     "Machine": {"picture"},
     "MachineCheck": {"picture"},

@@ -41,7 +41,8 @@ def test_near_another_setting_the_error_is_that_of_the_setting_itself(hand):
     for near in (here, there):  # the same readings are wild at both: none
         quick = hand.at(here, near=near)
         assert quick["mean_abs_error_percent"] == pytest.approx(found["mean_abs_error_percent"], rel=1e-4)
-        assert quick["deviation_percent"] == pytest.approx(found["deviation_percent"], rel=1e-3, abs=2e-3)
+        # a thirtieth of the last digit that the studio shows
+        assert quick["deviation_percent"] == pytest.approx(found["deviation_percent"], rel=1e-3, abs=3e-3)
 
 
 def test_the_machine_by_hand_carries_effect_and_law(hand):

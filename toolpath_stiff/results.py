@@ -103,7 +103,7 @@ class Result(ABC):
         --------
         >>> import toolpath_stiff as tps
         >>> tps.effects().to_frame()["link"].tolist()[:3]
-        ['tool', 'platform', 'joints']
+        ['tool', 'tool', 'platform']
         """
         raise self._cannot("has no table", "use to_dict()")
 

@@ -15,6 +15,7 @@ from tests.updating.cases import campaign, make_problem, readings_by_hand, simpl
 from toolpath_stiff.inference import candidates
 from toolpath_stiff.inference.candidates import Candidate, CandidateTable, Component, candidates_of, tabulate
 from toolpath_stiff.inference.evidence import Problem
+from toolpath_stiff.inference.noise import JOINT_ERROR
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.size_priors import EXPECTED, VISIBLE, SizePrior
 from toolpath_stiff.stiffness.contract import Parameter
@@ -107,10 +108,8 @@ def test_a_table_says_what_the_model_says(name):
             sizes = unit * rng.uniform(0.02, 0.25) / scale
             reaches = np.array([c.reach(np.sign(s)) for c, s in zip(table.candidate.components, sizes, strict=True)])
             sizes *= min(1.0, 0.9 * float(np.min(reaches / np.abs(sizes))))
-            if (
-                table.candidate.effect.vector
-            ):  # linear from the joints' nuisance: a search, which the final fit corrects
-                sizes *= min(1.0, 1e-3 / np.abs(sizes).max())
+            if table.candidate.effect.vector:  # linear, from the joints' nuisance: as far as that goes
+                sizes *= min(1.0, JOINT_ERROR / np.abs(sizes).max())
             # A drift that takes away a reading's whole deflection leaves it no stiffness: at most half of it.
             sizes *= min(1.0, 0.5 / max(1e-9, float(np.max(-(table.columns @ sizes) / base))))
             model = added(table, sizes)

@@ -151,6 +151,6 @@ def preview(
     >>> round(hand.at(strut_law=False)["mean_abs_error_percent"], 2)
     9.62
     >>> round(hand.at({"weak_strut": {"strut": 4, "factor": 0.8}})["mean_abs_error_percent"], 2)
-    10.04
+    10.02
     """
     return Preview(Question(machine, data, noise_percent, strut_spread_percent, 0))

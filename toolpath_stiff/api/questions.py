@@ -192,7 +192,7 @@ def diagnose(
     >>> found.verdict, found.plausible[:2], found.best
     ('adequate', ['none', 'joint_moment_stiffness'], 'joint_moment_stiffness')
     >>> found.to_frame()[["effect", "probability", "mean_abs_error_percent"]].shape
-    (12, 3)
+    (16, 3)
     >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
     (['diagnose.json', 'residuals.csv'], 6)
     """

@@ -134,7 +134,9 @@ class Scattering:
         narrow, wide_places = _narrow(self.places)
         self.turn, spread = _turn_blocks(covariance, clamps, narrow)
         self.weights = 1.0 / np.sqrt(1.0 + EXCESSES[:, None] ** 2 * np.maximum(spread, 0.0))  # (g, n)
-        self._shared = self.turned(np.concatenate([covariance.shared, np.sqrt(covariance.common) * wide_clamps]))
+        self._shared = self.turned(
+            np.concatenate([covariance.shared, np.sqrt(covariance.groups.spread(covariance.common)) * wide_clamps])
+        )
         self._wide_places = self.turned(wide_places)
         self.axes = cache(self._axes)
         self.sd = np.sqrt(covariance.diagonal)
@@ -196,11 +198,11 @@ def _turn_blocks(covariance: Covariance, clamp: IntArray, place: IntArray) -> tu
     """
     from scipy.sparse import csr_array
 
-    spread, parts = np.zeros(len(clamp)), []
+    spread, parts, clamping = np.zeros(len(clamp)), [], covariance.groups.spread(covariance.common)
     for rows in _connected(clamp, place).members():
         own_variance, of, place_of = covariance.own_variance[rows], clamp[rows], place[rows]
         same = (of[:, None] == of) & (of >= 0)
-        inverse = np.linalg.inv(np.linalg.cholesky(np.diag(own_variance) + covariance.common * same))
+        inverse = np.linalg.inv(np.linalg.cholesky(np.diag(own_variance) + clamping[rows] * same))
         spread[rows], turn = np.linalg.eigh(inverse @ ((place_of[:, None] == place_of) & (place_of >= 0)) @ inverse.T)
         parts.append((turn.T @ inverse, np.repeat(rows, len(rows)), np.tile(rows, len(rows))))
     data, row, column = (np.concatenate([np.ravel(part[k]) for part in parts]) for k in range(3))

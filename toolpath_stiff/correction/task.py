@@ -1,7 +1,7 @@
 """A task: the machine that is to be corrected, by which measurements, and what of it may change."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -69,12 +69,8 @@ class UpdateTask:
 
     @cached_property
     def noise_model(self) -> Noise:
-        """Of several noise models the one with the largest noise, as in a diagnosis.
-
-        What is fitted goes into a machine file, which has no nuisance for links taken for rigid: none is fitted here.
-        """
-        largest = max(noise_models(self.data, self.noise, self.strut_spread), key=lambda model: model.typical)
-        return replace(largest, rest=0.0)
+        """Of several noise models the one with the largest noise, as in a diagnosis."""
+        return max(noise_models(self.data, self.noise, self.strut_spread), key=lambda model: model.typical)
 
     @cached_property
     def problem(self) -> Problem:

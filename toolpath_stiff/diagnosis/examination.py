@@ -23,9 +23,9 @@ from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import fitted_nuisances
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.rivals import lowers_error
 from toolpath_stiff.inference.slips import SuspectEntry
 from toolpath_stiff.inference.unexcluded import Unexcluded
-from toolpath_stiff.inference.votes import lowers_error
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.planning.result import PlanRow
 from toolpath_stiff.portrait.alike import Alike

@@ -10,7 +10,7 @@ import numpy as np
 from toolpath_stiff.inference.candidates import Candidate, Component, table_of
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.least_squares import bounded_step
-from toolpath_stiff.inference.votes import part_of
+from toolpath_stiff.inference.rivals import part_of
 from toolpath_stiff.stiffness.term_effect import TermEffect, size_parameter
 from toolpath_stiff.stiffness.terms import Term
 

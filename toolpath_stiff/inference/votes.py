@@ -24,17 +24,13 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document, json_number
 from toolpath_stiff.inference.covariances import Groups, Precision
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
-from toolpath_stiff.inference.left_out import HeldOut, held_out
 from toolpath_stiff.inference.noise import REST_COLUMNS
 from toolpath_stiff.inference.size_priors import EXPECTED
-from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.stiffness.contract import SETUP, Effect
 
 SMALL = 4.0
 CHANCE = 0.05  # one-sided
 DRAWS = 2000
 CERTAIN = 4  # decimals of a vote on which all processors agree
-UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
 MOST_OPEN = 3  # explanations that a verdict lists for their votes; all votes are in the document
 FEWEST_POSES = 6  # below, no spread over poses can be told
 Votes = Mapping[str, FloatArray]  # rival -> (poses,) log predictive density of the explanation above the rival's
@@ -95,16 +91,6 @@ def standard_error(differences: FloatArray) -> float:
     return float(np.sqrt(len(differences)) * differences.std(ddof=1)) if len(differences) > 1 else float("nan")
 
 
-def part_of(effect: Effect) -> str:
-    """The link that an effect sits on; what belongs to one set-up is a part of its own."""
-    return SETUP if SETUP in effect.needs else effect.link
-
-
-def parts_of(fit: Fit) -> tuple[str, ...]:
-    """Of all effects of a fit, in order; none of the model alone."""
-    return tuple(sorted(part_of(candidate.effect) for candidate in fit.candidates))
-
-
 def vote_document(rival: str, differences: FloatArray) -> Document:
     """Votes against a rival as diagnose.json has them."""
     return {
@@ -150,23 +136,3 @@ def left_open(first: str, standing: Sequence[str], rivals: Sequence[str], agains
     new = [name for name in rivals if name not in standing][: max(MOST_OPEN - 1 - len(kept), int(better))]
     gains = {name: round(float(np.sum(against.get(name, 0.0))), CERTAIN - 1) for name in (*kept, *new)}
     return first, *sorted(gains, key=lambda name: (gains[name], name))
-
-
-def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
-    """Explanations that one must outvote beside the model alone: those of other parts, those with less of itself.
-
-    `fits`: all explanations by name; of those with more effects the search has its own price.
-    """
-    own, names = parts_of(fit), {*fit.names}
-    others = {name: other for name, other in fits.items() if {*other.names} != names and len(other.names) <= len(names)}
-    return {name: o for name, o in others.items() if parts_of(o) != own or {*o.names} < names}
-
-
-def lowers_error(before: HeldOut, after: HeldOut) -> bool:
-    """Whether an explanation lowers the mean error at left-out points: one that does not is no answer."""
-    return not before.mean_error - after.mean_error <= UNSEEN
-
-
-def left_out_of(fit: Fit, data: Readings) -> HeldOut:
-    """Residuals at the tip's left-out points."""
-    return held_out(fit, data.point).of_readings(data.tip)

@@ -69,7 +69,7 @@ class Pending:
 
 
 @dataclass
-class Compensation:
+class RadiusCompensation:
     """Cutter compensation in force.
 
     Attributes
@@ -134,14 +134,16 @@ class CenterMove:
     way: tuple[Point2, ...] = ()
 
 
-def enter(cutter: Compensation, start: Point2, target: Point2, arc: OffsetArc | None) -> tuple[CenterMove, Point2]:
+def enter(
+    cutter: RadiusCompensation, start: Point2, target: Point2, arc: OffsetArc | None
+) -> tuple[CenterMove, Point2]:
     """The first move, and its direction (arcs have none). Raises `ArcError`.
 
     LinuxCNC's, longer than the tool's radius, ends beside its end point; Fanuc's where the next one says.
 
     Examples
     --------
-    >>> step, _ = enter(Compensation(1, 3.0, (0, 1, 2), 1.0), (0.0, 0.0), (10.0, 0.0), None)
+    >>> step, _ = enter(RadiusCompensation(1, 3.0, (0, 1, 2), 1.0), (0.0, 0.0), (10.0, 0.0), None)
     >>> [round(value, 9) for value in step.end]
     [10.0, 3.0]
     """
@@ -160,7 +162,7 @@ def enter(cutter: Compensation, start: Point2, target: Point2, arc: OffsetArc | 
     return CenterMove(_beside(target, cutter.radius, across)), (math.cos(across), math.sin(across))
 
 
-def _go(cutter: Compensation, start: Point2, target: Point2, arc: OffsetArc | None, least: float) -> CenterMove:
+def _go(cutter: RadiusCompensation, start: Point2, target: Point2, arc: OffsetArc | None, least: float) -> CenterMove:
     if arc is None:
         return _go_straight(cutter, start, target, least)
     return _go_round(cutter, start, target, arc.center, arc.turn, least)
@@ -174,7 +176,7 @@ def _angle(tail: Point2, head: Point2) -> float:
     return math.atan2(head[1] - tail[1], head[0] - tail[0])
 
 
-def _enter_arc(cutter: Compensation, start: Point2, target: Point2, center: Point2, turn: int) -> CenterMove:
+def _enter_arc(cutter: RadiusCompensation, start: Point2, target: Point2, center: Point2, turn: int) -> CenterMove:
     """The first move, an arc: from the present point, tangent at its end to the programmed one. Raises `ArcError`."""
     inside = cutter.side * turn > 0
     if inside:
@@ -186,7 +188,7 @@ def _enter_arc(cutter: Compensation, start: Point2, target: Point2, center: Poin
     return CenterMove(end, center=_beside(end, math.dist(start, end) / 2.0 / cosine, inward))
 
 
-def _check_fits(cutter: Compensation, radius: float) -> None:
+def _check_fits(cutter: RadiusCompensation, radius: float) -> None:
     """Raise `ArcError` for an arc that the tool, inside it, cannot follow."""
     refuse_arc_if(
         radius <= cutter.radius,
@@ -195,7 +197,7 @@ def _check_fits(cutter: Compensation, radius: float) -> None:
     )
 
 
-def _go_straight(cutter: Compensation, start: Point2, target: Point2, least: float = CORNER) -> CenterMove:
+def _go_straight(cutter: RadiusCompensation, start: Point2, target: Point2, least: float = CORNER) -> CenterMove:
     """A straight move from one programmed point to another, after others; `least`: rad that make a corner.
 
     Raises `ArcError`.
@@ -219,7 +221,7 @@ def _go_straight(cutter: Compensation, start: Point2, target: Point2, least: flo
 
 
 def _go_round(
-    cutter: Compensation, start: Point2, target: Point2, center: Point2, turn: int, least: float = CORNER
+    cutter: RadiusCompensation, start: Point2, target: Point2, center: Point2, turn: int, least: float = CORNER
 ) -> CenterMove:
     """An arc from one programmed point to another, after other moves; `least`: rad that make a corner.
 
@@ -253,7 +255,7 @@ def _within(value: float) -> float:
     return value
 
 
-def _arc_meets_line(cutter: Compensation, arc: OffsetArc, start: Point2, along: float) -> Point2:
+def _arc_meets_line(cutter: RadiusCompensation, arc: OffsetArc, start: Point2, along: float) -> Point2:
     """Where the offset arc before meets the offset line that begins at a programmed point."""
     end = cutter.pending[0].end
     radius = math.dist(arc.center, (end[cutter.axes[0]], end[cutter.axes[1]]))
@@ -266,7 +268,7 @@ def _arc_meets_line(cutter: Compensation, arc: OffsetArc, start: Point2, along: 
 
 
 def _line_meets_arc(
-    cutter: Compensation, heading: float, corner: float, center: Point2, turn: int, radius: float
+    cutter: RadiusCompensation, heading: float, corner: float, center: Point2, turn: int, radius: float
 ) -> Point2:
     """Where the offset line before meets the offset arc."""
     side = 1 if cutter.side * turn > 0 else -1
@@ -275,7 +277,7 @@ def _line_meets_arc(
     return _beside(center, offset, heading + turn * turned if side > 0 else heading + math.pi - turn * turned)
 
 
-def _arc_meets_arc(cutter: Compensation, arc: OffsetArc, center: Point2, turn: int, radius: float) -> Point2:
+def _arc_meets_arc(cutter: RadiusCompensation, arc: OffsetArc, center: Point2, turn: int, radius: float) -> Point2:
     """Where the offset arc before meets the next one."""
     end = cutter.pending[0].end
     old = math.dist(arc.center, (end[cutter.axes[0]], end[cutter.axes[1]]))
@@ -287,7 +289,7 @@ def _arc_meets_arc(cutter: Compensation, arc: OffsetArc, center: Point2, turn: i
     return _beside(arc.center, old, _angle(arc.center, center) + (turn if inside else -turn) * back)
 
 
-def go_on(cutter: Compensation, start: Point2, target: Point2, arc: OffsetArc | None) -> CenterMove:
+def go_on(cutter: RadiusCompensation, start: Point2, target: Point2, arc: OffsetArc | None) -> CenterMove:
     """A further move, straight or an arc. Raises `ArcError` where the tool cannot follow it, or controls differ."""
     if not cutter.straight:
         return _go(cutter, start, target, arc, CORNER)
@@ -318,7 +320,7 @@ def go_on(cutter: Compensation, start: Point2, target: Point2, arc: OffsetArc | 
     return _outside(cutter, _end(cutter, start, target, arc), (before, turn), beside, arc)
 
 
-def _end(cutter: Compensation, start: Point2, target: Point2, arc: OffsetArc | None) -> Point2:
+def _end(cutter: RadiusCompensation, start: Point2, target: Point2, arc: OffsetArc | None) -> Point2:
     """Where the tool centre is beside the end of a programmed move."""
     if arc is not None and cutter.side * arc.turn > 0:
         _check_fits(cutter, math.dist(arc.center, target))
@@ -332,13 +334,13 @@ def _heading(point: Point2, start: Point2, target: Point2, arc: OffsetArc | None
     return _angle(arc.center, point) + arc.turn * math.pi / 2.0
 
 
-def _beside_contour(point: Point2, cutter: Compensation, heading: float) -> Point2:
+def _beside_contour(point: Point2, cutter: RadiusCompensation, heading: float) -> Point2:
     """Where the tool centre is beside a point of a contour with that heading."""
     return _beside(point, cutter.radius, heading + cutter.side * math.pi / 2.0)
 
 
 def _outside(
-    cutter: Compensation, end: Point2, headings: tuple[float, float], beside: Point2, arc: OffsetArc | None
+    cutter: RadiusCompensation, end: Point2, headings: tuple[float, float], beside: Point2, arc: OffsetArc | None
 ) -> CenterMove:
     """Straight moves round an outside corner: heading before it, and turn; a straight move before it is made longer."""
     before, turn = headings

@@ -10,7 +10,7 @@ from enum import Enum
 from typing import Literal, get_args
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.compensation import Compensation
+from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.frames import Frames
@@ -322,7 +322,7 @@ class State:
     assumptions: list[str] = field(default_factory=list)
     trace: list[Move] | None = None
     corner: CurrentBlock | None = None
-    cutter: Compensation | None = None
+    cutter: RadiusCompensation | None = None
     beside: list[float] | None = None
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)

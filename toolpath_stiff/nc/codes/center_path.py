@@ -8,7 +8,7 @@ import math
 from dataclasses import replace
 
 from toolpath_stiff.nc import compensation, geometry
-from toolpath_stiff.nc.compensation import CenterMove, Compensation, OffsetArc, Pending
+from toolpath_stiff.nc.compensation import CenterMove, OffsetArc, Pending, RadiusCompensation
 from toolpath_stiff.nc.frames import Frames, standing
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Move
 from toolpath_stiff.nc.state import State
@@ -16,7 +16,7 @@ from toolpath_stiff.nc.state import State
 SAME_PLACE = 1e-9  # mm; a step of less in the plane is none
 
 
-def offset_move(state: State, cutter: Compensation, move: Move, control: list[float]) -> bool:
+def offset_move(state: State, cutter: RadiusCompensation, move: Move, control: list[float]) -> bool:
     """Record what a programmed move makes of the tool centre's path. Returns whether any move was added.
 
     `move`: as programmed, from where the tool centre stands; `control`: its programmed end in control coordinates.
@@ -49,7 +49,7 @@ def offset_move(state: State, cutter: Compensation, move: Move, control: list[fl
 
 
 def _go_round_corner(
-    state: State, cutter: Compensation, move: Move, step: CenterMove, start: geometry.Point2, there: list[float]
+    state: State, cutter: RadiusCompensation, move: Move, step: CenterMove, start: geometry.Point2, there: list[float]
 ) -> None:
     """End the moves before the corner, and go round it if it is convex; rotary axes turn on the way round.
 
@@ -73,7 +73,7 @@ def _go_round_corner(
     cutter.anchor = cutter.center
 
 
-def _add(state: State, cutter: Compensation, move: Move, end: list[float], arc: OffsetArc | None) -> Move | None:
+def _add(state: State, cutter: RadiusCompensation, move: Move, end: list[float], arc: OffsetArc | None) -> Move | None:
     """Record a move of the tool centre to a point in program coordinates; None if it goes nowhere."""
     assert cutter.position is not None
     frames, here = state.frames, cutter.position
@@ -86,7 +86,7 @@ def _add(state: State, cutter: Compensation, move: Move, end: list[float], arc: 
     return move if state.recorder.add(move) else None
 
 
-def settle(state: State, cutter: Compensation, to: geometry.Point2) -> None:
+def settle(state: State, cutter: RadiusCompensation, to: geometry.Point2) -> None:
     """Move the end of the pending moves; raises `ArcError` where the tool would have to go back."""
     assert cutter.position is not None
     for pending in cutter.pending:
@@ -106,7 +106,7 @@ def _row(state: State, move: Move) -> int:
     return next(row for row in range(len(recent) - 1, -1, -1) if recent[row] is move)
 
 
-def _gouges(cutter: Compensation, move: Pending, to: geometry.Point2) -> bool:
+def _gouges(cutter: RadiusCompensation, move: Pending, to: geometry.Point2) -> bool:
     """Whether a move that ends at `to` would go back, or round the wrong way."""
     anchor, arc = cutter.anchor, move.arc
     if arc is None:
@@ -116,7 +116,7 @@ def _gouges(cutter: Compensation, move: Pending, to: geometry.Point2) -> bool:
     return apart > compensation.MATCHING * cutter.unit or (arc.programmed != 0.0 and longer)
 
 
-def _rewrite(state: State, cutter: Compensation, pending: Pending) -> None:
+def _rewrite(state: State, cutter: RadiusCompensation, pending: Pending) -> None:
     """The recorded move of one whose end has changed."""
     move, arc, recent = pending.move, pending.arc, state.recorder.recent
     if move is None:
@@ -134,7 +134,7 @@ def to_setup_of_program(frames: Frames, program: list[float]) -> list[float]:
     return frames.to_setup(frames.to_control(program))
 
 
-def _programmed(frames: Frames, cutter: Compensation, arc: Arc) -> OffsetArc:
+def _programmed(frames: Frames, cutter: RadiusCompensation, arc: Arc) -> OffsetArc:
     """The programmed arc in program coordinates."""
     center = frames.to_program(frames.from_setup([*arc.center, 0.0, 0.0, 0.0]))
     turns = 1 + int((abs(arc.sweep) - 1e-9) / math.tau)

@@ -4,7 +4,7 @@ import math
 
 from toolpath_stiff.nc.codes.center_path import settle, to_setup_of_program
 from toolpath_stiff.nc.codes.code import Code, family, g_codes
-from toolpath_stiff.nc.compensation import TYPE_A, Compensation
+from toolpath_stiff.nc.compensation import TYPE_A, RadiusCompensation
 from toolpath_stiff.nc.geometry import PLANES, ArcError
 from toolpath_stiff.nc.state import CurrentBlock, State
 
@@ -42,7 +42,9 @@ def switch_on(state: State, block: CurrentBlock, code: str) -> None:
         return
     diameter = _diameter(state, block, code)
     side = SIDES[code] if diameter >= 0.0 else -SIDES[code]
-    state.cutter = Compensation(side, abs(diameter) / 2.0, PLANES[state.plane], state.length_scale, straight=straight)
+    state.cutter = RadiusCompensation(
+        side, abs(diameter) / 2.0, PLANES[state.plane], state.length_scale, straight=straight
+    )
     if straight:
         state.assume(TYPE_A)
 

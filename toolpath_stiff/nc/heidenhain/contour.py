@@ -11,7 +11,7 @@ from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.cutter import LEFT, RIGHT, switch_off
 from toolpath_stiff.nc.codes.motion import machine_move, record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
-from toolpath_stiff.nc.compensation import Compensation
+from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
 from toolpath_stiff.nc.geometry import PLANES, ArcError
 from toolpath_stiff.nc.heidenhain.points import ON_CIRCLE_MM, feed, in_plane, inch_tenths, named, polar, present
@@ -65,7 +65,7 @@ def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
     state.assume(COMPENSATED)
     scale = state.plain.scale
     turned = SIDES[side] if radius >= 0.0 else -SIDES[side]
-    state.cutter = Compensation(
+    state.cutter = RadiusCompensation(
         turned, abs(radius) / scale, PLANES[state.plane], state.length_scale, straight=True, rounded=True
     )
 

@@ -1,0 +1,40 @@
+"""Which explanations a name must outvote, and whether one lowers the error at left-out points at all."""
+
+from collections.abc import Mapping
+
+from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.left_out import HeldOut, held_out
+from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.stiffness.contract import SETUP, Effect
+
+UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
+
+
+def part_of(effect: Effect) -> str:
+    """The link that an effect sits on; what belongs to one set-up is a part of its own."""
+    return SETUP if SETUP in effect.needs else effect.link
+
+
+def parts_of(fit: Fit) -> tuple[str, ...]:
+    """Of all effects of a fit, in order; none of the model alone."""
+    return tuple(sorted(part_of(candidate.effect) for candidate in fit.candidates))
+
+
+def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
+    """Explanations that one must outvote beside the model alone: those of other parts, those with less of itself.
+
+    `fits`: all explanations by name; of those with more effects the search has its own price.
+    """
+    own, names = parts_of(fit), {*fit.names}
+    others = {name: other for name, other in fits.items() if {*other.names} != names and len(other.names) <= len(names)}
+    return {name: o for name, o in others.items() if parts_of(o) != own or {*o.names} < names}
+
+
+def left_out_of(fit: Fit, data: Readings) -> HeldOut:
+    """Residuals at the tip's left-out points."""
+    return held_out(fit, data.point).of_readings(data.tip)
+
+
+def lowers_error(before: HeldOut, after: HeldOut) -> bool:
+    """Whether an explanation lowers the mean error at left-out points: one that does not is no answer."""
+    return not before.mean_error - after.mean_error <= UNSEEN
