@@ -194,7 +194,7 @@ def diagnose(
     >>> found.to_frame()[["effect", "probability", "mean_abs_error_percent"]].shape
     (16, 3)
     >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
-    (['diagnose.json', 'residuals.csv'], 6)
+    (['diagnose.json', 'residuals.csv'], 7)
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     on, part, origin = question.on, None if program is None else program_from(program), origin_si(origin_mm_deg)
