@@ -79,7 +79,7 @@ class Update(FolderResult):
     >>> update.accepted, update.to_dict()["objective"]
     (True, 'likelihood')
     >>> update.to_frame()["mean_abs_error_percent"].round(2).tolist()
-    [9.62, 9.67]
+    [9.62, 9.62]
     >>> print(update.machine_text().splitlines()[0][:24])
     # Machine nist, updated.
     >>> with tempfile.TemporaryDirectory() as folder:
