@@ -144,13 +144,21 @@ def renewed(shown: list[str], lines: list[str]) -> list[str]:
         for j, other in enumerate(letters):
             alike_here = difflib.SequenceMatcher(None, own, other).ratio()
             best[i + 1][j + 1] = max(best[i + 1][j], best[i][j] + alike_here)
-    place, chosen = len(lines), []
+    place, chosen = len(lines), list[int]()
     for i in range(len(wanted), 0, -1):
         while best[i][place] == best[i][place - 1]:
             place -= 1
         place -= 1
-        chosen.append(lines[place])
-    return [line if line == ELLIPSIS else chosen.pop() for line in shown]
+        chosen.append(place)
+    now, place = list[str](), 0
+    for line in shown:
+        if line != ELLIPSIS:
+            left_out = bool(chosen[-1] != place and now[-1:] != [ELLIPSIS])
+            place = chosen.pop() + 1
+            now += [*[ELLIPSIS] * left_out, lines[place - 1]]
+        else:
+            now.append(line)
+    return [*now, *[ELLIPSIS] * (place < len(lines) and now[-1] != ELLIPSIS)]
 
 
 def play(tutorial: Path, pictures: bool) -> Iterator[tuple[str, list[str], list[str]]]:
