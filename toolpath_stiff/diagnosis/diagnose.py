@@ -30,7 +30,7 @@ from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import ReadProgram
-from toolpath_stiff.planning.plan import RivalPlan
+from toolpath_stiff.planning.plan import RivalPlan, reading_words
 from toolpath_stiff.planning.result import plan
 from toolpath_stiff.portrait.alike import Alike, looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
@@ -222,8 +222,8 @@ def with_plan(diagnosis: Diagnosis, progress: Callable[[str], None] = lambda tex
         return replace(diagnosis, remarks=(visits.nothing_gained,))
     why = visits.why
     remarks = [
-        f"{' and '.join(pair.effects)}: tip stiffness cannot tell them apart; put an indicator "
-        + " or ".join(dict.fromkeys(pair.indicator_across.values()))
+        f"{' and '.join(pair.effects)}: tip stiffness cannot tell them apart; this would: "
+        + ", or ".join(dict.fromkeys(map(reading_words, pair.indicator_across.values())))
         for pair in visits.pairs
         if not pair.separable
     ]

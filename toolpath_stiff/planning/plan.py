@@ -64,6 +64,11 @@ def telling(effect: Effect) -> str:
     return f"none: {effect.told_by}" if effect.told_by else INDICATORS[effect.link]
 
 
+def reading_words(place: str) -> str:
+    """What `telling` gives as words for people."""
+    return place.removeprefix("none: ") if place.startswith("none: ") else f"an indicator {place}"
+
+
 @dataclass(frozen=True)
 class PairGap:
     """The gap between two rivals.
@@ -247,7 +252,9 @@ class RivalPlan:
             lines.append(f"{sure} is expected after {self.repeats} repeats of each, clamped anew")
         for pair in self.pairs:
             if not pair.separable:
-                places = "; or ".join(f"{link}: {place}" for link, place in pair.indicator_across.items())
+                places = "; or ".join(
+                    f"{link}: {place.removeprefix('none: ')}" for link, place in pair.indicator_across.items()
+                )
                 lines.append(
                     f"tip stiffness cannot tell {pair.effects[0]} from {pair.effects[1]} ({pair.separation_sigma:.1f} "
                     f"sigma after all poses); put an indicator across the link: {places}"

@@ -168,6 +168,18 @@ def at_pose(path: LoadPath, i: int) -> str:
     return f" at X{x:g} Y{y:g} Z{z:g} mm"
 
 
+def body_on_springs(path: LoadPath, shifts: tuple[float, float, float], rocking: float) -> FloatArray:
+    """(n, 3, 3) m/N at the tip of a body that shifts along base axes, m/N, and rocks about X and Y, rad/(N m).
+
+    The tip's force F at p has the moment p x F about the origin.
+    """
+    x, y, z = path.position.T
+    moment = np.zeros((len(path), 2, 3))  # (p x F)_x and (p x F)_y per component of F
+    moment[:, 0, 1], moment[:, 0, 2] = -z, y
+    moment[:, 1, 0], moment[:, 1, 2] = z, -x
+    return np.asarray(rocking * np.swapaxes(moment, 1, 2) @ moment + np.diag(shifts))
+
+
 def at_the_tip(path: LoadPath, compliances: FloatArray) -> FloatArray:
     """(n, 12, 12) quadratic form of the tip force alone: compliances (n, 3, 3) or (3, 3) m/N, base axes."""
     form = np.zeros((len(path), 12, 12))

@@ -3,7 +3,15 @@
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values, at_the_tip, compliance
+from toolpath_stiff.stiffness.contract import (
+    Effect,
+    LoadPath,
+    Parameter,
+    Values,
+    at_the_tip,
+    body_on_springs,
+    compliance,
+)
 from toolpath_stiff.stiffness.effects.frame_compliance import BUILT, frame_vertices
 
 LEVER = f"{BUILT} at a lever of about 1 m"
@@ -38,12 +46,7 @@ class FrameSway(Effect):
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Quadratic form of the tip force, in base axes."""
-        x, y, z = path.position.T
-        moment = np.zeros((len(path), 2, 3))  # (p x F)_x and (p x F)_y per component of F
-        moment[:, 0, 1], moment[:, 0, 2] = -z, y
-        moment[:, 1, 0], moment[:, 1, 2] = z, -x
-        rocking = p["rocking"] * np.swapaxes(moment, 1, 2) @ moment
-        return at_the_tip(path, rocking + np.diag([p["sideways"], p["sideways"], p["vertical"]]))
+        return at_the_tip(path, body_on_springs(path, (p["sideways"], p["sideways"], p["vertical"]), p["rocking"]))
 
     def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:
         """With the body that all six struts pull at."""

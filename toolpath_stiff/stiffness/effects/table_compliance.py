@@ -1,9 +1,16 @@
 """Table compliance: the workpiece's side of the loop gives way."""
 
-import numpy as np
-
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Parameter, Values, at_the_tip, compliance
+from toolpath_stiff.stiffness.contract import (
+    EXPERIENCE,
+    Effect,
+    LoadPath,
+    Parameter,
+    Values,
+    at_the_tip,
+    body_on_springs,
+    compliance,
+)
 
 BUILT = f"{EXPERIENCE}: machine beds are built for 100 to 500 N/um"
 LEVER = f"{BUILT} at a lever of about 1 m"
@@ -35,9 +42,4 @@ class TableCompliance(Effect):
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
         """Quadratic form of the tip force, in base axes."""
-        x, y, z = path.position.T
-        moment = np.zeros((len(path), 2, 3))  # (p x F)_x and (p x F)_y per component of F
-        moment[:, 0, 1], moment[:, 0, 2] = -z, y
-        moment[:, 1, 0], moment[:, 1, 2] = z, -x
-        rocking = p["rocking"] * np.swapaxes(moment, 1, 2) @ moment
-        return at_the_tip(path, rocking + np.diag([p["x"], p["y"], p["z"]]))
+        return at_the_tip(path, body_on_springs(path, (p["x"], p["y"], p["z"]), p["rocking"]))
