@@ -8,6 +8,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Groups, Precision
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
+from toolpath_stiff.inference.fits import prior_of
 from toolpath_stiff.inference.noise import REST_COLUMNS
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.votes import CERTAIN, Votes
@@ -38,6 +39,7 @@ def votes(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, Fl
 def _log_predictive(fit: Fit, precision: Precision, points: Groups) -> FloatArray:
     """(points,) log density of each point's readings given all others, up to a constant of the data."""
     prior = law_prior(fit.jacobian.shape[1])
+    prior[:2, :2] = prior_of(fit.law_free) * np.eye(2)
     sizes = np.arange(2, len(prior))
     # A size is expected to change the stiffness by no more than any effect does.
     prior[sizes, sizes] = np.mean(fit.jacobian[:, 2:] ** 2, axis=0) / EXPECTED[1] ** 2
