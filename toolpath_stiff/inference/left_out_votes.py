@@ -28,8 +28,8 @@ def votes(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, Fl
 
 
 def _price(fit: Fit) -> float:
-    """Of the law's distance from the machine file, and 1 a fitted size (Akaike 1973)."""
-    return len(fit.free) + (0.5 * float(fit.law @ fit.law) / LAW_PRIOR**2 if fit.law_free else 0.0)
+    """1 for each fitted size and constant of the law (Akaike 1973), and the law's distance from the machine file."""
+    return len(fit.free) + (2.0 + 0.5 * float(fit.law @ fit.law) / LAW_PRIOR**2 if fit.law_free else 0.0)
 
 
 def _squares_by_point(residuals: FloatArray, covariance: Covariance, points: Groups) -> FloatArray:
