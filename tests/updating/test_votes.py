@@ -13,9 +13,7 @@ from toolpath_stiff.correction.task import MACHINE, UpdateTask
 from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.inference.fair_forms import fair_rivals
 from toolpath_stiff.inference.left_out_votes import closest, votes
-from toolpath_stiff.inference.noise import REST_COLUMNS
 from toolpath_stiff.inference.nuisances import findings, fitted_nuisances, nuisance_words
-from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.votes import SMALL, chance_of_losing, left_open, outvoted, standard_error, vote_words
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
@@ -40,32 +38,29 @@ def test_a_rival_is_outvoted_by_all_poses_not_by_one():
     assert "worse by" in vote_words("x", even) and "better by" in vote_words("x", -even)
 
 
-def test_a_vote_is_the_density_of_a_left_out_pose_given_the_others():
-    """By the joint normal density of all readings, marginalised by hand with dense matrices."""
+def test_a_vote_is_what_a_pose_adds_to_the_density_of_those_before_it():
+    """By the Cholesky factor of the dense covariance of all readings, whose whitened residuals are innovations."""
     judgement = judged(7, "paper", "weak_strut", STRONG)
-    problem, base = judgement.problem, judgement.base
-    fit = judgement.fits["weak_strut"]
-    given = problem.scatter.covariance
-    point = problem.predictor.data.point
+    problem, base, fit = judgement.problem, judgement.base, judgement.fits["weak_strut"]
+    given, point = problem.scatter.covariance, problem.predictor.data.point
+    order, wild = np.argsort(point, kind="stable"), sorted({*fit.scatter.wild, *base.scatter.wild})
+    dense = np.diag(given.own_variance) + given.shared.T @ given.shared
+    dense += given.common * (given.groups.of[:, None] == given.groups.of)
+    dense[wild, wild] += problem.scatter.widening[wild]
+    lower = np.linalg.cholesky(dense[np.ix_(order, order)])
 
     def density(one) -> np.ndarray:
-        prior = np.diag([0.2**2] * 2 + [EXPECTED[1] ** 2 / np.mean(c**2) for c in one.jacobian[:, 2:].T])
-        shared = given.shared[:-REST_COLUMNS]
-        dense = np.diag(given.own_variance) + shared.T @ shared + one.jacobian @ prior @ one.jacobian.T
-        dense += given.common * (given.groups.of[:, None] == given.groups.of)
-        wild = sorted({*fit.scatter.wild, *base.scatter.wild})
-        dense[wild, wild] += problem.scatter.widening[wild]
-        found = []
-        for label in np.unique(point):
-            out = point == label
-            gain = np.linalg.solve(dense[np.ix_(~out, ~out)], dense[np.ix_(~out, out)]).T
-            left = one.residual[out] - gain @ one.residual[~out]
-            spread = dense[np.ix_(out, out)] - gain @ dense[np.ix_(~out, out)]
-            found.append(-0.5 * (left @ np.linalg.solve(spread, left) + np.linalg.slogdet(spread)[1]))
-        return np.array(found)
+        squares = np.linalg.solve(lower, one.residual[order]) ** 2
+        price = len(one.free) + 0.5 * float(one.law @ one.law) / 0.2**2
+        labels = np.unique(point)
+        return np.array([-0.5 * squares[point[order] == label].sum() - price / len(labels) for label in labels])
 
-    expected = density(fit) - density(base)
-    assert votes(problem, fit, {"none": base})["none"] == pytest.approx(expected, abs=2e-3)
+    votes_for = votes(problem, fit, {"none": base})["none"]
+    assert votes_for == pytest.approx(density(fit) - density(base), abs=1e-3)
+    # Of a fit with the file's strut law: two constants fewer.
+    held = replace(base, law_free=False, law=np.zeros(2))
+    law = 2.0 + 0.5 * float(base.law @ base.law) / 0.2**2
+    assert votes(problem, fit, {"none": held})["none"].sum() == pytest.approx(votes_for.sum() - law, abs=1e-2)
 
 
 def test_a_name_has_outvoted_every_rival_and_says_by_how_much():
