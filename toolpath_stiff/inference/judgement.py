@@ -403,7 +403,7 @@ def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str
 def put_to_vote(
     problem: Problem, noise: Noise, candidates: Candidates, gates: Gates, verdict: str, explanations: tuple[str, ...]
 ) -> tuple[str, tuple[str, ...], Votes]:
-    """Verdict and explanations after the votes of left-out poses, and the votes for the first explanation.
+    """Verdict and explanations after the votes of the readings, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer. A name that has not outvoted every rival of another part is
     one of several; the closest of these stand beside it. A model that passes because its nuisances have taken up more
