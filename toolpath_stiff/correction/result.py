@@ -24,6 +24,7 @@ from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.error_model import error_model
 from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent, errors_text
+from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.machine.model import Hexapod
@@ -130,6 +131,16 @@ class Update(FolderResult):
         return self.steps[-1] if self.changed else self.steps[0]
 
     @property
+    def kept_law(self) -> Support | None:
+        """Why the strut law stays as given beside effects, where the data do not support the refitted one."""
+        return next((support for support in self.turned_down if support.effect == LAW_REFITTED), None)
+
+    @property
+    def known(self) -> Fit:
+        """The fit that says how well law and sizes are known: a law that stays as given is no better known for it."""
+        return self.steps[-2].fit if self.changed and self.kept_law else self.last.fit
+
+    @property
     def changed(self) -> bool:
         """True where there is something to be written."""
         return bool(self.steps[-1].fit.names) or self.task.strut_law
@@ -174,7 +185,7 @@ class Update(FolderResult):
         """How far the last model may be off at a pose; None where too little was measured to tell."""
         if self.task.objective != LIKELIHOOD:
             return None
-        return error_model(self.last.fit, self.task.problem.predictor.data, self.noise)
+        return error_model(self.known, self.task.problem.predictor.data, self.noise)
 
     @cached_property
     def corrected(self) -> Hexapod | None:
@@ -184,7 +195,8 @@ class Update(FolderResult):
     def fitted(self, provenance: Document) -> Hexapod:
         """The machine with the last model, which comes from there."""
         setups = self.task.data.setup.tolist()
-        return fitted_machine(self.task.machine, self.last.fit, provenance, self.widening, setups, self.errors)
+        fit = self.last.fit
+        return fitted_machine(self.task.machine, fit, provenance, self.widening, setups, self.errors, self.known)
 
     def _written(self) -> Hexapod:
         if self.corrected is None:
@@ -299,7 +311,8 @@ class Update(FolderResult):
             return f"Strut law refitted; no effect added. {errors}"
         cause = joined(last.fit.findings)
         word = "added" if self.described is None else "added as described, not as identified"
-        return f"{cause[:1].upper()}{cause[1:]} ({joined(last.fit.names)} {word}). {unconfirmed}{errors}"
+        law = f"The strut law stays: {'; '.join(self.kept_law.reasons)}. " if self.kept_law else ""
+        return f"{cause[:1].upper()}{cause[1:]} ({joined(last.fit.names)} {word}). {law}{unconfirmed}{errors}"
 
     @property
     def _errors(self) -> str:

@@ -19,7 +19,7 @@ Of several effects each is judged beside the others.
 The paper's own estimation (`--objective mean-error`) is a ladder of one step, the strut law of smallest mean error.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,19 +39,21 @@ from toolpath_stiff.inference.candidates import Candidate, testable_effects
 from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import add_effect, base_fit, baseline
+from toolpath_stiff.inference.fits import add_effect, base_fit, baseline, with_given_law
 from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import score_families, signatures, tables_of
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.left_out_votes import votes
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.votes import outvoted
+from toolpath_stiff.inference.rivals import rivals_of_law
+from toolpath_stiff.inference.votes import outvoted, vote_words
 from toolpath_stiff.planning.plan import telling
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.stiffness.sizes import joined
 
 TRIED = 4  # candidates a step of `--auto`, the most likely first
 MOST_EFFECTS = 4  # that `--auto` adds
+LAW_GIVEN = "strut law as given"
 
 
 def update(task: UpdateTask) -> Update:
@@ -139,6 +141,11 @@ def build_ladder(task: UpdateTask) -> Update:
         steps.append(better)
         supports.append(tried[-1])
         tried = []
+    if steps[-1].fit.law_free and (steps[-1].fit.names or task.strut_law):
+        given, law = _law_support(task, steps[-1])
+        kept = not (law.supported or task.force) and steps[-1].fit.names
+        steps += [given] if kept else []
+        (tried if kept else supports).append(law)
     return Update(
         task, tuple(steps), refitted, tuple(supports), turned_down=tuple(tried), drawn=_drawn(task, steps[-1].fit)
     )
@@ -242,28 +249,59 @@ def _support(
             f"twice the log likelihood rises by {gained:.1f}: the best of all candidates gains {others.threshold:.1f} "
             "by chance once in twenty campaigns"
         )
-    instruments = _instruments(others.problem, none, alone)
-    if instruments and task.believe != MACHINE:
-        tells = joined([f"{tells} would tell {name}" for name, tells in instruments.items()])
-        reasons.append(
-            f"an error of the instrument foretells left-out poses as well: {joined(list(instruments))}; {tells}; "
-            "--believe machine (believe='machine') takes it for the machine's"
-        )
+    rivals = {} if fit.candidates[j].effect.is_instrument else _instruments(others.problem, none)
+    instruments = _as_well(others.problem, alone, rivals)
+    reasons += _mistakable(task, instruments)
     return Support(
         fit.names[j], not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
         json_number(in_se, 3), json_number(gained), json_number(others.threshold), tuple(instruments),
     )  # fmt: skip
 
 
-def _instruments(problem: Problem, none: Fit, alone: Fit) -> dict[str, str]:
-    """Errors of the instrument that an effect of the machine has not outvoted -> the reading that would tell."""
-    if alone.candidates[0].effect.is_instrument:
-        return {}
+def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Support]:
+    """Judge the refitted strut law of a step; the same effects beside the file's law."""
+    task.progress("judging the strut law")
+    fit, problem = after.fit, task.problem
+    given = LadderStep.of(LAW_GIVEN, with_given_law(problem, fit), task.data)
+    differences = votes(problem, fit, {LAW_GIVEN: given.fit})[LAW_GIVEN]
+    reasons, instruments = [], dict[str, str]()
+    if outvoted(differences):
+        instruments = _as_well(problem, fit, rivals_of_law(problem, given.fit))
+        reasons = _mistakable(task, instruments)
+    else:
+        reasons.append(f"{vote_words('as given it', differences)} than refitted, no more than chance")
+    gained = 2.0 * (fit.log_posterior - given.fit.log_posterior) / dispersion(fit)
+    return given, Support(
+        LAW_REFITTED, not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
+        json_number(gain_in_standard_errors(given.held, after.held), 3), json_number(gained), None, tuple(instruments),
+    )  # fmt: skip
+
+
+def _instruments(problem: Problem, none: Fit) -> dict[str, Fit]:
+    """Errors of the instrument by name, each on top of a fit."""
     effects = [effect for effect in testable_effects(problem.predictor)[0] if effect.is_instrument]
-    bests = {family.name: family.best for family in score_families(problem, effects, none) if family.best is not None}
-    against = votes(problem, alone, bests)
-    told_by = {effect.name: telling(effect).removeprefix("none: ") for effect in effects}
-    return {name: told_by[name] for name, differences in against.items() if not outvoted(differences)}
+    return {family.name: family.best for family in score_families(problem, effects, none) if family.best is not None}
+
+
+def _as_well(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, str]:
+    """Errors of the instrument that a fit has not outvoted -> the reading that would tell."""
+    against = votes(problem, fit, rivals)
+    return {
+        name: telling(rivals[name].candidates[-1].effect).removeprefix("none: ")
+        for name, differences in against.items()
+        if not outvoted(differences)
+    }
+
+
+def _mistakable(task: UpdateTask, instruments: Mapping[str, str]) -> list[str]:
+    """That what is taken for the machine's may be an instrument's; nothing where the user believes the machine."""
+    if not instruments or task.believe == MACHINE:
+        return []
+    tells = joined([f"{tells} would tell {name}" for name, tells in instruments.items()])
+    return [
+        f"an error of the instrument foretells left-out poses as well: {joined(list(instruments))}; {tells}; "
+        "--believe machine (believe='machine') takes it for the machine's"
+    ]
 
 
 def _next_effect(task: UpdateTask, before: LadderStep) -> tuple[LadderStep | None, list[Support]]:

@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 
-from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.candidates import candidates_of, testable_effects
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fits import add_effect
 from toolpath_stiff.inference.left_out import HeldOut, held_out
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import SETUP, Effect
@@ -28,6 +30,16 @@ def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
     own, names = parts_of(fit), {*fit.names}
     others = {name: other for name, other in fits.items() if {*other.names} != names and len(other.names) <= len(names)}
     return {name: o for name, o in others.items() if parts_of(o) != own or {*o.names} < names}
+
+
+def rivals_of_law(problem: Problem, given: Fit) -> dict[str, Fit]:
+    """Errors of the instrument by name, each beside a fit with the file's strut law: what a refitted law may stand for.
+
+    Under one load a law that is softer by a share is at the tip the same as a load cell that reads too little by it.
+    """
+    effects = [effect for effect in testable_effects(problem.predictor)[0] if effect.is_instrument]
+    wanted = {e.name: candidates_of(e, problem.predictor.data) for e in effects if e.name not in given.names}
+    return {name: add_effect(problem, given, candidates, law_free=False) for name, candidates in wanted.items()}
 
 
 def left_out_of(fit: Fit, data: Readings) -> HeldOut:
