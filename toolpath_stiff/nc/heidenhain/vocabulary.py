@@ -89,6 +89,7 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("Q|FN0|FN1|FN2|FN3|FN4|FN5|FN6|FN7|FN8|FN13", _SILENT, "Q parameter"),
         ("FN9|FN10|FN11|FN12", _SILENT, "jump on a condition"),
         ("FN14", _SILENT, "error: the program stops"),
+        ("FN18|FN28", _LISTED, "data of the control: the parameter is not known from there on"),
         ("FN15|FN16|FN19|FN20|FN29|FN37|FN38", _LISTED, "message, PLC: changes no path"),
     )),
     ("non-modal", _BASICS, (
@@ -120,7 +121,7 @@ _REFUSED = (
     ("CYCL-DEF-208", "a helix whose way in the manual draws without numbers", _BY_MOVES, _DRILLING),
     ("TCH-PROBE", "probing", "leave probing out", f"{_CYCLES}, Touch probe cycles"),
     ("SEL PATTERN CALL CYCL-CALL-PAT", "points of other files or patterns", "post the points one by one", _PATTERNS),
-    ("FN17 FN18 FN26 FN27 FN28", "data of the control or of a table", "put the numbers into the program", _Q),
+    ("FN17 FN26 FN27", "data of the control or of a table", "put the numbers into the program", _Q),
     ("SPL", "a spline", "post lines and arcs", PATHS),
 )  # fmt: skip
 REFUSED: dict[str, Refused] = {
