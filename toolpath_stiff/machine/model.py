@@ -19,8 +19,10 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
+from toolpath_stiff.machine.elements import Element, Stance
 from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.poses import Pose
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import n_per_m_from_n_per_um
 
 Derived = TypeVar("Derived")
@@ -280,6 +282,80 @@ class MachineTool:
         """A copy with some attributes replaced."""
         return replace(self, **changes)
 
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Of the j joints that the control moves."""
+        raise NotImplementedError
+
+    @property
+    def joint_kinds(self) -> tuple[str, ...]:
+        """Of each joint "linear" or "rotary"."""
+        return ("linear",) * len(self.joint_names)
+
+    @property
+    def joint_limits(self) -> FloatArray:
+        """(j, 2) m or rad, low and high; -inf and inf: none."""
+        return np.tile([-np.inf, np.inf], (len(self.joint_names), 1))
+
+    @property
+    def configurations(self) -> tuple[str, ...]:
+        """Names of the ways to hold the same pose, one where there is no choice."""
+        return ("",)
+
+    @property
+    def singularity_names(self) -> tuple[str, ...]:
+        """Of the s measures that vanish where the machine is singular."""
+        return ()
+
+    @property
+    def singularity_margins(self) -> tuple[float, ...]:
+        """Smallest admissible value of each measure, which is 1 at most."""
+        return ()
+
+    def singularities(self, stance: Stance) -> FloatArray:
+        """(n, s) the measures at n poses."""
+        return np.empty((len(stance.joints), 0))
+
+    @property
+    def elements(self) -> tuple[Element, ...]:
+        """What gives way, in the order of `Stance.loads`."""
+        raise NotImplementedError
+
+    def rotation_of(self, abc: FloatArray) -> FloatArray:
+        """(n, 3, 3) orientation of the tool in work axes of programmed angles (n, 3) rad: roll, pitch, yaw."""
+        return rotation_matrices(abc)
+
+    def solve(
+        self,
+        position: FloatArray,
+        rotation: FloatArray | None = None,
+        tool_length: ArrayLike = np.nan,
+        configuration: int | None = None,
+        start: FloatArray | None = None,
+    ) -> Stance:
+        """How the machine stands at n poses, the inverse kinematics.
+
+        Parameters
+        ----------
+        position, rotation
+            (n, 3) m, the tip, and (n, 3, 3), the tool's axes, in work axes; None: upright.
+        tool_length
+            m, scalar or (n,); nan: the reference tool.
+        configuration
+            Index into `configurations`, kept at all poses; None: at each pose that furthest from the joints' limits.
+        start
+            (j,) joints before the first pose of a path, from which turns are counted on; None: nearest the middle.
+        """
+        raise NotImplementedError
+
+    def forward(self, joints: FloatArray, tool_length: ArrayLike = np.nan) -> tuple[FloatArray, FloatArray]:
+        """(n, 3) m, the tip, and (n, 3, 3), the tool's axes, in work axes, of joints (n, j) m or rad."""
+        raise NotImplementedError
+
+    def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
+        """Bodies of a drawing by name, (n, p, 3) m in base axes."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True, kw_only=True)
 class Hexapod(MachineTool):
@@ -305,6 +381,11 @@ class Hexapod(MachineTool):
     strut_law: StrutLaw
     platform_bar_stiffness: float = np.inf
 
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The struts."""
+        return tuple(f"strut{i}" for i in range(1, 7))
+
     def platform_joints_for(self, tool_length: ArrayLike) -> FloatArray:
         """(6, 3) m, or (n, 6, 3) for n lengths: platform joints relative to the tip of such a tool, nan: of reference.
 
@@ -317,6 +398,14 @@ class Hexapod(MachineTool):
             return self.platform_joints
         extension = np.where(np.isnan(length), 0.0, length - self.reference_tool_length)
         return np.asarray(self.platform_joints + extension[..., None, None] * np.array([0.0, 0.0, 1.0]))
+
+
+def as_hexapod(machine: MachineTool, asking: str) -> Hexapod:
+    """The machine of six struts. Raises `InputError` of another kind: `asking` begins the sentence."""
+    if isinstance(machine, Hexapod):
+        return machine
+    mistake = f"{asking} knows machines of six struts only: {machine.name} is of kind {machine.kind}"
+    raise InputError(mistake, expected="a hexapod; other kinds are analyzed, mapped, placed and compared")
 
 
 @dataclass(frozen=True)
