@@ -1,4 +1,4 @@
-"""What a six-strut machine is: joints, tool, strut law, platform bars, limits. SI units.
+"""What a machine is; a six-strut one: joints, tool, strut law, platform bars, limits. SI units.
 
 Every quantity carries its origin: "published", "recovered" (from published figures), "assumed", or "fitted" (to
 measurements, by `tps update`). How well fitted parameters are known is `Uncertainty`: standard deviations in the units
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -214,24 +214,19 @@ class EffectEntry:
         return EffectError(text, expected=expected, hint=hint, file=self.file or None, line=line)
 
 
-@dataclass(frozen=True)
-class Hexapod:
-    """A six-strut platform machine, SI units.
+@dataclass(frozen=True, kw_only=True)
+class MachineTool:
+    """What every machine has, whatever holds its tool, SI units.
+
+    A kind is a subclass: `Hexapod`, or one whose file describes what of its load path gives way (`elements`).
 
     Attributes
     ----------
     name, title, source
         Short name, title for headings, where the figures come from.
-    frame_joints
-        (6, 3) m, base frame; row i belongs to strut i + 1.
-    platform_joints
-        (6, 3) m, platform frame, relative to the tip of the reference tool.
     reference_tool_length
-        m, from the spindle nose to the tip that `platform_joints` refers to.
-    strut_law
-        Stiffness of a strut over its length.
-    platform_bar_stiffness
-        N/m of each bar of the platform truss; inf: rigid.
+        m, from the spindle nose to the tip that the geometry refers to; nan where nobody says: tools of a program then
+        do not move the machine.
     limits
         Reach.
     default_origin
@@ -250,16 +245,16 @@ class Hexapod:
         Physical effects that the machine file carries; instruments act on readings only.
     uncertainty
         Of parameters that were fitted to measurements; None if none were.
+    text
+        The machine file; "" where there is none.
     """
+
+    kind: ClassVar[str]
 
     name: str
     title: str
     source: str
-    frame_joints: FloatArray
-    platform_joints: FloatArray
-    reference_tool_length: float
-    strut_law: StrutLaw
-    platform_bar_stiffness: float = np.inf
+    reference_tool_length: float = np.nan
     limits: Limits = field(default_factory=Limits)
     default_origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     rapid_feed: float = defaults.RAPID_FEED
@@ -271,6 +266,7 @@ class Hexapod:
     effects: tuple[EffectEntry, ...] = ()
     instruments: tuple[EffectEntry, ...] = ()
     uncertainty: Uncertainty | None = None
+    text: str = field(default="", repr=False)
 
     def once(self, key: object, make: Callable[[], Derived]) -> Derived:
         """What `make` computes of this machine, computed once: it never changes, `with_changes` makes another."""
@@ -279,6 +275,35 @@ class Hexapod:
             known[key] = make()
         derived: Derived = known[key]
         return derived
+
+    def with_changes(self, **changes: Any) -> Self:
+        """A copy with some attributes replaced."""
+        return replace(self, **changes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hexapod(MachineTool):
+    """A six-strut platform machine, SI units.
+
+    Attributes
+    ----------
+    frame_joints
+        (6, 3) m, base frame; row i belongs to strut i + 1.
+    platform_joints
+        (6, 3) m, platform frame, relative to the tip of the reference tool.
+    strut_law
+        Stiffness of a strut over its length.
+    platform_bar_stiffness
+        N/m of each bar of the platform truss; inf: rigid.
+    """
+
+    kind: ClassVar[str] = "hexapod"
+
+    reference_tool_length: float
+    frame_joints: FloatArray
+    platform_joints: FloatArray
+    strut_law: StrutLaw
+    platform_bar_stiffness: float = np.inf
 
     def platform_joints_for(self, tool_length: ArrayLike) -> FloatArray:
         """(6, 3) m, or (n, 6, 3) for n lengths: platform joints relative to the tip of such a tool, nan: of reference.
@@ -292,10 +317,6 @@ class Hexapod:
             return self.platform_joints
         extension = np.where(np.isnan(length), 0.0, length - self.reference_tool_length)
         return np.asarray(self.platform_joints + extension[..., None, None] * np.array([0.0, 0.0, 1.0]))
-
-    def with_changes(self, **changes: Any) -> Hexapod:
-        """A copy with some attributes replaced."""
-        return replace(self, **changes)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
-from toolpath_stiff.machine.model import EffectEntry, Hexapod
+from toolpath_stiff.machine.model import EffectEntry, MachineTool
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.active import ActiveEffect, read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
@@ -55,11 +55,11 @@ class StiffnessModel:
         What every result says of effects that fail `effects check` and were allowed all the same.
     """
 
-    machine: Hexapod
+    machine: MachineTool
     effects: tuple[ActiveEffect, ...] = ()
     instruments: tuple[ActiveEffect, ...] = ()
-    control: Hexapod | None = None
-    given: Hexapod | None = None
+    control: MachineTool | None = None
+    given: MachineTool | None = None
     conditions: Conditions = field(default_factory=Conditions)
     unchecked: tuple[str, ...] = ()
 
@@ -75,7 +75,7 @@ class StiffnessModel:
 
 
 def build_model(
-    machine: Hexapod,
+    machine: MachineTool,
     effect_files: Iterable[str | Path] = (),
     extra: Iterable[ActiveEffect] = (),
     conditions: Conditions | None = None,
@@ -131,7 +131,7 @@ def build_model(
     return _assembled(machine, actives, conditions or Conditions(machine.setup, machine.temperature))
 
 
-def _assembled(given: Hexapod, actives: Sequence[ActiveEffect], conditions: Conditions) -> StiffnessModel:
+def _assembled(given: MachineTool, actives: Sequence[ActiveEffect], conditions: Conditions) -> StiffnessModel:
     """Geometry effects applied one after the other, to the true machine and to what the control takes it for."""
     effects = tuple(active for active in actives if not active.effect.is_instrument)
     machine = control = given
@@ -181,7 +181,7 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
     raise EffectError(f"machine {given.name} has no parameter {name!r}")
 
 
-def _activate(machine: Hexapod, kind: str, entry: EffectEntry, files: tuple[str | Path, ...]) -> ActiveEffect:
+def _activate(machine: MachineTool, kind: str, entry: EffectEntry, files: tuple[str | Path, ...]) -> ActiveEffect:
     try:
         effect = find_effect(entry.name, files)
     except InputError as error:
