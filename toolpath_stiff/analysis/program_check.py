@@ -52,7 +52,7 @@ def machine_findings(program: ReadProgram, machine: Hexapod, step: float) -> tup
     same = (samples.move[1:] == samples.move[:-1]) & samples.cutting[1:] & (time > 0.0)
     if not same.any():
         return findings, {}
-    speed = (np.abs(np.diff(there.strut_lengths, axis=0)[same]) / time[same, None]).max(axis=1)
+    speed = (np.abs(np.diff(there.joints, axis=0)[same]) / time[same, None]).max(axis=1)
     fastest, top = mm_per_min_from_m_per_s(float(speed.max())), int(np.argmax(speed))
     return findings, {"mm_per_min": fastest, "line": int(samples.line[1:][same][top])}
 

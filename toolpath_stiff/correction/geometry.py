@@ -11,7 +11,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.model import Hexapod, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, StrutLaw, as_hexapod
 from toolpath_stiff.stiffness.core import tip_compliance
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, n_per_um_from_n_per_m
@@ -57,7 +57,7 @@ def machine_of(
     platform = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(6, height)])
     vertex, out, up = np.deg2rad(VERTEX_DEG), [lower_radius, upper_radius] * 3, [lower_height, upper_height] * 3
     frame = np.column_stack([out * np.cos(vertex), out * np.sin(vertex), up]) + (scale * platform - platform)
-    nist = load_machine("nist")
+    nist = as_hexapod(load_machine("nist"), "the paper")
     return nist.with_changes(frame_joints=frame, platform_joints=scale * platform, strut_law=law or nist.strut_law)
 
 
@@ -85,7 +85,7 @@ def recover_geometry(starts: int = 20, seed: int = 1) -> Document:
     from scipy.optimize import least_squares
 
     position, table = table_1()
-    rng, law = np.random.default_rng(seed), load_machine("nist").strut_law
+    rng, law = np.random.default_rng(seed), as_hexapod(load_machine("nist"), "the paper").strut_law
     # Unknowns are measured in units of their scatter: in metres and N/mm a solver would stop at once.
     low, width = SCATTER[:, 0], SCATTER[:, 1] - SCATTER[:, 0]
 

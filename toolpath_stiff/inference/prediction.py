@@ -135,7 +135,7 @@ class Predictor:
     def _read(self, stiffness: FloatArray, instruments: Sequence[ActiveEffect], machine: Hexapod) -> FloatArray:
         """(n,) ln of what the instruments show of stiffnesses (n,)."""
         if instruments:
-            path = replace(self.full_path, machine=machine)
+            path = replace(self.full_path, machine_tool=machine)
             for active in instruments:
                 stiffness = shown_by(active, stiffness, path, self.data)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -145,7 +145,7 @@ class Predictor:
         """(m,) N/m at the distinct rows."""
         given = self.base.machine
         if model.machine.platform_joints is given.platform_joints and model.machine.frame_joints is given.frame_joints:
-            path = replace(prepared.path, machine=model.machine)
+            path = replace(prepared.path, machine_tool=model.machine)
             return mechanical_stiffness(model, path, prepared.data, prepared.forces)
         return mechanical_stiffness(model, measured_path(model, prepared.data), prepared.data)
 

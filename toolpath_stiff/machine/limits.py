@@ -83,7 +83,10 @@ def _workspace_limits(limits: Limits) -> list[Limit]:
 
 def _both_ends(name: str, quantity: str, low: float, high: float, unit: str) -> list[Limit]:
     span = high - low if np.isfinite(high - low) else 1.0
-    return [Limit(f"{name} min", quantity, low, True, span, unit), Limit(f"{name} max", quantity, high, False, span, unit)]
+    return [
+        Limit(f"{name} min", quantity, low, True, span, unit),
+        Limit(f"{name} max", quantity, high, False, span, unit),
+    ]
 
 
 def _joint_limits(machine: MachineTool) -> list[Limit]:
@@ -189,9 +192,7 @@ def reach(
     return Reach(margins[rows, worst], worst, values[rows, worst], limits)
 
 
-def _values(
-    machine: MachineTool, tip: FloatArray, stance: Struts | Stance, rotation: ArrayLike | None
-) -> FloatArray:
+def _values(machine: MachineTool, tip: FloatArray, stance: Struts | Stance, rotation: ArrayLike | None) -> FloatArray:
     """(n, l) what the machine's limits bound, those that are infinite too."""
     joints, tips = np.repeat(stance.joints, 2, axis=1), np.repeat(tip, 2, axis=1)
     if isinstance(stance, Struts):

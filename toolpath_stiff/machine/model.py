@@ -22,7 +22,7 @@ from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.machine.elements import Element, Stance
 from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.poses import Pose
-from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.units import n_per_m_from_n_per_um
 
 Derived = TypeVar("Derived")
@@ -324,6 +324,11 @@ class MachineTool:
     def rotation_of(self, abc: FloatArray) -> FloatArray:
         """(n, 3, 3) orientation of the tool in work axes of programmed angles (n, 3) rad: roll, pitch, yaw."""
         return rotation_matrices(abc)
+
+    def angles_of(self, abc: FloatArray) -> FloatArray:
+        """(n, 3) rad, roll, pitch, yaw of the tool in work axes of programmed angles (n, 3) rad."""
+        plain = type(self).rotation_of is MachineTool.rotation_of or not abc.any()
+        return abc if plain else roll_pitch_yaw(self.rotation_of(abc))
 
     def solve(
         self,

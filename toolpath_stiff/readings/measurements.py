@@ -394,7 +394,7 @@ def measured_path(model: StiffnessModel, data: Readings) -> LoadPath:
     path = load_path(model, data.position[first], data.rotation[first], length).take(which)
     return replace(
         path,
-        struts=path.struts if data.beside is None else data.beside.on_lengths(path.struts),
+        stance=path.stance if data.beside is None else data.beside.on_lengths(path.struts),
         force=data.force,
         direction=data.direction,
         setup=None if "setup" in data.missing else data.setup,
