@@ -280,6 +280,10 @@ class MachineTool:
         """A copy with some attributes replaced."""
         return replace(self, **changes)
 
+    def extension(self, tool_length: ArrayLike) -> FloatArray:
+        """M by which tools are longer than the reference tool; nan of either, the reference tool's: 0."""
+        return np.nan_to_num(np.asarray(tool_length, dtype=float) - self.reference_tool_length)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Hexapod(MachineTool):
