@@ -59,4 +59,3 @@ class SpanningBeam:
         along = end - start
         axes = beam_axes(along, rows_of(applied(first.axes, self.near_z)))
         return Spring(start + 0.5 * along, axes, beam_compliance(np.linalg.norm(along, axis=1), self.stiffness))
-

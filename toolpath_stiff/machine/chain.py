@@ -32,6 +32,11 @@ class Frame:
         """(n, 3) in base axes of a point (3,) of this frame; (3,) where the frame is the same at all poses."""
         return rows_of(self.origin + applied(self.axes, place))
 
+    @property
+    def placement(self) -> Placement:
+        """It in the base, where it is the same at all poses."""
+        return Placement(self.axes[..., 0], self.origin[:, 0])
+
     def turn(self, axes: FloatArray) -> FloatArray:
         """(n, 3, 3) in base axes of axes (3, 3) in this frame; (3, 3) where the frame is the same at all poses."""
         return rows_of(turned(self.axes, axes))

@@ -177,7 +177,9 @@ def rod_forces(directions: FloatArray, arms: FloatArray, last: FloatArray | None
         return np.asarray(np.linalg.inv(wrenches))
     except np.linalg.LinAlgError:
         singular = ~(np.abs(np.linalg.det(wrenches)) > 0.0)
-        return np.where(singular[:, None, None], np.nan, np.linalg.inv(np.where(singular[:, None, None], np.eye(6), wrenches)))
+        return np.where(
+            singular[:, None, None], np.nan, np.linalg.inv(np.where(singular[:, None, None], np.eye(6), wrenches))
+        )
 
 
 def body_under_rods(forces: FloatArray, directions: FloatArray, arms: FloatArray, axes: FloatArray) -> FloatArray:

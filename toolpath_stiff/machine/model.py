@@ -361,6 +361,10 @@ class MachineTool:
         """Bodies of a drawing by name, (n, p, 3) m in base axes."""
         raise NotImplementedError
 
+    def extension(self, tool_length: ArrayLike) -> FloatArray:
+        """M by which tools are longer than the reference tool; nan of either, the reference tool's: 0."""
+        return np.nan_to_num(np.asarray(tool_length, dtype=float) - self.reference_tool_length)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Hexapod(MachineTool):

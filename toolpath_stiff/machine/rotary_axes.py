@@ -19,8 +19,19 @@ ASIDE = 1e-6  # rad by which the tool may point elsewhere: what rounding of word
 
 @dataclass(frozen=True)
 class RotaryAxes:
-    """Rotary axes (k, 3), in work axes at joint values of 0, and the tool's axes (3, 3) there; at most two axes."""
+    """At most two rotary axes from the work to the tool.
 
+    Attributes
+    ----------
+    joints
+        Their numbers among the machine's joints.
+    axes
+        Unit vectors (3,) in work axes at joint values of 0.
+    home
+        (3, 3) the tool's axes there.
+    """
+
+    joints: list[int]
     axes: tuple[FloatArray, ...]
     home: FloatArray
 

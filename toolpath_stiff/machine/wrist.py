@@ -81,7 +81,9 @@ class SphericalWrist:
         if centre is None or not square or abs(abs(float(z[1] @ z[2])) - 1.0) > SQUARE:
             return None
         arm = Placement(np.column_stack([np.cross(z[1], z[0]), z[1], z[0]]), homes[0].origin)
-        a, b, c = (arm.inverse().then(Placement(np.eye(3), p)).origin for p in (homes[1].origin, homes[2].origin, centre))
+        a, b, c = (
+            arm.inverse().then(Placement(np.eye(3), p)).origin for p in (homes[1].origin, homes[2].origin, centre)
+        )
         plane = [complex(point[2], point[0]) for point in (a, b, c)]
         wrist = np.column_stack([np.cross(z[4], z[3]), z[4], z[3]])
         sine, _, cosine = wrist.T @ z[5]
@@ -144,9 +146,7 @@ class SphericalWrist:
         Wrist centre's distance from axis 1 over the arm's length; sine of the elbow's bend; sine of the wrist's.
         """
         gamma = self.sign * joints[2] + np.angle(self.lower) - np.angle(self.upper)
-        point = self.shoulder + np.exp(1j * joints[1]) * (
-            self.upper + self.lower * np.exp(1j * self.sign * joints[2])
-        )
+        point = self.shoulder + np.exp(1j * joints[1]) * (self.upper + self.lower * np.exp(1j * self.sign * joints[2]))
         length = abs(self.upper) + abs(self.lower)
         return np.abs(np.stack([point.imag / length, np.sin(gamma), np.sin(joints[4] + self.bend)]))
 
