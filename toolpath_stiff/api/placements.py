@@ -17,7 +17,7 @@ from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, low_high, numbers
@@ -171,7 +171,7 @@ def _keep_out(text: str) -> KeepOut:
 
 
 def _bounds(
-    machine: Hexapod, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
+    machine: MachineTool, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
 ) -> Bounds:
     """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
     heights = sorted(set(map(float, heights_mm)))
@@ -245,7 +245,9 @@ def try_placement(
     on, part = machine_from(machine), program_from(program)
     model, direction = on.running(part), parse_load(load)
     read = part.moves(None, model.machine.default_origin)
-    return PlacementTrial(read, Evaluator(model, work_path(read, m_from_mm(step_mm), direction), direction, force_N))
+    return PlacementTrial(
+        read, Evaluator(model, work_path(read, m_from_mm(step_mm), direction, model.machine), direction, force_N)
+    )
 
 
 @checked

@@ -17,12 +17,14 @@ from toolpath_stiff.machine.kinematics import (
     solve_struts,
 )
 from toolpath_stiff.machine.model import Hexapod, Limits, MachineTool, as_hexapod
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 # What limits bound: strut lengths, swing of the joints at frame and platform, the tool tip, the singularity index.
 STRUT, FRAME, PLATFORM, SINGULARITY, JOINTS = "strut", "frame", "platform", "singularity", "joints"
 AXES = ("x", "y", "z")
+DRAWN = 1000  # joint values of which the middle of a workspace is the best
 
 
 @dataclass(frozen=True)
@@ -218,6 +220,15 @@ def stand(machine: MachineTool, pose: ArrayLike) -> tuple[FloatArray, Struts | S
     turn = rotation_matrices(values[None, 3:])
     stance = solved(machine, values[None, :3], turn)
     return values, stance, reach(machine, values[:3], stance, turn)
+
+
+def upright_middle(machine: MachineTool) -> Pose:
+    """Of places that joints drawn between their limits lead to, that farthest from all limits with the tool upright."""
+    low, high = np.nan_to_num(machine.joint_limits, posinf=np.pi, neginf=-np.pi).T
+    joints = low + (high - low) * np.random.default_rng(0).uniform(size=(DRAWN, len(low)))
+    places = machine.forward(joints)[0]
+    x, y, z = places[int(np.argmax(reach(machine, places, machine.solve(places)).margin))].round(3).tolist()
+    return (x, y, z, 0.0, 0.0, 0.0)
 
 
 RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and how many: each goes on where the one before found a limit
