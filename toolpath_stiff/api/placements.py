@@ -17,6 +17,7 @@ from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.limits import working_box
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.program import Program, program_from
@@ -176,7 +177,7 @@ def _bounds(
     """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
     heights = sorted(set(map(float, heights_mm)))
     sides = [*box[:2], (heights[0], heights[-1]) if heights else box[2]]
-    workspace = mm_from_m(machine.limits.workspace).T.tolist()
+    workspace = mm_from_m(working_box(machine)).T.tolist()
     for axis, side, reach in zip("xyz", sides, workspace, strict=True):
         if side is None and not np.isfinite(reach).all():
             raise InputError(f"the machine file bounds no workspace in {axis}", hint=f"give --{axis} LO:HI")

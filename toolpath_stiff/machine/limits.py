@@ -223,12 +223,28 @@ def stand(machine: MachineTool, pose: ArrayLike) -> tuple[FloatArray, Struts | S
 
 
 def upright_middle(machine: MachineTool) -> Pose:
-    """Of places that joints drawn between their limits lead to, that farthest from all limits with the tool upright."""
+    """The place farthest from all limits, of many, with the tool upright."""
+    places, margin = _drawn_places(machine)
+    x, y, z = places[int(np.argmax(margin))].round(3).tolist()
+    return (x, y, z, 0.0, 0.0, 0.0)
+
+
+def working_box(machine: MachineTool) -> FloatArray:
+    """(2, 3) m, lower and upper corner of where program zero may sit: the stated workspace, else what is reached."""
+    stated = machine.limits.workspace
+    if isinstance(machine, Hexapod) or np.isfinite(stated).all():
+        return stated
+    places, margin = _drawn_places(machine)
+    within = places[margin >= 0.0] if (margin >= 0.0).any() else places
+    return np.where(np.isfinite(stated), stated, [within.min(axis=0), within.max(axis=0)])
+
+
+def _drawn_places(machine: MachineTool) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) m, places that joints drawn between their limits lead to, and (n,) margins there with the tool upright."""
     low, high = np.nan_to_num(machine.joint_limits, posinf=np.pi, neginf=-np.pi).T
     joints = low + (high - low) * np.random.default_rng(0).uniform(size=(DRAWN, len(low)))
     places = machine.forward(joints)[0]
-    x, y, z = places[int(np.argmax(reach(machine, places, machine.solve(places)).margin))].round(3).tolist()
-    return (x, y, z, 0.0, 0.0, 0.0)
+    return places, reach(machine, places, machine.solve(places)).margin
 
 
 RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and how many: each goes on where the one before found a limit
