@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rotations import rotation_matrices
@@ -100,9 +101,10 @@ def standard_dh(alpha: float, a: float, offset: float, d: float) -> Placement:
     return placement((0.0, 0.0, d), (0.0, 0.0, offset)).then(placement((a, 0.0, 0.0), (alpha, 0.0, 0.0)))
 
 
-def aligned(axis: Sequence[float]) -> Placement:
+def aligned(axis: ArrayLike) -> Placement:
     """A placement whose z is a direction, turned from z by the shortest way."""
-    x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    direction = np.asarray(axis, dtype=float)
+    x, y, z = direction / np.linalg.norm(direction)
     if z < -1.0 + 1e-12:
         return placement(rpy=(np.pi, 0.0, 0.0))
     share = 1.0 / (1.0 + z)  # Rodrigues' formula about (-y, x, 0)

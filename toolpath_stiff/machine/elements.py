@@ -2,7 +2,8 @@
 
 A wrench w = (force, moment about the tip), base axes, puts the loads S w on an element; its compliances c turn them
 into the tip's motion C w, C = sum S^T diag(c) S over all elements, whether they carry the tool or the work. A body that
-gives way is a spring of three translations and three rotations at a place, in axes: [R^T, 0; R^T [o - p]x^T ...] as rows.
+gives way is a spring of three translations and three rotations at a place o, in axes R: its force is R^T f, its moment
+R^T (m + (p - o) x f) under a force f and moment m at the tip p.
 Arrays lead with the pose; they are made as columns (poses last) and handed out transposed, so that sums over many
 poses run along memory.
 """

@@ -14,18 +14,23 @@ from toolpath_stiff import defaults
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
-from toolpath_stiff.machine import hexapod_file, serial_file
+from toolpath_stiff.machine import delta, hexaglide, hexapod_file, pentapod, serial_file
 from toolpath_stiff.machine.limits import upright_middle
 from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.machine.schema import MachineToml
-from toolpath_stiff.machine.serial import Serial
 from toolpath_stiff.toml_reader import LARGEST_BYTES, shortened
 
 # What `kind` of a machine file may say -> the reader of such files.
 KINDS: dict[str, Callable[[MachineToml], MachineTool]] = {
-    Hexapod.kind: hexapod_file.read,
-    Serial.kind: serial_file.read,
+    "hexapod": hexapod_file.read,
+    "serial": serial_file.read,
+    "delta": delta.read,
+    "pentapod": pentapod.read,
+    "hexaglide": hexaglide.read,
 }
+
+
+ALIASES = {"linear_delta": "delta"}
 
 
 def packaged_machines() -> dict[str, Path]:
@@ -84,6 +89,7 @@ def parse_machine(text: str, file: str = "machine.toml") -> MachineTool:
     """Parse the text of a machine file; `file` is only used in messages. Raises `InputError`."""
     toml = MachineToml(text, file, kind=InputError)
     kind = toml.data.get("kind", Hexapod.kind)
+    kind = ALIASES.get(str(kind), kind)
     if not isinstance(kind, str) or kind not in KINDS:
         raise toml.fault("", "kind", f" = {shortened(kind)}", expected=f"one of {', '.join(KINDS)}")
     machine = KINDS[kind](toml)

@@ -13,7 +13,7 @@ def wound(values: FloatArray, limits: FloatArray, linear: Sequence[bool], start:
     """Values (j, n) with whole turns added to rotary joints, so that they lie within limits (j, 2) where they can.
 
     Without a start each is as near to the middle of its limits as it can be. With a start (j,) the poses are a path:
-    a joint goes on from pose to pose by less than half a turn, and the path as a whole lies within the limits if it can.
+    a joint goes on from pose to pose by less than half a turn, and the whole path lies within the limits if it can.
     """
     wound = values.copy()
     for i, (low, high) in enumerate(limits):

@@ -24,7 +24,7 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m
 # What limits bound: strut lengths, swing of the joints at frame and platform, the tool tip, the singularity index.
 STRUT, FRAME, PLATFORM, SINGULARITY, JOINTS = "strut", "frame", "platform", "singularity", "joints"
 AXES = ("x", "y", "z")
-DRAWN = 1000  # joint values of which the middle of a workspace is the best
+WIDEST, ROUNDS, DRAWN = 4.0, 9, 500  # m, rounds, draws in each, by which the middle of a workspace is sought
 
 
 @dataclass(frozen=True)
@@ -223,28 +223,23 @@ def stand(machine: MachineTool, pose: ArrayLike) -> tuple[FloatArray, Struts | S
 
 
 def upright_middle(machine: MachineTool) -> Pose:
-    """The place farthest from all limits, of many, with the tool upright."""
-    places, margin = _drawn_places(machine)
-    x, y, z = places[int(np.argmax(margin))].round(3).tolist()
+    """The place farthest from all limits with the tool upright, by draws in boxes around the best, each half as wide."""
+    rng, best = np.random.default_rng(0), np.zeros(3)
+    for half in WIDEST * 0.5 ** np.arange(ROUNDS):
+        places = best + half * rng.uniform(-1.0, 1.0, (DRAWN, 3))
+        places[0] = best
+        best = places[int(np.argmax(reach(machine, places, machine.solve(places)).margin))]
+    x, y, z = best.round(3).tolist()
     return (x, y, z, 0.0, 0.0, 0.0)
 
 
 def working_box(machine: MachineTool) -> FloatArray:
-    """(2, 3) m, lower and upper corner of where program zero may sit: the stated workspace, else what is reached."""
-    stated = machine.limits.workspace
+    """(2, 3) m, lower and upper corner of where program zero may sit: the stated workspace, else the reach from it."""
+    stated, origin = machine.limits.workspace, np.array(machine.default_origin[:3])
     if isinstance(machine, Hexapod) or np.isfinite(stated).all():
         return stated
-    places, margin = _drawn_places(machine)
-    within = places[margin >= 0.0] if (margin >= 0.0).any() else places
-    return np.where(np.isfinite(stated), stated, [within.min(axis=0), within.max(axis=0)])
-
-
-def _drawn_places(machine: MachineTool) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) m, places that joints drawn between their limits lead to, and (n,) margins there with the tool upright."""
-    low, high = np.nan_to_num(machine.joint_limits, posinf=np.pi, neginf=-np.pi).T
-    joints = low + (high - low) * np.random.default_rng(0).uniform(size=(DRAWN, len(low)))
-    places = machine.forward(joints)[0]
-    return places, reach(machine, places, machine.solve(places)).margin
+    ends = np.stack([reach_along(machine, origin, sign * np.eye(3), np.eye(3)) for sign in (-1.0, 1.0)])
+    return np.where(np.isfinite(stated), stated, origin + ends * [[-1.0], [1.0]])
 
 
 RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and how many: each goes on where the one before found a limit

@@ -5,7 +5,6 @@ turned. The tool's axis has two pairs of angles (Paden and Kahan's second subpro
 Introduction to Robotic Manipulation, 1994, 3.3); of both the one whose turn about the tool axis is the one asked for.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,10 +34,10 @@ class RotaryAxes:
     axes: tuple[FloatArray, ...]
     home: FloatArray
 
-    def rotation(self, angles: Sequence[FloatArray]) -> FloatArray:
+    def rotation(self, angles: FloatArray) -> FloatArray:
         """(3, 3, n) tool axes in work axes at angles (k, n) rad."""
         total = self.home[..., None]
-        for axis, angle in zip(reversed(self.axes), reversed(angles), strict=True):
+        for axis, angle in zip(reversed(self.axes), angles[::-1], strict=True):
             total = turned_about(axis, angle, total)
         return total
 
@@ -50,7 +49,7 @@ class RotaryAxes:
         for pair in pairs[1:]:
             other = self._agreement(rotation, pair)
             best = np.where(other > spin + ASIDE, pair, best)
-        pointing = np.einsum("in,in->n", rotation[:, 2] + 0.0 * best[:1].sum(axis=0), self.rotation(best)[:, 2])
+        pointing = (rotation[:, 2] * self.rotation(best)[:, 2]).sum(axis=0)
         # 1 - cos of the angle is half its square.
         return np.where(pointing > 1.0 - 0.5 * ASIDE**2, best, np.nan)
 

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.bodies import Body, SpanningBeam
 from toolpath_stiff.machine.chain import (
     STILL,
@@ -28,16 +27,15 @@ from toolpath_stiff.machine.chain import (
     rows_of,
     turned_from_left,
 )
+from toolpath_stiff.machine.chain_search import follow
 from toolpath_stiff.machine.elements import Element, Stance
 from toolpath_stiff.machine.joint_values import joint_margin, wound
 from toolpath_stiff.machine.model import MachineTool
-from toolpath_stiff.machine.newton import newton_solutions
 from toolpath_stiff.machine.rotary_axes import RotaryAxes
+from toolpath_stiff.machine.words import LETTERS, refuse_words
 from toolpath_stiff.machine.wrist import CONFIGURATIONS, SINGULARITIES, SphericalWrist
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.units import deg_from_rad
 
-LETTERS = ("A", "B", "C")
 # Smallest admissible measure of a singularity unless the file has one, assumed: the sine of three degrees.
 LEAST = 0.05
 
@@ -142,8 +140,13 @@ class Serial(MachineTool):
     def frames(self, values: FloatArray) -> tuple[list[Frame], list[Frame]]:
         """Frames of both chains at joint values (j, n): the base, one a joint, then the tip and the work."""
         count, values = len(self.tool_joints), values[self.chain]
-        tool, work = chain_frames(self.tool_joints, values[:count]), chain_frames(self.work_joints, values[count:])
-        return [*tool, tool[-1].moved(self.tip)], [*work, work[-1].moved(self.work)]
+        work = chain_frames(self.work_joints, values[count:])
+        return self.tool_frames(values[:count]), [*work, work[-1].moved(self.work)]
+
+    def tool_frames(self, values: FloatArray) -> list[Frame]:
+        """Frames of the tool's chain at its joint values."""
+        tool = chain_frames(self.tool_joints, values)
+        return [*tool, tool[-1].moved(self.tip)]
 
     def rotation_of(self, abc: FloatArray) -> FloatArray:
         """(n, 3, 3) tool axes in work axes of a program's words A, B, C (n, 3) rad.
@@ -154,12 +157,8 @@ class Serial(MachineTool):
         if (axes := self.rotary_axes) is None:
             return rotation_matrices(abc)
         names = [self.joint_names[i] for i in axes.joints]
-        for letter, words in zip(LETTERS, abc.T, strict=True):
-            if letter not in names and words.any():
-                turned = deg_from_rad(float(words[np.flatnonzero(words)[0]]))
-                mistake = f"machine {self.name} has no axis {letter}, and the program turns it to {turned:g} deg"
-                raise InputError(mistake, expected=f"words of its axes: {', '.join(self.joint_names)}")
-        angles = [abc[:, LETTERS.index(name)] for name in names]
+        refuse_words(self.name, abc, "".join(names))
+        angles = abc[:, [LETTERS.index(name) for name in names]].T
         return np.broadcast_to(rows_of(axes.rotation(angles)), (len(abc), 3, 3))
 
     def forward(self, joints: ArrayLike, tool_length: ArrayLike = np.nan) -> tuple[FloatArray, FloatArray]:
@@ -208,9 +207,9 @@ class Serial(MachineTool):
         limits, linear = self.joint_limits, [joint.linear for joint in self.joints]
         best, chosen = np.full((len(limits), tip.shape[1]), np.nan), np.zeros(tip.shape[1], dtype=np.int64)
         margin = joint_margin(best, limits)
-        for number, values in enumerate(self._solutions(tip, axes, start)):
+        for number, solution in enumerate(self._solutions(tip, axes, start)):
             if configuration in (None, number) or len(self.configurations) == 1:
-                values = wound(values, limits, linear, start)
+                values = wound(solution, limits, linear, start)
                 room = joint_margin(values, limits)
                 better = room > margin
                 best, margin = np.where(better, values, best), np.where(better, room, margin)
@@ -225,17 +224,24 @@ class Serial(MachineTool):
         held = np.zeros(len(self.joints)) if start is None else start
         held = np.clip(held, *self.joint_limits.T)[:, None]
         tool, work = self.frames(held)
+        joints = np.repeat(held, tip.shape[1], axis=1)
         if self.wrist is None:
-            yield from newton_solutions(self, tip, axes, held)
+            count, in_base = len(self.tool_joints), turned_from_left(work[-1].axes[..., 0], axes)
+            target = turned_from_left(work[-1].axes[..., 0], tip[:, None])[:, 0] + work[-1].origin
+            in_base = np.broadcast_to(in_base, (3, 3, tip.shape[1]))
+            mine = self.chain[:count]
+            joints[mine] = follow(
+                self.tool_joints, self.tool_frames, target, in_base, None if start is None else start[mine]
+            ).T
+            yield joints
             return
         first = len(self.tool_joints) - 6
         base = tool[first].placement.inverse().then(work[-1].placement)
         local = turned_from_left(base.axes, tip[:, None])[:, 0] + base.origin[:, None]
         local_axes = turned_from_left(base.axes, np.broadcast_to(axes, (3, 3, tip.shape[1])))
         for values in self.wrist.solutions(local_axes, local):
-            joints = np.repeat(held, tip.shape[1], axis=1)
             joints[self.chain[first : first + 6]] = values
-            yield joints
+            yield joints.copy()
 
     def _of_linear_axes(self, rotary: RotaryAxes, tip: FloatArray, axes: FloatArray) -> FloatArray:
         """(j, n) values of three linear axes and the rotary ones: angles first, then the linear axes meet the tip."""
@@ -276,9 +282,9 @@ class Serial(MachineTool):
         return SINGULARITIES if self.wrist else ()
 
     @property
-    def singularity_margins(self) -> FloatArray:
-        """(s,) smallest admissible measures."""
-        return np.array([self.least.get(name, LEAST) for name in self.singularity_names])
+    def singularity_margins(self) -> tuple[float, ...]:
+        """Smallest admissible measures."""
+        return tuple(self.least.get(name, LEAST) for name in self.singularity_names)
 
     def singularities(self, stance: Stance) -> FloatArray:
         """(n, s) how far from singular: 1 far, 0 singular. The compliance of a serial machine does not show it."""

@@ -15,9 +15,9 @@ from toolpath_stiff.units import m_from_mm, m_from_nm
 
 TEXT, NAMES = Key(text=True, required=False), Key(text=True, shape=(0,), required=False)
 POINT, DIRECTION = Key(unit="mm", shape=(3,), required=False), Key(shape=(3,), low=-1.0, high=1.0, required=False)
-GIVE = {"low": 0.0, "required": False}
-ALONG, ABOUT = Key(unit="nm/N", shape=(3,), high=1e7, **GIVE), Key(unit="nrad/(N m)", shape=(3,), high=1e9, **GIVE)
-PER_JOINT = Key(unit="nrad/(N m)", shape=(1,), many=True, or_one=True, high=1e9, **GIVE)
+ALONG = Key(unit="nm/N", shape=(3,), low=0.0, high=1e7, required=False)
+ABOUT = Key(unit="nrad/(N m)", shape=(3,), low=0.0, high=1e9, required=False)
+PER_JOINT = Key(unit="nrad/(N m)", shape=(1,), many=True, or_one=True, low=0.0, high=1e9, required=False)
 BEAM = ("EA_MN", "EIy_MNm2", "EIz_MNm2", "GJ_MNm2")
 ELEMENT = {
     "name": Key(text=True),
@@ -45,7 +45,8 @@ class ElementReader:
     """Reads one element after the other; frames of each side are numbered from the base, the last one tip or work."""
 
     def __init__(self, toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[Placement]) -> None:
-        self.toml, self.chains, self.section, self.row = toml, chains, "", {}
+        self.toml, self.chains, self.section = toml, chains, ""
+        self.row: Document = {}
         self.homes = []
         for joints, end in zip(chains, ends, strict=True):
             homes = [STILL]
@@ -143,14 +144,14 @@ class ElementReader:
             if self.row["frame"] not in names:
                 raise self.fault("frame", f" = {self.row['frame']!r}", f"one of {', '.join(names)}")
             return names.index(self.row["frame"]) + 1, point
-        names = {name.lstrip("-") for name in self.row.get(moving, ())}
-        frame = len(names)
-        if {joint.name for joint in joints[:frame]} != names:
+        moved = {name.lstrip("-") for name in self.row.get(moving, ())}
+        frame = len(moved)
+        if {joint.name for joint in joints[:frame]} != moved:
             order = ", ".join(joint.name for joint in joints)
-            mistake = f" = {sorted(names)}: no part of the {'work' if work else 'tool'}'s axes moves so"
+            mistake = f" = {sorted(moved)}: no part of the {'work' if work else 'tool'}'s axes moves so"
             raise self.fault(moving, mistake, f"the first ones of {order}")
         signs = {name.startswith("-") for name in self.row.get(moving, ())}
-        if names and signs != {work}:
+        if moved and signs != {work}:
             raise self.fault(moving, f" = {sorted(self.row[moving])}", "-X on the work's side, X on the tool's")
         return frame, self.homes[work][frame].inverse().then(point)
 
@@ -171,14 +172,13 @@ class ElementReader:
 
 
 def read_bodies(
-    toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[Placement]
+    toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[Placement] = (STILL, STILL)
 ) -> tuple[tuple[Part, ...], tuple[Part, ...]]:
     """What gives way on the tool's and on the work's side."""
     reader = ElementReader(toml, chains, ends)
     sides: tuple[list[Part], list[Part]] = ([], [])
     for nth, row in enumerate(read_rows(toml, "element", ELEMENT), 1):
-        for side, parts in zip(sides, reader.read(nth, row), strict=True):
-            side += parts
-    if not any(sides):
-        raise InputError("no [[element]]: nothing gives way", expected="springs, joints or beams", file=toml.file)
+        of_tool, of_work = reader.read(nth, row)
+        sides[0].extend(of_tool)
+        sides[1].extend(of_work)
     return tuple(sides[0]), tuple(sides[1])

@@ -1,4 +1,4 @@
-"""Files of serial machines: joints by Denavit-Hartenberg rows or by origin and axis, or the axes of a mill by limits."""
+"""Files of serial machines: joints by Denavit-Hartenberg rows, by origin and axis, or a mill's axes by their limits."""
 
 from collections.abc import Sequence
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.chain import (
     STILL,
     ChainJoint,
@@ -25,7 +26,6 @@ MODIFIED, STANDARD, XYZAC, XYZBC = "modified DH", "standard DH", "linuxcnc xyzac
 LENGTH, ANGLE = Key(unit="mm", required=False), Key(unit="deg", required=False, low=-3600.0, high=3600.0)
 POINT, DIRECTION = Key(unit="mm", shape=(3,), required=False), Key(shape=(3,), low=-1.0, high=1.0, required=False)
 TEXT = Key(text=True, required=False)
-BOUND = {"infinite": True, "low": -np.inf, "high": np.inf}
 AXIS = {
     "name": Key(text=True),
     "type": Key(text=True),
@@ -35,8 +35,11 @@ AXIS = {
     "xyz_mm": POINT,
     "rpy_deg": Key(unit="deg", shape=(3,), low=-360.0, high=360.0, required=False),
     "axis": DIRECTION,
-    **{f"{side}_mm": Key(unit="mm", required=False, **BOUND) for side in ("min", "max")},
-    **{f"{side}_deg": Key(unit="deg", required=False, **BOUND) for side in ("min", "max")},
+    **{
+        f"{side}_{unit}": Key(unit=unit, required=False, infinite=True, low=-np.inf, high=np.inf)
+        for side in ("min", "max")
+        for unit in ("mm", "deg")
+    },
 }
 DH = ("a_mm", "d_mm", "alpha_deg", "offset_deg")
 TRUNNION = ("x_rot_point_mm", "y_rot_point_mm", "z_rot_point_mm", "x_offset_mm", "y_offset_mm", "z_offset_mm")
@@ -73,6 +76,8 @@ def read(toml: MachineToml) -> Serial:
     else:
         tool, work, tip, table = _of_mill(toml, values)
     bodies = read_bodies(toml, (tool, work), (tip, table))
+    if not any(bodies):
+        raise InputError("no [[element]]: nothing gives way", expected="springs, joints or beams", file=toml.file)
     machine = Serial(
         **common_fields(toml, values),
         reference_tool_length=m_from_mm(values.get("reference_tool", {}).get("length_mm", np.nan)),

@@ -148,7 +148,7 @@ class SphericalWrist:
         gamma = self.sign * joints[2] + np.angle(self.lower) - np.angle(self.upper)
         point = self.shoulder + np.exp(1j * joints[1]) * (self.upper + self.lower * np.exp(1j * self.sign * joints[2]))
         length = abs(self.upper) + abs(self.lower)
-        return np.abs(np.stack([point.imag / length, np.sin(gamma), np.sin(joints[4] + self.bend)]))
+        return np.asarray(np.abs(np.stack([point.imag / length, np.sin(gamma), np.sin(joints[4] + self.bend)])))
 
 
 def _meeting_point(origins: Sequence[FloatArray], axes: Sequence[FloatArray], most: float) -> FloatArray | None:

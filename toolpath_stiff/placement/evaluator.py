@@ -215,10 +215,11 @@ class Evaluator:
             rows = np.flatnonzero(chosen == configuration)
             stance, in_work = stand(rows, np.arange(n), configuration)
             margin[rows] = reach(machine, in_work[0], stance).margin.reshape(-1, n)
-            possible = (margin[rows][:, self.cuts] >= 0.0).all(axis=1)
+            possible = np.asarray(margin[rows][:, self.cuts] >= 0.0).all(axis=1)
             wanted = np.flatnonzero((possible[:, None] & self.path.headline).ravel())
             if len(wanted):
-                some = tuple(None if values is None else values[wanted] for values in in_work)
+                tip, turns, towards = in_work
+                some = tip[wanted], None if turns is None else turns[wanted], towards[wanted]
                 values = np.full(len(rows) * n, np.nan)
                 values[wanted] = evaluate_stance(self.model, stance.take(wanted), some, self.load).stiffness
                 stiffness[rows] = values.reshape(-1, n)
