@@ -58,7 +58,9 @@ class Module:
         hal = ctypes.CDLL(str(stub), ctypes.RTLD_GLOBAL)
         hal.stub_pin.restype = ctypes.POINTER(ctypes.c_double)
         hal.stub_clear()
-        self.module = ctypes.CDLL(shutil.copy(MODULES / f"{name}.so", folder / f"{name}{len(list(folder.iterdir()))}.so"))
+        self.module = ctypes.CDLL(
+            shutil.copy(MODULES / f"{name}.so", folder / f"{name}{len(list(folder.iterdir()))}.so")
+        )
         assert self.module.rtapi_app_main() == 0
         for pin, value in pins.items():
             place = hal.stub_pin(pin.encode())

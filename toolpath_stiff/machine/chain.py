@@ -82,6 +82,8 @@ class ChainJoint:
         Its frame in the frame before, at value 0; it moves along or about z.
     low, high
         m or rad; inf: no limit.
+    given
+        The axes that its description gave the frame, in the frame.
     """
 
     name: str
@@ -89,6 +91,7 @@ class ChainJoint:
     place: Placement
     low: float = -np.inf
     high: float = np.inf
+    given: Placement = STILL
 
 
 def modified_dh(alpha: float, a: float, offset: float, d: float) -> Placement:
