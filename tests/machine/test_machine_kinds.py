@@ -104,7 +104,8 @@ at = "tip"
 translation_nm_per_N = [9.0, 9.0, 3.5]
 rotation_nrad_per_Nm = [0.0, 0.0, 0.0]
 """ + "".join(
-    f'[[axis]]\nname = "{name}"\ntype = "{kind}"\naxis = {axis}\nxyz_mm = {place}\nmin_{unit} = -inf\nmax_{unit} = inf\n'
+    f'[[axis]]\nname = "{name}"\ntype = "{kind}"\naxis = {axis}\nxyz_mm = {place}\n'
+    f"min_{unit} = -inf\nmax_{unit} = inf\n"
     for name, kind, axis, place, unit in (
         ("X", "linear", [1, 0, 0], [0, 0, 0], "mm"),
         ("Y", "linear", [0, 1, 0], [0, 0, 0], "mm"),
@@ -262,7 +263,8 @@ UR = 'name = "offset wrist"\nkind = "serial"\nconvention = "standard DH"\n' + JO
     )
 )  # fmt: skip
 RAIL = (DATA / "robot200.toml").read_text().split("[[pose]]")[0].replace(
-    "[[axis]]                       # modified", axis("E1", "linear", axis=[0, 1, 0], low=0, high=4000) + "[[axis]] # modified"
+    "[[axis]]                       # modified",
+    axis("E1", "linear", axis=[0, 1, 0], low=0, high=4000) + "[[axis]] # modified",
 ).replace('at = "base"', 'frame = "E1"\ncentre_mm = [0, 0, 0]')  # fmt: skip
 GLIDE = """
 name = "glide"
@@ -330,7 +332,7 @@ MOVED = {"joint ": 5, "carriage ": 2, "foot ": 0, "strut ": 0}  # the load of an
 
 @pytest.mark.parametrize("name", [name for name in KINDS if name not in ("mill5", "mill3", "head")])
 def test_elements_carry_what_virtual_work_says(name):
-    """Load per unit force at the tip = motion of the tip per motion of the joint, by differences of forward kinematics."""
+    """Load per unit force at the tip = motion of the tip per motion of the joint, by differences of `forward`."""
     machine, rng = KINDS[name], np.random.default_rng(3)
     position, rotation = poses(name, rng.uniform(-0.5, 0.5, (1, 6)), rng.uniform(-0.5, 0.5, (1, 7)))
     stance = machine.solve(position, rotation)
@@ -359,7 +361,7 @@ def test_a_rail_stays_where_it_is_put():
     machine, bare = KINDS["rail"], MACHINES["robot200"]
     position, rotation = bare.forward(np.deg2rad([[5.0, 12.0, 45.0, -30.0, -60.0, -165.0]]))
     start = np.array([1.5, 0, 0, 0, 0, 0, 0])
-    stance = machine.solve(position + [0.0, 1.5, 0.0], rotation, configuration=0, start=start)
+    stance = machine.solve(position + np.array([0.0, 1.5, 0.0]), rotation, configuration=0, start=start)
     expected = bare.solve(position, rotation, configuration=0, start=start[1:])
     np.testing.assert_allclose(stance.joints[0], [1.5, *expected.joints[0]], atol=1e-12)
     np.testing.assert_allclose(stance.tip_compliance(), expected.tip_compliance(), rtol=1e-12, atol=1e-18)

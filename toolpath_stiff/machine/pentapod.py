@@ -1,8 +1,8 @@
 """Pentapods: five telescopic struts on rings about the tool's axis; one of them keeps the head from turning about it.
 
-Kinematics of pentakins(9): a strut lies in the plane of its base joint and the tool's axis; its ring has a radius and
-a height above the tip. Struts carry no torque about the axis; the strut whose ring has no bearing bends under it: a force
-at its base joint, along its hinge (assumed: spherical base joint, hinge on the head).
+Kinematics of pentakins(9): a strut lies in the plane of its base joint and the tool's axis; its ring has a radius
+and a height above the tip. Struts carry no torque about the axis; the strut whose ring has no bearing bends under it: a
+force at its base joint, along its hinge (assumed: spherical base joint, hinge on the head).
 """
 
 from __future__ import annotations
