@@ -66,7 +66,7 @@ POSITIVE = 3.0
 # Share of the stiffness that `adequate` may leave along a path; assumed: a third of what cutting forces are known to.
 LEFT = 0.03
 ONE_SIDED = 1.645  # normal quantile of 95 %
-TAKEN_UP = ("joint_offset", "weak_strut")  # effects that the nuisances take up
+TAKEN_UP = {"joint_offset": "joint", "weak_strut": "strut"}  # effects that nuisances take up, of which kind
 Evidence = dict[tuple[str, ...], float]  # of effects, pairs and triples by their names
 
 
@@ -160,12 +160,12 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     seed
         Of the simulated readings.
     """
-    candidates = find_candidates(problem, effects)
+    candidates = find_candidates(problem, noise, effects)
     gates = apply_gates(problem, noise, candidates, seed)
     probability, form = weigh(problem, noise, candidates, gates)
     doubtful = question(problem.predictor)
     verdict, explanations = ("unexplained", ()) if doubtful else decide(gates, probability)
-    verdict, explanations, ballots = put_to_vote(problem, noise, candidates, gates, verdict, explanations)
+    verdict, explanations, ballots = put_to_vote(problem, candidates, gates, verdict, explanations)
     doubt, factor = ("", 1.0) if doubtful else noise_doubt(problem, noise, gates.base, verdict, seed)
     described = None
     if verdict == "identified":
@@ -189,23 +189,28 @@ class Candidates:
         All effects that do something to these data, the most likely first.
     forms
         Forms that a discrepancy may take which no effect describes.
+    within
+        Effects of which there is no more than the nuisances assume of every joint and strut: no explanations.
     """
 
     base: Fit
     families: tuple[Family, ...]
     forms: Forms
+    within: tuple[str, ...] = ()
 
     @property
     def offered(self) -> list[tuple[Family, Fit]]:
         """Effects that fit best when they are there, with that fit."""
-        return [(family, family.best) for family in self.families if family.best is not None]
+        return [(f, f.best) for f in self.families if f.best is not None and f.name not in self.within]
 
 
-def find_candidates(problem: Problem, effects: Sequence[Effect]) -> Candidates:
+def find_candidates(problem: Problem, noise: Noise, effects: Sequence[Effect]) -> Candidates:
     """Fit every effect with each of its choices beside the strut law."""
     base = problem.score_base()
     forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
-    return Candidates(base, tuple(score_families(problem, effects, base)), forms)
+    told = {entry["nuisance"] for entry in findings(fitted_nuisances(base, noise))}
+    within = tuple(name for name, nuisance in TAKEN_UP.items() if nuisance not in told)
+    return Candidates(base, tuple(score_families(problem, effects, base)), forms, within)
 
 
 @dataclass
@@ -282,7 +287,7 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: in
             singles.append(family)
     gates.singles = tuple(family.name for family in singles)
     evidence: Evidence = {(f.name,): f.log_evidence for f in families}
-    pairs, search = search_pairs(problem, families, base)
+    pairs, search = search_pairs(problem, [f for f in families if f.name not in candidates.within], base)
     gates.add(pairs, evidence, passes)
     # What an effect beside another must add to be considered: its prior, and odds of 3 to 1.
     price = float(np.log(POSITIVE * _prior(families, 1) / _prior(families, 2)))
@@ -401,7 +406,7 @@ def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str
 
 
 def put_to_vote(
-    problem: Problem, noise: Noise, candidates: Candidates, gates: Gates, verdict: str, explanations: tuple[str, ...]
+    problem: Problem, candidates: Candidates, gates: Gates, verdict: str, explanations: tuple[str, ...]
 ) -> tuple[str, tuple[str, ...], Votes]:
     """Verdict and explanations after the votes of the readings, and the votes for the first explanation.
 
@@ -411,7 +416,7 @@ def put_to_vote(
     """
     base, fits = candidates.base, {family.name: best for family, best in candidates.offered} | gates.fits
     if verdict == "adequate":
-        taken = [name for name in TAKEN_UP if name in fits] if findings(fitted_nuisances(base, noise)) else []
+        taken = [name for name in TAKEN_UP if name in fits]
         instead, ballots = _instead_of_law(problem, base)
         gates.fits |= instead
         beside = _shortened(problem, fits | instead, (NONE, *taken, *instead))
