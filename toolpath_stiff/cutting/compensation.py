@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray
-from toolpath_stiff.documents import Document, certain, to_dict, without_nan
+from toolpath_stiff.documents import Document, certain, records, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.courses import move_lengths, points_along
@@ -241,8 +241,8 @@ class Compensation(Result):
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
         names = ("turns", "contraction", "course_error_um", "notes")
-        rows = [dict(zip(self.lines, row, strict=True)) for row in zip(*self.lines.values(), strict=True)]
-        document = {"program": self.rewritten.name, "changed": self.changed, "walls": self.walls, "lines": rows}
+        document = {"program": self.rewritten.name, "changed": self.changed, "walls": self.walls}
+        document["lines"] = records(self.lines)
         return dict(certain(without_nan(to_dict(document | {name: getattr(self, name) for name in names}))))
 
     def to_frame(self) -> pd.DataFrame:

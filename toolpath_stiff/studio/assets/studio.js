@@ -135,7 +135,7 @@ function classify() {
 // Of a cut, what path and profile may show instead of stiffness: its unit and digits, what it is.
 const LAYERS = { error: ["\u00b5m", 1, "error of the surface, + material left"], width: ["mm", 2, "width of cut"],
   shift: ["\u00b5m", 1, "shift of the compensated path, + to the left"] };
-const layer = () => (state.program.path?.[which] && LAYERS[which]) || ["N/mm", 0, ""];
+const layer = () => (state.program?.path?.[which] && LAYERS[which]) || ["N/mm", 0, ""];
 // The compensated path beside the other, with its shift so many times larger that it is seen: stretches of points.
 function shifted(path) {
   const most = Math.max(...path.shift.map(Math.abs)) / 1000 || 1, times = 10 ** Math.round(Math.log10(4 / most)),
