@@ -185,7 +185,7 @@ def _pattern(state: State, block: CurrentBlock, number: int, values: Values) -> 
     plain, unit = state.plain, state.length_scale
     if plain.cycle is None:
         raise block.fail(None, "without a cycle to call", "CYCL DEF before it")
-    change = {name: values[name] for name in ("Q200", "Q203", "Q204") if name in values}
+    change: Values = {name: values[name] for name in ("Q200", "Q203", "Q204") if name in values}
     cycle = plain.cycle[1] | change
     clear, far = cycle["Q203"] + cycle["Q200"], values.get("Q301", 1.0)
     second = max(clear, cycle["Q203"] + cycle.get("Q204", 0.0))
