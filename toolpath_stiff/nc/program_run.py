@@ -8,9 +8,9 @@ call unchanged.
 
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
@@ -48,14 +48,17 @@ class Subprogram:
         The local variables with which each of its runs begins; None: it has those of its caller.
     modal
         Whether G66 calls it.
+    stop
+        Of a repeated section the line after it; -1: it is a call.
     """
 
     name: str
     first: int
     back: int
     again: int
-    arguments: dict[int, float | None] | None = None
+    arguments: Mapping[Any, float | None] | None = None
     modal: bool = False
+    stop: int = -1
 
 
 @dataclass

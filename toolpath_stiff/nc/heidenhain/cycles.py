@@ -6,7 +6,7 @@ a rapid.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.geometry import PLANES
@@ -80,7 +80,7 @@ def _check(block: CurrentBlock, number: int, values: Values) -> None:
 
 def call(state: State, block: CurrentBlock) -> None:
     """The cycle defined last, at the present point (CYCL CALL, M99, M89)."""
-    plain, frames, normal = state.plain, state.frames, PLANES[state.plane][2]
+    plain, normal = state.plain, PLANES[state.plane][2]
     if plain.cycle is None:
         raise block.fail(None, "calls a cycle, and none is defined", "CYCL DEF before it")
     waits = state.cutter is not None or plain.held is not None or plain.approach is not None
@@ -90,20 +90,32 @@ def call(state: State, block: CurrentBlock) -> None:
         return
     check_known(state, block, {normal: 0.0}, rapid=True)
     block.refuse_if(plain.unknown, None, "calls a cycle where X or Y is not known", "X and Y before it")
-    unit, modal = state.length_scale, state.feed
     block.refuse_if(number in (207, 209) and state.speed <= 0.0, None, "taps without a speed", "S above 0")
-    for height, rate, wait in strokes(number, values, state.speed):
+    unit, pitch = state.length_scale, state.length_scale if number in (207, 209) else inch_tenths(state)
+    auto = plain.tool_feed or 0.0
+    plunge(
+        state,
+        block,
+        (
+            (height * unit, None if rate in (None, MAX) else auto if rate == AUTO else rate * pitch, wait)
+            for height, rate, wait in strokes(number, values, state.speed)
+        ),
+    )
+
+
+def plunge(state: State, block: CurrentBlock, path: Iterable[Stroke]) -> None:
+    """Carry out strokes at the present point, in mm and mm/min; a feed of 0 is none that was given."""
+    frames, normal, modal = state.frames, PLANES[state.plane][2], state.feed
+    for height, rate, wait in path:
         place = frames.to_program(frames.position)
-        if abs(place[normal] - height * unit) > SAME_HEIGHT_MM:
-            place[normal] = height * unit
-            pitch = unit if number in (207, 209) else inch_tenths(state)
-            fed = plain.tool_feed if rate == AUTO else None if rate is None else rate * pitch
-            block.refuse_if(rate is not None and not fed, None, "cuts without a feed", "its feed above 0")
-            state.feed = fed
-            record(state, block, RAPID if rate in (None, MAX) else CYCLE, frames.to_control(place), (normal,))
+        if abs(place[normal] - height) > SAME_HEIGHT_MM:
+            place[normal] = height
+            block.refuse_if(rate is not None and not rate > 0.0, None, "cuts without a feed", "its feed above 0")
+            state.feed = rate
+            record(state, block, RAPID if rate is None else CYCLE, frames.to_control(place), (normal,))
         if wait:
             state.recorder.add_dwell(wait)
-    state.feed, plain.heading = modal, None
+    state.feed, state.plain.heading = modal, None
 
 
 def strokes(number: int, values: Values, speed: float) -> Iterator[Stroke]:
