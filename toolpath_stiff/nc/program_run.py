@@ -8,10 +8,10 @@ call unchanged.
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
@@ -51,14 +51,17 @@ class Subprogram:
         The local variables with which each of its runs begins; None: it has those of its caller.
     modal
         Whether G66 calls it.
+    stop
+        Of a repeated section the line after it; -1: it is a call.
     """
 
     name: str
     first: int
     back: int
     again: int
-    arguments: dict[int, float | None] | None = None
+    arguments: Mapping[Any, float | None] | None = None
     modal: bool = False
+    stop: int = -1
 
 
 @dataclass
@@ -189,7 +192,7 @@ class ProgramRun:
     def _block(self, row: int) -> Block:
         block = self._called.get(row) if self._levels else None
         if self._levels:
-            self._step(row)
+            self._count_block(row)
         if block is None:
             block = self._tried(self._read, row, Block(row + 1, ()))
             if self._levels:
@@ -218,7 +221,7 @@ class ProgramRun:
         """The line of the main file from which a subprogram's file is called: its moves are of that line."""
         return next((level.back for level in reversed(self._levels) if level.back <= self._main_lines), 1)
 
-    def _step(self, row: int) -> None:
+    def _count_block(self, row: int) -> None:
         """Count a block that runs."""
         self._blocks += 1
         if self._blocks > MOST_BLOCKS:

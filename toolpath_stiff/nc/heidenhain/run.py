@@ -66,7 +66,7 @@ class HeidenhainRun(ProgramRun):
     def _steered(self, row: int) -> int:
         """Carry out the statement in a line; where the run goes on."""
         self._row = row
-        self._step(row)
+        self._count_block(row)
         try:
             return self._carried_out(row, self._statement(row))
         except InputError as error:
