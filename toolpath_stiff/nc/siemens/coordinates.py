@@ -52,9 +52,7 @@ def frame(state: State, block: CurrentBlock, code: str) -> None:
         angle = block.take("RPL")
         block.refuse_if(angle is not None and any(values), "RPL", "beside angles about axes", "one of them")
         values[PLANES[state.plane][2]] += angle or 0.0
-        plain.inner = product(
-            plain.inner, rotation_matrix((x, y, z))
-        )  # Z first, then about the new Y and X (RPY angles)
+        plain.inner = product(plain.inner, rotation_matrix(values))  # Z first, then about the new Y and X (RPY angles)
     elif kind == "SCALE":
         factors = [1.0 if word is None else word for word in words]
         uneven = len(set(factors)) > 1 or factors[0] <= 0.0
