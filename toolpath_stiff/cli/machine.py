@@ -135,7 +135,7 @@ def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Pi
     return run.show(args, check, written, code=0 if check.good else NOT_GOOD)
 
 
-@command("machine new", "machine_template", REPLACE, without=["file"])
+@command("machine new", "machine_template", REPLACE)
 def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     """Write a commented template."""
     text = tps.machine_template(file, kind=args.kind).text
