@@ -18,11 +18,14 @@ from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
-MOST_TRIED = 400  # poses of a path at which every configuration is tried
+OF_THE_WORK = ("tangential", "axial", "normal", "radial")  # loads that turn with the work; others are of the machine
+MOST_TRIED = 60  # poses of a path at which every configuration is tried
 FEW_CORNERS = 0.2  # share of the rows; a second load of every pose costs more than these poses twice
 Progress = Callable[[int, int], None]
 # Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, length of the tool (nan: the reference tool).
 Poses = tuple[FloatArray, FloatArray | None, float]
+# Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, tangents (n, 3), all in work axes.
+WorkPoses = tuple[FloatArray, FloatArray | None, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ class Evaluation:
         (n,) a strut is longer or shorter than the strut law was given for.
     reach
         Margins and limits.
+    configuration
+        That is kept over a path, "" where there is no choice.
     """
 
     stiffness: FloatArray
@@ -48,6 +53,7 @@ class Evaluation:
     joints: FloatArray
     extrapolated: BoolArray
     reach: Reach
+    configuration: str = ""
 
     @property
     def reachable(self) -> BoolArray:
@@ -254,14 +260,18 @@ def _by_elements(
     kept = kept_configuration(machine, position, abc, lengths) if follows else None
     stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(machine))
     substituted, extrapolated = np.zeros((2, n), dtype=bool)
-    result = Evaluation(np.empty(n), substituted, np.empty((n, len(machine.joint_names))), extrapolated, stand)
+    joints, name = np.empty((n, len(machine.joint_names))), "" if kept is None else machine.configurations[kept]
+    result = Evaluation(np.empty(n), substituted, joints, extrapolated, stand, name)
     before = None
+    if follows and n:
+        before = machine.solve(position[:1], rotation_matrices(abc[:1]), lengths[:1], kept).joints[0]
     for start in range(0, n, BLOCK):
         rows = np.arange(start, min(start + BLOCK, n))
         turn = rotation_matrices(abc[rows]) if abc[rows].any() else None
         stance = machine.solve(position[rows], turn, lengths[rows], kept, before)
-        result.put(rows, _of_stance(model, stance, position[rows], tangent[rows], load))
-        before = stance.joints[-1] if follows and np.isfinite(stance.joints[-1]).all() else None
+        result.put(rows, evaluate_stance(model, stance, (position[rows], turn, tangent[rows]), load))
+        if before is not None and np.isfinite(stance.joints[-1]).all():
+            before = stance.joints[-1]
         if progress:
             progress(int(rows[-1]) + 1, n)
     return result
@@ -277,16 +287,19 @@ def kept_configuration(machine: MachineTool, position: FloatArray, abc: FloatArr
     return int(np.argmax([reach(machine, position[few], stance).margin.min() for stance in stances]))
 
 
-def _of_stance(
-    model: StiffnessModel, stance: Stance, position: FloatArray, tangent: FloatArray, load: Load
+def evaluate_stance(
+    model: StiffnessModel,
+    stance: Stance,
+    in_work: WorkPoses,
+    load: Load,
 ) -> Evaluation:
-    """A machine of elements where it stands; `position` and `tangent` (n, 3) in work axes."""
-    machine, n = model.machine, len(position)
+    """A machine of elements where it stands; tip, tool axes and tangent in work axes."""
+    machine, n, (position, _, tangent) = model.machine, len(stance), in_work
     stand = reach(machine, position, stance)
-    if stance.work_axes is not None:
-        tangent = np.einsum("nij,nj->ni", stance.work_axes, tangent)
     along, substituted = np.full(n, np.nan), np.zeros(n, dtype=bool)
-    direction, known = geometric_directions(load, stance.position, stance.rotation, tangent)
+    direction, known = geometric_directions(load, *in_work)
+    if stance.work_axes is not None and load.kind in OF_THE_WORK:
+        direction = np.einsum("nij,nj->ni", stance.work_axes, direction)
     for rows in (np.flatnonzero(stand.reachable & known), np.flatnonzero(stand.reachable & ~known)):
         if not len(rows):
             continue

@@ -135,10 +135,10 @@ def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Pi
     return run.show(args, check, written, code=0 if check.good else NOT_GOOD)
 
 
-@command("machine new", REPLACE)
+@command("machine new", "machine_template", REPLACE, without=["file"])
 def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     """Write a commented template."""
-    text = tps.machine_template(file).text
+    text = tps.machine_template(file, kind=args.kind).text
     return run.write_text(args, file, text, "edit it, then", "machine", "check", file, fresh=True)
 
 

@@ -6,6 +6,7 @@ key, value and bound.
 
 from collections.abc import Callable
 from copy import deepcopy
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine import delta, hexaglide, hexapod_file, pentapod, serial_file
+from toolpath_stiff.machine.limits import upright_middle
 from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.machine.schema import MachineToml
 from toolpath_stiff.toml_reader import LARGEST_BYTES, shortened
@@ -23,10 +25,12 @@ KINDS: dict[str, Callable[[MachineToml], MachineTool]] = {
     "hexapod": hexapod_file.read,
     "serial": serial_file.read,
     "delta": delta.read,
-    "linear_delta": delta.read,
     "pentapod": pentapod.read,
     "hexaglide": hexaglide.read,
 }
+
+
+ALIASES = {"linear_delta": "delta"}
 
 
 def packaged_machines() -> dict[str, Path]:
@@ -85,6 +89,20 @@ def parse_machine(text: str, file: str = "machine.toml") -> MachineTool:
     """Parse the text of a machine file; `file` is only used in messages. Raises `InputError`."""
     toml = MachineToml(text, file, kind=InputError)
     kind = toml.data.get("kind", Hexapod.kind)
+    kind = ALIASES.get(str(kind), kind)
     if not isinstance(kind, str) or kind not in KINDS:
         raise toml.fault("", "kind", f" = {shortened(kind)}", expected=f"one of {', '.join(KINDS)}")
-    return KINDS[kind](toml).with_changes(text=text)
+    machine = KINDS[kind](toml)
+    if isinstance(machine, Hexapod) or "setup" in toml.data:
+        return machine.with_changes(text=text)
+    middle = upright_middle(machine)
+    return machine.with_changes(
+        text=text,
+        default_origin=middle,
+        limits=replace(machine.limits, neutral_pose=middle),
+        origins={**machine.origins, "setup": "assumed"},
+        remarks={
+            **machine.remarks,
+            "setup": "not in the file; program zero is put far from all limits, tool upright",
+        },
+    )

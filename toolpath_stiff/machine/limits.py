@@ -17,12 +17,14 @@ from toolpath_stiff.machine.kinematics import (
     solve_struts,
 )
 from toolpath_stiff.machine.model import Hexapod, Limits, MachineTool, as_hexapod
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 # What limits bound: strut lengths, swing of the joints at frame and platform, the tool tip, the singularity index.
 STRUT, FRAME, PLATFORM, SINGULARITY, JOINTS = "strut", "frame", "platform", "singularity", "joints"
 AXES = ("x", "y", "z")
+WIDEST, ROUNDS, DRAWN = 4.0, 9, 500  # m, rounds, draws in each, by which the middle of a workspace is sought
 
 
 @dataclass(frozen=True)
@@ -218,6 +220,26 @@ def stand(machine: MachineTool, pose: ArrayLike) -> tuple[FloatArray, Struts | S
     turn = rotation_matrices(values[None, 3:])
     stance = solved(machine, values[None, :3], turn)
     return values, stance, reach(machine, values[:3], stance, turn)
+
+
+def upright_middle(machine: MachineTool) -> Pose:
+    """The place farthest from all limits with the tool upright, by draws in boxes around the best, each half as wide."""
+    rng, best = np.random.default_rng(0), np.zeros(3)
+    for half in WIDEST * 0.5 ** np.arange(ROUNDS):
+        places = best + half * rng.uniform(-1.0, 1.0, (DRAWN, 3))
+        places[0] = best
+        best = places[int(np.argmax(reach(machine, places, machine.solve(places)).margin))]
+    x, y, z = best.round(3).tolist()
+    return (x, y, z, 0.0, 0.0, 0.0)
+
+
+def working_box(machine: MachineTool) -> FloatArray:
+    """(2, 3) m, lower and upper corner of where program zero may sit: the stated workspace, else the reach from it."""
+    stated, origin = machine.limits.workspace, np.array(machine.default_origin[:3])
+    if isinstance(machine, Hexapod) or np.isfinite(stated).all():
+        return stated
+    ends = np.stack([reach_along(machine, origin, sign * np.eye(3), np.eye(3)) for sign in (-1.0, 1.0)])
+    return np.where(np.isfinite(stated), stated, origin + ends * [[-1.0], [1.0]])
 
 
 RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and how many: each goes on where the one before found a limit

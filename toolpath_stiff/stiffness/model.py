@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.machine.elements import Stance
@@ -128,8 +129,8 @@ def build_model(
     names = [active.effect.name for active in actives]
     for active in () if isinstance(machine, Hexapod) else actives:
         if not active.effect.every_kind:
-            kinds = f"effect {active.effect.name} holds on hexapods only, {machine.name} is of kind {machine.kind}"
-            raise EffectError(kinds, hint="leave it out")
+            mistake = f"effect {active.effect.name} holds on hexapods only, {machine.name} is of kind {machine.kind}"
+            raise EffectError(mistake, hint="leave it out")
     for name in names:
         if names.count(name) > 1:
             hint = "keep one of them (finite platform bars count as platform_flexibility)"
@@ -204,7 +205,7 @@ def _activate(machine: MachineTool, kind: str, entry: EffectEntry, files: tuple[
 def load_path(
     model: StiffnessModel,
     position: ArrayLike,
-    rotation: ArrayLike | None = None,
+    rotation: FloatArray | None = None,
     tool_length: ArrayLike = np.nan,
     force: ArrayLike = defaults.FORCE,
     **seen: Any,
