@@ -82,6 +82,8 @@ class ChainJoint:
         Its frame in the frame before, at value 0; it moves along or about z.
     low, high
         m or rad; inf: no limit.
+    given
+        The axes that its description gave the frame, in the frame.
     """
 
     name: str
@@ -89,6 +91,7 @@ class ChainJoint:
     place: Placement
     low: float = -np.inf
     high: float = np.inf
+    given: Placement = STILL
 
 
 def modified_dh(alpha: float, a: float, offset: float, d: float) -> Placement:
@@ -116,23 +119,31 @@ def chain_frames(joints: Sequence[ChainJoint], values: FloatArray) -> list[Frame
     """The base and the frame of every joint, moved, at joint values (j, n) m or rad."""
     frames = [Frame(np.eye(3)[..., None], np.zeros((3, 1)))]
     for joint, value in zip(joints, values, strict=True):
-        frame = frames[-1].moved(joint.place)
+        before = frames[-1]
+        x, y, z = (applied(before.axes, column) for column in joint.place.axes.T)
+        origin = before.origin + applied(before.axes, joint.place.origin)
         if joint.linear:
-            frames.append(Frame(frame.axes, frame.origin + value * frame.axes[:, 2]))
+            frames.append(Frame(np.stack([x, y, z], axis=1), origin + value * z))
         else:
-            frames.append(Frame(about_z(frame.axes, np.cos(value), np.sin(value)), frame.origin))
+            frames.append(Frame(_about_z(x, y, z, value), origin))
     return frames
 
 
-def about_z(axes: FloatArray, cosine: FloatArray, sine: FloatArray) -> FloatArray:
-    """(3, 3, n) axes turned about their own z."""
-    x, y = axes[:, 0], axes[:, 1]
-    z = np.broadcast_to(axes[:, 2], (3, *np.shape(cosine)))
-    return np.stack([cosine * x + sine * y, cosine * y - sine * x, z], axis=1)
+def _about_z(x: FloatArray, y: FloatArray, z: FloatArray, angle: FloatArray) -> FloatArray:
+    """(3, 3, n) axes x, y, z (3, n) turned about z."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    axes = np.empty((3, 3, len(angle)))
+    part = np.empty((3, len(angle)))
+    np.add(np.multiply(x, cosine, out=axes[:, 0]), np.multiply(y, sine, out=part), out=axes[:, 0])
+    np.subtract(np.multiply(y, cosine, out=axes[:, 1]), np.multiply(x, sine, out=part), out=axes[:, 1])
+    axes[:, 2] = z
+    return axes
 
 
 def turned(axes: FloatArray, by: FloatArray) -> FloatArray:
-    """(3, 3, n) product of rotations (3, 3, n) and a constant one (3, 3); zeros are not multiplied."""
+    """(3, 3, n) product of rotations (3, 3, n) and a constant one (3, 3)."""
+    if np.array_equal(by, np.eye(3)):
+        return axes
     return np.stack([applied(axes, column) for column in by.T], axis=1)
 
 
@@ -142,12 +153,13 @@ def turned_from_left(by: FloatArray, axes: FloatArray) -> FloatArray:
 
 
 def applied(axes: FloatArray, vector: FloatArray) -> FloatArray:
-    """(3, n) product of rotations (3, 3, n) and a constant vector (3,); zeros are not multiplied."""
-    terms = [axes[:, k] * vector[k] for k in np.flatnonzero(vector)]
-    total = terms[0] if terms else np.zeros((3, axes.shape[2]))
-    for term in terms[1:]:
-        total = total + term
-    return total
+    """(3, n) product of rotations (3, 3, n) and a constant vector (3,); by 0 and 1 nothing is multiplied."""
+    total = None
+    for k, factor in enumerate(vector.tolist()):
+        if factor:
+            term = axes[:, k] if factor == 1.0 else axes[:, k] * factor
+            total = term if total is None else total + term
+    return np.zeros((3, axes.shape[2])) if total is None else total
 
 
 def columns_of(rows: FloatArray) -> FloatArray:

@@ -73,7 +73,8 @@ def follow(
         lost = np.flatnonzero(np.isnan(values[:, 0]) & ~tried)
         if not len(lost):
             break
-        seeds = start[None] if start is not None else all_solutions(joints, frames, tip[:, lost[0]], axes[..., lost[0]])
+        best = all_solutions(joints, frames, tip[:, lost[0]], axes[..., lost[0]]) if start is None else start[None]
+        seeds = best[:1]
         tried[lost[0]], start = True, None
         while len(seeds) and len(lost):
             near = solve_from(

@@ -1,8 +1,8 @@
 """Pentapods: five telescopic struts on rings about the tool's axis; one of them keeps the head from turning about it.
 
-Kinematics of pentakins(9): a strut lies in the plane of its base joint and the tool's axis; its ring has a radius and
-a height above the tip. Struts carry no torque about the axis; the strut whose ring has no bearing bends under it: a force
-at its base joint, along its hinge (assumed: spherical base joint, hinge on the head).
+Kinematics of pentakins(9): a strut lies in the plane of its base joint and the tool's axis; its ring has a radius
+and a height above the tip. Struts carry no torque about the axis; the strut whose ring has no bearing bends under it: a
+force at its base joint, along its hinge (assumed: spherical base joint, hinge on the head).
 """
 
 from __future__ import annotations
@@ -110,7 +110,9 @@ class Pentapod(Parallel):
     def forward(
         self, joints: ArrayLike, tool_length: ArrayLike = np.nan, start: ArrayLike | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Tip (n, 3) m and tool axes (n, 3, 3) of struts (n, 5) m, near a start (5,) x, y, z, a, b or the neutral pose.
+        """Tip (n, 3) m and tool axes (n, 3, 3) of struts (n, 5) m, near the neutral pose or a start.
+
+        A start is x, y, z, a, b, (5,) or (n, 5) m and rad.
 
         Raises `InputError` where no pose near the start has such struts.
         """
@@ -126,7 +128,7 @@ class Pentapod(Parallel):
             return legs.joints - lengths, np.concatenate([u, np.stack(turns, axis=-1)], axis=-1)
 
         first = np.asarray(self.limits.neutral_pose[:5] if start is None else start, dtype=float)
-        pose = newton(equations, np.tile(first, (len(lengths), 1)), LARGEST_STEPS)
+        pose = newton(equations, np.broadcast_to(first, (len(lengths), 5)), LARGEST_STEPS)
         missed = np.flatnonzero(np.isnan(pose).any(axis=1))
         if len(missed):
             raise InputError(f"row {missed[0] + 1}: no pose near the start has such struts", hint="check the lengths")

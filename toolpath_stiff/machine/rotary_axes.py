@@ -43,19 +43,16 @@ class RotaryAxes:
 
     def angles(self, rotation: FloatArray) -> FloatArray:
         """(k, n) rad that point the tool as (3, 3, n); nan where none do."""
-        pairs = list(self._pairs(rotation))
-        best = pairs[0]
-        spin = self._agreement(rotation, best)
-        for pair in pairs[1:]:
-            other = self._agreement(rotation, pair)
-            best = np.where(other > spin + ASIDE, pair, best)
-        pointing = (rotation[:, 2] * self.rotation(best)[:, 2]).sum(axis=0)
+        best, *others = self._pairs(rotation)
+        stand = self.rotation(best)
+        for pair in others:
+            other = self.rotation(pair)
+            # The trace of R^T R(angles) is 3 where the turn about the tool's axis is met too.
+            better = (rotation * other).sum(axis=(0, 1)) > (rotation * stand).sum(axis=(0, 1)) + ASIDE
+            best, stand = np.where(better, pair, best), np.where(better, other, stand)
+        pointing = (rotation[:, 2] * stand[:, 2]).sum(axis=0)
         # 1 - cos of the angle is half its square.
         return np.where(pointing > 1.0 - 0.5 * ASIDE**2, best, np.nan)
-
-    def _agreement(self, rotation: FloatArray, angles: FloatArray) -> FloatArray:
-        """(n,) trace of R^T R(angles): 3 where the turn about the tool's axis is met too."""
-        return np.asarray((rotation * self.rotation(angles)).sum(axis=(0, 1)))
 
     def _pairs(self, rotation: FloatArray) -> list[FloatArray]:
         n = rotation.shape[2]
@@ -78,14 +75,24 @@ class RotaryAxes:
             between = first[:, None] * along + aside[:, None] * share + sign * across[:, None] * left
             t2 = _turn_between(second, np.broadcast_to(home[:, None], between.shape), between)
             t1 = _turn_between(first, between, tool)
-            rest = np.einsum("ijn,kjn->ikn", rotation, turned_about(second, t2, self.home[..., None]))
-            pairs.append(np.stack([np.where(high < ON_AXIS, angle_about(first, rest), t1), t2]))
+            if len(idle := np.flatnonzero(high < ON_AXIS)):
+                still = turned_about(second, t2[idle], self.home[..., None])
+                t1[idle] = angle_about(first, np.einsum("ijn,kjn->ikn", rotation[..., idle], still))
+            pairs.append(np.stack([t1, t2]))
         return pairs
 
 
 def turned_about(axis: FloatArray, angle: FloatArray, axes: FloatArray) -> FloatArray:
     """(3, 3, n) axes (3, 3, n) turned about a constant unit vector (Rodrigues' formula)."""
     cosine, sine = np.cos(angle), np.sin(angle)
+    if np.count_nonzero(axis) == 1:  # about x, y or z two rows mix
+        i = int(np.flatnonzero(axis)[0])
+        j, k, sine = (i + 1) % 3, (i + 2) % 3, sine * axis[i]
+        out = np.empty((3, 3, len(angle)))
+        out[i] = axes[i]
+        np.subtract(cosine * axes[j], sine * axes[k], out=out[j])
+        np.add(sine * axes[j], cosine * axes[k], out=out[k])
+        return out
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     along = turned_from_left(np.outer(axis, axis), axes)

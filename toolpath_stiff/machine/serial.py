@@ -122,20 +122,13 @@ class Serial(MachineTool):
         rotary = [not joint.linear for joint in self.joints]
         if sum(rotary) > 2 or len(rotary) - sum(rotary) != 3:
             return None
-        still = np.zeros((len(rotary), 1))
-        tool, work = self.frames(still)
+        tool, work = self.frames(np.zeros((len(rotary), 1)))
         base = work[-1].axes[..., 0].T
         count = len(self.tool_joints)
-        # Loop from the work to the tool; a joint of the work turns it the other way.
-        loop = [(i, z) for i, z in reversed(list(enumerate(self._directions(still)))) if i >= count]
-        loop += [(i, z) for i, z in enumerate(self._directions(still)) if i < count]
-        loop = [(int(self.chain[i]), base @ z[:, 0]) for i, z in loop if rotary[self.chain[i]]]
-        return RotaryAxes([i for i, _ in loop], tuple(z for _, z in loop), base @ tool[-1].axes[..., 0])
-
-    def _directions(self, values: FloatArray) -> list[FloatArray]:
-        """(3, n) base axes, along or about which each joint of the chains moves the tool against the work."""
-        tool, work = self.frames(values)
-        return [frame.axes[:, 2] for frame in tool[1:-1]] + [-frame.axes[:, 2] for frame in work[1:-1]]
+        # Loop from the work to the tool.
+        z = [base @ direction[:, 0] for direction in _directions(tool, work)]
+        loop = [i for i in (*reversed(range(count, len(z))), *range(count)) if rotary[self.chain[i]]]
+        return RotaryAxes([int(self.chain[i]) for i in loop], tuple(z[i] for i in loop), base @ tool[-1].axes[..., 0])
 
     def frames(self, values: FloatArray) -> tuple[list[Frame], list[Frame]]:
         """Frames of both chains at joint values (j, n): the base, one a joint, then the tip and the work."""
@@ -203,23 +196,30 @@ class Serial(MachineTool):
     def joint_values(
         self, tip: FloatArray, axes: FloatArray, configuration: int | None, start: FloatArray | None
     ) -> tuple[FloatArray, IntArray]:
-        """(j, n) values with the reference tool's tip (3, n) and axes (3, 3, n) in work axes, (n,) configurations."""
+        """(j, n) values with the reference tool's tip (3, n) and axes (3, 3, n) in work axes, (n,) configurations.
+
+        Arguments as of `solve`.
+        """
         limits, linear = self.joint_limits, [joint.linear for joint in self.joints]
-        best, chosen = np.full((len(limits), tip.shape[1]), np.nan), np.zeros(tip.shape[1], dtype=np.int64)
-        margin = joint_margin(best, limits)
-        for number, solution in enumerate(self._solutions(tip, axes, start)):
-            if configuration in (None, number) or len(self.configurations) == 1:
-                values = wound(solution, limits, linear, start)
-                room = joint_margin(values, limits)
-                better = room > margin
-                best, margin = np.where(better, values, best), np.where(better, room, margin)
-                chosen = np.where(better, number, chosen)
+        best, chosen, margin = np.empty(0), np.zeros(tip.shape[1], dtype=np.int64), np.empty(0)
+        for number, solution in self._solutions(tip, axes, configuration, start):
+            values = wound(solution, limits, linear, start)
+            if configuration is not None or len(self.configurations) == 1:
+                return values, np.full(tip.shape[1], number)
+            room = joint_margin(values, limits)
+            if not len(best):
+                best, margin = values, room
+            better = room > margin
+            best, margin = np.where(better, values, best), np.where(better, room, margin)
+            chosen[better] = number
         return best, chosen
 
-    def _solutions(self, tip: FloatArray, axes: FloatArray, start: FloatArray | None) -> Iterator[FloatArray]:
-        """(j, n) values of each configuration; nan where it does not reach."""
+    def _solutions(
+        self, tip: FloatArray, axes: FloatArray, configuration: int | None, start: FloatArray | None
+    ) -> Iterator[tuple[int, FloatArray]]:
+        """Number and (j, n) values of each configuration, or of one; nan where it does not reach."""
         if self.rotary_axes:
-            yield self._of_linear_axes(self.rotary_axes, tip, axes)
+            yield 0, self._of_linear_axes(self.rotary_axes, tip, axes)
             return
         held = np.zeros(len(self.joints)) if start is None else start
         held = np.clip(held, *self.joint_limits.T)[:, None]
@@ -233,31 +233,31 @@ class Serial(MachineTool):
             joints[mine] = follow(
                 self.tool_joints, self.tool_frames, target, in_base, None if start is None else start[mine]
             ).T
-            yield joints
+            yield 0, joints
             return
         first = len(self.tool_joints) - 6
         base = tool[first].placement.inverse().then(work[-1].placement)
         local = turned_from_left(base.axes, tip[:, None])[:, 0] + base.origin[:, None]
         local_axes = turned_from_left(base.axes, np.broadcast_to(axes, (3, 3, tip.shape[1])))
-        for values in self.wrist.solutions(local_axes, local):
+        for number, values in self.wrist.solutions(local_axes, local, configuration):
             joints[self.chain[first : first + 6]] = values
-            yield joints.copy()
+            yield number, joints.copy()
 
     def _of_linear_axes(self, rotary: RotaryAxes, tip: FloatArray, axes: FloatArray) -> FloatArray:
         """(j, n) values of three linear axes and the rotary ones: angles first, then the linear axes meet the tip."""
         values = np.zeros((len(self.joints), tip.shape[1]))
-        for i, angles in zip(rotary.joints, rotary.angles(axes), strict=True):
-            values[i] = angles
-        reached = np.isfinite(rotary.angles(axes)).all(axis=0)
+        angles = rotary.angles(axes)
+        for i, angle in zip(rotary.joints, angles, strict=True):
+            values[i] = angle
         tool, work = self.frames(values)
-        along = {int(i): z for i, z in zip(self.chain, self._directions(values), strict=True)}
+        along = dict(zip(self.chain.tolist(), _directions(tool, work), strict=True))
         linear = [i for i, joint in enumerate(self.joints) if joint.linear]
         a, b, c = (along[i] for i in linear)
         missing = _product(work[-1].axes, tip[:, None])[:, 0] + work[-1].origin - tool[-1].origin
         volume = (a * np.cross(b, c, axis=0)).sum(axis=0)
         for i, (second, third) in zip(linear, ((b, c), (c, a), (a, b)), strict=True):  # Cramer's rule
             values[i] = (missing * np.cross(second, third, axis=0)).sum(axis=0) / volume
-        return np.where(reached, values, np.nan)
+        return np.where(np.isfinite(angles).all(axis=0), values, np.nan)
 
     def _stance(self, joints: FloatArray, chosen: IntArray, extension: FloatArray) -> Stance:
         """The stance at joint values (j, n) with tools so much longer than the reference tool."""
@@ -302,6 +302,11 @@ class Serial(MachineTool):
             points = [np.broadcast_to(frame.origin, (3, n)).T for frame in frames]
             drawn.append((side, np.stack(points, axis=1)))
         return drawn
+
+
+def _directions(tool: list[Frame], work: list[Frame]) -> list[FloatArray]:
+    """(3, n) base axes, along or about which each joint of the chains moves the tool against the work."""
+    return [frame.axes[:, 2] for frame in tool[1:-1]] + [-frame.axes[:, 2] for frame in work[1:-1]]
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:

@@ -143,7 +143,8 @@ class ElementReader:
             names = [joint.name for joint in joints]
             if self.row["frame"] not in names:
                 raise self.fault("frame", f" = {self.row['frame']!r}", f"one of {', '.join(names)}")
-            return names.index(self.row["frame"]) + 1, point
+            number = names.index(self.row["frame"])
+            return number + 1, joints[number].given.then(point)
         moved = {name.lstrip("-") for name in self.row.get(moving, ())}
         frame = len(moved)
         if {joint.name for joint in joints[:frame]} != moved:

@@ -114,8 +114,9 @@ def _of_rows(
             raise toml.fault(section, "name", f" = {row['name']!r} is there twice")
         linear = _is_linear(toml, section, row)
         before, after = _placements(toml, section, row, convention)
-        low, high = _bounds(toml, section, row, linear)
-        sides[side].append(ChainJoint(row["name"], linear, rests[side].then(before), low, high))
+        given = STILL if any(key in row for key in DH) else after
+        place = rests[side].then(before)
+        sides[side].append(ChainJoint(row["name"], linear, place, *_bounds(toml, section, row, linear), given))
         rests[side] = after
     _check_units(toml, sides["tool"] + sides["work"])
     tip, work = values.get("tool"), values.get("work", {})

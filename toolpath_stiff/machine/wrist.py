@@ -101,8 +101,10 @@ class SphericalWrist:
             bend=float(np.arctan2(sine, cosine)),
         )
 
-    def solutions(self, axes: FloatArray, tip: FloatArray) -> Iterator[FloatArray]:
-        """(6, n) rad for each of `CONFIGURATIONS`, nan where the arm does not reach.
+    def solutions(
+        self, axes: FloatArray, tip: FloatArray, configuration: int | None = None
+    ) -> Iterator[tuple[int, FloatArray]]:
+        """Number and (6, n) rad of each of `CONFIGURATIONS`, or of one; nan where the arm does not reach.
 
         `axes` (3, 3, n) and `tip` (3, n) are the tip's frame in the frame before joint 1.
         """
@@ -112,33 +114,33 @@ class SphericalWrist:
         x, y, z = wrist + inverse.origin[:, None]
         upper, lower = abs(self.upper), abs(self.lower)
         with np.errstate(invalid="ignore"):
-            flat = np.sqrt(x * x + y * y - self.lateral**2)
-            for radius in (flat, -flat):
-                q1 = np.arctan2(y, x) - np.arctan2(self.lateral, radius)
-                turn = _unturned_z(target, np.cos(q1), np.sin(q1))
+            flat, round_z = np.sqrt(x * x + y * y - self.lateral**2), np.arctan2(y, x)
+            for number in range(0, 8, 2):
+                if configuration is not None and configuration // 2 * 2 != number:
+                    continue
+                front, up = number < 4, number % 4 < 2
+                radius = flat if front else -flat
+                q1 = round_z - np.arctan2(self.lateral, radius)
                 real, imaginary = z - self.shoulder.real, radius - self.shoulder.imag
                 cosine = (real * real + imaginary * imaginary - upper**2 - lower**2) / (2.0 * upper * lower)
-                bend = np.arccos(cosine)
                 # Up is where the elbow lies above the line from shoulder to wrist, whichever way the arm leans.
-                up = bend if radius is flat else -bend
-                towards = np.arctan2(imaginary, real)
-                for gamma in (up, -up):
-                    q2 = towards - np.arctan2(lower * np.sin(gamma), upper + lower * cosine) - np.angle(self.upper)
-                    q3 = self.sign * (gamma - np.angle(self.lower) + np.angle(self.upper))
-                    psi = q2 + self.sign * q3
-                    yield from self._wrist(q1, q2, q3, _unturned_y(turn, np.cos(psi), np.sin(psi)))
+                gamma = np.arccos(cosine) if front == up else -np.arccos(cosine)
+                bend = np.arctan2(lower * np.sin(gamma), upper + lower * cosine)
+                q2 = np.arctan2(imaginary, real) - bend - np.angle(self.upper)
+                q3 = self.sign * (gamma - np.angle(self.lower) + np.angle(self.upper))
+                rest = _unturned(target, q1, q2 + self.sign * q3)
+                for i, wrist_angles in enumerate(self._wrist(rest)):
+                    if configuration in (None, number + i):
+                        yield number + i, np.stack([q1, q2, q3, *wrist_angles])
 
-    def _wrist(self, q1: FloatArray, q2: FloatArray, q3: FloatArray, rest: FloatArray) -> Iterator[FloatArray]:
-        """Both turns of the wrist that make the rest (3, 3, n): Rz(q4) Ry(q5 + bend) Rz(q6)."""
+    def _wrist(self, rest: FloatArray) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
+        """q4, q5, q6 of both turns of the wrist that make the rest (3, 3, n): Rz(q4) Ry(q5 + bend) Rz(q6)."""
         euler = turned_from_left(self.before, rest)
         sine = np.hypot(euler[0, 2], euler[1, 2])
         q4, q5 = np.arctan2(euler[1, 2], euler[0, 2]), np.arctan2(sine, euler[2, 2])
-        across = np.divide(euler[:2, 2], sine, out=np.zeros_like(euler[:2, 2]), where=sine > 0.0)
-        across[0, sine == 0.0] = 1.0
-        c, s = across
+        c, s = np.cos(q4), np.sin(q4)
         q6 = np.arctan2(c * euler[1, 0] - s * euler[0, 0], c * euler[1, 1] - s * euler[0, 1])
-        yield np.stack([q1, q2, q3, q4, q5 - self.bend, q6])
-        yield np.stack([q1, q2, q3, q4 + np.pi, -q5 - self.bend, q6 + np.pi])
+        return (q4, q5 - self.bend, q6), (q4 + np.pi, -q5 - self.bend, q6 + np.pi)
 
     def singularities(self, joints: FloatArray) -> FloatArray:
         """(3, n) how far from singular at joint values (6, n): 1 far, 0 singular.
@@ -165,11 +167,13 @@ def _cleaned(axes: FloatArray) -> FloatArray:
     return np.where(np.abs(axes) < 1e-14, 0.0, axes)
 
 
-def _unturned_z(axes: FloatArray, cosine: FloatArray, sine: FloatArray) -> FloatArray:
-    """Rz^T R, (3, 3, n)."""
-    return np.stack([cosine * axes[0] + sine * axes[1], cosine * axes[1] - sine * axes[0], axes[2]])
-
-
-def _unturned_y(axes: FloatArray, cosine: FloatArray, sine: FloatArray) -> FloatArray:
-    """Ry^T R, (3, 3, n)."""
-    return np.stack([cosine * axes[0] - sine * axes[2], axes[1], sine * axes[0] + cosine * axes[2]])
+def _unturned(axes: FloatArray, about_z: FloatArray, about_y: FloatArray) -> FloatArray:
+    """Ry^T Rz^T R, (3, 3, n)."""
+    cosine, sine = np.cos(about_z), np.sin(about_z)
+    x, y, z = cosine * axes[0] + sine * axes[1], cosine * axes[1] - sine * axes[0], axes[2]
+    cosine, sine = np.cos(about_y), np.sin(about_y)
+    rest = np.empty(axes.shape)
+    np.subtract(cosine * x, sine * z, out=rest[0])
+    rest[1] = y
+    np.add(sine * x, cosine * z, out=rest[2])
+    return rest
