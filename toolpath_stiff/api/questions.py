@@ -154,7 +154,8 @@ def compare(
     teller(progress)("comparing")
     comparison = compare_readings(question.model, question.readings, **question.common)
     following = hint("which effect would explain it", question.request.command("diagnose"))
-    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=(following,)))
+    following = (following,) if isinstance(question.model, Hexapod) else ()
+    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=following))
 
 
 @checked
@@ -280,8 +281,8 @@ def update(
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     task = UpdateTask(
         question.hexapod("update"), question.readings, [add] if isinstance(add, str) else list(add),
-        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe, objective=objective,
-        files=question.request.data, machine_file=str(machine_file), request=question.request,
+        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe,
+        objective=objective, files=question.request.data, machine_file=str(machine_file), request=question.request,
         progress=teller(progress), **question.common,
     )  # fmt: skip
     return replace(update_machine(task), inputs=question.inputs, opened=question.on.carrying)
