@@ -1,0 +1,104 @@
+"""The free turn about the tool's axis along a path: what a cut leaves open and a robot needs.
+
+Candidates are turns times configurations of the joints at every pose; the least costly way through them is found by
+dynamic programming over the poses (Viterbi, IEEE Transactions on Information Theory 13, 1967). Arrays in, arrays out.
+"""
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray, IntArray, product
+from toolpath_stiff.rotations import rotation_about_z
+
+WHOLE = 2.0 * np.pi
+
+
+def turned_about_tool(rotation: FloatArray, turn: FloatArray) -> FloatArray:
+    """(..., 3, 3) tool axes (..., 3, 3) turned about their own z by angles (...) rad."""
+    return product(rotation, rotation_about_z(turn))
+
+
+def feed_turns(rotation: FloatArray, tangent: FloatArray) -> FloatArray:
+    """(n,) rad about the tool's axis that lay its x along the feed (n, 3), without jumps of a whole turn.
+
+    Where nothing moves, or along the axis alone, the turn stays as it was.
+    """
+    local = np.einsum("nij,ni->nj", rotation, tangent)
+    moving = np.flatnonzero(np.hypot(local[:, 0], local[:, 1]) > 1e-6)
+    if not len(moving):
+        return np.zeros(len(tangent))
+    turns = np.unwrap(np.arctan2(local[moving, 1], local[moving, 0]))
+    return turns[np.clip(np.searchsorted(moving, np.arange(len(tangent)), side="right") - 1, 0, None)]
+
+
+def steps_between(joints: FloatArray, rotary: FloatArray) -> FloatArray:
+    """(n - 1, ...) rad or m between joint values (n, ..., j) of poses, the shorter way round where `rotary` (j,) is 1."""
+    step = np.diff(joints, axis=0)
+    return np.asarray(step - rotary * WHOLE * np.round(step / WHOLE))
+
+
+def constant_costs(joints: FloatArray, cost: FloatArray, rotary: FloatArray, largest: FloatArray) -> FloatArray:
+    """(c, t) mean costs of configurations and turns that are kept at all poses; inf where a pose or a step forbids it.
+
+    Arguments as of `least_costly_way`; poses that no candidate reaches do not count.
+    """
+    some = np.isfinite(cost).any(axis=(1, 2))
+    kept = cost[some].mean(axis=0) if some.any() else np.full(cost.shape[1:], np.inf)
+    for before, after, most in zip(joints[:-1], joints[1:], largest, strict=True):
+        step = np.abs(steps_between(np.stack([before, after]), rotary)[0])
+        kept = np.where((step > most).any(axis=-1), np.inf, kept)  # nan, out of reach, is not
+    return kept
+
+
+def least_costly_way(
+    joints: FloatArray, cost: FloatArray, rotary: FloatArray, largest: FloatArray, weight: float, window: int
+) -> tuple[IntArray, IntArray]:
+    """The configuration and the turn of every pose whose costs and squared steps add up to the least.
+
+    Parameters
+    ----------
+    joints
+        (n, c, t, j) m and rad, of c configurations and t turns round the circle.
+    cost
+        (n, c, t) of each; inf where it is out of reach. Poses that no candidate reaches are passed over.
+    rotary
+        (j,) 1 for joints that turn, 0 for those that slide.
+    largest
+        (n - 1, j) most that a joint may move between two poses.
+    weight
+        Of squared steps, in units of the cost.
+    window
+        Most turns by which a pose may differ from the one before.
+
+    Returns
+    -------
+    (n,) configurations and (n,) turns, as numbers. Where the way is broken a change is dearer than all else.
+    """
+    n, configurations, turns, count = joints.shape
+    near = (np.arange(turns)[:, None] + np.arange(-window, window + 1)) % turns
+    finite = cost[np.isfinite(cost)]
+    change = 1.0 + 2.0 * n * (np.ptp(finite) if len(finite) else 0.0) + weight * n * count * WHOLE**2
+    total, came = cost[0].copy(), np.zeros((n, configurations, turns), dtype=np.int64)
+    last = joints[0]
+    own = np.arange(configurations * turns).reshape(configurations, turns)
+    for i in range(1, n):
+        if not np.isfinite(cost[i]).any():
+            came[i] = own  # nobody gets there: as if it were not on the path
+            continue
+        step = joints[i][:, :, None] - last[:, near]
+        step -= rotary * WHOLE * np.round(step / WHOLE)
+        ways = total[:, near] + weight * (step**2).sum(axis=-1)
+        ways[~(np.abs(step) <= largest[i - 1]).all(axis=-1)] = np.inf
+        best = ways.argmin(axis=-1)
+        least = np.take_along_axis(ways, best[..., None], axis=-1)[..., 0]
+        came[i] = own[:, 0][:, None] + near[np.arange(turns), best]
+        if np.isfinite(total).any():  # else this is the first pose that is reached
+            broken = total.min() + change < least
+            least, came[i][broken] = np.minimum(least, total.min() + change), int(total.argmin())
+        else:
+            least = np.zeros_like(cost[i])
+        total, last = least + cost[i], joints[i]
+    way = np.empty(n, dtype=np.int64)
+    way[-1] = int(total.argmin())
+    for i in range(n - 1, 0, -1):
+        way[i - 1] = came[i].flat[way[i]]
+    return way // turns, way % turns
