@@ -14,7 +14,6 @@ from toolpath_stiff.analysis.evaluation import joint_columns
 from toolpath_stiff.analysis.machine_check import MachineCheck, check_machine
 from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.correction.geometry import recover_geometry as recover
 from toolpath_stiff.documents import Document
 from toolpath_stiff.files import read_bytes, write_atomically
 from toolpath_stiff.machine.elements import Stance
@@ -491,27 +490,3 @@ def machine_from_linuxcnc(
     machine, notes = machine_from_hal(text, unit, path.name)
     heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
     return TextFile(machine.name, machine_toml(machine, heading), notes)
-
-
-@checked
-def recover_geometry(
-    *,
-    starts: Annotated[int, Option("--starts", at_least=1, at_most=1000)] = 20,
-    seed: Annotated[int, Option("--seed", at_least=0)] = 1,
-) -> Document:
-    """Fit the NIST geometry to the paper's Table 1 anew, from scattered starting points.
-
-    Parameters
-    ----------
-    starts
-        How many starting points.
-    seed
-        Of where they lie.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.recover_geometry(starts=1)["starts"]
-    1
-    """
-    return recover(starts=starts, seed=seed)

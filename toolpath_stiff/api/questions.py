@@ -14,7 +14,7 @@ from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.compare import compare as compare_readings
 from toolpath_stiff.correction.draft import EffectDraft, draft
 from toolpath_stiff.correction.result import Update
-from toolpath_stiff.correction.task import MACHINE, UpdateTask
+from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
@@ -226,7 +226,7 @@ def update(
     keep_strut_law: Annotated[bool, Option("--keep-strut-law", instead_of="strut_law")] = False,
     auto: Annotated[bool, Option("--auto")] = False,
     force: Annotated[bool, Option("--force")] = False,
-    believe: Annotated[str | None, Option("--believe", choices=(MACHINE,))] = None,
+    believe: Annotated[str | None, Option("--believe", choices=(MACHINE, INSTRUMENT))] = None,
     objective: Annotated[str, Option("--objective", choices=("likelihood", "mean-error"))] = "likelihood",
     machine_file: str | Path = "machine.toml",
     columns: Mapped = None,
@@ -253,7 +253,7 @@ def update(
         Write what the data do not support as well, never what fits worse than the machine given; and as
         --replace.
     believe
-        Machine: take for the machine's what an error of the instrument would show as well; else it is refused.
+        Machine or instrument: take for its what an error of the other would show as well; else it is refused.
     objective
         Mean-error: the strut law alone, as the paper fitted it.
     machine_file
@@ -280,8 +280,8 @@ def update(
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     task = UpdateTask(
         question.hexapod("update"), question.readings, [add] if isinstance(add, str) else list(add),
-        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe, objective=objective,
-        files=question.request.data, machine_file=str(machine_file), request=question.request,
+        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe,
+        objective=objective, files=question.request.data, machine_file=str(machine_file), request=question.request,
         progress=teller(progress), **question.common,
     )  # fmt: skip
     return replace(update_machine(task), inputs=question.inputs, opened=question.on.carrying)
