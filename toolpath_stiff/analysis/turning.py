@@ -6,7 +6,7 @@ changes along the path is taken where no constant one is feasible, or where it g
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,15 +15,18 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.joint_values import TURN
+from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.path.turning import (
     constant_costs,
     feed_turns,
     least_costly_way,
-    steps_between,
+    room_to_wind,
     turned_about_tool,
+    unwound,
 )
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
+from toolpath_stiff.units import deg_from_rad, nm_from_m
 
 FIXED, FEED, BEST = "fixed", "feed", "best"
 TURNS = 72  # of 5 degrees: compliance is smooth over the turn, and next ones differ by some tenths of a percent
@@ -49,7 +52,9 @@ class TurnChoice:
     constant
         Whether both are the same all along.
     changes
-        Samples before which the configuration changes, or a joint jumps.
+        Samples before which the configuration changes, a joint jumps or has to turn back.
+    mode
+        As asked for.
     mean, best_constant, median_constant
         m/N, mean compliance at the nodes: as chosen, of the best constant turn (nan: none is feasible), and the median
         of all constant ones that are.
@@ -60,9 +65,34 @@ class TurnChoice:
     configuration: IntArray
     constant: bool
     changes: IntArray
+    mode: str = BEST
     mean: float = np.nan
     best_constant: float = np.nan
     median_constant: float = np.nan
+
+    def kept(self, machine: MachineTool) -> MachineTool:
+        """The machine in the configuration of the most samples; any of them where the turn was not chosen for one."""
+        if self.mode != BEST or len(machine.configurations) < 2:
+            return machine
+        return machine.with_changes(only=int(np.bincount(self.configuration).argmax()))
+
+    @property
+    def sentence(self) -> str:
+        """What was chosen, in words."""
+        first, last = deg_from_rad(float(self.turn[0])), deg_from_rad(float(self.turn[-1]))
+        if self.mode == FEED:
+            return "the tool is turned about its axis with the feed"
+        if self.constant:
+            chosen = f"kept {first:.1f} deg from the program's"
+        else:
+            chosen = f"changed along the path from {first:.1f} to {last:.1f} deg from the program's"
+        figures = f"mean compliance {nm_from_m(self.mean):.1f} nm/N at up to {NODES} places"
+        if np.isfinite(self.best_constant):
+            figures += (
+                f"; the best constant turn has {nm_from_m(self.best_constant):.1f}, the median constant one "
+                f"{nm_from_m(self.median_constant):.1f}"
+            )
+        return f"the turn about the tool's axis is {chosen}: {figures}"
 
 
 def choose_turn(
@@ -101,38 +131,42 @@ def choose_turn(
     if len(machine.joint_names) < 6 or machine.joint_kinds.count("rotary") < 3:
         raise InputError(f"--turn {mode}: machine {machine.name} has no turn about the tool's axis to spare")
     if mode == FEED:
-        return _kept(rotation, feed_turns(rotation, tangent))
+        return replace(_kept(rotation, feed_turns(rotation, tangent)), mode=FEED)
     nodes = np.unique(np.linspace(0, len(abc) - 1, NODES).round().astype(np.int64))
     angles = TURN / turns * np.arange(turns)
-    joints, cost = _candidates(model, (position[nodes], rotation[nodes], tangent[nodes]), tool_length[nodes], load, angles)
+    poses = (position[nodes], rotation[nodes], tangent[nodes])
+    joints, cost = _candidates(model, poses, tool_length[nodes], load, angles)
     if not np.isfinite(cost).any():
         raise InputError(f"--turn best: machine {machine.name} reaches no pose of the path at any turn")
-    rotary = np.array([float(kind == "rotary") for kind in machine.joint_kinds])
-    largest = np.full((len(nodes) - 1, len(rotary)), STEP)
-    constant = constant_costs(joints, cost, rotary, largest)
+    limits = machine.joint_limits
+    winds = np.array([kind == "rotary" for kind in machine.joint_kinds]) & (np.ptp(limits, axis=1) > TURN)
+    constant = constant_costs(joints, cost, limits, winds, STEP)
     weight = SMOOTH * float(np.median(cost[np.isfinite(cost)]))
-    configuration, number = least_costly_way(joints, cost, rotary, largest, weight, WINDOW)
+    configuration, number = least_costly_way(joints, cost, winds, STEP, weight, WINDOW)
     rows = np.arange(len(nodes))
     along = cost[rows, configuration, number]
-    reached = np.isfinite(along)
-    means = float(along[reached].mean()), float(constant.min())
+    means = float(along[np.isfinite(along)].mean()), float(constant.min())
     keeps = np.isfinite(means[1]) and means[0] > (1.0 - GAIN) * means[1]
     if keeps:
         best = np.unravel_index(int(constant.argmin()), constant.shape)
         configuration, number = np.full(len(nodes), best[0]), np.full(len(nodes), best[1])
-    steps = np.abs(steps_between(joints[rows, configuration, number], rotary))
-    broken = np.flatnonzero((np.diff(configuration) != 0) | (steps > STEP).any(axis=1))
+    reached = np.flatnonzero(np.isfinite(cost[rows, configuration, number]))
+    path = unwound(joints[reached, configuration[reached], number[reached]], winds)
+    broken = (np.diff(configuration[reached]) != 0) | (np.abs(np.diff(path, axis=0)) > STEP).any(axis=1)
+    changes, begin = [], 0
+    for i in range(1, len(path)):
+        if broken[i - 1] or not room_to_wind(path[begin : i + 1], limits, winds):
+            changes.append(int(nodes[reached[i]]))
+            begin = i
     turn = np.interp(np.arange(len(abc)), nodes, np.unwrap(angles[number]))
-    nearest = np.abs(np.arange(len(abc))[:, None] - nodes).argmin(axis=1) if len(abc) <= NODES else np.searchsorted(
-        0.5 * (nodes[1:] + nodes[:-1]), np.arange(len(abc))
-    )
+    nearest = np.searchsorted(0.5 * (nodes[1:] + nodes[:-1]), np.arange(len(abc)))
     possible = constant[np.isfinite(constant)]
     return TurnChoice(
         turn=turn,
-        abc=roll_pitch_yaw(turned_about_tool(rotation, turn)),
+        abc=roll_pitch_yaw(turned_about_tool(rotation, turn)) + 0.0,
         configuration=configuration[nearest],
         constant=bool(keeps),
-        changes=nodes[broken + 1],
+        changes=np.array(changes, dtype=np.int64),
         mean=means[1] if keeps else means[0],
         best_constant=means[1] if np.isfinite(means[1]) else np.nan,
         median_constant=float(np.median(possible)) if len(possible) else np.nan,
@@ -141,7 +175,7 @@ def choose_turn(
 
 def _kept(rotation: FloatArray, turn: FloatArray) -> TurnChoice:
     """A turn that is given."""
-    abc = roll_pitch_yaw(turned_about_tool(rotation, turn))
+    abc = roll_pitch_yaw(turned_about_tool(rotation, turn)) + 0.0
     nothing = np.zeros(len(turn), dtype=np.int64)
     return TurnChoice(turn, abc, nothing, bool((turn == turn[:1]).all()), nothing[:0])
 

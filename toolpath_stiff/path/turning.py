@@ -6,7 +6,7 @@ dynamic programming over the poses (Viterbi, IEEE Transactions on Information Th
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray, product
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.rotations import rotation_about_z
 
 WHOLE = 2.0 * np.pi
@@ -30,27 +30,39 @@ def feed_turns(rotation: FloatArray, tangent: FloatArray) -> FloatArray:
     return turns[np.clip(np.searchsorted(moving, np.arange(len(tangent)), side="right") - 1, 0, None)]
 
 
-def steps_between(joints: FloatArray, rotary: FloatArray) -> FloatArray:
-    """(n - 1, ...) rad or m between joint values (n, ..., j) of poses, the shorter way round where `rotary` (j,) is 1."""
+def unwound(joints: FloatArray, winds: BoolArray) -> FloatArray:
+    """(n, ..., j) joint values of poses with whole turns added where `winds` (j,): they go on the shorter way."""
     step = np.diff(joints, axis=0)
-    return np.asarray(step - rotary * WHOLE * np.round(step / WHOLE))
+    step = step - winds * WHOLE * np.round(step / WHOLE)
+    return np.concatenate([joints[:1], joints[:1] + np.cumsum(step, axis=0)])
 
 
-def constant_costs(joints: FloatArray, cost: FloatArray, rotary: FloatArray, largest: FloatArray) -> FloatArray:
+def room_to_wind(path: FloatArray, limits: FloatArray, winds: BoolArray) -> BoolArray:
+    """(...) whether unwound values (n, ..., j) lie within limits (j, 2), as a whole path and but for whole turns."""
+    low, high = limits[:, 0] - path.min(axis=0), limits[:, 1] - path.max(axis=0)
+    with np.errstate(invalid="ignore"):
+        fits = np.where(winds, np.ceil(low / WHOLE) <= np.floor(high / WHOLE), (low <= 0.0) & (high >= 0.0))
+    return np.asarray(fits.all(axis=-1))
+
+
+def constant_costs(
+    joints: FloatArray, cost: FloatArray, limits: FloatArray, winds: BoolArray, largest: float
+) -> FloatArray:
     """(c, t) mean costs of configurations and turns that are kept at all poses; inf where a pose or a step forbids it.
 
-    Arguments as of `least_costly_way`; poses that no candidate reaches do not count.
+    Arguments as of `least_costly_way`, and the limits (j, 2) of the joints; poses that nobody reaches do not count.
     """
     some = np.isfinite(cost).any(axis=(1, 2))
-    kept = cost[some].mean(axis=0) if some.any() else np.full(cost.shape[1:], np.inf)
-    for before, after, most in zip(joints[:-1], joints[1:], largest, strict=True):
-        step = np.abs(steps_between(np.stack([before, after]), rotary)[0])
-        kept = np.where((step > most).any(axis=-1), np.inf, kept)  # nan, out of reach, is not
-    return kept
+    if not some.any():
+        return np.full(cost.shape[1:], np.inf)
+    path = unwound(joints[some], winds)
+    steps = np.abs(np.diff(path, axis=0)).max(axis=(0, -1), initial=0.0)
+    kept = cost[some].mean(axis=0)
+    return np.where((steps <= largest) & room_to_wind(path, limits, winds), kept, np.inf)
 
 
 def least_costly_way(
-    joints: FloatArray, cost: FloatArray, rotary: FloatArray, largest: FloatArray, weight: float, window: int
+    joints: FloatArray, cost: FloatArray, winds: BoolArray, largest: float, weight: float, window: int
 ) -> tuple[IntArray, IntArray]:
     """The configuration and the turn of every pose whose costs and squared steps add up to the least.
 
@@ -60,10 +72,10 @@ def least_costly_way(
         (n, c, t, j) m and rad, of c configurations and t turns round the circle.
     cost
         (n, c, t) of each; inf where it is out of reach. Poses that no candidate reaches are passed over.
-    rotary
-        (j,) 1 for joints that turn, 0 for those that slide.
+    winds
+        (j,) joints that have more than a whole turn: their values count but for whole turns.
     largest
-        (n - 1, j) most that a joint may move between two poses.
+        m or rad, most that a joint may move between two poses.
     weight
         Of squared steps, in units of the cost.
     window
@@ -85,9 +97,9 @@ def least_costly_way(
             came[i] = own  # nobody gets there: as if it were not on the path
             continue
         step = joints[i][:, :, None] - last[:, near]
-        step -= rotary * WHOLE * np.round(step / WHOLE)
+        step -= winds * WHOLE * np.round(step / WHOLE)
         ways = total[:, near] + weight * (step**2).sum(axis=-1)
-        ways[~(np.abs(step) <= largest[i - 1]).all(axis=-1)] = np.inf
+        ways[~(np.abs(step) <= largest).all(axis=-1)] = np.inf
         best = ways.argmin(axis=-1)
         least = np.take_along_axis(ways, best[..., None], axis=-1)[..., 0]
         came[i] = own[:, 0][:, None] + near[np.arange(turns), best]
