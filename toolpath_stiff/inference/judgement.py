@@ -45,7 +45,7 @@ from toolpath_stiff.inference.nuisances import findings, fitted_nuisances
 from toolpath_stiff.inference.rivals import INSTRUMENT, entries, left_out_of, lowers_error, rivals_of, rivals_of_law
 from toolpath_stiff.inference.several import search_pairs, search_triples
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
-from toolpath_stiff.inference.votes import MOST_OPEN, Votes, left_open, outvoted
+from toolpath_stiff.inference.votes import Votes, outvoted
 from toolpath_stiff.stiffness.contract import Effect
 
 NONE = "none"
@@ -54,6 +54,7 @@ OUTSIDE = "outside the catalogue"
 PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_TRIPLES, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.03, 0.10
 FALSE_ALARM = 0.05  # of the base model's gate
 ADEQUATE = 0.005  # below this probability an explanation does not explain the data
+MOST_OPEN = 3  # entries that an ambiguous verdict lists; all votes are in the document
 NAMED = 0.90  # probability from which a single name is the answer
 HELD = 0.95  # probability that the plausible set adds up to where it is not a single name
 STANDS = 0.05  # probability from which something outside the catalogue, or another pair, is not ruled out
@@ -436,8 +437,9 @@ def put_to_vote(
     ballots = votes(problem, fits[top], rivals)
     ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
     open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
-    left = _shortened(problem, fits, left_open(top, standing, open_rivals, ballots))
-    return ("ambiguous" if open_rivals else verdict), left, ballots
+    others = [name for name in standing if name != top and name not in ballots]
+    others += [name for name in ballots if name in (*standing, *open_rivals)]  # the closest first
+    return ("ambiguous" if open_rivals else verdict), _shortened(problem, fits, (top, *others)), ballots
 
 
 def _shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
