@@ -21,6 +21,7 @@ from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
+from toolpath_stiff.machine.model import Hexapod, as_hexapod
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, finite_number, names, numbers, words_of
 from toolpath_stiff.planning.menu import COSTS, Menu
@@ -84,10 +85,14 @@ class Question:
         assert self.data is not None
         return self.data.on(self.on)
 
+    def hexapod(self, asking: str) -> Hexapod:
+        """The machine as its file has it. Raises `InputError` where it is of another kind, which `asking` cannot do."""
+        return as_hexapod(self.model, asking)
+
     def diagnosed(self, tell: Callable[[str], None], *words: str, inputs: Iterable[str] = ()) -> Diagnosis:
         """A diagnosis of the readings; `words` are further ones of the command that gives it."""
         return replace(
-            diagnose_readings(self.model, self.readings, progress=tell, **self.common),
+            diagnose_readings(self.hexapod("diagnose"), self.readings, progress=tell, **self.common),
             names=self.request.data,
             line=self.request.command("diagnose", *words),
             asked=self.request,
@@ -149,7 +154,8 @@ def compare(
     teller(progress)("comparing")
     comparison = compare_readings(question.model, question.readings, **question.common)
     following = hint("which effect would explain it", question.request.command("diagnose"))
-    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=(following,)))
+    following = (following,) if isinstance(question.model, Hexapod) else ()
+    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=following))
 
 
 @checked
@@ -274,9 +280,9 @@ def update(
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     task = UpdateTask(
-        question.model, question.readings, [add] if isinstance(add, str) else list(add), strut_law=strut_law,
-        keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe, objective=objective,
-        files=question.request.data, machine_file=str(machine_file), request=question.request,
+        question.hexapod("update"), question.readings, [add] if isinstance(add, str) else list(add),
+        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe,
+        objective=objective, files=question.request.data, machine_file=str(machine_file), request=question.request,
         progress=teller(progress), **question.common,
     )  # fmt: skip
     return replace(update_machine(task), inputs=question.inputs, opened=question.on.carrying)
@@ -404,6 +410,7 @@ def plan(
     """
     line = words_of(plan, {name: value for name, value in locals().items() if name not in COMMON})
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
+    model = question.hexapod("plan")
     minutes = {name: float(value) for name, value in (minutes or {}).items()}
     for name, value in minutes.items():
         one_of("minutes", name, tuple(COSTS))
@@ -422,7 +429,13 @@ def plan(
     )
     judgement = None if diagnosis is None else diagnosis.main
     proposal = plan_visits(
-        question.model, readings, menu, between=tuple(between), n=n, judgement=judgement, **question.common
+        model,
+        readings,
+        menu,
+        between=tuple(between),
+        n=n,
+        judgement=judgement,
+        **question.common,
     )
     command = question.request.command("plan", *line)
     return replace(proposal, names=question.request.data, line=command, inputs=question.inputs)

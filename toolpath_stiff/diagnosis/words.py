@@ -14,7 +14,17 @@ from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
-from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
+from toolpath_stiff.inference.judgement import (
+    ADEQUATE,
+    FALSE_ALARM,
+    HELD,
+    LEFT,
+    NONE,
+    OUTSIDE,
+    POSITIVE,
+    STANDS,
+    Judgement,
+)
 from toolpath_stiff.inference.noise import REST
 from toolpath_stiff.inference.nuisances import findings, nuisance_words
 from toolpath_stiff.inference.repeats import OUTLIERS
@@ -90,7 +100,7 @@ def _cause(diagnosis: Examination, name: str) -> str:
     fit = diagnosis.fits[name]
     if diagnosis.main.probability.get(name, 0.0) < SHOWN and name in diagnosis.main.votes:
         titles = joined([candidate.effect.title for candidate in fit.candidates])
-        return f"{titles} ({name}: less likely than {100 * SHOWN:g} %, but foretells left-out poses as well)"
+        return f"{titles} ({name}: less likely than {100 * SHOWN:g} %, but foretells pose after pose as well)"
     unusual = f", more than is usual ({joined(sizes)}) " if (sizes := _unusual(fit)) else " "
     return f"{joined(fit.findings)}{unusual}({name}, probability {chance})"
 
@@ -117,13 +127,20 @@ def _capital(text: str) -> str:
 
 def _rivals(diagnosis: Examination) -> str:
     """Explanations that stand beside each other."""
-    causes = [_cause(diagnosis, name) for name in diagnosis.explanations]
-    if len(causes) < 2:
+    causes = [
+        f"{_cause(diagnosis, first)}{f' - or, alike at these poses, {joined(same)}' if same else ''}"
+        for first, *same in diagnosis.entries
+    ]
+    if len(diagnosis.explanations) < 2:
         return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
     if diagnosis.explanations[0] not in (NONE, diagnosis.best):
         return f"What is likeliest lowers no error at points that are left out: {'; '.join(causes)}."
+    if diagnosis.explanations[0] == NONE and diagnosis.main.votes:
+        moved = float(np.mean(np.abs(diagnosis.base.jacobian @ diagnosis.base.law)))
+        causes[0] = f"the strut law is off and moves the stiffness by {100.0 * moved:.2g} %"
+        return f"Readings of the tip do not tell which of these it is: either {', or '.join(causes)}."
     first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
-    if first < POSITIVE * second:
+    if first < POSITIVE * second or len(causes) < 2:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
     return f"Most likely {causes[0]}; not ruled out: {'; '.join(causes[1:])}."
 
@@ -265,8 +282,11 @@ def assumptions(diagnosis: Examination) -> list[str]:
         "stiffness, as far as these data could show them; typical sizes rank, bounds alone exclude: assumed",
         f"gates: {100 * FALSE_ALARM:g} % false alarms, explanations are dropped below {100 * ADEQUATE:g} %; "
         f"the plausible set holds {100 * HELD:g} %",
-        f"a name has foretold left-out poses better than every rival of another part by {SMALL:g} of log probability "
-        f"and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, else it is one of several",
+        f"a name has foretold pose after pose better than every rival of another part, by {SMALL:g} of log probability "
+        f"and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, or by {SMALL:g} without the pose that "
+        "says most; else it is one of several",
+        f"a model is adequate where its refitted strut law moves the stiffness by up to {100 * LEFT:g} % (95 %), or "
+        "nothing else explains the readings as well beside the file's law: assumed",
         f"a further effect matters from {100 * MATTERS:g} % of the tip's stiffness on",
     ]
     if "force_N" in diagnosis.data.missing:

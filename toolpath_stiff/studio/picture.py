@@ -11,6 +11,7 @@ import numpy as np
 import toolpath_stiff as tps
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
+from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.studio.session import Session
 
 MERIDIANS, PARALLELS = 36, 9  # of the reach boundary
@@ -184,16 +185,21 @@ def program(session: Session) -> Document:
     """The program's text and, once it is analyzed, its path."""
     state, analysis = session.case.state, session.found("analyze")
     lines = session.once("lines", session.program_key, lambda: list(session.case.program.lines))
+    path, shifted = analysis.path if analysis else None, session.found("compensate")
+    if path and shifted:
+        shift = np.interp(path["s_mm"], shifted.path["s_mm"], shifted.path["shift"])
+        path = {**path, "shift": np.round(shift, 3).tolist()}
     return {
         "name": state.program.rpartition("/")[2],
         "lines": lines[:MOST_LINES],
         "origin": origin(session),
         "require": state.require,
         "placed": bool(state.origin),
-        "path": analysis.path if analysis else None,
+        "path": path,
+        "compensated": result(session, "compensate"),
         "summary": analysis.document if analysis else None,
         "result": analysis.result if analysis else "",
-        "error": "" if analysis else session.failed("analyze"),
+        "error": session.failed("compensate") if analysis else session.failed("analyze"),
     }
 
 
@@ -207,9 +213,10 @@ def origin(session: Session) -> list[float]:
 
 
 def placement(session: Session) -> Document:
-    """The figures where the program sits; the front of the last search and the set-up sheet, if there are."""
-    now, place = None, origin(session)
+    """The figures where the program sits and where it sat; the front of the last search and the set-up sheet."""
+    now, before, place = None, None, origin(session)
     with suppress(TpsError):
-        key = (session.key("place"), tuple(place))
-        now = session.once("placed", key, lambda: session.trial().at(place))
-    return {**(result(session, "place") or {}), "now": now, "set_up": result(session, "set_up")}
+        key, trial = session.key("place"), session.trial()
+        now = session.once("placed", (key, tuple(place)), lambda: trial.at(place))
+        before = session.once("unplaced", key, lambda: trial.at(pose_in_mm(trial.program.origin)))
+    return {**(result(session, "place") or {}), "now": now, "before": before, "set_up": result(session, "set_up")}

@@ -35,6 +35,24 @@ function ring(g, x, y, radius, colour, width) {
   g.arc(x, y, radius, 0, 2 * Math.PI);
   stroke(g, colour, width);
 }
+const aligned = (g, textAlign, textBaseline) => Object.assign(g, { textAlign, textBaseline });
+// The outline through points [x, y, ...] on the screen, to stroke or fill.
+function trace(g, points, close = true) {
+  g.beginPath();
+  points.forEach(([x, y], i) => g[i ? "lineTo" : "moveTo"](x, y));
+  if (close) g.closePath();
+}
+function fill(g, points, colour) {
+  trace(g, points);
+  g.fillStyle = g.strokeStyle = colour;
+  g.fill();
+  g.stroke();
+}
+// A ring that is seen on any ground.
+function mark(g, x, y, radius, colour = ink.accent, width = 2.5) {
+  ring(g, x, y, radius, ink.panel, 2 + width);
+  ring(g, x, y, radius, colour, width);
+}
 function stroke(g, colour, width, dash = []) {
   g.setLineDash(dash);
   Object.assign(g, { strokeStyle: colour, lineWidth: width });
@@ -64,6 +82,9 @@ function watchTheme(changed) {
   addEventListener("beforeprint", again(true));
   addEventListener("afterprint", again(false));
 }
+// The class of a value on a scale of so many colours.
+const classAt = (v, [low, high], count) =>
+  Math.max(0, Math.min(count - 1, Math.floor((v - low) / (high - low || 1) * count)));
 const ramp = (colours) => `linear-gradient(to right, ${colours.join(",")})`;
 // A pair of stacked canvases, and a tip over them.
 class Stage {
@@ -72,6 +93,10 @@ class Stage {
     [this.base, this.overlay] = element.querySelectorAll("canvas");
     this.tip = element.querySelector(".tip");
     this.waiting = false;
+    const save = document.createElement("button");
+    Object.assign(save, { type: "button", className: "save", textContent: "PNG", title: "Save this picture" });
+    save.addEventListener("click", () => this.save());
+    element.append(save);
     new ResizeObserver(() => this.resize()).observe(element);
   }
   resize() {
@@ -100,6 +125,17 @@ class Stage {
     g.lineJoin = g.lineCap = "round";
     g.font = "12px system-ui, 'DejaVu Sans', sans-serif";
     return g;
+  }
+  // The picture as it stands, as a file.
+  save() {
+    const picture = document.createElement("canvas"), link = document.createElement("a");
+    [picture.width, picture.height] = [this.base.width, this.base.height];
+    const g = picture.getContext("2d");
+    g.fillStyle = ink.panel;
+    g.fillRect(0, 0, picture.width, picture.height);
+    for (const canvas of [this.base, this.overlay]) g.drawImage(canvas, 0, 0);
+    Object.assign(link, { href: picture.toDataURL(), download: `${document.title.split(":")[0]}.png` });
+    link.click();
   }
   // A tip beside a place; without lines there is none.
   tell([x, y], lines) {
