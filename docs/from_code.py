@@ -82,7 +82,7 @@ HUNTED = (
     "CYCL DEF 11.1", "CYCL DEF 200", "CYCL DEF 201", "CYCL DEF 207", "PLANE SPATIAL", "PLANE RESET", "LBL", "CALL LBL",
     "FN12", "Q",
 )  # fmt: skip
-UNHELD = ("BEGIN PGM", "END PGM", "FUNCTION TCPM", "FUNCTION RESET TCPM", "M")
+UNHELD = ("BEGIN PGM", "END PGM", "FUNCTION RESET TCPM", "M")
 
 
 def statements_table() -> str:

@@ -117,7 +117,8 @@ def test_creos_coordinate_system_is_a_comment_over_several_lines():
         ("TRANS/0,0,5", 3, "TRANS"),
         ("ORIGIN/1,2,3", 3, "ORIGIN"),
         ("ROTABL/90,BAXIS", 3, "ROTABL"),
-        ("CUTCOM/LEFT,1", 3, "cutter compensation"),
+        ("$$-> CUTCOM_GEOMETRY_TYPE / OUTPUT_ON_PROFILE\nCUTCOM/LEFT,1", 4, "points of the contour"),
+        ("CYCLE/DRILL,RAPTO,3,CLEAR,2,FEDTO,-5,MMPM,100", 3, "RAPTO beside CLEAR|CLEAR twice"),
         ("CALSUB/5", 3, "CALSUB"),
         ("TLRGT,GORGT/L1", 3, "TLRGT"),
         ("RETRCT", 3, "retracts"),
@@ -125,7 +126,6 @@ def test_creos_coordinate_system_is_a_comment_over_several_lines():
         ("CYCLE/DRILL, 126.0, 85.0, 1.0,MMPR", 3, "order depends on"),
         ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2,RAPTO,1", 3, "RAPTO"),
         ("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2,RETURN,0", 3, "RETURN,0"),
-        ("CYCLE/DRILL,DEEP,STEP,20,CLEAR,3,FEDTO,-72,RTRCTO,AUTO,MMPM,250", 3, "AUTO"),
         ("GOTO/PT1", 3, "APT's processor"),
         ("P1=POINT/1,2,3", 3, "APT's processor"),
         ("GOTO/1,2", 3, "2 numbers"),
@@ -167,7 +167,7 @@ def test_creos_coordinate_system_is_a_comment_over_several_lines():
         ("MULTAX/OFF\nGOTO/1,0,0,0,.6,.8", 4, "MULTAX/OFF"),
         ("MSYS/0,0,0,1,0,0,0,1,0\nGOTO/0,0,0\nMSYS/5,0,0,1,0,0,0,1,0", 5, "another coordinate system"),
         ("MODE/LASER", 3, "MODE/LASER"),
-        ("CUTCOM/ON,LEFT", 3, "cutter compensation"),
+        ("CUTCOM/SIDEWAYS", 3, "CUTCOM/SIDEWAYS"),
         ("RAPD0", 3, "may move the tool"),
         ("TLCOMP/ON,LEFT", 3, "cutter compensation"),
         ("CALLSUB/1001", 3, "repeats or calls"),
@@ -252,3 +252,29 @@ def test_every_word_is_in_the_table_once_with_its_meaning_and_source():
 def test_the_spindle_turns_as_the_file_says(words, per_minute):
     moves = read(f"{START}{words}\nGOTO/0,0,0\nGOTO/1,0,0\n").moves
     np.testing.assert_allclose(moves.spindle, per_minute * np.pi / 30.0)
+
+
+HOLE = "UNITS/MM\nRAPID/\nGOTO/20,125,25\nCYCLE/INIT\n{}\nGOTO/20,125,0\nCYCLE/OFF\nFINI\n"
+
+
+@pytest.mark.parametrize(
+    ("cycle", "heights"),
+    [
+        ("CYCLE/DEEP2,FEDTO,6,1STPECK,6,SUBPECK,2.,MMPM,382,RAPTO,3.,RTRCTO,25.",
+         "R 3 C -3 R 3 R -2.746 C -5 R 3 R -4.746 C -6 R 25"),
+        ("CYCLE/DRILL,RAPTO,3.,FEDTO,-5.,RTRCTO,AUTO,MMPM,382", "R 3 C -5 R 25"),
+        ("CYCLE/BORE,DEPTH,5,CLEAR,3,MMPM,100", "R 3 C -5 C 3"),
+        ("CYCLE/BORE,DEPTH,5,CLEAR,3,MMPM,100,DWELL,1,RETURN,9", "R 3 C -5 C 3 R 9"),
+    ],
+)  # fmt: skip
+def test_holes_as_nx_and_solidworks_write_them(cycle, heights):
+    moves = read(HOLE.format(cycle)).moves
+    shown = [f"{'RFAC'[kind]} {end[2] * 1e3:.6g}" for kind, end in zip(moves.motion, moves.end, strict=True)]
+    assert " ".join(shown) == heights and set(moves.end[:, 0]) == {0.02}
+
+
+@pytest.mark.parametrize(("words", "doubt"), [("ON,LENGTH,20", 0), ("OFF", 0), ("LEFT", 1), ("RIGHT,XYPLAN", 1)])
+def test_points_are_the_tool_centres_under_compensation_of_the_control(words, doubt):
+    program = read(f"FEDRAT/600,MMPM\nGOTO/0,0,0\nCUTCOM/{words}\nGOTO/5,0,0\n")
+    assert program.moves.end[-1, 0] * 1e3 == pytest.approx(5)
+    assert sum("off by the tool's radius" in remark.text for remark in program.warnings) == doubt

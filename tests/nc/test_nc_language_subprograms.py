@@ -123,5 +123,5 @@ def test_refusals(text, line, words):
 
 def test_repeats_of_repeats_end(monkeypatch):
     monkeypatch.setattr("toolpath_stiff.nc.program_run.MOST_BLOCKS", 1000)
-    with pytest.raises(InputError, match="more than 1000 blocks"):
+    with pytest.raises(InputError, match="more than 1,000 blocks"):
         parse_program("M98 P1 L9999\nM30\nO1\nM98 P2 L9999\nM99\nO2\nS1\nM99")

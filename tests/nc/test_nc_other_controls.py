@@ -288,7 +288,7 @@ def test_a_corner_that_is_none():
         ("G1 X10. ,R2.\nM8\nY10.", 4, "makes a corner"),
         ("G1 X10. ,R2.\nG0 Y10.", 4, "makes a corner"),
         ("G1 X10. ,R2.\nG55 Y10.", 4, "beside other codes"),
-        ("G1 X10. ,R12.\nY10.", 4, "takes 12.0000 mm of moves of 10.0000"),
+        ("G1 X10. ,R12.\nY10.", 4, "does not fit its contour elements"),
         ("G1 X10. ,R2.\nX0.", 4, "goes straight back"),
         ("G1 X10. ,R2.\nZ10.", 4, "do not lie in the plane"),
         ("G1 X10. ,R2. ,C2.\nY10.", 3, "beside another corner"),

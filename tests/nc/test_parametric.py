@@ -321,16 +321,16 @@ def test_check_goes_on_behind_a_loop_without_its_end(loop, leave):
     ],
 )
 def test_a_loop_in_which_nothing_changes_is_refused_at_once(text, controller, line, monkeypatch):
-    monkeypatch.setattr("toolpath_stiff.nc.parametric.run.MOST_STEPS", 200)
+    monkeypatch.setattr("toolpath_stiff.nc.program_run.MOST_BLOCKS", 200)
     error = refusal(text, controller)
     assert "never ends" in error.found and error.line == line
 
 
 def test_a_loop_without_an_end_is_stopped(monkeypatch):
-    monkeypatch.setattr("toolpath_stiff.nc.parametric.run.MOST_IDLE", 500)
+    monkeypatch.setattr("toolpath_stiff.nc.program_run.MOST_IDLE", 500)
     error = refusal("#1=0\no1 while [1]\n#1=[#1+1]\no1 endwhile\n", LINUXCNC)
     assert "never ends" in error.found and error.line == 4
-    monkeypatch.setattr("toolpath_stiff.nc.parametric.run.MOST_STEPS", 900)
+    monkeypatch.setattr("toolpath_stiff.nc.program_run.MOST_BLOCKS", 900)
     error = refusal("F9\n#1=0\no1 while [1]\nG1 X#1\n#1=[#1+1]\no1 endwhile\n", LINUXCNC)
     assert "900 blocks" in error.found
 

@@ -7,6 +7,7 @@ motion) is zero; the machine frame places that at the origin.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -78,7 +79,7 @@ class Frames:
         """Control coordinates of a point in program coordinates."""
         offset = self.offsets.at(self.active)
         if self.linear is not None:
-            program = [*_rotate(self.linear, program[:3]), *program[3:]]
+            program = [*rotate(self.linear, program[:3]), *program[3:]]
         if self.rotation is not None:
             program = _about(self.rotation, program, self.rotation[2])
         if not offset.rotation:
@@ -98,7 +99,7 @@ class Frames:
             program = [m - g for m, g in zip(moved, self.g92, strict=True)]
         if self.linear is not None:
             square = sum(row[0] ** 2 for row in self.linear)  # of the scale
-            program = [*(v / square for v in _rotate(_transposed(self.linear), program[:3])), *program[3:]]
+            program = [*(v / square for v in rotate(_transposed(self.linear), program[:3])), *program[3:]]
         return program if self.rotation is None else _about(self.rotation, program, -self.rotation[2])
 
     def axis_to_control(self, axis: int, program: Numbers) -> Numbers:
@@ -164,13 +165,16 @@ class Frames:
         point = self.to_setup(self.position)
         point[2] += self.tool
         origin = self.origin
-        return [*(t + o for t, o in zip(_rotate(_matrix(origin), point[:3]), origin[:3], strict=True)), *point[3:]]
+        return [
+            *(t + o for t, o in zip(rotate(rotation_matrix(origin[3:]), point[:3]), origin[:3], strict=True)),
+            *point[3:],
+        ]
 
     def control_of_machine(self, machine: list[float]) -> list[float]:
         """Control coordinates of a point in machine coordinates."""
         origin = self.origin
         moved = [m - o for m, o in zip(machine[:3], origin[:3], strict=True)]
-        control = self.from_setup([*_rotate(_transposed(_matrix(origin)), moved), *machine[3:]])
+        control = self.from_setup([*rotate(_transposed(rotation_matrix(origin[3:])), moved), *machine[3:]])
         control[2] -= self.tool
         return control
 
@@ -206,10 +210,10 @@ def _about(rotation: Rotation, point: list[float], degrees: float) -> list[float
     return [rotation[0] + x, rotation[1] + y, *point[2:]]
 
 
-def _matrix(origin: ShopPose) -> list[list[float]]:
-    """Q = Rz(C) Ry(B) Rx(A) of a placement; plain floats, faster than arrays for one matrix."""
+def rotation_matrix(angles: Sequence[float]) -> list[list[float]]:
+    """Rz(C) Ry(B) Rx(A) of angles A, B, C in degrees; plain floats, faster than arrays for one matrix."""
     (ca, sa), (cb, sb), (cc, sc) = (
-        (math.cos(math.radians(v)), math.sin(math.radians(v))) if v else (1.0, 0.0) for v in origin[3:]
+        (math.cos(math.radians(v)), math.sin(math.radians(v))) if v else (1.0, 0.0) for v in angles
     )
     return [
         [cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa],
@@ -226,5 +230,6 @@ def _cross(a: list[float], b: list[float]) -> list[float]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def _rotate(matrix: list[list[float]], vector: list[float]) -> list[float]:
+def rotate(matrix: list[list[float]], vector: list[float]) -> list[float]:
+    """A vector turned, or changed otherwise, by a matrix."""
     return [sum(m * v for m, v in zip(row, vector, strict=True)) for row in matrix]

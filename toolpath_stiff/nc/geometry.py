@@ -1,11 +1,7 @@
 """Geometry of words: planes, arcs of G2 and G3 within LinuxCNC's tolerances, corners, tool axes. mm, rad."""
 
 import math
-from collections.abc import Sequence
 
-import numpy as np
-
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -27,8 +23,6 @@ CENTER_WORDS = ("I", "J", "K")
 CENTER_LETTERS = "IJKR"  # words that an arc alone has
 
 LEAST_SWEEP = 1e-10  # rad; an arc of less is a whole turn
-CORNER_ANGLE = 1e-6  # rad; a corner of less is none
-SAME_HEIGHT_MM = 1e-9
 
 
 def normal_of(plane: str) -> Vector:
@@ -159,49 +153,6 @@ def turn_between(first: float, last: float, clockwise: bool) -> float:
     if sweep < LEAST_SWEEP:
         sweep = math.tau
     return -sweep if clockwise else sweep
-
-
-def corner(
-    begin: Sequence[float], vertex: Sequence[float], end: Sequence[float], normal: Vector, size: float, rounded: bool
-) -> tuple[Vector, Vector, Vector, float] | None:
-    """Where the corner at `vertex` between two straight moves is cut off or rounded; None where they go straight on.
-
-    Returns the end of the first move, the beginning of the second, the centre and the signed sweep in rad about
-    `normal` (a unit vector). Raises `ArcError` unless both moves lie in the plane of `normal` and are long enough.
-
-    Examples
-    --------
-    >>> first, last, center, sweep = corner((0, 0, 0), (9, 0, 0), (9, 9, 0), (0.0, 0.0, 1.0), 2.0, rounded=True)
-    >>> first, center
-    ((7.0, 0.0, 0.0), (7.0, 2.0, 0.0))
-    """
-    here, z = np.asarray(vertex, dtype=float), np.array(normal)
-    before, after = here - begin, np.asarray(end, dtype=float) - here
-    lengths = float(np.linalg.norm(before)), float(np.linalg.norm(after))
-    refuse_arc_if(
-        min(lengths) == 0.0 or max(abs(before @ z), abs(after @ z)) > SAME_HEIGHT_MM,
-        "a corner between moves that do not lie in the plane, or have no length",
-        "two moves in it",
-    )
-    u, v = before / lengths[0], after / lengths[1]
-    turn = math.atan2(float(np.cross(u, v) @ z), float(u @ v))
-    if abs(turn) < CORNER_ANGLE:
-        return None
-    refuse_arc_if(math.pi - abs(turn) < CORNER_ANGLE, "a corner of a path that goes straight back", "another direction")
-    along = size * math.tan(abs(turn) / 2.0) if rounded else size
-    refuse_arc_if(
-        along > min(lengths),
-        f"a corner that takes {along:.4f} mm of moves of {lengths[0]:.4f} and {lengths[1]:.4f} mm",
-        "a smaller one",
-    )
-    left = math.copysign(size, turn) * np.cross(z, u)
-    first = here - along * u
-    return _vector(first), _vector(here + along * v), _vector(first + left), turn
-
-
-def _vector(values: FloatArray) -> Vector:
-    x, y, z = values.tolist()
-    return (x, y, z)
 
 
 def roll_pitch_of_axis(i: float, j: float, k: float) -> tuple[float, float]:

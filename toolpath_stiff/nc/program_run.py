@@ -8,14 +8,16 @@ call unchanged.
 
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, TypeVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.interpreter import execute
+from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Jump, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
@@ -25,7 +27,8 @@ from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
 from toolpath_stiff.nc.words import Block, read_block
 
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
-MOST_BLOCKS = 1_000_000  # run in subprograms; a count beyond is a slip in a number of repeats
+MOST_BLOCKS = 1_000_000  # that run, all repeats counted; a count beyond is a slip in a number of repeats
+MOST_IDLE = 100_000  # of loops that run without a move between; a program that works out values needs far fewer
 MOST_REPEATS = 9999
 MOST_ERRORS = 100  # beyond, a file is not a program for this reader
 SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
@@ -107,6 +110,12 @@ class ProgramRun:
         self._called: dict[int, Block] = {}  # blocks of subprograms by line, from 0: each is read once
         self._blocks = 0
         self.jumps: list[Jump] = []
+        # Files of subprograms, whose lines follow those of the program: first line, line after the last, name.
+        self.folder = None if request.controller.subprograms is None else Path(request.controller.subprograms)
+        self._files: list[tuple[int, int, str]] = []
+        self._main_lines = len(lines)
+        self._passes: dict[int, str] = {}  # by the line that jumps back: what changes often, as it was there
+        self._moved = (0, 0)  # moves at the last step back after a move, and the blocks that had run by then
 
     @staticmethod
     def meaning(code: str) -> str:
@@ -183,9 +192,7 @@ class ProgramRun:
     def _block(self, row: int) -> Block:
         block = self._called.get(row) if self._levels else None
         if self._levels:
-            self._blocks += 1
-            if self._blocks > MOST_BLOCKS:
-                raise self._fail(row, f"the subprograms run more than {MOST_BLOCKS} blocks", "fewer repeats")
+            self._count_block(row)
         if block is None:
             block = self._tried(self._read, row, Block(row + 1, ()))
             if self._levels:
@@ -206,7 +213,42 @@ class ProgramRun:
         return self._place(row).fail(problem, expected, hint, column)
 
     def _place(self, row: int) -> Place:
-        return Place(self.name, row + 1)
+        """File and line (from 1) of a line that is read."""
+        in_files = (Place(name, row - first + 1) for first, stop, name in self._files if first <= row < stop)
+        return next(in_files, Place(self.name, row + 1))
+
+    def _line_of_call(self) -> int:
+        """The line of the main file from which a subprogram's file is called: its moves are of that line."""
+        return next((level.back for level in reversed(self._levels) if level.back <= self._main_lines), 1)
+
+    def _count_block(self, row: int) -> None:
+        """Count a block that runs."""
+        self._blocks += 1
+        if self._blocks > MOST_BLOCKS:
+            raise self._fail(row, f"more than {MOST_BLOCKS:,} blocks have run", "fewer repeats, a loop that ends")
+
+    def _check_loop(self, row: int, to: int, changing: object) -> None:
+        """Refuse a loop in which nothing changes, or that makes no move in very many blocks, where it goes back."""
+        moves = len(self.state.recorder)
+        if moves != self._moved[0]:
+            self._moved = (moves, self._blocks)
+        now = repr((self.state.frames, changing))
+        if now == self._passes.get(row) or self._blocks - self._moved[1] > MOST_IDLE:
+            problem = f"the loop back to line {self._place(to).line} never ends"
+            raise self._fail(row, f"{problem}: no variable or position changes, or nothing moves", "a loop that ends")
+        self._passes[row] = now
+
+    def _load(self, names: Iterable[str], before: tuple[str, ...] = ()) -> int | None:
+        """Read the first of these files of the folder that is there; its first line, None if there is none."""
+        files = (self.folder / name for name in names) if self.folder is not None else ()
+        file = next((file for file in files if file.is_file()), None)
+        if file is None:
+            return None
+        first = len(self.lines) + len(before)
+        self.lines = (*self.lines, *before, *read_lines(file))
+        self._files.append((first, len(self.lines), file.name))
+        self._programs = self._sequence = None
+        return first
 
     def _check_head(self, block: Block, numbered: bool) -> None:
         """A program number within a program: the next one begins where this one did not end."""

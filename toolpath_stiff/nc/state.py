@@ -163,7 +163,7 @@ class Conversational:
     Attributes
     ----------
     pole, heading
-        Circle centre (CC) and the direction in which the last contour element ended, in the plane; None: not known.
+        Circle centre (CC) with its plane, and the direction in which the last contour element ended; None: not known.
     held, corner
         A contour element that waits for the corner behind it, with its feed, and that corner's statement (CHF, RND).
     approach
@@ -198,14 +198,14 @@ class Conversational:
         Whether the program takes settable offsets, and changes tools by T alone; ORIVECT, ORIAXES.
     """
 
-    pole: tuple[float, float] | None = None
-    heading: tuple[float, float] | None = None
+    pole: tuple[str, complex] | None = None
+    heading: complex | None = None
     held: tuple[CurrentBlock, Element, float | None] | None = None
     corner: CurrentBlock | None = None
     approach: tuple[dict[int, float], Callable[[complex], None]] | None = None
     fast: bool = False
     to_corner: bool = False
-    cycle: tuple[int, dict[str, float], int] | None = None
+    cycle: tuple[int, dict[str, float]] | None = None
     modal: bool = False
     shift: list[float] = field(default_factory=lambda: [0.0] * 3)
     outer: list[float] = field(default_factory=lambda: [0.0] * 3)

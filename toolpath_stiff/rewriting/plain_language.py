@@ -18,6 +18,7 @@ from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.reader import read
 from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.words import Word
 from toolpath_stiff.rewriting.controls import DECIMALS_INCH, DECIMALS_MM
 from toolpath_stiff.rewriting.turn import Turn
 from toolpath_stiff.units import MM_PER_INCH, mm_from_m
@@ -61,7 +62,7 @@ def placed_lines(turn: Turn, lines: Sequence[str], name: str, unit: float, decim
     while row < len(lines):
         statement, line = read_statement(lines, row, name), lines[row]
         if statement.head in PLACED:
-            words = {key: (text, column, whole) for key, text, column, whole in statement.words}
+            words = {word.letter: word for word in statement.words}
             new, here = _placed(turn, statement, words, here, unit, name)
             line = _edited(line, words, new, decimals)
         elif statement.head not in KEPT and statement.head[0] != "Q":
@@ -78,7 +79,7 @@ def placed_lines(turn: Turn, lines: Sequence[str], name: str, unit: float, decim
 def _placed(
     turn: Turn,
     statement: PlainStatement,
-    words: dict[str, tuple[str, int, str]],
+    words: dict[str, Word],
     here: list[float],
     unit: float,
     name: str,
@@ -88,9 +89,9 @@ def _placed(
     if "M91" in words or "M92" in words:
         return {}, [math.nan if key in words else v for key, v in zip("XY", here, strict=True)]
     leaning = turn.turns and words.keys() & {"A", "B", "C", "IA", "IB", "IC", "TX", "NX"}
-    if leaning or any("Q" in words[key][0] for key in COORDINATES if key in words):
+    if leaning or any(statement.words[place].letter in COORDINATES for place in statement.computed):
         raise place.fail(f"{head} with rotary axes or Q parameters as coordinates", "numbers", HINT)
-    values = {str(key): float(words[key][0]) for key in COORDINATES if key in words}
+    values = {str(key): words[key].value for key in COORDINATES if key in words}
     rows, shift, new = turn.turn[:2, :2].tolist(), [v / unit for v in turn.shift.tolist()], dict[str, float]()
     steps = [values.get(f"I{key}", 0.0) for key in "XY"]
     there = [values[key] if key in values else v + s for key, v, s in zip("XY", here, steps, strict=True)]
@@ -112,15 +113,14 @@ def _placed(
     return new, here if head == "CC" else there
 
 
-def _edited(line: str, words: dict[str, tuple[str, int, str]], new: dict[str, float], decimals: int) -> str:
+def _edited(line: str, words: dict[str, Word], new: dict[str, float], decimals: int) -> str:
     """A line with other numbers in its words; words that it did not have stand behind the last one of these."""
     texts = dict[str, str]()
     for key, value in new.items():
         digits = f"{value:+.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:+.0f}"
         texts[key] = key + (digits if digits.strip("+-0.") else "+0")
-    last = max((words[key][1] - 1 + len(words[key][2]) for key in new if key in words), default=len(line))
+    last = max((words[key].column - 1 + len(words[key].text) for key in new if key in words), default=len(line))
     line = line[:last] + "".join(f" {text}" for key, text in texts.items() if key not in words) + line[last:]
-    for key in sorted((key for key in new if key in words), key=lambda key: -words[key][1]):
-        _, column, whole = words[key]
-        line = line[: column - 1] + texts[key] + line[column - 1 + len(whole) :]
+    for word in sorted((words[key] for key in new if key in words), key=lambda word: -word.column):
+        line = line[: word.column - 1] + texts[word.letter] + line[word.column - 1 + len(word.text) :]
     return line

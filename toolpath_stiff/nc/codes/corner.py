@@ -4,13 +4,19 @@ Fanuc's operator's manuals, "Optional chamfering and corner R": both moves lie i
 corner that is cut off, both ways.
 """
 
+import cmath
+import math
 from dataclasses import replace
 
 from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.center_path import to_setup_of_program
 from toolpath_stiff.nc.codes.code import FANUC, HAAS, family
+from toolpath_stiff.nc.elements import cut_off
 from toolpath_stiff.nc.moves import ARC, FEED, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import CORNERS
+
+SAME_MM = 1e-9
 
 
 def corner(state: State, block: CurrentBlock, code: str) -> None:
@@ -36,19 +42,34 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     )
     state.corner = None
     begin, vertex, end = before.start, frames.to_setup(frames.position), frames.to_setup(target)
-    normal = frames.turn_direction(geometry.normal_of(state.plane))
+    first, second, normal = geometry.PLANES[state.plane]
+    points = [frames.to_program(frames.from_setup(point)) for point in (begin, vertex, end)]
     geometry.refuse_arc_if(
-        begin[3:] != vertex[3:] or vertex[3:] != end[3:], "a corner while the rotary axes turn", "X, Y and Z alone"
+        any(math.dist(point[3:], vertex[3:]) or abs(point[normal] - points[1][normal]) > SAME_MM for point in points),
+        "a corner between moves that do not lie in the plane, or while rotary axes turn",
+        "X, Y and Z alone, in the plane",
     )
     rounded = ",R" in pending.values
     size = pending.values[",R" if rounded else ",C"].value * state.length_scale
-    ends = geometry.corner(begin[:3], vertex[:3], end[:3], normal, size, rounded)
-    if ends is None:  # the path goes straight on
+    before_corner, corner_point, after_corner = (complex(point[first], point[second]) for point in points)
+    lines = ((before_corner, corner_point, None, 0), (corner_point, after_corner, None, 0))
+    cut = cut_off(*lines, size, rounded)
+    if cut is None:  # the path goes straight on
         return
-    first, last, center, sweep = ends
-    before.end = [*first, *vertex[3:]]
-    arc = Arc(center, normal, sweep) if rounded else None
-    bound, motion, beyond = before.from_machine[1], ARC if arc else FEED, [*last, *vertex[3:]]
+
+    def in_setup(place: complex) -> list[float]:
+        point = list(points[1])
+        point[first], point[second] = place.real, place.imag
+        return to_setup_of_program(frames, point)
+
+    start, stop, center, _ = cut
+    before.end = in_setup(start)
+    arc = None
+    if center is not None:
+        x, y, z = in_setup(center)[:3]
+        turned = cmath.phase((stop - center) / (start - center))
+        arc = Arc((x, y, z), frames.turn_direction(geometry.normal_of(state.plane)), turned)
+    bound, motion, beyond = before.from_machine[1], ARC if arc else FEED, in_setup(stop)
     state.recorder.add(
         replace(before, motion=motion, start=before.end, end=beyond, from_machine=(bound, bound), arc=arc)
     )

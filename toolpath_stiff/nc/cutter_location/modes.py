@@ -23,6 +23,10 @@ FEED_UNITS: dict[str, tuple[float | None, bool]] = {
 }
 INCH_FEEDS = {"IPM", "IPR", "FPM", "FPR"}
 LENGTH_UNITS = {"MM": 1.0, "INCH": MM_PER_INCH, "INCHES": MM_PER_INCH, "IN": MM_PER_INCH}
+COMPENSATES = (
+    "cutter compensation by the control: the points are taken as those of the tool's centre; where the CAM system "
+    "writes the contour, the path is off by the tool's radius"
+)
 SEVERAL_TOOLS = ToolEntry(0, remark="several tools without numbers")
 TURNING = "turning: the points are read as those of a mill, X as a position"
 HEADING = "a heading or a remark"
@@ -142,6 +146,16 @@ def one_frame(state: CutterLocationState, kind: str, numbers: tuple[float, ...],
             "write each of them to a file of its own",
         )
     state.frames[kind] = numbers
+
+
+def cutcom(state: CutterLocationState, statement: MajorStatement) -> None:
+    """Compensation by the control: the points of such a file are the tool's, and the compensation wear."""
+    words, (what, *_) = statement.words, (*statement.words, "")
+    state.refuse_if(what not in ("OFF", "ON", "LEFT", "RIGHT"), statement.shown, "CUTCOM/LEFT, RIGHT, ON or OFF")
+    harmless = what == "OFF" or "LENGTH" in words
+    problem = f"{statement.shown} beside points of the contour (OUTPUT_ON_PROFILE)"
+    state.refuse_if(state.on_contour and not harmless, problem, "points of the tool's centre (OUTPUT_ON_CENTER)")
+    state.note("compensation off, or of the length" if harmless else COMPENSATES, doubtful=not harmless)
 
 
 def mode(state: CutterLocationState, statement: MajorStatement) -> None:

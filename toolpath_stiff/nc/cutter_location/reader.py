@@ -114,6 +114,7 @@ def run(state: CutterLocationState, lines: tuple[str, ...], most_errors: int = 1
 def _take_comment(state: CutterLocationState, lines: tuple[str, ...], index: int) -> None:
     """Take what CAM systems tell in comments: CATIA's operations, CATIA's and Creo's coordinate systems."""
     operation, frame = OPERATION.match(lines[index]), frame_in_comment(lines, index)
+    state.on_contour = state.on_contour or "OUTPUT_ON_PROFILE" in lines[index]
     if operation:
         state.marks.append((index + 1, operation[1]))
     elif frame is not None:
@@ -141,6 +142,10 @@ def _conclude(state: CutterLocationState) -> None:
     if not state.units_given and len(state.recorder):
         state.assume(NO_UNITS)
     state.warnings += state.doubted.values()
+    unknown = [str(number) for number, tool in state.used_tools.items() if number and math.isnan(tool.length)]
+    if unknown:
+        text = f"LOADTL without a length (tools {', '.join(unknown)}): they are taken as long as the reference tool"
+        state.warnings.append(Remark(f"{text}; --tools FILE gives them"))
     if state.turning_back and not state.smooth:
         text = "the tool turns back where this arc begins, and no arc of the file begins smoothly: "
         remark = Remark(f"{text}check that the arcs turn the right way about their axes", state.turning_back[0])

@@ -44,6 +44,7 @@ class CutterLocationState:
     speed: float = 0.0  # of the spindle, 1/min; 0: not known, or it stands
     turn: float = 1.0  # -1: counter-clockwise; nan: a speed of the surface
     revolutions: float = 0.0  # that SPINDL/ON goes back to
+    on_contour: bool = False  # Creo's OUTPUT_ON_PROFILE: points of the contour beside CUTCOM
     frames: dict[str, tuple[float, ...]] = field(default_factory=dict)  # who names a coordinate system: its numbers
 
     # The tool.
@@ -70,6 +71,7 @@ class CutterLocationState:
     hole: Drilling | None = None  # that each point drills: heights from the point in mm
     hole_feed: float = 0.0  # mm/min or mm per revolution
     hole_per_revolution: bool = False
+    hole_from: Vector | None = None  # where the tool stood before the cycle, to whose height each hole goes back
 
     # What the file holds.
     recorder: Recorder = field(default_factory=Recorder)
@@ -201,6 +203,8 @@ def drill(state: CutterLocationState, target: Vector, axis: Vector, hole: Drilli
         "a GOTO/ before the cycle that turns the tool",
     )
     feed = state.feed_per_minute(state.hole_feed, state.hole_per_revolution)
+    if state.hole_from is not None:
+        hole = replace(hole, clear=max(hole.retract, dot(minus(state.hole_from, target), axis)))
     if state.point is None:
         stand(state, along(target, axis, hole.clear), axis)
         state.assume(FIRST_POINT)

@@ -16,11 +16,13 @@ from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_numb
 READ, LISTED, DOUBTFUL, REFUSED = "read", "listed", "listed, with a warning", "refused"
 # Who writes it.
 ALL, CREO, NX, CATIA, AUTODESK, CAMPLETE = "all", "Creo", "NX", "CATIA", "Autodesk", "Autodesk for CAMplete"
+SOLIDWORKS = "SolidWorks CAM"
 CATIA_CREO, CREO_NX, MOST = f"{CATIA}, {CREO}", f"{CREO}, {NX}, {AUTODESK}", f"{CATIA}, {CREO}, {AUTODESK}"
 # Where it is described.
 ISO, APT = "ISO 4343", "ISO 4342, the APT language"
 PTC, SIEMENS = 'PTC, "Supported CL Data Commands"', 'Siemens NX, "CLSF Manager"'
 DASSAULT, POSTS = "Dassault, CATIA's help on APT import", "Autodesk's APT posts"
+SAMPLES = "published files of SolidWorks CAM"
 VERICUT, MANUALS = 'Vericut, "Supported APT-CLS NC Program Records"', "manuals of post processors"
 # An unknown word that begins like one of a motion or a feed, or that carries a point, is not passed over.
 LIKE_MOTION = ("GO", "RAP", "FED", "CIR", "ARC", "MOV", "HEL", "CYC", "TLA", "TLO", "TLL", "TLR", "UNI", "MUL", "FRO")
@@ -106,7 +108,7 @@ TABLE = (
     MajorWord("MOVARC", motion.movarc, _CIRCLE, AUTODESK, ISO, "/x,y,z,i,j,k,r,ANGLE,a"),
     MajorWord("INDIRV", motion.indirv, "direction in which the next circle begins", CATIA_CREO, APT, "/i,j,k"),
     MajorWord("TLON,GOFWD", motion.tlon, "the tool moves along a circle", CATIA_CREO, DASSAULT, "/(...),ON,(...)"),
-    MajorWord("CYCLE", cycles.cycle, "drilling cycle", ALL, PTC, "/DRILL, DEEP, BRKCHP or TAP and pairs, or /OFF"),
+    MajorWord("CYCLE", cycles.cycle, "drilling cycle", ALL, PTC, "/DRILL, DEEP, BRKCHP, TAP, BORE and pairs, or /OFF"),
     MajorWord("FEDRAT", modes.fedrat, "feed", ALL, ISO, "/number[,unit] or unit,number"),
     MajorWord("SPINDL", modes.spindl, "spindle speed", ALL, ISO),
     MajorWord("UNITS", modes.units, "length unit", f"{CREO}, {AUTODESK}", ISO, "/MM or INCHES"),
@@ -119,6 +121,7 @@ TABLE = (
     MajorWord("TLDATA", modes.cutter, "tool diameter", NX, SIEMENS, "/kind,d"),
     MajorWord("DELAY", modes.delay, "pause", ALL, ISO, _PAUSE),
     MajorWord("DWELL", modes.delay, "pause", "", ISO, _PAUSE),
+    MajorWord("CUTCOM", modes.cutcom, "cutter compensation", MOST, ISO, "/LEFT, RIGHT, ON or OFF", DOUBTFUL),
     MajorWord("MODE", modes.mode, "milling; turning is read alike", AUTODESK, POSTS, "/MILL or TURN"),
     MajorWord("FINI", modes.fini, "end of the file", MOST, ISO),
     MajorWord("TOOL PATH", modes.heading, HEADING, NX, SIEMENS, "/name,TOOL,tool", LISTED),
@@ -127,7 +130,6 @@ TABLE = (
     MajorWord("MCS", modes.frame_word, FRAMES["MCS"], AUTODESK, POSTS, kind=LISTED),
     MajorWord("CSYS", modes.frame_word, FRAMES["CSYS"], "", VERICUT, kind=LISTED),
     MajorWord("ZERO", modes.frame_word, FRAMES["ZERO"], AUTODESK, POSTS, kind=LISTED),
-    *refused(_COMPENSATES, ISO, "CUTCOM", unless="OFF"),
     *refused(_SHIFTS, ISO, "TRANS ORIGIN", unless="0,0,0"),
     *refused(_TURNS, ISO, "ROTABL ROTHED", unless="0"),
     *refused(_TURNS, MANUALS, "ROTATE TABLE INDEX TILT", unless="0"),
@@ -147,7 +149,8 @@ TABLE = (
     *listed(_OUTPUT, ALL, ISO, "MACHIN SEQNO LEADER TMARK REWIND"),
     *listed(_OUTPUT, "", MANUALS, "CHANNEL NOPOST CLDATA PROGRM"),
     *listed("for CAMplete", CAMPLETE, POSTS, "CSI_PROGRAM_COMMENT CSI_SET_PATH_PARAM CSI_PATH_TOLERANCE"),
-    *listed(TOOL, CAMPLETE, POSTS, "CSI_SET_FLUTE_LENGTH"),
+    *listed(TOOL, CAMPLETE, POSTS, "CSI_SET_FLUTE_LENGTH CSI_SET_EXTENSION_LENGTH"),
+    *listed("in which system the machine is", SOLIDWORKS, SAMPLES, "TRNTYP"),
     *listed("coolant", ALL, ISO, "COOLNT FLUSH"),
     *listed("a plane to retract to, of which nothing is made without RETRCT", "", ISO, "CLEARP CLRSRF"),
     *listed("the part surface; the points have its height already", CATIA, DASSAULT, "AUTOPS PSIS"),

@@ -52,36 +52,43 @@ def begin_contour(
     state.feed = rate if code == "APPR LCT" else modal
     side = next((word for word in ("R0", "RL", "RR") if block.take(word) is not None), "R0")
     block.refuse_if(side == "R0" and code != "APPR LT", None, f"{code} without a side", "RL or RR")
-    length = size_of(state, block, "LEN") if code in ("APPR LT", "APPR LN") else 0.0
-    across = SIDES.get(side, 1) * 1j * heading
     if side != "R0":
         begin_compensation(state, block, side)
     cutter = state.cutter
-    if code == "APPR LT":
-        place, center, turn = apex - length * heading, None, 0
-    elif code == "APPR LN":
-        assert cutter is not None
-        state.cutter, place, center, turn = None, apex + (length + cutter.radius) * across, None, 0
-    else:
-        assert cutter is not None
-        radius, swept = size_of(state, block, "R"), 0.0
-        back = -1.0 if radius < 0.0 else 1.0
-        center, turn = apex + abs(radius) * back * across, round(back) * SIDES[side]
-        state.assume(OF_CONTOUR)
-        if code == "APPR CT":
-            swept = math.radians(size_of(state, block, "CCA", 1.0))
-            place = center + (apex - center) * cmath.exp(-1j * turn * swept)
-        else:
-            place = _touching(block, start - center, radius, cutter.radius, -turn) + center
+    place, center, turn = _way(state, block, code, apex, -heading, -SIDES.get(side, 1), start)
+    if code == "APPR LN":
+        state.cutter = None
     go(state, block, {first: place.real, second: place.imag}, rapid=rapid)
     if depth is not None:
         go(state, block, {normal: depth}, rapid=rapid)
     state.cutter, state.feed = cutter, rate
-    if turn == 0 or abs(apex - place) > NO_ARC_MM:
-        go(state, block, {first: apex.real, second: apex.imag}, center, turn)
+    if center is None or abs(apex - place) > NO_ARC_MM:
+        go(state, block, {first: apex.real, second: apex.imag}, center, -turn)
     unused = next(iter(block.free), None)
     block.refuse_if(unused, unused, f"is no word of {code}", "its own words")
     state.feed = after
+
+
+def _way(
+    state: State, block: CurrentBlock, code: str, apex: complex, away: complex, side: int, other: complex
+) -> tuple[complex, complex | None, int]:
+    """Where the line or arc ends that leaves a contour point in a direction, the arc's centre and its turn.
+
+    An approach is such a way back: `side` is then the other one than the contour's. `other`: where LCT begins or ends.
+    """
+    across, kind = side * 1j * away, code.split()[1]
+    if kind == "LT":
+        return apex + size_of(state, block, "LEN") * away, None, 0
+    assert state.cutter is not None
+    if kind == "LN":
+        return apex + (size_of(state, block, "LEN") + state.cutter.radius) * across, None, 0
+    state.assume(OF_CONTOUR)
+    radius, swept = size_of(state, block, "R"), size_of(state, block, "CCA", 1.0) if kind == "CT" else 0.0
+    turn = side if radius > 0.0 else -side
+    center = apex + radius * across
+    if kind == "CT":
+        return center + (apex - center) * cmath.exp(1j * turn * math.radians(swept)), center, turn
+    return center + _touching(block, other - center, radius, state.cutter.radius, turn), center, turn
 
 
 def size_of(state: State, block: CurrentBlock, letter: str, scale: float | None = None) -> float:
@@ -113,39 +120,21 @@ def depart(state: State, block: CurrentBlock, code: str) -> None:
     plain, (first, second, normal) = state.plain, PLANES[state.plane]
     if plain.heading is None:
         raise block.fail(None, "without a contour element in the plane before it", "L, C, CR or CT before it")
-    heading, cutter, apex = complex(*plain.heading), state.cutter, in_plane(state, present(state))
-    heading /= abs(heading)
+    heading, cutter, apex = plain.heading / abs(plain.heading), state.cutter, in_plane(state, present(state))
     block.refuse_if(cutter is None and code != "DEP LT", None, "without RL or RR, which give its side", "L statements")
-    across = (cutter.side if cutter else 1) * 1j * heading
     there = named(state, block)
     block.refuse_if(feed(state, block), "FMAX", "on the way off a contour", "F with a number")
     block.take("R0")
-    depth, center, turn, radius, swept = there.pop(normal, None), 0j, 0, 0.0, 0.0
-    block.refuse_if(bool(there) != (code == "DEP LCT"), None, "with or without its end point", "X and Y with LCT alone")
-    if code in ("DEP CT", "DEP LCT"):
-        assert cutter is not None
-        radius = size_of(state, block, "R")
-        back = -1.0 if radius < 0.0 else 1.0
-        center, turn = apex + abs(radius) * back * across, round(back) * cutter.side
-        state.assume(OF_CONTOUR)
-    if code == "DEP LT":
-        _go(state, block, apex + size_of(state, block, "LEN") * heading)
-    elif code == "DEP CT":
-        swept = math.radians(size_of(state, block, "CCA", 1.0))
-        _go(state, block, center + (apex - center) * cmath.exp(1j * turn * swept), center, turn)
-    elif code == "DEP LCT":
-        assert cutter is not None
-        block.refuse_if(not there.keys() >= {first, second}, None, "without its end point", "X and Y")
-        end = complex(there[first], there[second])
-        place = _touching(block, end - center, radius, cutter.radius, turn) + center
-        if abs(place - apex) > NO_ARC_MM:
-            _go(state, block, place, center, turn)
+    depth = there.pop(normal, None)
+    if there.keys() != ({first, second} if code == "DEP LCT" else set()):
+        raise block.fail(None, "with or without its end point", "X and Y with LCT alone")
+    end = complex(there.get(first, 0.0), there.get(second, 0.0))
+    place, center, turn = _way(state, block, code, apex, heading, cutter.side if cutter else 1, end)
+    if code != "DEP LN" and abs(place - apex) > NO_ARC_MM:
+        _go(state, block, place, center, turn)
     stop(state, block)
-    if code == "DEP LN":
-        here = in_plane(state, present(state))
-        _go(state, block, here + size_of(state, block, "LEN") * across)
-    elif code == "DEP LCT":
-        _go(state, block, complex(there[first], there[second]))
+    if code in ("DEP LN", "DEP LCT"):
+        _go(state, block, end if code == "DEP LCT" else place)
     if depth is not None:
         go(state, block, {normal: depth})
 

@@ -15,7 +15,16 @@ from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
 from toolpath_stiff.nc.elements import direction as direction_of
 from toolpath_stiff.nc.geometry import PLANES, ArcError
-from toolpath_stiff.nc.heidenhain.points import ON_CIRCLE_MM, feed, in_plane, inch_tenths, named, polar, present
+from toolpath_stiff.nc.heidenhain.points import (
+    ON_CIRCLE_MM,
+    feed,
+    in_plane,
+    inch_tenths,
+    named,
+    plane_of_pole,
+    polar,
+    present,
+)
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import LARGEST_MM
@@ -30,12 +39,14 @@ SIDES = {"RL": LEFT, "RR": RIGHT}
 
 
 def pole(state: State, block: CurrentBlock, code: str) -> None:
-    """CC: circle centre and pole; without coordinates the present point."""
-    first, second, _ = PLANES[state.plane]
-    here, point = present(state), named(state, block)
-    block.refuse_if(len(point.keys() & {first, second}) == 1, code, "with one coordinate", "both, or none")
-    state.plain.pole = (point.pop(first, here[first]), point.pop(second, here[second]))
-    block.refuse_if(point, code, f"with a coordinate off the plane {state.plane}", "two of it")
+    """CC: circle centre and pole, perhaps in another plane than the tool's; without coordinates the present point."""
+    point = named(state, block)
+    plane = next((name for name, axes in PLANES.items() if point.keys() == {*axes[:2]}), None) if point else state.plane
+    if plane is None:
+        raise block.fail(code, "with other coordinates than two of a plane", "two of X, Y, Z, or none")
+    first, second, _ = PLANES[plane]
+    here = present(state)
+    state.plain.pole = plane, complex(point.get(first, here[first]), point.get(second, here[second]))
 
 
 def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:
@@ -96,7 +107,7 @@ def go(
         _cut_corner(state, block, (begin, end, center, turn), there, rapid)
     ahead = end - begin if center is None else turn * 1j * (end - center)
     flat = abs(ahead) > 0.0 and not there.keys() - {first, second}
-    plain.heading, plain.fast = ((ahead.real, ahead.imag) if flat else None), rapid
+    plain.heading, plain.fast = (ahead if flat else None), rapid
     if plain.to_corner:
         block.refuse_if(rapid or turns > 1 or there.keys() - {first, second}, None, *_NO_CORNER)
         plain.held = (block, (begin, end, center, turn), state.feed)
@@ -166,8 +177,8 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
 
 
 def line(state: State, block: CurrentBlock, code: str) -> None:
-    """L, LP: straight to a point. In machine coordinates under M91."""
-    plain, there, rapid = state.plain, polar(state, block) if code == "LP" else named(state, block), feed(state, block)
+    """L: straight to a point. In machine coordinates under M91."""
+    plain, there, rapid = state.plain, named(state, block), feed(state, block)
     if plain.tilt is not None and there.keys() & {3, 4, 5}:
         block.refuse_if(
             there.keys() & {0, 1, 2} and not rapid, None, "turns rotary axes in a tilted plane", "FMAX, or no A, B, C"
@@ -188,9 +199,7 @@ def line(state: State, block: CurrentBlock, code: str) -> None:
         block.refuse_if(
             state.cutter or plain.held or plain.to_corner, "M91", "beside a contour with compensation or a corner"
         )
-        block.refuse_if(
-            code == "LP" or any(letter[0] == "I" for letter in block.values), "M91", "with polar words or steps"
-        )
+        block.refuse_if(any(letter[0] == "I" for letter in block.values), "M91", "with steps", "coordinates")
         block.take("R0")
         unit = state.length_scale
         values = {AXES[a]: Word(AXES[a], v / unit if a < 3 else v, 1, AXES[a]) for a, v in there.items()}
@@ -204,21 +213,28 @@ def line(state: State, block: CurrentBlock, code: str) -> None:
         go(state, block, there, rapid=rapid)
 
 
+def polar_line(state: State, block: CurrentBlock, code: str) -> None:
+    """LP: straight to a point in polar coordinates about CC."""
+    with plane_of_pole(state, block) as pole:
+        there, rapid = polar(state, block, pole), feed(state, block)
+        compensate(state, block, there)
+        go(state, block, there, rapid=rapid)
+
+
 def circle(state: State, block: CurrentBlock, code: str) -> None:
     """C: about CC to a point; CP: about CC by or to a polar angle, with a height a helix."""
-    if state.plain.pole is None:
-        raise block.fail(None, "without a circle centre, or after a change of the coordinates", "CC before it")
-    center, here, turns = complex(*state.plain.pole), in_plane(state, present(state)), 1
-    step = block.values.get("IPA")
+    step, turns = block.values.get("IPA"), 1
     block.refuse_if(code == "CP" and not block.has("PA") and step is None, code, "without an angle", "PA or IPA")
     block.refuse_if(block.has("PR") or block.has("IPR"), code, "with a radius", "the radius of its start")
     turn = direction(block, step.value if step else 0.0)
     if step is not None:
         block.refuse_if(step.value * turn <= 0.0, step, "is against the direction of rotation DR", "the same sign")
         turns = max(1, math.ceil(abs(step.value) / 360.0 - 1e-9))
-    there = polar(state, block) if code == "CP" else named(state, block)
-    block.refuse_if(abs(here - center) < ON_CIRCLE_MM, None, "begins at its circle centre", "another CC")
-    _round(state, block, there, center, turn, turns)
+    with plane_of_pole(state, block) as center:
+        there = polar(state, block, center) if code == "CP" else named(state, block)
+        at_center = abs(in_plane(state, present(state)) - center) < ON_CIRCLE_MM
+        block.refuse_if(at_center, None, "begins at its circle centre", "another CC")
+        _round(state, block, there, center, turn, turns)
 
 
 def _round(
@@ -257,12 +273,17 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
 
 def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
     """CT, CTP: an arc to a point that goes on smoothly from the contour element before."""
-    there, heading = polar(state, block) if code == "CTP" else named(state, block), state.plain.heading
+    heading = state.plain.heading
     if heading is None:
         raise block.fail(None, "without a contour element in the plane before it", "L, C, CR or CT before it")
+    if code == "CT":
+        there = named(state, block)
+    else:
+        with plane_of_pole(state, block) as pole:
+            there = polar(state, block, pole)
     start = in_plane(state, present(state))
     end = in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
-    ahead = complex(*heading) / abs(complex(*heading))
+    ahead = heading / abs(heading)
     chord = (end - start) / ahead  # seen along the path
     block.refuse_if(abs(chord) < ON_CIRCLE_MM, None, "to its own start", "another point")
     if abs(cmath.phase(chord)) < STRAIGHT_ON:

@@ -6,10 +6,9 @@ cycle 7 in the tilted plane, then mirror image or rotation, and the scale. Where
 one, moves are refused. mm, degrees.
 """
 
-import math
-
 from toolpath_stiff.nc.codes import tools
 from toolpath_stiff.nc.codes.motion import record
+from toolpath_stiff.nc.frames import rotate, rotation_matrix
 from toolpath_stiff.nc.geometry import PLANES, roll_pitch_of_axis
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -19,17 +18,10 @@ Matrix = list[list[float]]
 TIP_TURNS = (
     "PLANE, cycle 19 and CYCLE800 turn the tool about its tip where it stands: how the machine's axes turn is not known"
 )
+HOW_AXES_TURN = (
+    "STAY", "MOVE", "TURN", "F", "FMAX", "SEQ+", "SEQ-", "SYM", "DIST", "ABST", "MB", "MBMAX", "TABLEROT", "COORDROT",
+)  # fmt: skip
 SPATIAL = "the angles of cycle 19 are spatial angles, not positions of the machine's axes"
-
-
-def rotation_of(angles: tuple[float, float, float]) -> Matrix:
-    """Rz(C) Ry(B) Rx(A): PLANE SPATIAL turns about the fixed axes, A first."""
-    (ca, sa), (cb, sb), (cc, sc) = ((math.cos(math.radians(v)), math.sin(math.radians(v))) for v in angles)
-    return [
-        [cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa],
-        [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa],
-        [-sb, cb * sa, cb * ca],
-    ]
 
 
 def product(a: Matrix, b: Matrix) -> Matrix:
@@ -46,12 +38,12 @@ def apply(state: State, block: CurrentBlock) -> None:
     if plain.angle:
         turn = [0.0, 0.0, 0.0]
         turn[PLANES[state.plane][2]] = plain.angle
-        inner = product(rotation_of((turn[0], turn[1], turn[2])), inner)
+        inner = product(rotation_matrix(turn), inner)
     for axis in plain.mirrored:
         inner[axis] = [-v for v in inner[axis]]
     shift = plain.shift
     if plain.tilt is not None:
-        shift = [row[0] for row in product(plain.tilt, [[v] for v in plain.shift])]
+        shift = rotate(plain.tilt, plain.shift)
         inner = product(plain.tilt, inner)
     unit = [[float(row == column) for column in range(3)] for row in range(3)]
     frames.linear = None if inner == unit else inner
@@ -117,22 +109,7 @@ def tilt(state: State, block: CurrentBlock, code: str) -> None:
     plain, frames = state.plain, state.frames
     letters = ("SPA", "SPB", "SPC") if code == "PLANE SPATIAL" else AXES[3:]
     angles = [block.take(letter) for letter in letters]
-    for word in (
-        "STAY",
-        "MOVE",
-        "TURN",
-        "F",
-        "FMAX",
-        "SEQ+",
-        "SEQ-",
-        "SYM",
-        "DIST",
-        "ABST",
-        "MB",
-        "MBMAX",
-        "TABLEROT",
-        "COORDROT",
-    ):
+    for word in HOW_AXES_TURN:
         block.take(word)
     block.refuse_if(code == "PLANE SPATIAL" and None in angles, None, "without SPA, SPB and SPC", "all three")
     a, b, c = (angle or 0.0 for angle in angles)
@@ -149,7 +126,7 @@ def tilt(state: State, block: CurrentBlock, code: str) -> None:
         state.assume(SPATIAL)
     if plain.tilt is None:
         plain.outer, plain.shift = plain.shift, [0.0] * 3
-    plain.tilt = rotation_of((a, b, c)) if leans else None
+    plain.tilt = rotation_matrix((a, b, c)) if leans else None
     if not leans:
         plain.outer, plain.shift = [0.0] * 3, plain.outer
     apply(state, block)
@@ -180,7 +157,7 @@ def datum(state: State, block: CurrentBlock, code: str) -> None:
 def hold_tip(state: State, block: CurrentBlock, code: str) -> None:
     """M128, FUNCTION TCPM: X, Y, Z are the tip's while rotary axes turn; M129, FUNCTION RESET TCPM: no longer."""
     plain, on = state.plain, code in ("M128", "FUNCTION TCPM")
-    for word in ("FTCP", "AXISPOS", "AXISSPAT", "PATHCTRLAXIS", "PATHCTRLVECTOR", "F", "FMAX"):
-        block.take(word)
+    if code[0] == "F":
+        block.free.clear()
     tools.hold_tip(state, block, code, on)
     plain.held_tip = on

@@ -5,6 +5,8 @@ HEIDENHAIN, user's manual of the iTNC 530, "Fundamentals of positioning", "Polar
 
 import cmath
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from toolpath_stiff.nc.codes.feeds import SLOWEST
 from toolpath_stiff.nc.geometry import PLANES
@@ -55,11 +57,25 @@ def named(state: State, block: CurrentBlock) -> dict[int, float]:
     return there
 
 
-def polar(state: State, block: CurrentBlock) -> dict[int, float]:
-    """Axis -> coordinate of PR and PA about the pole, and of the other axis words."""
+@contextmanager
+def plane_of_pole(state: State, block: CurrentBlock) -> Iterator[complex]:
+    """The pole in its plane, which is in force meanwhile: CC X Z in G17 gives a circle of ZX."""
     if state.plain.pole is None:
-        raise block.fail(None, "without a pole, or after a change of the coordinates", "CC before it")
-    pole = complex(*state.plain.pole)
+        problem = "without a circle centre or pole, or after a change of the coordinates"
+        raise block.fail(None, problem, "CC before it")
+    kept, (state.plane, pole) = state.plane, state.plain.pole
+    plain, other = state.plain, state.plane != kept
+    waits = state.cutter or state.beside or plain.held or plain.to_corner or plain.approach
+    try:
+        block.refuse_if(other and waits, None, f"in another plane than {kept}, beside a corner or RL, RR", "R0 before")
+        yield pole
+    finally:
+        state.plane = kept
+    plain.heading = None if other else plain.heading
+
+
+def polar(state: State, block: CurrentBlock, pole: complex) -> dict[int, float]:
+    """Axis -> coordinate of PR and PA about the pole, and of the other axis words."""
     here = in_plane(state, present(state)) - pole
     radius, step = block.take("PR"), block.take("IPR")
     angle, turn = block.take("PA"), block.take("IPA")

@@ -6,19 +6,20 @@ the TNC 640, "Programming fundamentals", "Structuring programs", "Fixed cycles")
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up
 from toolpath_stiff.nc.place import Place
-from toolpath_stiff.nc.words import LONGEST_BLOCK, MOST_DIGITS, Block, Word
+from toolpath_stiff.nc.words import LONGEST_BLOCK, MOST_DIGITS, Word
 
 NUMBER = r"(?:\d+[.,]?\d*|[.,]\d+)"
 VALUE = rf"[+-]?\s*(?:{NUMBER}|Q[LR]?\d+)"
 _BEGIN = re.compile(r"\s*(/?)\s*(?:N?\d+(?![\d.,])\s*)?(/?)\s*", re.IGNORECASE)
 _COMMENT = re.compile(r'"[^"]*"|;.*')
 _HEAD = re.compile(
-    r"(?:BEGIN|END)\s+PGM|BLK\s+FORM(?:\s+(?:0[.,][12]|[A-Z]+))?|TOOL\s+(?:CALL|DEF)|CYCL\s+DEF\s+\d+(?:[.,]\d+)?"
+    r"(?:BEGIN|END)\s+PGM|BLK\s+FORM(?:\s+(?:0[.,][12]|[A-Z]+))?|TOOL\s+(?:CALL|DEF)|CYCL\s+DEF\s*\d+(?:\s*[.,]\d+)?"
     r"|CYCL\s+CALL(?:\s+P[OA][ST]\b)?|CALL\s+(?:LBL|PGM)|FN\s*\d+\s*:|FUNCTION\s+(?:RESET\s+)?[A-Z]+|PLANE\s+[A-Z]+"
     r"|(?:APPR|DEP)\s+[A-Z]+|TCH\s+PROBE(?:\s+\d+)?|(?:SEL|PATTERN|INIT)\s+[A-Z]+|Q[LRS]?\d+(?=\s*=)|[A-Z]+"
 )
@@ -28,43 +29,37 @@ _WORD = re.compile(
     rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
     rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
     r"|([XYZABCUVW])(?![A-Z])"
-    rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"",
+    rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"|[FRM](?![A-Z\d])",
 )
 _LABEL = re.compile(r'\s*/?\s*(?:N?\d+\s+)?/?\s*LBL\s*(?:0*(\d+)|"([^"]*)")\s*$')
 PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
-_SPECIAL = {
-    "BEGIN PGM": re.compile(r"\b(INCH)()\s*$"),
-    "CYCL DEF 9.1": re.compile(rf"()({NUMBER}|Q[LR]?\d+)\s*$"),
-}
+_INCH = re.compile(r"\b(INCH)()\s*$")
+_NUMBER_BEHIND = re.compile(rf"()({VALUE})\s*$")  # a name in the control's language
+_OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|17)\.[1-5])")
+_VALUES = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
 # Heads whose rest has another form, or does not matter.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
+    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|TCH|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
     r"|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 
 
 @dataclass(frozen=True)
 class PlainStatement:
-    """A statement: its head, the words (key, value as written, column, text), its rest as text, and the line after it.
+    """A statement: its head, its words, its rest as text, and the line after it.
 
-    A word of no value has "" as one; of a bare axis letter the key is "X!", of a bare number "#", of a name `"`.
+    Of a bare axis letter a word's key is "X!", of a bare number "#", of a name `"`. `computed`: place of a word -> its
+    value as it is written, where that is a Q parameter or no number.
     """
 
     line: int
     head: str
     column: int
-    words: tuple[tuple[str, str, int, str], ...]
+    words: tuple[Word, ...]
+    computed: dict[int, str]
     rest: str
     optional: bool
     after: int
-
-    def block(self, value: Callable[[str, str, int], float]) -> Block:
-        """Its words with numbers, the head first; `value` works out what is written behind a key, in a column."""
-        words = (
-            Word(key, value(key, written, column) if written else 0.0, column, text)
-            for key, written, column, text in self.words
-        )
-        return Block(self.line, (Word("", 0.0, self.column, self.head), *words), optional=self.optional)
 
 
 def code_text(line: str) -> str:
@@ -90,34 +85,36 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
     assert begin is not None
     head = _HEAD.match(text, begin.end())
     if begin.end() == len(text) or text[begin.end()] in "*(":
-        return PlainStatement(row + 1, "", 1, (), "", False, after)
+        return PlainStatement(row + 1, "", 1, (), {}, "", False, after)
     if head is None:
         raise place.fail(
             f"{text[begin.end() :][:20]!r} is no statement", "Heidenhain's plain language", "", begin.end() + 1
         )
     shown = " ".join(head[0].split()).replace(",", ".").replace("FN ", "FN").rstrip(": ")
+    if shown.startswith("CYCL DEF"):
+        shown = "CYCL DEF " + shown.removeprefix("CYCL DEF").replace(" ", "")
     if len(text) > LONGEST_BLOCK:
         raise place.fail(f"a statement of {len(text)} characters", f"at most {LONGEST_BLOCK}")
-    end, optional = head.start() if shown == "M" else head.end(), bool(begin[1] or begin[2])
-    rest, words = text[end:], list[tuple[str, str, int, str]]()
-    if look_up(shown) is not None and not _OTHERWISE.match(shown):
-        words = _words(text, end, place, shown)
-        if shown.startswith("CYCL DEF") and "." not in shown:
-            while after < len(lines) and PARAMETER.match(lines[after]):
-                words += _words(code_text(lines[after]), 0, Place(name, after + 1), shown)
-                after += 1
-    special = _SPECIAL[shown].search(text, end) if shown in _SPECIAL else None
-    if special is not None:  # a unit, or a time behind its name in the control's language
-        words = [(special[1] or "#", (special[2] or "").replace(",", "."), special.start() + 1, special[0].strip())]
-    return PlainStatement(row + 1, shown, head.start() + 1, tuple(words), rest, optional, after)
+    end, cycle = head.start() if shown == "M" else head.end(), shown.startswith("CYCL DEF") and "." not in shown
+    rest, words, computed = text[end:], list[Word](), dict[int, str]()
+    special = _INCH if shown == "BEGIN PGM" else _NUMBER_BEHIND if _OLD.match(shown) else None
+    has_words = special is None and look_up(shown) is not None and not _OTHERWISE.match(shown)
+    if special is not None and (number := special.search(text, end)):
+        _add(words, computed, number[1] or "#", number[2].replace(",", "."), number.start() + 1, number[0].strip())
+    if has_words:
+        first = PARAMETER.search(text, end) if cycle else None  # what stands before it is the cycle's name
+        _words(words, computed, text, first.start() if first else len(text) if cycle else end, place, shown)
+    while after < len(lines) and (lines[after - 1].rstrip().endswith("~") or (cycle and PARAMETER.match(lines[after]))):
+        if has_words and (cycle or ";" not in lines[after - 1]):  # else a remark goes on
+            _words(words, computed, code_text(lines[after]), 0, Place(name, after + 1), shown)
+        after += 1
+    return PlainStatement(
+        row + 1, shown, head.start() + 1, tuple(words), computed, rest, bool(begin[1] or begin[2]), after
+    )
 
 
-def _words(text: str, position: int, place: Place, head: str) -> list[tuple[str, str, int, str]]:
-    """Words of a text from a position on; of a cycle what stands before its first parameter is its name."""
-    words = list[tuple[str, str, int, str]]()
-    if head.startswith("CYCL DEF") and "." not in head:
-        first = PARAMETER.search(text, position)
-        position = first.start() if first else len(text)
+def _words(words: list[Word], computed: dict[int, str], text: str, position: int, place: Place, head: str) -> None:
+    """Add the words of a text from a position on."""
     while position < len(text):
         if text[position].isspace():
             position += 1
@@ -139,6 +136,16 @@ def _words(text: str, position: int, place: Place, head: str) -> list[tuple[str,
             raise place.fail(f"a number of {len(written)} characters", "", "", position + 1)
         if key == "M":
             key = f"M{written.lstrip('+0') or '0'}"
-        words.append((key, written, position + 1, quoted if quoted is not None else match[0]))
+        if match.lastindex:  # else F, R or M alone, which changes nothing
+            _add(words, computed, key, written, position + 1, quoted if quoted is not None else match[0])
         position = match.end()
-    return words
+
+
+def _add(words: list[Word], computed: dict[int, str], key: str, written: str, column: int, text: str) -> None:
+    """Add a word; its value is worked out when it runs where it is no number."""
+    number = _VALUES.get(written)
+    if number is None and "Q" not in written and written != "PREDEF":
+        number = float(written or 0.0)
+    if number is None:
+        computed[len(words)] = written
+    words.append(Word(key, number or 0.0, column, text))

@@ -4,6 +4,7 @@ The functions are in `contour`, `approach`, `coordinates`, `cycles`, `functions`
 FN). M functions that mean what they mean in G code are the one table's (`codes.registry`).
 """
 
+import re
 from functools import lru_cache
 
 from toolpath_stiff.nc.codes.code import Act, Code, Refused, holds_anyway
@@ -36,7 +37,7 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("RND", contour.corner, "rounding of the corner to the next element"),
     )),
     ("motion", POLAR, (
-        ("LP", contour.line, "straight, in polar coordinates"),
+        ("LP", contour.polar_line, "straight, in polar coordinates"),
         ("CP", contour.circle, "arc about CC by a polar angle, helix"),
         ("CTP", contour.tangent_circle, "arc that goes on smoothly, in polar coordinates"),
     )),
@@ -74,10 +75,18 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("CYCL DEF 203", cycles.define, "drilling, with pecks and chip breaking"),
         ("CYCL DEF 205", cycles.define, "deep drilling"),
         ("CYCL DEF 240", cycles.define, "centring"),
+        ("CYCL DEF 241", cycles.define, "single-lip drilling"),
+        ("|".join(f"CYCL DEF 1.{part}" for part in range(6)), cycles.define_older, "pecking, of older controls"),
         ("CYCL CALL|CYCL CALL POS", cycles.call_statement, "carries out the cycle"),
     )),
-    ("motion", _TAPPING, (("CYCL DEF 206|CYCL DEF 207|CYCL DEF 209", cycles.define, "tapping"),)),
+    ("motion", _TAPPING, (
+        ("CYCL DEF 206|CYCL DEF 207|CYCL DEF 209", cycles.define, "tapping"),
+        ("|".join(f"CYCL DEF 2.{part}" for part in range(5)), cycles.define_older, "tapping, of older controls"),
+        ("|".join(f"CYCL DEF 17.{part}" for part in range(4)), cycles.define_older, "tapping, of older controls"),
+    )),
     ("motion", _PATTERNS, (("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),)),
+    ("motion", _SPECIAL, (("CYCL DEF 300", functions.left_out, "300 to 399: the machine builder's, left out"),)),
+    ("motion", f"{_CYCLES}, Touch probe cycles", (("TCH PROBE", functions.left_out, "probing, left out"),)),
     ("dwell", _SPECIAL, (("CYCL DEF 9.1", functions.dwell, "dwell"),)),
     ("path control", _SPECIAL, (
         ("CYCL DEF 9.0|CYCL DEF 13.0|CYCL DEF 13.1|CYCL DEF 32.0|CYCL DEF 32.1|CYCL DEF 32.2|CYCL DEF 32.3", _LISTED,
@@ -89,6 +98,7 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("Q|FN0|FN1|FN2|FN3|FN4|FN5|FN6|FN7|FN8|FN13", _SILENT, "Q parameter"),
         ("FN9|FN10|FN11|FN12", _SILENT, "jump on a condition"),
         ("FN14", _SILENT, "error: the program stops"),
+        ("FN18|FN28", _LISTED, "data of the control: the parameter is not known from there on"),
         ("FN15|FN16|FN19|FN20|FN29|FN37|FN38", _LISTED, "message, PLC: changes no path"),
     )),
     ("non-modal", _BASICS, (
@@ -118,9 +128,8 @@ _REFUSED = (
      "a tilted plane given otherwise", "PLANE SPATIAL", _PLANE),
     ("CYCL-DEF-204", "back boring", _BY_MOVES, _DRILLING),
     ("CYCL-DEF-208", "a helix whose way in the manual draws without numbers", _BY_MOVES, _DRILLING),
-    ("TCH-PROBE", "probing", "leave probing out", f"{_CYCLES}, Touch probe cycles"),
     ("SEL PATTERN CALL CYCL-CALL-PAT", "points of other files or patterns", "post the points one by one", _PATTERNS),
-    ("FN17 FN18 FN26 FN27 FN28", "data of the control or of a table", "put the numbers into the program", _Q),
+    ("FN17 FN26 FN27", "data of the control or of a table", "put the numbers into the program", _Q),
     ("SPL", "a spline", "post lines and arcs", PATHS),
 )  # fmt: skip
 REFUSED: dict[str, Refused] = {
@@ -130,9 +139,13 @@ REFUSED: dict[str, Refused] = {
 }
 
 
+_BUILDERS = re.compile(r"CYCL DEF 3\d\d")
+
+
 @lru_cache(256)
 def look_up(head: str) -> Code | None:
-    """The row of a statement's head; of Q parameters that of "Q"."""
+    """The row of a statement's head; of Q parameters that of "Q", of the machine builder's cycles that of 300."""
+    head = "TCH PROBE" if head.startswith("TCH PROBE") else "CYCL DEF 300" if _BUILDERS.fullmatch(head) else head
     return STATEMENTS.get("Q" if (head[0] == "Q" and head[1:2].isdigit()) or head[:2] in ("QL", "QR") else head)
 
 

@@ -15,7 +15,6 @@ from typing import Any
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.interpreter import execute
-from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.expressions import EQUAL, number
 from toolpath_stiff.nc.parametric.families import NGC, family_of
@@ -23,14 +22,11 @@ from toolpath_stiff.nc.parametric.macro_calls import MACRO_CALLS, call_of
 from toolpath_stiff.nc.parametric.statements import Assignment, Statement, Steering, read_statement, worked_out
 from toolpath_stiff.nc.parametric.structure import Structure, structure_of
 from toolpath_stiff.nc.parametric.variables import Variables
-from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.program_run import HEAD, ProgramRun, Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
 from toolpath_stiff.nc.words import Block, Word
 
-MOST_STEPS = 1_000_000  # blocks that run, all repeats counted
-MOST_IDLE = 100_000  # blocks of loops that run without a move between; a program that works out values needs far fewer
 Step = Callable[[Any, int, Steering], int | None]  # of a run: its line, what it steers; where the run goes on
 SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
 
@@ -46,24 +42,13 @@ class ParametricRun(ProgramRun):
         super().__init__(request, tally, fast=False)
         self.family = family_of(self.lines, self.state.dialect, self.name)
         self.variables = Variables(self.family, self.state)
-        self.folder = None if request.controller.subprograms is None else Path(request.controller.subprograms)
-        self._main_lines = len(self.lines)
-        self._files: list[tuple[int, int, str]] = []  # first line, line after the last, name
         self._statements: dict[int, Statement] = {}
         self._structure_known: Structure | None = None
         self._modal: Call | None = None
         self._at = 0  # the block that runs
-        self._steps = 0
-        self._passes: dict[int, str] = {}  # by the line that jumps back: what changes often, as it was there
-        self._moved = (0, 0)  # moves at the last jump back after a move, and the blocks that had run by then
         self._began = False  # a variable was set, or the flow steered
         self._repeats: dict[tuple[int, int], int] = {}  # left of a loop, by the calls that run and its line
         self._marks: dict[str, int] = {}  # lines of BREAK and CONTINUE that LinuxCNC's interpreter has not forgotten
-
-    def _place(self, row: int) -> Place:
-        """File and line (from 1) of a line that is read."""
-        in_files = (Place(name, row - first + 1) for first, stop, name in self._files if first <= row < stop)
-        return next(in_files, super()._place(row))
 
     def _statement(self, row: int) -> Statement:
         if row not in self._statements:
@@ -86,10 +71,6 @@ class ParametricRun(ProgramRun):
         """Set variables, once all values are known (LinuxCNC, "Numbered Parameters")."""
         for set_variable in [assignment(self.variables) for assignment in assignments]:
             set_variable()
-
-    def _line_of_call(self) -> int:
-        """The line of the main file from which a subprogram's file is called: its moves are of that line."""
-        return next((level.back for level in reversed(self._levels) if level.back <= self._main_lines), 1)
 
     def _word_fault(self, word: Word, problem: str, expected: str) -> InputError:
         return self._fail(self._at, f"{word.text} {problem}", expected, column=word.column)
@@ -142,32 +123,24 @@ class ParametricRun(ProgramRun):
 
     def _target(self, row: int, call: Call) -> tuple[int, int]:
         if call.number not in self._heads() and call.number < 10_000:
-            self._load((f"O{call.number:04d}", f"O{call.number}", f"{call.number}", f"{call.number:04d}"))
+            self._load_program((f"O{call.number:04d}", f"O{call.number}", f"{call.number}", f"{call.number:04d}"))
         if call.arguments is None:
             return super()._target(row, call)
         if call.number not in self._heads():
             raise self._fail(row, f"the file has no program O{call.number}", column=call.column)
         return call.number, call.repeats or 1
 
-    def _load(self, names: tuple[str, ...]) -> None:
-        """Read a subprogram's file from the folder, if it is there; its lines follow those that are read."""
-        names = names if self.folder is not None else ()
-        files = (Path(self.folder or "", name + suffix) for name in names for suffix in SUFFIXES)
-        file = next((file for file in files if file.is_file()), None)
-        if file is not None:
-            first = len(self.lines)
-            self.lines = (*self.lines, *read_lines(file))
-            self._files.append((first, len(self.lines), file.name))
-            self._programs = self._sequence = self._structure_known = None
+    def _load_program(self, names: tuple[str, ...]) -> None:
+        """Read a subprogram's file from the folder, if it is there."""
+        if self._load(name + suffix for name in names for suffix in SUFFIXES) is not None:
+            self._structure_known = None
 
     def _steered(self, row: int) -> int | None:
         """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
         self._at = row
         if any(row == first for first, *_ in self._files):  # the end of the file before it
             return len(self.lines)
-        self._steps += 1
-        if self._steps > MOST_STEPS:
-            raise self._fail(row, f"more than {MOST_STEPS:,} blocks have run", "a loop that ends")
+        self._count_block(row)
         statement = self._statement(row)
         block, steering = statement.block, statement.steering
         self.variables.line = block.line
@@ -192,19 +165,9 @@ class ParametricRun(ProgramRun):
         if to == row + 1:
             return to
         if to <= row:
-            self._check_loop(row, to)
+            variables = self.variables
+            self._check_loop(row, to, (variables.levels, variables.common, self._repeats, self._levels))
         return super()._jump(row, to) if max(row, to) < self._main_lines else to
-
-    def _check_loop(self, row: int, to: int) -> None:
-        """Refuse a loop in which nothing changes, or that makes no move in very many blocks, where it goes back."""
-        moves, variables = len(self.state.recorder), self.variables
-        if moves != self._moved[0]:
-            self._moved = (moves, self._steps)
-        now = repr((self.state.frames, variables.levels, variables.common, self._repeats, self._levels))
-        if now == self._passes.get(row) or self._steps - self._moved[1] > MOST_IDLE:
-            problem = f"the loop back to line {self._place(to).line} never ends"
-            raise self._fail(row, f"{problem}: no variable or position changes, or nothing moves", "a loop that ends")
-        self._passes[row] = now
 
     def _return(self, row: int, flow: Flow | GoTo) -> int | None:
         """M99; with P it goes on at that block of the caller, wherever that is."""
@@ -305,7 +268,7 @@ class ParametricRun(ProgramRun):
     def _call_sub(self, row: int, steering: Steering) -> int | None:
         label, name = steering.label, steering.label.strip("<>")
         if label not in self._structure.subs and Path(name).name == name:
-            self._load((name.lower(), name, *(() if label.startswith("<") else (f"o{name}",))))
+            self._load_program((name.lower(), name, *(() if label.startswith("<") else (f"o{name}",))))
         first = self._structure.subs.get(label, -1) + 1
         if not first:
             problem = f"{steering.shown}: the program, or the folder of its subprograms, has no such sub"

@@ -7,8 +7,9 @@ swivelled one, then the settable offset. mm, degrees.
 
 from toolpath_stiff.nc.codes import coordinates as settable
 from toolpath_stiff.nc.codes import tools
+from toolpath_stiff.nc.frames import rotation_matrix
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.coordinates import Matrix, product, rotation_of, turn_tool
+from toolpath_stiff.nc.heidenhain.coordinates import Matrix, product, turn_tool
 from toolpath_stiff.nc.heidenhain.points import present
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -51,8 +52,7 @@ def frame(state: State, block: CurrentBlock, code: str) -> None:
         angle = block.take("RPL")
         block.refuse_if(angle is not None and any(values), "RPL", "beside angles about axes", "one of them")
         values[PLANES[state.plane][2]] += angle or 0.0
-        x, y, z = values
-        plain.inner = product(plain.inner, rotation_of((x, y, z)))  # Z first, then about the new Y and X (RPY angles)
+        plain.inner = product(plain.inner, rotation_matrix(values))  # Z first, then about the new Y and X (RPY angles)
     elif kind == "SCALE":
         factors = [1.0 if word is None else word for word in words]
         uneven = len(set(factors)) > 1 or factors[0] <= 0.0
@@ -99,7 +99,7 @@ def swivel(state: State, block: CurrentBlock, code: str) -> None:
         axis = (mode >> 2 * place & 3) - 1
         block.refuse_if(angle and axis < 0, "MODE", "names no axis for each angle", "57, 27 or 39")
         about = [angle if axis == number else 0.0 for number in range(3)]
-        turned = product(turned, rotation_of((about[0], about[1], about[2])))
+        turned = product(turned, rotation_matrix((about[0], about[1], about[2])))
     added = kind % 10 == 1 and plain.tilt is not None
     before, outer = (plain.tilt or UNIT, plain.outer) if added else (UNIT, [0.0] * 3)
     for matrix, point in ((before, points[0]), (product(before, turned), points[1])):
@@ -130,10 +130,10 @@ def orientation(state: State, block: CurrentBlock, code: str) -> None:
 def pole(state: State, block: CurrentBlock, code: str) -> None:
     """G110, G111, G112: the pole, from the present point, from zero, from the last pole."""
     first, second, _ = PLANES[state.plane]
-    here, last = present(state), state.plain.pole or (0.0, 0.0)
-    base = {"G110": (here[first], here[second]), "G111": (0.0, 0.0), "G112": last}[code]
+    here, last = present(state), state.plain.pole[1] if state.plain.pole else 0j
+    base = {"G110": complex(here[first], here[second]), "G111": 0j, "G112": last}[code]
     x, y = ((block.take(AXES[axis]) or 0.0) * state.length_scale for axis in (first, second))
-    state.plain.pole = base[0] + x, base[1] + y
+    state.plain.pole = state.plane, base + complex(x, y)
 
 
 def units(state: State, block: CurrentBlock, code: str) -> None:

@@ -103,7 +103,7 @@ def _points(state: State, block: CurrentBlock) -> dict[int, float]:
         block.refuse_if(plain.pole is None, None, "polar words without a pole", "G111 before it")
         first, second, _ = PLANES[state.plane]
         block.refuse_if(there.keys() & {first, second}, None, "polar words beside those of the plane")
-        pole = complex(*(plain.pole or (0.0, 0.0)))
+        pole = plain.pole[1] if plain.pole else 0j
         here = in_plane(state, present(state)) - pole
         given = block.take("RP"), block.take("IRP"), block.take("AP"), block.take("IAP")
         radius = abs(here) if given[0] is None else given[0] * scale
@@ -199,7 +199,7 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
         places = (begin.real, begin.imag), (end.real, end.imag)
         middle = complex(*center_from_radius(*places, radius * scale, clockwise))
     elif polar_words and not by_center:
-        middle = complex(*(state.plain.pole or (0.0, 0.0)))
+        middle = state.plain.pole[1] if state.plain.pole else 0j
     else:
         block.refuse_if(not by_center, None, "an arc without a centre", "I, J, K, CR= or AR=")
     contour.go(state, block, there, middle, turn, turns)

@@ -10,7 +10,6 @@ import re
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.heidenhain.statements import code_text
-from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.expressions import Value as Number
 from toolpath_stiff.nc.parametric.run import ParametricRun, Step
@@ -361,7 +360,7 @@ class SiemensRun(ParametricRun):
         times = self._times(scanner)
         scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind the call of {name}", "a block of its own")
         if name not in self._subs:
-            self._load((name,))
+            self._load_sub(name)
         if name not in self._subs:
             problem = f"{name} is no word that is known, and no subprogram of the file or of a folder"
             raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=steering.column)
@@ -390,15 +389,12 @@ class SiemensRun(ParametricRun):
             bound[name] = bool(value) if kind == "BOOL" else float(value)
         return bound
 
-    def _load(self, names: tuple[str, ...]) -> None:
-        """Read a subprogram's file from the folder, if it is there; its lines follow those that are read."""
+    def _load_sub(self, name: str) -> None:
+        """Read a subprogram's file from the folder, if it is there."""
         files = sorted(self.folder.iterdir()) if self.folder is not None else []
-        fits = (file for file in files if file.suffix.upper() in SUFFIXES and file.stem.upper() == names[0])
-        file = next((file for file in fits if file.is_file()), None)
-        if file is not None:
-            first, lines = len(self.lines) + 1, read_lines(file)
-            self.lines = (*self.lines, f"%_N_{names[0]}_SPF", *lines, END_OF_FILE)
-            self._files.append((first, first + len(lines), file.name))
+        fits = [file.name for file in files if file.suffix.upper() in SUFFIXES and file.stem.upper() == name]
+        if self._load(fits, (f"%_N_{name}_SPF",)) is not None:
+            self.lines = (*self.lines, END_OF_FILE)
             self._structure_known = None
             self._lex()
 
