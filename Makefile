@@ -15,7 +15,7 @@ demo: $(VENV)/.run
 # The case stays in reports/studio: a second call goes on where the first was left.
 studio: $(VENV)/.run
 	@if [ -f reports/studio/case.toml ]; then $(BIN)/tps studio --case reports/studio; \
-	else $(BIN)/tps studio --case reports/studio --exercise 7 --program $(PROGRAM); fi
+	else $(BIN)/tps studio --case reports/studio --exercise 52 --program $(PROGRAM); fi
 
 # One thread of linear algebra a process: the processes share the cores already. Each process takes a run of neighbouring
 # tests, so that what the tests of a module share is computed once; who is done takes over from the others.

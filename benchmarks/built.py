@@ -53,8 +53,8 @@ def named(record: Record) -> bool:
 
 
 def listed(record: Record) -> bool:
-    """`ambiguous` with the truth among at most three."""
-    few = record["verdict"] == "ambiguous" and len(record["explanations"]) <= 3
+    """`ambiguous` with the truth among at most three entries: what is alike at one place is one."""
+    few = record["verdict"] == "ambiguous" and record["entries"] <= 3
     return few and any(holds(names, record) for names in record["explanations"])
 
 

@@ -141,6 +141,7 @@ def answer_of(diagnosis: tps.Diagnosis) -> Record:
     return {
         "verdict": said["verdict"],
         "explanations": [words.split(" + ") for words in said["explanations"]],
+        "entries": len(said["entries"]),
         "portrait": [entry["link"] for entry in portrait["links"]],
         "left_out": sum(bool(row.get("left_out")) for row in said.get("suspect_rows", ())),
     }

@@ -67,7 +67,6 @@ PAIRS = {
         machine="nist", between=("spindle_compliance", "none"), n=2, minutes={"pose": 20}
     ),
     "forces slots.csv --cut cut.toml --axes=x,y,z": lambda: tps.forces("slots.csv", "cut.toml"),
-    "machine recover --starts 2": lambda: tps.recover_geometry(starts=2),
     "machine check nist.toml": lambda: tps.Machine.load("nist.toml").check(),
     "effects list": tps.effects,
     "effects draft nist-table1 --noise 20 -o missing.toml": lambda: tps.draft_effect(

@@ -17,7 +17,6 @@ from toolpath_stiff.api.forces import forces as forces
 from toolpath_stiff.api.machines import Machine as Machine
 from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
 from toolpath_stiff.api.machines import machine_template as machine_template
-from toolpath_stiff.api.machines import recover_geometry as recover_geometry
 from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
 from toolpath_stiff.api.many import analyze_many as analyze_many
 from toolpath_stiff.api.measurements import Measurements as Measurements

@@ -1,8 +1,9 @@
 """Tables that users give, one heading and a row a line: known columns by their names, numbers with a decimal point.
 
 Text with commas, semicolons or tabs between the cells, or a sheet of an Excel workbook. The heading is the first line
-that is neither empty nor a comment. Between semicolons and tabs numbers may have decimal commas. Columns of other names
-or in other units are read where a mapping says which they are.
+that is neither empty nor a comment; where a mapping names columns, the first that has them all: what instruments write
+above it is passed over. A row of units may follow. Between semicolons and tabs numbers may have decimal commas. Columns
+of other names or in other units are read where a mapping says which they are.
 """
 
 import csv
@@ -11,9 +12,10 @@ import io
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import NamedTuple
 
-from toolpath_stiff.column_names import columns_option, converted, heading_key, parted, same_quantity
+from toolpath_stiff.column_names import UNITS, columns_option, converted, heading_key, parted, same_quantity
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import decoded, read_bytes
 from toolpath_stiff.workbooks import Rows, is_workbook, sheet_rows, split_name
@@ -22,6 +24,7 @@ SEPARATORS = ",;\t"
 ALIKE = 0.75  # of two names: from there one may be a slip of the other
 SPREADSHEET_ERROR = re.compile(r"#[A-ZÄÖÜ][A-ZÄÖÜ0-9/_]*[!?]|#N/?[AV]")
 MARKED = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
+NUMBER = re.compile(r"[+-]?[\d.,]+(?:e[+-]?\d+)?", re.IGNORECASE)
 LIKE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 
 
@@ -116,7 +119,9 @@ def parse_table(text: str, file: str, columns: Columns) -> Table:
     if "\0" in text:
         raise InputError("neither text nor an Excel workbook", hint="export it as CSV", file=file)
     lines = (re.sub('"[^"]*"', "quoted", line) for line in io.StringIO(text, newline=None))
-    first = next((line for line in lines if line.strip(" ,;\t\n") and not line.startswith("#")), "")
+    filled = (line for line in lines if line.strip(" ,;\t\n") and not line.startswith("#"))
+    first, named = next(filled, ""), _mapped(columns)
+    first = next((line for line in chain([first], filled) if all(name in line for name in named)), first)
     separator = max(SEPARATORS, key=first.count)
     reader = csv.reader(io.StringIO(text, newline=None), delimiter=separator)
     try:
@@ -131,12 +136,25 @@ def _table(rows: Rows, file: str, columns: Columns, separator: str, remarks: lis
     rows = [(n, row) for n, row in rows if any(row) and (row[0][:1] != "#" or SPREADSHEET_ERROR.fullmatch(row[0]))]
     if not rows:
         raise InputError("the file is empty", expected="a heading and rows below it", file=file)
-    (line, written), *body = rows
+    named = _mapped(columns)
+    start = next((i for i, (_, row) in enumerate(rows) if named.keys() <= set(row)), 0)
+    if start:
+        remarks.append(f"{start} lines above the heading are passed over")
+    (line, written), *body = rows[start:]
     while not written[-1]:
         written.pop()
-    heading = _named(written, columns, file, line)
-    units = {i: pair for i, cell in enumerate(written) if (pair := _units(cell, heading[i], columns))}
-    body = [(n, _fitted(row, len(heading), not separator)) for n, row in body]
+    full = written  # with the units below
+    if body and _are_units(body[0][1]):
+        (below, cells), *body = body
+        remarks.append(f"line {below} is a row of units")
+        full = [f"{cell} [{unit}]" for cell, unit in zip(written, _fitted(cells, len(written), pad=True), strict=True)]
+    heading = _named(written, full, columns, file, line)
+    units = {i: pair for i, cell in enumerate(written) if (pair := _units(cell, full[i], heading[i], columns))}
+    # Instruments leave a last column of remarks out where it is empty.
+    least = (
+        0 if not separator else max((i + 1 for i, name in enumerate(heading) if not named or name in named.values()))
+    )
+    body = [(n, _fitted(row, len(heading), len(row) >= least)) for n, row in body]
     numbers = [i for i, name in enumerate(heading) if name not in columns.texts]
     if separator in ";\t" and separator and _has_commas(heading, body, numbers, file):
         remarks.append("numbers are read with decimal commas")
@@ -163,6 +181,11 @@ def _stripped(cell: str) -> str:
     return text[1:] if text[:2] in ("'=", "'+", "'-", "'@") else text
 
 
+def _are_units(cells: Sequence[str]) -> bool:
+    """Whether cells below a heading are units: one is known, none is a number."""
+    return not any(map(NUMBER.fullmatch, cells)) and any(heading_key(cell) in UNITS for cell in cells)
+
+
 def _fitted(cells: list[str], width: int, pad: bool) -> list[str]:
     """Without empty cells beyond the heading; those of a sheet are as long as the heading."""
     while len(cells) > width and not cells[-1]:
@@ -170,12 +193,19 @@ def _fitted(cells: list[str], width: int, pad: bool) -> list[str]:
     return cells + [""] * (width - len(cells)) if pad else cells
 
 
-def _named(written: Sequence[str], columns: Columns, file: str, line: int) -> list[str]:
-    """Names of the headings; those that are not known stay as they are. Raises `InputError`."""
-    sources = columns.sources or {}
-    mapped = {source.heading: name for name, source in sources.items() if source.heading}
+def _mapped(columns: Columns) -> dict[str, str]:
+    """Heading -> column that a mapping says it is."""
+    return {source.heading: name for name, source in (columns.sources or {}).items() if source.heading}
+
+
+def _named(written: Sequence[str], full: Sequence[str], columns: Columns, file: str, line: int) -> list[str]:
+    """Names of the headings (`full`: with their units); those that are not known stay as they are.
+
+    Raises `InputError`.
+    """
+    sources, mapped = columns.sources or {}, _mapped(columns)
     known = {heading_key(name): name for name in (*columns.numbers, *columns.texts)}
-    heading = [mapped.get(cell) or known.get(heading_key(cell), cell) for cell in written]
+    heading = [mapped.get(cell) or known.get(heading_key(text), cell) for cell, text in zip(written, full, strict=True)]
     for cell in mapped:
         if cell not in written:
             shown = ", ".join(repr(cell) for cell in written if cell)
@@ -189,19 +219,19 @@ def _named(written: Sequence[str], columns: Columns, file: str, line: int) -> li
         name, meant = next(iter(slips.items()))
         hint = f"did you mean {meant}? Otherwise give it another name"
         if columns.sources is not None:
-            pairs = [(theirs, parted(theirs)[1], *parted(of)) for theirs, of in slips.items()]
+            pairs = [(theirs, parted(full[heading.index(theirs)])[1], *parted(of)) for theirs, of in slips.items()]
             entries = [f"{name}={cell}:{unit if same_quantity(unit, own) else own}" for cell, unit, name, own in pairs]
             hint += f", or say its unit: {columns_option(entries)}"
         raise InputError(f"column {name!r}", expected=meant, hint=hint, file=file, line=line)
     return heading
 
 
-def _units(written: str, name: str, columns: Columns) -> tuple[str, str] | None:
-    """Unit of a column that is mapped and the one that it is to have; None where they are the same."""
+def _units(written: str, full: str, name: str, columns: Columns) -> tuple[str, str] | None:
+    """Unit of a column that is mapped (`full`: heading and unit) and the one that it is to have; None: the same."""
     source, unit = (columns.sources or {}).get(name), parted(name)[1]
     if source is None or source.heading != written:
         return None
-    stated = next((stated for stated in (source.unit, parted(written)[1]) if same_quantity(stated, unit)), unit)
+    stated = next((stated for stated in (source.unit, parted(full)[1]) if same_quantity(stated, unit)), unit)
     return None if stated == unit else (stated, unit)
 
 

@@ -210,7 +210,7 @@ def test_a_pose_is_the_same_alone_and_among_many(load):
     parts = [slice(start, start + 100) for start in range(0, n, 100)]
     few = [evaluate(model, position[p], abc[p], tangent[p], tool[p], load) for p in parts]
     assert 0.5 < many.reachable.mean() < 1.0
-    for name in ("stiffness", "strut_lengths", "reach.margin", "reach.value"):
+    for name in ("stiffness", "joints", "reach.margin", "reach.value"):
         alone = np.concatenate([attrgetter(name)(part) for part in few])
         np.testing.assert_allclose(attrgetter(name)(many), alone, rtol=1e-9, atol=1e-12, err_msg=name)
     for name in ("substituted", "extrapolated", "reach.limit"):

@@ -14,11 +14,17 @@ from toolpath_stiff.nc.reader import parse_program
 
 TEXT = HEAD + pocket(0.5, 6, False, 10) + "M2\n"
 GIVEN = setup(10, 30.0)
+# Gauss and Lobatto's nine nodes (Abramowitz, Stegun, table 25.6), as shares of the height.
+HEIGHTS = 0.5 + 0.5 * np.array([-1, -0.8997579954, -0.6771862795, -0.3631174638, 0, 0.3631174638, 0.6771862795,
+                                0.8997579954, 1])  # fmt: skip
 HEADING = "x_mm,y_mm,z_mm,nx,ny,nz,deviation_um"
 
 
-def measured(factor=1.0, off_line=0, by_um=0.0, noise_um=0.3, own=False):
-    """Rows of a file: points of the true walls, `factor` times the foretold error, one line `by_um` further out."""
+def measured(factor=1.0, off_line=0, by_um=0.0, noise_um=0.3, own=False, share=(0.0, 1.0)):
+    """Rows of a file: points of the true walls between shares of their height.
+
+    Off by `factor` times the error foretold at that height, one line `by_um` further out.
+    """
     rng = np.random.default_rng(3)
     program = parse_program(TEXT)
     cut = evaluate_cut(MODEL, program, ORIGIN, GIVEN, 2e-3)
@@ -27,11 +33,12 @@ def measured(factor=1.0, off_line=0, by_um=0.0, noise_um=0.3, own=False):
         x, y, z = cut.samples.position[i] * 1e3
         tx, ty, _ = cut.samples.tangent[i]
         out = np.array([ty, -tx]) * (1 if side == 0 else -1)  # of the part, towards the tool
-        error = factor * cut.wall_mean[i, side] * 1e6 + rng.normal(0.0, noise_um)
-        error += by_um if cut.samples.line[i] == off_line else 0.0
         low, high = cut.wall_heights[i, side] * 1e3
+        place_z = rng.uniform(*share)
+        error = factor * np.interp(place_z, HEIGHTS, cut.wall_profiles[i, side]) * 1e6 + rng.normal(0.0, noise_um)
+        error += by_um if cut.samples.line[i] == off_line else 0.0
         place = np.array([x, y]) - out * (5.0 - (error * 1e-3 if own else 0.0))
-        where = f"{place[0]:.6f},{place[1]:.6f},{z + rng.uniform(low, high):.3f}"
+        where = f"{place[0]:.6f},{place[1]:.6f},{z + low + place_z * (high - low):.4f}"
         rows.append(f"{where},{out[0]:.6f},{out[1]:.6f},0" + ("" if own else f",{error:.4f}"))
     return rows
 
@@ -54,6 +61,15 @@ def test_the_factor_comes_back(tmp_path, own):
     document = compared.to_dict()
     assert document["points"] == len(rows) and {row["line"] for row in document["lines"]} == set(compared.line.tolist())
     assert len(compared.to_frame()) == len(rows) and "factor      1.3" in str(compared)
+
+
+@pytest.mark.parametrize("share", [(0.0, 0.2), (0.8, 1.0)])
+def test_points_at_one_height_are_held_against_the_error_there(tmp_path, share):
+    """At the foot this wall is off by 1.6 times its mean, at the top by hardly anything: the factor is one at both."""
+    compared = compare(tmp_path, measured(share=share, noise_um=0.05))
+    assert compared.factor[0] == pytest.approx(1.0, abs=0.02)
+    assert not any(row["fails"] for row in compared.lines)
+    assert (compared.height[compared.foretold != 0.0] <= 6e-3 * share[1] + 1e-6).all()
 
 
 def test_the_line_where_the_model_fails(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -219,3 +220,56 @@ def test_a_stated_spread_is_the_same_for_all():
     coefficients = coefficients_from(table, lambda key, mistake, expected: InputError(mistake))
     assert coefficients.deviation * SHOWN == pytest.approx([80, 20, 240, 2, 2, 0.1])
     assert coefficients.origin == "a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed"
+
+
+DYNOWARE = """DynoWare,Version 2.5.1.2
+Path:,C:\\Users\\Administrator\\Desktop\\20180315\\
+Filename:,slot.dwd
+Manipulated:,0
+Date:,
+Time:,
+Sampling rate [Hz]:,2917
+Cycle No:,1
+Time,Fx,Fy,Fz
+s,N,N,N
+"""
+LABVIEW = """LabVIEW Measurement
+Separator\tTab
+Decimal_Separator\t,
+X_Columns\tNo
+Date\t2019/07/22
+***End_of_Header***
+
+Channels\t3
+X_Dimension\tTime\tTime\tTime
+***End_of_Header***
+X_Value\tForce_0\tForce_1\tForce_2\tComment
+"""
+NAMES = {"time": "Time", "fx": "Fx", "fy": "Fy", "fz": "Fz"}
+FORCE = {"sample_rate_Hz": "=2917", "fx": "Force_0", "fy": "Force_1", "fz": "Force_2"}
+# What stands above the rows, what between cells, the unit of force in kN, the mapping.
+INSTRUMENTS = {
+    "DynoWare": (DYNOWARE, ",", 1e3, NAMES),
+    "DynoWare in kN": (DYNOWARE.replace("s,N,N,N", "s,kN,kN,kN"), ",", 1.0, NAMES),
+    "LabVIEW, without a column of time": (LABVIEW, "\t", 1e3, FORCE),
+    "semicolons, units in brackets": ("slot\nTime;Fx;Fy;Fz\n[s];[kN];[kN];[kN]\n", ";", 1.0, NAMES),
+}
+
+
+@pytest.mark.parametrize("instrument", INSTRUMENTS)
+def test_files_as_instruments_write_them(tmp_path, instrument):
+    """Lines above the heading, a row of units, decimal commas, no column of time: the same coefficients."""
+    files, cut = write_records(tmp_path, (0.06, 0.08, 0.1), 0.0)
+    first = tps.forces(files, cut)
+    head, separator, factor, mapping = INSTRUMENTS[instrument]
+    for file in map(Path, files):
+        rows = [[float(cell) for cell in line.split(";")] for line in file.read_text().splitlines()[1:]]
+        lines = [separator.join([f"{t:.6f}", *(f"{factor * force:.6f}" for force in forces)]) for t, *forces in rows]
+        text = "\n".join(lines)
+        file.write_text(head + (text if separator == "," else text.replace(".", ",")))
+        beside = tmp_path / f"{file.name}.columns.toml"
+        constants = [line for line in beside.read_text().splitlines() if '"=' in line]
+        beside.write_text("\n".join(constants))
+    fit = tps.forces(files, cut, columns=mapping)
+    assert fit.coefficients.values == pytest.approx(first.coefficients.values, rel=2e-3)
+    assert fit.force == pytest.approx(first.force, abs=0.05)

@@ -29,7 +29,9 @@ def simple_machine() -> Hexapod:
     """Three pairs of struts at right angles: lengths and angles can be read off."""
     frame = np.array([[0, 0, 2.0], [0, 1, 2.0], [-2.0, 0, 0], [-2.0, 0, 1], [0, 2.0, 0], [1, 2.0, 0]])
     platform = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 0], [0, 0, 1], [0, 0, 0], [1, 0, 0.0]])
-    return Hexapod("simple", "", "", frame, platform, 0.1, StrutLaw(1, 1e7, 3, 1e7), limits=Limits())
+    law = StrutLaw(1, 1e7, 3, 1e7)
+    return Hexapod(name="simple", title="", source="", frame_joints=frame, platform_joints=platform,
+                   reference_tool_length=0.1, strut_law=law)  # fmt: skip
 
 
 def test_lengths_and_directions_by_hand():

@@ -16,7 +16,7 @@ import pytest
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.kinematics import singularity_index, solve_struts, solve_struts_at
-from toolpath_stiff.machine.model import Hexapod, Limits, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.rotations import rotation_about_z, rotation_matrices
 from toolpath_stiff.stiffness import closed_form, core
 from toolpath_stiff.stiffness.model import build_model
@@ -121,7 +121,8 @@ def random_machine(rng) -> Hexapod:
     frame = rng.uniform([-1, -1, 1.0], [1, 1, 2.0], (6, 3))
     platform = rng.uniform([-0.4, -0.4, 0.0], [0.4, 0.4, 0.3], (6, 3))
     law = StrutLaw(0.5, 4e7, 3.0, 2e7)
-    return Hexapod("random", "random", "", frame, platform, 0.1, law, limits=Limits())
+    return Hexapod(name="random", title="random", source="", frame_joints=frame, platform_joints=platform,
+                   reference_tool_length=0.1, strut_law=law)  # fmt: skip
 
 
 def rounding(machine: Hexapod, position, rotation) -> tuple[np.ndarray, np.ndarray]:

@@ -232,7 +232,7 @@ def test_a_singular_pose_is_nan_and_leaves_its_neighbours_alone():
     sound = load_path(model, np.zeros((2, 3)))
     arms = sound.struts.arms.copy()
     arms[1] = 0.0
-    broken = replace(sound, struts=replace(sound.struts, arms=arms))
+    broken = replace(sound, stance=replace(sound.struts, arms=arms))
     compliance = exact.tip_compliance(model, broken)
     assert np.isnan(compliance[1]).all()
     assert np.array_equal(compliance[0], exact.tip_compliance(model, sound)[0])

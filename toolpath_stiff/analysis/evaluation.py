@@ -9,18 +9,23 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import Load, geometric_directions, load_directions
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import Extremes, Reach, machine_limits, reach
+from toolpath_stiff.machine.elements import Stance
+from toolpath_stiff.machine.limits import Extremes, Reach, machine_limits, reach, solved
+from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness import core
-from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import mm_from_m
+from toolpath_stiff.stiffness import core, element_sum
+from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
+from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
+OF_THE_WORK = ("tangential", "axial", "normal", "radial")  # loads that turn with the work; others are of the machine
+MOST_TRIED = 60  # poses of a path at which every configuration is tried
 FEW_CORNERS = 0.2  # share of the rows; a second load of every pose costs more than these poses twice
 Progress = Callable[[int, int], None]
 # Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, length of the tool (nan: the reference tool).
 Poses = tuple[FloatArray, FloatArray | None, float]
+# Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, tangents (n, 3), all in work axes.
+WorkPoses = tuple[FloatArray, FloatArray | None, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -33,19 +38,22 @@ class Evaluation:
         (n,) N/m along the load, displacement measured along it; nan where the pose is out of reach.
     substituted
         (n,) the asked load direction does not exist there, the softest one stands in.
-    strut_lengths
-        (n, 6) m.
+    joints
+        (n, j) m or rad, what the control moves: strut lengths of a hexapod.
     extrapolated
         (n,) a strut is longer or shorter than the strut law was given for.
     reach
         Margins and limits.
+    configuration
+        That is kept over a path, "" where there is no choice.
     """
 
     stiffness: FloatArray
     substituted: BoolArray
-    strut_lengths: FloatArray
+    joints: FloatArray
     extrapolated: BoolArray
     reach: Reach
+    configuration: str = ""
 
     @property
     def reachable(self) -> BoolArray:
@@ -54,7 +62,7 @@ class Evaluation:
 
     def put(self, rows: IntArray, part: "Evaluation") -> None:
         """Enter the figures of some rows."""
-        for name in ("stiffness", "substituted", "strut_lengths", "extrapolated"):
+        for name in ("stiffness", "substituted", "joints", "extrapolated"):
             getattr(self, name)[rows] = getattr(part, name)
         for name in ("margin", "limit", "value"):
             getattr(self.reach, name)[rows] = getattr(part.reach, name)
@@ -100,6 +108,8 @@ def evaluate(
     array([54823., 49735.])
     """
     n, load = len(position), load or Load()
+    if not isinstance(model.machine, Hexapod):
+        return _by_elements(model, position, abc, tangent, tool_length, load, progress)
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
     corners = _corners(position, abc, lengths)
     route = core.choose_route(model, n - int(np.count_nonzero(corners)))
@@ -150,7 +160,7 @@ def _by_closed_form(
     With each (n,) where the figures hold: not for other directions, at poses near singular ones, and where an angle
     near zero decides.
     """
-    machine, (tip, rotation, tool) = model.machine, poses
+    machine, (tip, rotation, tool) = as_hexapod(model.machine, "the closed form"), poses
     directed = [geometric_directions(load, tip, rotation, tangent) for tangent in tangents]
     position, towards = np.ascontiguousarray(tip.T), np.stack([direction.T for direction, _ in directed])
     turns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
@@ -178,18 +188,20 @@ def _by_solution(model: StiffnessModel, load: Load, tangent: FloatArray, poses: 
 def tip_compliances(
     model: StiffnessModel, poses: Poses, force: float
 ) -> tuple[FloatArray, BoolArray, Reach, FloatArray]:
-    """Strut lengths (n, 6) m, whether the strut law is extrapolated (n,), reach, compliance (n, 3, 3) m/N.
+    """Joints (n, j) m or rad, whether a strut law is extrapolated (n,), reach, compliance (n, 3, 3) m/N.
 
     The compliance is nan out of reach, and leaves load-dependent effects out.
     """
     tip, rotation, _ = poses
-    struts = solve_struts(model.machine, *poses)
-    stand = reach(model.machine, tip, struts, rotation)
+    stance = solved(model.machine, *poses)
+    stand = reach(model.machine, tip, stance, rotation)
     compliance = np.full((len(tip), 3, 3), np.nan)
     compliance[stand.reachable] = core.tip_compliance(model, *_some(poses, stand.reachable), force)
     _refuse_no_number(model, tip, stand.reachable & np.isnan(compliance[:, 0, 0]))
-    extrapolated = np.asarray(model.machine.strut_law.extrapolates(struts.lengths).any(axis=1))
-    return struts.lengths, extrapolated, stand, compliance
+    extrapolated = np.zeros(len(tip), dtype=bool)
+    if isinstance(model.machine, Hexapod):
+        extrapolated |= model.machine.strut_law.extrapolates(stance.joints).any(axis=1)
+    return stance.joints, extrapolated, stand, compliance
 
 
 def compliance_along(
@@ -216,3 +228,88 @@ def _refuse_no_number(model: StiffnessModel, tip: FloatArray, bad: BoolArray) ->
             f"machine {model.machine.name} is singular at X{x:g} Y{y:g} Z{z:g} mm: the tip has no stiffness there",
             hint="keep such poses out of reach: min_index of [limits.singularity] in the machine file, such as 0.05",
         )
+
+
+def joint_columns(machine: MachineTool, joints: FloatArray) -> dict[str, FloatArray]:
+    """Column -> values of joints (n, j) m or rad in the shop's units: "strut1_mm", "joint_X_mm", "joint_5_deg"."""
+    columns = {}
+    for name, kind, values in zip(machine.joint_names, machine.joint_kinds, joints.T, strict=True):
+        word = name.replace(" ", "_")
+        word = word if word.startswith(("joint", "strut", "carriage")) else f"joint_{word}"
+        linear = kind == "linear"
+        columns[f"{word}_{'mm' if linear else 'deg'}"] = mm_from_m(values) if linear else deg_from_rad(values)
+    return columns
+
+
+def _by_elements(
+    model: StiffnessModel,
+    position: FloatArray,
+    abc: FloatArray,
+    tangent: FloatArray,
+    tool_length: FloatArray | float,
+    load: Load,
+    progress: Progress | None,
+) -> Evaluation:
+    """A machine of elements at n poses under any load, as `evaluate`; poses with a tangent are a path.
+
+    Along a path the machine keeps one configuration, that with the largest smallest margin.
+    """
+    machine, n = model.machine, len(position)
+    lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
+    follows = bool(tangent.any())
+    kept = kept_configuration(machine, position, abc, lengths) if follows else None
+    stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(machine))
+    substituted, extrapolated = np.zeros((2, n), dtype=bool)
+    joints, name = np.empty((n, len(machine.joint_names))), "" if kept is None else machine.configurations[kept]
+    result = Evaluation(np.empty(n), substituted, joints, extrapolated, stand, name)
+    before = None
+    if follows and n:
+        before = machine.solve(position[:1], rotation_matrices(abc[:1]), lengths[:1], kept).joints[0]
+    for start in range(0, n, BLOCK):
+        rows = np.arange(start, min(start + BLOCK, n))
+        turn = rotation_matrices(abc[rows]) if abc[rows].any() else None
+        stance = machine.solve(position[rows], turn, lengths[rows], kept, before)
+        result.put(rows, evaluate_stance(model, stance, (position[rows], turn, tangent[rows]), load))
+        if before is not None and np.isfinite(stance.joints[-1]).all():
+            before = stance.joints[-1]
+        if progress:
+            progress(int(rows[-1]) + 1, n)
+    return result
+
+
+def kept_configuration(machine: MachineTool, position: FloatArray, abc: FloatArray, lengths: FloatArray) -> int | None:
+    """The configuration whose smallest margin over n poses is the largest; None where there is no choice."""
+    if len(machine.configurations) < 2 or not len(position):
+        return None
+    few = np.unique(np.linspace(0, len(position) - 1, MOST_TRIED).round().astype(np.int64))
+    turn = rotation_matrices(abc[few])
+    stances = (machine.solve(position[few], turn, lengths[few], i) for i in range(len(machine.configurations)))
+    return int(np.argmax([reach(machine, position[few], stance).margin.min() for stance in stances]))
+
+
+def evaluate_stance(
+    model: StiffnessModel,
+    stance: Stance,
+    in_work: WorkPoses,
+    load: Load,
+) -> Evaluation:
+    """A machine of elements where it stands; tip, tool axes and tangent in work axes."""
+    machine, n, (position, _, tangent) = model.machine, len(stance), in_work
+    stand = reach(machine, position, stance)
+    along, substituted = np.full(n, np.nan), np.zeros(n, dtype=bool)
+    direction, known = geometric_directions(load, *in_work)
+    if stance.work_axes is not None and load.kind in OF_THE_WORK:
+        direction = np.einsum("nij,nj->ni", stance.work_axes, direction)
+    for rows in (np.flatnonzero(stand.reachable & known), np.flatnonzero(stand.reachable & ~known)):
+        if not len(rows):
+            continue
+        part = stance if len(rows) == n else stance.take(rows)
+        path, towards = path_of_stance(model, part, **model.conditions.columns(len(rows))), direction[rows]
+        if not known[rows[0]]:  # the compliance directs the load
+            compliance = element_sum.tip_compliance(model, path)
+            some = (part.position, part.rotation, tangent[rows])
+            towards, substituted[rows] = load_directions(load, compliance, *some)
+        along[rows] = element_sum.compliance_along(model, path, towards)
+    stiffness = 1.0 / along
+    _refuse_no_number(model, position, stand.reachable & ~((stiffness > 0.0) & (stiffness < np.inf)))
+    return Evaluation(stiffness, substituted, stance.joints, np.zeros(n, dtype=bool), stand)

@@ -113,18 +113,18 @@ def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
         evaluate_poses(model, np.array([pose[:3]]), np.array([pose[3:]]))
         for pose in (machine.limits.neutral_pose, machine.default_origin)
     )
-    wrong = _struts(machine)
+    wrong = _struts(machine) if isinstance(machine, Hexapod) else []
     for name, report in (("neutral pose", neutral), ("default origin", origin)):
         if not report.reach.reachable[0]:
             wrong.append(f"the {name} is out of reach: {report.reach.describe(0)}")
-    doubtful = _odd_struts(neutral.strut_lengths[0])
+    doubtful = _odd_struts(neutral.joints[0]) if isinstance(machine, Hexapod) else []
     if neutral.reach.reachable[0]:
         softest = n_per_um_from_n_per_m(float(neutral.softest_stiffness[0]))
         if not ROBOT <= softest <= BEYOND:
             beside = "less than a robot arm has" if softest < ROBOT else "more than any machine tool has"
             doubtful.append(f"at the neutral pose the softest direction has {softest:.3g} N/um at the tool, {beside}")
     if neutral.extrapolated[0]:
-        lengths = ", ".join(f"{mm_from_m(float(v)):.0f}" for v in neutral.strut_lengths[0])
+        lengths = ", ".join(f"{mm_from_m(float(v)):.0f}" for v in neutral.joints[0])
         doubtful.append(f"at the neutral pose the struts ({lengths} mm) lie outside the lengths of [strut_law]")
     same = [section for section, remark in machine.remarks.items() if remark == TEMPLATE_REMARK]
     if same:

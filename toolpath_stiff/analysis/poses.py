@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.evaluation import Poses, compliance_along, tip_compliances
+from toolpath_stiff.analysis.evaluation import Poses, compliance_along, joint_columns, tip_compliances
 from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
@@ -19,7 +19,7 @@ from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, nm_from_m
+from toolpath_stiff.units import n_per_mm_from_n_per_m, nm_from_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,7 +30,7 @@ POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
 @dataclass(frozen=True, repr=False, eq=False)
 class PoseStiffness(Result):
-    """Stiffness at n poses: along X, Y, Z, in the softest and the stiffest direction, with strut lengths and margins.
+    """Stiffness at n poses: along X, Y, Z, in the softest and the stiffest direction, with joint values and margins.
 
     Arrays are in SI, nan where a pose is out of reach; `columns` has them in the shop's units.
 
@@ -47,8 +47,8 @@ class PoseStiffness(Result):
     tip_compliance
         (n, 3, 3) m/N, column j the displacement of the tip for each newton of the load along axis j, all effects
         included.
-    strut_lengths
-        (n, 6) m.
+    joints
+        (n, j) m or rad, what the control moves: strut lengths of a hexapod.
     extrapolated
         (n,) a strut is outside the range that the strut law was given for.
     reach
@@ -86,7 +86,7 @@ class PoseStiffness(Result):
     stiffest: FloatArray
     stiffest_stiffness: FloatArray
     tip_compliance: FloatArray
-    strut_lengths: FloatArray
+    joints: FloatArray
     extrapolated: BoolArray
     reach: Reach
     pose_mm_deg: FloatArray = field(default_factory=lambda: np.empty((0, 6)))
@@ -119,7 +119,7 @@ class PoseStiffness(Result):
             columns |= {f"{which}_d{axis}": getattr(self, which)[:, i] for i, axis in enumerate("xyz")}
         return {
             **columns,
-            **{f"strut{i + 1}_mm": mm_from_m(self.strut_lengths[:, i]) for i in range(6)},
+            **joint_columns(self.model.machine, self.joints),
             "extrapolated": self.extrapolated.astype(int),
             "margin": self.reach.margin,
             "margin_limit": limits[self.reach.limit],
@@ -163,7 +163,7 @@ def evaluate_poses(
 ) -> PoseStiffness:
     """Evaluate n poses: position (n, 3) m, abc (n, 3) rad."""
     poses = (position, rotation_matrices(abc), np.nan)
-    lengths, extrapolated, stand, compliance = tip_compliances(model, poses, force)
+    joints, extrapolated, stand, compliance = tip_compliances(model, poses, force)
     soft, stiff = (principal_directions(compliance, softest) for softest in (True, False))
 
     def along(direction: FloatArray) -> FloatArray:
@@ -177,7 +177,7 @@ def evaluate_poses(
         stiffest=stiff,
         stiffest_stiffness=along(stiff),
         tip_compliance=_by_axes(model, compliance, poses, force),
-        strut_lengths=lengths,
+        joints=joints,
         extrapolated=extrapolated,
         reach=stand,
     )

@@ -13,7 +13,7 @@ from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.documents import Document, number, to_dict
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.nc.checking import ERROR, WARNING, Finding, UsedCode, check, in_order
 from toolpath_stiff.nc.courses import Extents
 from toolpath_stiff.nc.moves import ReadProgram
@@ -30,13 +30,19 @@ if TYPE_CHECKING:
 MOST_NAMED = 20  # lines named for one kind of finding
 
 
-def machine_findings(program: ReadProgram, machine: Hexapod, step: float) -> tuple[list[Finding], dict[str, float]]:
+def machine_findings(program: ReadProgram, machine: MachineTool, step: float) -> tuple[list[Finding], dict[str, float]]:
     """Moves beyond reach; the largest speed of a strut in a cut at the programmed feeds, with its line.
 
     The program sits where it was read for; `step` is the distance of the samples, m.
     """
     moves, origin = place(program.moves, program.origin), program.origin
-    samples = sample_moves(moves, step=step, rapid_feed=machine.rapid_feed, origin=origin)
+    samples = sample_moves(
+        moves,
+        step=step,
+        rapid_feed=machine.rapid_feed,
+        origin=origin,
+        angles_of=machine.angles_of if program.native else None,
+    )
     poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
     there = evaluate(StiffnessModel(machine), *poses, Load("z"))
     lines, findings = np.unique(samples.line[~there.reachable]).tolist(), []
@@ -50,9 +56,9 @@ def machine_findings(program: ReadProgram, machine: Hexapod, step: float) -> tup
         findings.append(Finding(0, 0, "reach", f"and {more} more lines leave the machine's reach", WARNING))
     time = np.diff(samples.t)
     same = (samples.move[1:] == samples.move[:-1]) & samples.cutting[1:] & (time > 0.0)
-    if not same.any():
+    if not same.any() or not isinstance(machine, Hexapod):
         return findings, {}
-    speed = (np.abs(np.diff(there.strut_lengths, axis=0)[same]) / time[same, None]).max(axis=1)
+    speed = (np.abs(np.diff(there.joints, axis=0)[same]) / time[same, None]).max(axis=1)
     fastest, top = mm_per_min_from_m_per_s(float(speed.max())), int(np.argmax(speed))
     return findings, {"mm_per_min": fastest, "line": int(samples.line[1:][same][top])}
 
@@ -146,7 +152,7 @@ class ProgramCheck(Result):
         return f"{self.program}, {errors}"
 
 
-def check_program(request: Request, machine: Hexapod | None, step: float = defaults.STEP) -> ProgramCheck:
+def check_program(request: Request, machine: MachineTool | None, step: float = defaults.STEP) -> ProgramCheck:
     """Everything that is to be said of a program, in the shop's units.
 
     Parameters

@@ -28,9 +28,9 @@ from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.nc.courses import move_lengths
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, Moves, ReadProgram
+from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.poses import Pose, pose_in_mm
@@ -192,7 +192,7 @@ class Analysis(EvaluatedPath, FolderResult):
 
 
 def analyze(
-    machine: Hexapod | StiffnessModel,
+    machine: MachineTool | StiffnessModel,
     program: ReadProgram,
     *,
     origin: Pose | None = None,
@@ -241,7 +241,8 @@ def analyze(
     model = machine if isinstance(machine, StiffnessModel) else build_model(machine)
     direction = parse_load(load) if isinstance(load, str) else load
     place_at, source = _effective_origin(model.machine, program, origin)
-    samples = sample_moves(place(program.moves, place_at), step, model.machine.rapid_feed, place_at)
+    words = model.machine.angles_of if program.native else None
+    samples = sample_moves(place(program.moves, place_at), step, model.machine.rapid_feed, place_at, words)
     poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
     analysis = Analysis(
         program=program,
@@ -258,7 +259,7 @@ def analyze(
     return analysis
 
 
-def _effective_origin(machine: Hexapod, program: ReadProgram, origin: Pose | None) -> tuple[Pose, str]:
+def _effective_origin(machine: MachineTool, program: ReadProgram, origin: Pose | None) -> tuple[Pose, str]:
     """The option, else the program's own word, else the machine's default."""
     chosen, source = program.origin, program.origin_source
     if origin is not None:
@@ -330,9 +331,9 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
 
 def _assumptions(analysis: Analysis) -> list[str]:
     """Everything that was assumed or recovered rather than published or given."""
-    machine, model, law = analysis.machine, analysis.model, analysis.machine.strut_law
+    machine, model = analysis.machine, analysis.model
     sentences = list(analysis.program.assumptions)
-    if _words_turn_the_platform(analysis.program):
+    if _words_turn_the_platform(analysis.program) and isinstance(machine, Hexapod):
         sentences.append(
             "A, B, C of the program are roll, pitch, yaw of the platform (see [kinematics] of controller files)"
         )
@@ -352,9 +353,13 @@ def _assumptions(analysis: Analysis) -> list[str]:
         f"a force of {analysis.force:g} N for deflections{secant}: these are along the load, under an assumed force, "
         "not an error of the surface (--cut computes that)",
     ]
-    low, high = sorted((mm_from_m(law.length_1), mm_from_m(law.length_2)))
-    range_of_law = f"the strut law is extrapolated outside {low:.1f} to {high:.1f} mm of strut length"
-    sentences.append("the stiffness of a strut is the same at every length" if law.constant else range_of_law)
+    if isinstance(machine, Hexapod):
+        law = machine.strut_law
+        low, high = sorted((mm_from_m(law.length_1), mm_from_m(law.length_2)))
+        range_of_law = f"the strut law is extrapolated outside {low:.1f} to {high:.1f} mm of strut length"
+        sentences.append("the stiffness of a strut is the same at every length" if law.constant else range_of_law)
+    else:
+        sentences += _of_elements(analysis)
     if analysis.parameter_band is not None:
         whole = ", of struts, joints and what the model lacks, as `[uncertainty.errors]` of the machine file has them"
         beside = whole if analysis.parameter_band.form.any() else " alone"
@@ -362,8 +367,20 @@ def _assumptions(analysis: Analysis) -> list[str]:
             f"the band of the stiffness holds the uncertainty of the fitted parameters{beside}, propagated linearly: "
             f"{', '.join(analysis.parameter_band.names)}"
         )
-    if not acting_effects(model):
+    if not acting_effects(model) and isinstance(machine, Hexapod):
         sentences.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
+    return sentences
+
+
+def _of_elements(analysis: Analysis) -> list[str]:
+    """What is assumed of a machine of elements on a path."""
+    machine = analysis.machine
+    names = ", ".join(dict.fromkeys(element.name for element in machine.elements))
+    sentences = [f"what gives way is {names}; everything else is rigid"]
+    if analysis.at.configuration:
+        sentences.append(f"the configuration of the joints is kept over the program: {analysis.at.configuration}")
+    if np.isnan(machine.reference_tool_length) and not np.isnan(analysis.samples.tool_length).all():
+        sentences.append("tools of the program are as long as the machine file's tool, which states no length")
     return sentences
 
 
@@ -431,8 +448,7 @@ def _higher(first: float | None, second: float | None) -> float | None:
 
 def _words_turn_the_platform(program: ReadProgram) -> bool:
     """Whether rotary words were taken for the platform's own angles."""
-    native = not program.kinematics and program.dialect != CUTTER_LOCATION
-    return native and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())
+    return program.native and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())
 
 
 def required_stiffness_missed(analysis: EvaluatedPath, required: float) -> list[tuple[int, float]]:

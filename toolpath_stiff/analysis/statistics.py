@@ -5,13 +5,13 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpath_stiff.analysis.evaluation import Evaluation
+from toolpath_stiff.analysis.evaluation import Evaluation, joint_columns
 from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_rows
 from toolpath_stiff.analysis.poses import POSE_COLUMNS
 from toolpath_stiff.analysis.uncertainty import ParameterBand, parameter_band
 from toolpath_stiff.arrays import AnyArray, BoolArray, IntArray
 from toolpath_stiff.documents import Document
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.operations import Operations, operations
@@ -59,7 +59,7 @@ class EvaluatedPath:
     step: float
 
     @property
-    def machine(self) -> Hexapod:
+    def machine(self) -> MachineTool:
         """The machine, geometry effects included."""
         return self.model.machine
 
@@ -254,7 +254,7 @@ def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, 
         **path_columns(path.samples, rows),
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(evaluation.stiffness[rows]),
         "deflection_um": um_from_m(path.force / evaluation.stiffness[rows]),
-        **{f"strut{i + 1}_mm": mm_from_m(evaluation.strut_lengths[rows, i]) for i in range(6)},
+        **joint_columns(path.machine, evaluation.joints[rows]),
         "margin": reach.margin[rows],
         "margin_limit": names[reach.limit[rows]],
         "operation": path.operations.of_move[path.samples.move[rows]] + 1,

@@ -15,7 +15,7 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
-from toolpath_stiff.machine.model import EffectEntry, StrutLaw
+from toolpath_stiff.machine.model import EffectEntry, StrutLaw, as_hexapod
 from toolpath_stiff.stiffness.active import read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.units import n_per_mm_from_n_per_m
@@ -35,16 +35,17 @@ class Preview:
     """
 
     def __init__(self, question: Question) -> None:
+        self._hexapod = as_hexapod(question.model, "an effect set by hand")
         data, given = question.readings, question.common
         # Under the noise that a diagnosis writes out in full.
         noise = max(noise_models(data, given["noise"], given["strut_spread"]), key=lambda noise: noise.typical)
-        self._problem = Problem.of(Predictor(question.model, data, question.on.effect_files), noise)
+        self._problem = Problem.of(Predictor(self._hexapod, data, question.on.effect_files), noise)
         self._on = question.on
         self._near: tuple[Mapping[str, Document], Fit] | None = None
 
     def machine(self, effects: Mapping[str, Document]) -> Machine:
         """The machine with these effects and the strut law refitted beside them; arguments and errors as of `at`."""
-        return with_effects(self._on, effects, scaled_law(self._on.stated.strut_law, self._fit(effects).law))
+        return with_effects(self._on, effects, scaled_law(self._hexapod.strut_law, self._fit(effects).law))
 
     def at(
         self,
@@ -117,7 +118,7 @@ class Preview:
 
 def with_effects(machine: Machine, effects: Mapping[str, Document], strut_law: StrutLaw | None = None) -> Machine:
     """A machine with further effects, name -> the keys of its entry in a machine file, and with another strut law."""
-    entries, stated = _entries(effects), machine.stated
+    entries, stated = _entries(effects), as_hexapod(machine.stated, "an effect set by hand")
     read = [entry for entry in entries if find_effect(entry.name, machine.effect_files).is_instrument]
     return machine.carrying(
         stated.with_changes(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import as_hexapod
 from toolpath_stiff.results import TextFile
 from toolpath_stiff.stiffness.catalogue import EffectCatalogue, effects_from_file, known_effects
 from toolpath_stiff.stiffness.trial import EffectCheck, try_effect
@@ -46,8 +47,9 @@ def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> E
     True
     """
     on = machine_from(machine)
+    stated = as_hexapod(on.stated, "a check of effects")
     known_effects([str(file)])  # names that are taken
-    trials = {name: try_effect(effect, on.stated) for name, effect in effects_from_file(str(file)).items()}
+    trials = {name: try_effect(effect, stated) for name, effect in effects_from_file(str(file)).items()}
     return EffectCheck(str(file), on.name, trials)
 
 

@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
+from toolpath_stiff.analysis.evaluation import joint_columns
 from toolpath_stiff.analysis.machine_check import MachineCheck, check_machine
 from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.correction.geometry import recover_geometry as recover
 from toolpath_stiff.documents import Document
 from toolpath_stiff.files import read_bytes, write_atomically
-from toolpath_stiff.machine.file import load_machine, packaged_machines
+from toolpath_stiff.machine.elements import Stance
+from toolpath_stiff.machine.file import KINDS, load_machine, packaged_machines
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.limits import Reach, reach_along, stand
 from toolpath_stiff.machine.linuxcnc import machine_from_hal, units_of
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_text
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import Option, checked
@@ -179,7 +180,9 @@ class Machine(Result):
         return f"<Machine {self.name}: {self._short()}>"
 
     def _short(self) -> str:
-        return f"6 struts, {', '.join(self.effects) or 'no effects'}"
+        machine, effects = self.model.machine, ", ".join(self.effects) or "no effects"
+        struts = isinstance(machine, Hexapod)
+        return f"{'6 struts' if struts else f'{machine.kind}, {len(machine.joint_names)} joints'}, {effects}"
 
     def __str__(self) -> str:
         return self.text()
@@ -190,11 +193,11 @@ class Machine(Result):
         return self.model.machine.name
 
     @property
-    def stated(self) -> Hexapod:
+    def stated(self) -> MachineTool:
         """The machine as its file has it."""
         return self.model.given or self.model.machine
 
-    def carrying(self, stated: Hexapod) -> Machine:
+    def carrying(self, stated: MachineTool) -> Machine:
         """The same with what another machine file would have."""
         model = build_model(stated, self.effect_files, conditions=self.model.conditions)
         return replace(self, model=replace(model, unchecked=self.model.unchecked))
@@ -260,7 +263,20 @@ class Machine(Result):
         >>> machine.strut_lengths_mm((100, 0, 800, 0, 10, 0)).round(1).tolist()
         [2874.1, 2822.0, 2976.3, 2940.1, 2827.7, 2873.1]
         """
-        return mm_from_m(self.standing(pose_mm_deg)[1].lengths[0])
+        as_hexapod(self.model.machine, "a question for strut lengths")
+        return mm_from_m(self.standing(pose_mm_deg)[1].joints[0])
+
+    def joint_values(self, pose_mm_deg: Sequence[float]) -> dict[str, float]:
+        """Values of the joints at a pose, mm or degrees, by their columns in results; nan where none lead there.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> list(tps.Machine.load("nist").joint_values((0, 0, 800)))[:2]
+        ['strut1_mm', 'strut2_mm']
+        """
+        columns = joint_columns(self.model.machine, self.standing(pose_mm_deg)[1].joints)
+        return {name: float(values[0]) for name, values in columns.items()}
 
     def to_frame(self) -> pd.DataFrame:
         """Its figures: quantity, value, unit, origin (published, recovered, assumed, fitted), remark.
@@ -286,8 +302,8 @@ class Machine(Result):
         """
         return self._figure(machine=self.model.machine, pose=self.standing(pose_mm_deg)[0])
 
-    def standing(self, pose_mm_deg: Sequence[float] | None = None) -> tuple[FloatArray, Struts, Reach]:
-        """A pose (6,) in SI (unless given, the paper's Figure 2 or the default origin), struts and reach there.
+    def standing(self, pose_mm_deg: Sequence[float] | None = None) -> tuple[FloatArray, Struts | Stance, Reach]:
+        """A pose (6,) in SI (unless given, the paper's Figure 2 or the default origin), joints and reach there.
 
         Examples
         --------
@@ -308,7 +324,7 @@ class Machine(Result):
 
         The platform's joints are those at zero rotation; they turn about the tip with it.
         """
-        machine = self.model.machine
+        machine = as_hexapod(self.model.machine, "a drawing by joints")
         return {
             "frame": mm_from_m(machine.frame_joints).tolist(),
             "platform": mm_from_m(machine.platform_joints).tolist(),
@@ -388,11 +404,12 @@ class Machine(Result):
         ...     tps.Machine.load(file).name
         'nist'
         """
-        return write_atomically(file, machine_toml(self.stated))
+        stated = self.stated
+        return write_atomically(file, machine_toml(stated) if isinstance(stated, Hexapod) else stated.text)
 
 
 def _machine_again(
-    stated: Hexapod, conditions: Conditions, unchecked: tuple[str, ...], told: tuple[Any, ...]
+    stated: MachineTool, conditions: Conditions, unchecked: tuple[str, ...], told: tuple[Any, ...]
 ) -> Machine:
     """A machine in another process."""
     return Machine(replace(build_model(stated, told[1], conditions=conditions), unchecked=unchecked), *told)
@@ -403,9 +420,10 @@ def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects
     given = load_machine(machine)
     model = build_model(given, files)
     effects = own_effects(model, files)
+    tried_on = given if isinstance(given, Hexapod) else as_hexapod(load_machine(), "a trial")
     if not allow_unchecked_effects:
-        refuse_failing(effects, given, machine)
-    return replace(model, unchecked=tuple(failures(effects, given)))
+        refuse_failing(effects, tried_on, machine)
+    return replace(model, unchecked=tuple(failures(effects, tried_on)))
 
 
 def machine_from(machine: Machine | str | Path) -> Machine:
@@ -413,8 +431,20 @@ def machine_from(machine: Machine | str | Path) -> Machine:
     return machine if isinstance(machine, Machine) else Machine.load(machine)
 
 
-def machine_template(file: str | Path = "mine.toml") -> TextFile:
+@checked
+def machine_template(
+    file: str | Path = "mine.toml",
+    *,
+    kind: Annotated[str, Option("--kind", choices=tuple(KINDS))] = Hexapod.kind,
+) -> TextFile:
     """A commented machine file to edit, named after its file; nothing is written before `save`.
+
+    Parameters
+    ----------
+    file
+        That it will be.
+    kind
+        Of machine: six telescopic struts, or joints in series, five struts, a linear delta, struts on moving feet.
 
     Examples
     --------
@@ -423,7 +453,8 @@ def machine_template(file: str | Path = "mine.toml") -> TextFile:
     'mill'
     """
     target = Path(file)
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / "machine.toml.txt").read_text("utf-8")
+    name = "machine" if kind == Hexapod.kind else kind
+    text = (resources.files("toolpath_stiff") / "data" / "templates" / f"{name}.toml.txt").read_text("utf-8")
     text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
     return TextFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
 
@@ -459,27 +490,3 @@ def machine_from_linuxcnc(
     machine, notes = machine_from_hal(text, unit, path.name)
     heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
     return TextFile(machine.name, machine_toml(machine, heading), notes)
-
-
-@checked
-def recover_geometry(
-    *,
-    starts: Annotated[int, Option("--starts", at_least=1, at_most=1000)] = 20,
-    seed: Annotated[int, Option("--seed", at_least=0)] = 1,
-) -> Document:
-    """Fit the NIST geometry to the paper's Table 1 anew, from scattered starting points.
-
-    Parameters
-    ----------
-    starts
-        How many starting points.
-    seed
-        Of where they lie.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.recover_geometry(starts=1)["starts"]
-    1
-    """
-    return recover(starts=starts, seed=seed)

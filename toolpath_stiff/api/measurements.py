@@ -10,7 +10,7 @@ from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.documents import Document, without_nan
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.readings.measurements import Readings, read_measurements, reading_columns
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Measurements:
             columns = ", ".join(f"{ours}={theirs}" for ours, theirs in columns.items())
         self.columns = columns
         self.files = tuple(files)
-        self._last: tuple[Hexapod, Readings] | None = None
+        self._last: tuple[MachineTool, Readings] | None = None
 
     @classmethod
     def read(cls, *files: str | Path, columns: Mapped = None) -> Measurements:

@@ -17,7 +17,8 @@ from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.limits import working_box
+from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, low_high, numbers
@@ -171,12 +172,12 @@ def _keep_out(text: str) -> KeepOut:
 
 
 def _bounds(
-    machine: Hexapod, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
+    machine: MachineTool, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
 ) -> Bounds:
     """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
     heights = sorted(set(map(float, heights_mm)))
     sides = [*box[:2], (heights[0], heights[-1]) if heights else box[2]]
-    workspace = mm_from_m(machine.limits.workspace).T.tolist()
+    workspace = mm_from_m(working_box(machine)).T.tolist()
     for axis, side, reach in zip("xyz", sides, workspace, strict=True):
         if side is None and not np.isfinite(reach).all():
             raise InputError(f"the machine file bounds no workspace in {axis}", hint=f"give --{axis} LO:HI")
@@ -245,7 +246,9 @@ def try_placement(
     on, part = machine_from(machine), program_from(program)
     model, direction = on.running(part), parse_load(load)
     read = part.moves(None, model.machine.default_origin)
-    return PlacementTrial(read, Evaluator(model, work_path(read, m_from_mm(step_mm), direction), direction, force_N))
+    return PlacementTrial(
+        read, Evaluator(model, work_path(read, m_from_mm(step_mm), direction, model.machine), direction, force_N)
+    )
 
 
 @checked

@@ -14,13 +14,14 @@ from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.compare import compare as compare_readings
 from toolpath_stiff.correction.draft import EffectDraft, draft
 from toolpath_stiff.correction.result import Update
-from toolpath_stiff.correction.task import MACHINE, UpdateTask
+from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
+from toolpath_stiff.machine.model import Hexapod, as_hexapod
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, finite_number, names, numbers, words_of
 from toolpath_stiff.planning.menu import COSTS, Menu
@@ -84,10 +85,14 @@ class Question:
         assert self.data is not None
         return self.data.on(self.on)
 
+    def hexapod(self, asking: str) -> Hexapod:
+        """The machine as its file has it. Raises `InputError` where it is of another kind, which `asking` cannot do."""
+        return as_hexapod(self.model, asking)
+
     def diagnosed(self, tell: Callable[[str], None], *words: str, inputs: Iterable[str] = ()) -> Diagnosis:
         """A diagnosis of the readings; `words` are further ones of the command that gives it."""
         return replace(
-            diagnose_readings(self.model, self.readings, progress=tell, **self.common),
+            diagnose_readings(self.hexapod("diagnose"), self.readings, progress=tell, **self.common),
             names=self.request.data,
             line=self.request.command("diagnose", *words),
             asked=self.request,
@@ -221,7 +226,7 @@ def update(
     keep_strut_law: Annotated[bool, Option("--keep-strut-law", instead_of="strut_law")] = False,
     auto: Annotated[bool, Option("--auto")] = False,
     force: Annotated[bool, Option("--force")] = False,
-    believe: Annotated[str | None, Option("--believe", choices=(MACHINE,))] = None,
+    believe: Annotated[str | None, Option("--believe", choices=(MACHINE, INSTRUMENT))] = None,
     objective: Annotated[str, Option("--objective", choices=("likelihood", "mean-error"))] = "likelihood",
     machine_file: str | Path = "machine.toml",
     columns: Mapped = None,
@@ -248,7 +253,7 @@ def update(
         Write what the data do not support as well, never what fits worse than the machine given; and as
         --replace.
     believe
-        Machine: take for the machine's what an error of the instrument would show as well; else it is refused.
+        Machine or instrument: take for its what an error of the other would show as well; else it is refused.
     objective
         Mean-error: the strut law alone, as the paper fitted it.
     machine_file
@@ -274,8 +279,8 @@ def update(
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     task = UpdateTask(
-        question.model, question.readings, [add] if isinstance(add, str) else list(add), strut_law=strut_law,
-        keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe, objective=objective,
+        question.hexapod("update"), question.readings, [add] if isinstance(add, str) else list(add),
+        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe, objective=objective,
         files=question.request.data, machine_file=str(machine_file), request=question.request,
         progress=teller(progress), **question.common,
     )  # fmt: skip
@@ -404,6 +409,7 @@ def plan(
     """
     line = words_of(plan, {name: value for name, value in locals().items() if name not in COMMON})
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
+    model = question.hexapod("plan")
     minutes = {name: float(value) for name, value in (minutes or {}).items()}
     for name, value in minutes.items():
         one_of("minutes", name, tuple(COSTS))
@@ -422,7 +428,13 @@ def plan(
     )
     judgement = None if diagnosis is None else diagnosis.main
     proposal = plan_visits(
-        question.model, readings, menu, between=tuple(between), n=n, judgement=judgement, **question.common
+        model,
+        readings,
+        menu,
+        between=tuple(between),
+        n=n,
+        judgement=judgement,
+        **question.common,
     )
     command = question.request.command("plan", *line)
     return replace(proposal, names=question.request.data, line=command, inputs=question.inputs)

@@ -5,7 +5,6 @@ for example:
   tps machine new mine.toml                         a commented template to edit
   tps machine check mine.toml
   tps machine from-linuxcnc programs/hexapod.hal --units mm -o hexapod.toml
-  tps machine recover                               the NIST geometry from the paper's Table 1, fitted anew
 """
 
 import sys
@@ -17,7 +16,6 @@ from typing import Annotated
 import toolpath_stiff as tps
 from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, command
-from toolpath_stiff.correction.geometry import recovery_text
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.options import Option, finite_number, numbers
@@ -135,10 +133,10 @@ def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Pi
     return run.show(args, check, written, code=0 if check.good else NOT_GOOD)
 
 
-@command("machine new", REPLACE)
+@command("machine new", "machine_template", REPLACE, without=["file"])
 def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     """Write a commented template."""
-    text = tps.machine_template(file).text
+    text = tps.machine_template(file, kind=args.kind).text
     return run.write_text(args, file, text, "edit it, then", "machine", "check", file, fresh=True)
 
 
@@ -161,10 +159,3 @@ def from_linuxcnc(
         return run.write_text(args, out, machine_file.text, "next", "machine", "check", out)
     sys.stdout.write(machine_file.text)
     return 0
-
-
-@command("machine recover", "recover_geometry", JSON)
-def recover(args: Namespace) -> int:
-    """Fit the NIST geometry to the paper's Table 1 anew."""
-    recovery = run.call(args, tps.recover_geometry)
-    return run.show(args, recovery_text(recovery), document=lambda: recovery)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.comparison.element_predictor import ElementPredictor
 from toolpath_stiff.comparison.load_path import load_path_shares
 from toolpath_stiff.comparison.loop_readings import beside_tip
 from toolpath_stiff.comparison.principles import assess, model_free_checks
@@ -28,7 +29,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.noise import Noise, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import repeat_groups
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
 
@@ -115,7 +116,7 @@ class Comparison(FolderResult):
 
 
 def compare(
-    machine: Hexapod,
+    machine: MachineTool,
     data: Readings,
     *,
     noise: float | tuple[float, float] | None = None,
@@ -164,7 +165,10 @@ def compare(
             expected="readings of tool against work beside those of other loops",
             hint="`tps reduce` shows struts measured alone over their dates, raw records or stiffnesses",
         )
-    predictor = Predictor(machine, tip, effect_files)
+    if isinstance(machine, Hexapod):
+        predictor = Predictor(machine, tip, effect_files)
+    else:
+        predictor = ElementPredictor(machine, tip, effect_files)
     log_model, noises = modelled(predictor), noise_models(tip, noise, strut_spread)
     values = np.log(tip.stiffness) - log_model
     numbers, (names, notes) = variables(predictor, log_model), labels(tip)
@@ -178,7 +182,7 @@ def compare(
         outcomes.append(assess(checks, tip, scattering.covariance, scattering.draws(0.0)))
     summary = summary_of(predictor, values, structures, outcomes, not_checked, notes, seed)
     if data.beside is not None:  # other loops against the machine as its file has it
-        every = Predictor(machine, data, effect_files)
+        every = Predictor(as_hexapod(machine, "a reading beside the tip"), data, effect_files)
         spread = covariance(noise_models(data, noise, strut_spread)[-1], every)
         summary = replace(summary, loops=beside_tip(data, every.log_stiffness(), spread))
     return Comparison(

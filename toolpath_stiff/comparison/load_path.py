@@ -6,23 +6,31 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.repeats import repeat_groups
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings, measured_path
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.element_sum import energies, stance_of
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 
 def load_path_shares(model: StiffnessModel, data: Readings) -> dict[str, FloatArray]:
-    """Link, "strut 1" to "strut 6" and effects -> (3,) m/N along X, Y, Z, mean over the measured poses."""
+    """Element or link, "strut 1" to "strut 6" and effects -> (3,) m/N along X, Y, Z, mean over the measured poses."""
     poses = repeat_groups(data, apart=("direction", "force", "loop"))
     distinct = data.select(np.unique(poses, return_index=True)[1])
     axes = (np.broadcast_to(axis, (len(distinct), 3)).copy() for axis in np.eye(3))
     by_axis = [_by_link(model, replace(distinct, direction=axis)).mean(axis=0) for axis in axes]
-    names = [*(f"strut {i + 1}" for i in range(6)), *(active.effect.name for active in model.effects)]
+    machine = model.machine
+    elements = [f"strut {i + 1}" for i in range(6)]
+    if not isinstance(machine, Hexapod):
+        elements = [element.name for element in machine.elements]
+    names = [*elements, *(active.effect.name for active in model.effects)]
     return dict(zip(names, np.array(by_axis).T, strict=True))
 
 
 def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
     """(n, links) m/N along each row's direction."""
+    if not isinstance(model.machine, Hexapod):
+        return _by_element(model, data)
     path, whole, _, f = exact.under_load(model, measured_path(model, data), data.direction)
     loads = np.concatenate([f, data.direction, np.zeros((len(data), 3))], axis=1)  # [f; w]
     columns = [*(f**2 / path.machine.strut_law.stiffness(path.struts.lengths)).T]
@@ -39,4 +47,15 @@ def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
             motion = np.linalg.solve(path.struts.jacobian, stretch[..., None])[..., 0]
             energy += np.einsum("ni,nij,nj->n", motion, beside, motion)
         columns.append(energy)
+    return np.stack(columns, axis=1)
+
+
+def _by_element(model: StiffnessModel, data: Readings) -> FloatArray:
+    """(n, elements and effects) m/N along each row's direction, of a machine of elements."""
+    path = measured_path(model, data)
+    columns = energies(stance_of(path), data.direction)
+    for active in model.effects:
+        form = active.adds("load_compliance", path)
+        added = np.zeros((len(data), 3, 3)) if form is None else form[:, 6:9, 6:9]
+        columns.append(np.einsum("ni,nij,nj->n", data.direction, added, data.direction))
     return np.stack(columns, axis=1)

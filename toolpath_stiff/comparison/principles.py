@@ -19,7 +19,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions, radius
 from toolpath_stiff.inference.covariances import Covariance, Groups, Rows
 from toolpath_stiff.inference.repeats import repeat_groups
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import mm_from_m
 
@@ -64,9 +64,11 @@ class CheckOutcome:
     text: str
 
 
-def symmetries(machine: Hexapod) -> list[FloatArray]:
+def symmetries(machine: MachineTool) -> list[FloatArray]:
     """(3, 3) turns by 120 and 240 degrees about Z and mirrors that leave the machine's joints as they are."""
-    turns = []
+    turns: list[FloatArray] = []
+    if not isinstance(machine, Hexapod):
+        return turns
     for degrees, sign in [(120.0, 1.0), (240.0, 1.0), *((2.0 * half, -1.0) for half in range(0, 180, 30))]:
         c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
         q = np.array([[c, -sign * s, 0.0], [s, sign * c, 0.0], [0.0, 0.0, 1.0]])
@@ -79,7 +81,7 @@ def symmetries(machine: Hexapod) -> list[FloatArray]:
     return turns
 
 
-def model_free_checks(machine: Hexapod, data: Readings) -> tuple[list[Check], dict[str, str]]:
+def model_free_checks(machine: MachineTool, data: Readings) -> tuple[list[Check], dict[str, str]]:
     """The checks that n readings allow; for the others, why not."""
     cells, turns = Groups.by(repeat_groups(data)).members(), symmetries(machine)
     threefold = sum(np.linalg.det(q) > 0 for q in turns) == 2

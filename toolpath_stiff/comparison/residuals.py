@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from toolpath_stiff.analysis.evaluation import joint_columns
 from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
 from toolpath_stiff.comparison.structure import Pattern
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings, model_stiffness
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
@@ -129,7 +131,6 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
     data = predictor.data
     turn, position = data.rotation, mm_from_m(data.position)
     azimuth = np.where(radius(data) > SAME_PLANE, 3.0 * np.arctan2(position[:, 1], position[:, 0]), np.nan)
-    lengths, share = mm_from_m(predictor.strut_lengths()), 100.0 * predictor.strut_columns()
     known = [
         Variable("order", "the reading's place in the measuring order", "", np.arange(1.0, len(data) + 1.0)),
         Variable("height", "the height", "mm", position[:, 2]),
@@ -150,13 +151,7 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
             np.einsum("ni,ni->n", data.direction, turn[:, :, 2]) ** 2,
         ),
         Variable("vertical_share", "the load's vertical share", "", data.direction[:, 2] ** 2),
-        Variable("mean_strut_length", "the mean strut length", "mm", lengths.mean(axis=1)),
-        Variable("max_strut_length", "the longest strut's length", "mm", lengths.max(axis=1)),
-        Variable("min_strut_length", "the shortest strut's length", "mm", lengths.min(axis=1)),
-        *(
-            Variable(f"share_of_strut_{i + 1}", f"the share of strut {i + 1} in the compliance", "%", share[:, i])
-            for i in range(6)
-        ),
+        *_of_elements(predictor),
         Variable("model_stiffness", "the modelled stiffness", "N/mm", n_per_mm_from_n_per_m(np.exp(log_model))),
         Variable("deflection", "the modelled deflection", "um", um_from_m(data.force / np.exp(log_model))),
     ]
@@ -170,6 +165,24 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
     known += [column for column in columns if column.name not in data.missing or column.name in in_some_rows]
     known += [Variable(name, f"column {name}", "", values) for name, values in data.extra.items()]
     return [variable for variable in known if varies(variable.values)]
+
+
+def _of_elements(predictor: Predictor) -> Iterator[Variable]:
+    """How the machine stands, and the share of each of its elements in the compliance."""
+    machine, path = predictor.base.machine, predictor.full_path
+    if isinstance(machine, Hexapod):
+        lengths, names = mm_from_m(predictor.strut_lengths()), [f"strut {i}" for i in range(1, 7)]
+        yield Variable("mean_strut_length", "the mean strut length", "mm", lengths.mean(axis=1))
+        yield Variable("max_strut_length", "the longest strut's length", "mm", lengths.max(axis=1))
+        yield Variable("min_strut_length", "the shortest strut's length", "mm", lengths.min(axis=1))
+    else:
+        names = [element.name for element in machine.elements]
+        joints = zip(machine.joint_names, joint_columns(machine, path.stance.joints).items(), strict=True)
+        for name, (column, values) in joints:
+            yield Variable(column, f"the value of {name}", column.rpartition("_")[2], values)
+    for name, share in zip(names, 100.0 * predictor.strut_columns().T, strict=True):
+        column = f"share_of_{name.replace(' ', '_')}"
+        yield Variable(column, f"the share of {name} in the compliance", "%", np.ascontiguousarray(share))
 
 
 def varies(values: FloatArray) -> bool:

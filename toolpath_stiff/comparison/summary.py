@@ -20,7 +20,7 @@ from toolpath_stiff.inference.fits import base_fit
 from toolpath_stiff.inference.noise import Noise, Scatter
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.inference.slips import SuspectEntry, suspect_entries, suspect_rows
-from toolpath_stiff.machine.model import StrutLaw
+from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
@@ -170,12 +170,14 @@ def summary_of(
 
     where, along = planes(data), directions(data)
     problem = Problem(predictor, Scatter.of(last.scattering.noise, last.scattering.covariance))
-    law = base_fit(problem, law_free=True) if len(values) >= FEWEST_TO_REFIT else None
+    machine = predictor.base.machine
+    hexapod = machine if isinstance(machine, Hexapod) else None
+    law = base_fit(problem, law_free=True) if hexapod and len(values) >= FEWEST_TO_REFIT else None
     baseline = AllErrors(
         **vars(_errors(values, structures, np.ones(len(values), dtype=bool))),
         probability={found.scattering.noise.name: found.probability for found in structures},
         excess_scatter_percent={found.scattering.noise.name: 100.0 * found.excess for found in structures},
-        strut_law_refitted=None if law is None else _refitted(predictor.machine.strut_law, law),
+        strut_law_refitted=_refitted(hexapod.strut_law, law) if hexapod and law else None,
     )
     findings, noises = _findings(structures, values), [found.scattering.noise for found in structures]
     suspects = suspect_entries([] if law is None else suspect_rows(problem, law), data, left_out=None)
@@ -184,7 +186,7 @@ def summary_of(
     text = [question_text, overall_text(baseline, pattern=bool(findings))]
     text += [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in doubts]
     return ComparisonSummary(
-        machine=predictor.machine.name,
+        machine=machine.name,
         effects=predictor.effects_that_act,
         data=list(dict.fromkeys(data.file.tolist())),
         readings=len(data),
@@ -200,7 +202,7 @@ def summary_of(
         not_checked=not_checked,
         noise=[NoiseFigures.of(noise) for noise in noises],
         not_tested=[*(f"no column {name}" for name in data.missing), *notes],
-        assumptions=_assumptions(noises),
+        assumptions=_assumptions(noises, hexapod is not None),
         warnings=list(data.warnings),
         notes=[*data.notes, *doubts],
         suspect_rows=suspects,
@@ -270,14 +272,19 @@ def _far_readings(data: Readings, values: FloatArray, last: FoundPatterns) -> li
     return [FarReading(*row) for row in zip(*(column[far].tolist() for column in columns), strict=True)]
 
 
-def _assumptions(noises: Sequence[Noise]) -> list[str]:
+def _assumptions(noises: Sequence[Noise], hexapod: bool) -> list[str]:
     noise = noises[0]
+    spread = f"{100 * noise.strut_spread:.2g} %"
+    alike = (
+        f"struts alike to {spread}, joints where the machine file has them to "
+        f"{mm_from_m(noise.joint_error):.2g} mm (standard deviations, assumed)"
+    )
+    own = f"elements as stiff as the machine file has them to {spread} (standard deviation, assumed), at their places"
     return [
         *(f"noise, {model.name}: {model.origin}" for model in noises),
-        f"struts alike to {100 * noise.strut_spread:.2g} %, joints where the machine file has them to "
-        f"{mm_from_m(noise.joint_error):.2g} mm (standard deviations, assumed)",
+        alike if hexapod else own,
         f"{100 * noise.outliers:.2g} % of the readings wild, {noise.outlier_width:g} times wider (assumed)",
-        "findings and pictures: the machine file as given, its strut law not refitted",
+        f"findings and pictures: the machine file as given{', its strut law not refitted' if hexapod else ''}",
         f"scatter from place to place beyond the noise is looked for from {100 * EXCESSES[1]:.2g} % up",
     ]
 

@@ -1,8 +1,8 @@
 """Measured walls against the errors that a cut foretells: where the model of cut and machine fails.
 
 A point is held against the final wall beside which it lies: its measured deviation along the normal, out of the part,
-against the foretold mean over the wall's height. The lines of the program are the places; a line fails where its mean
-residual is beyond twice what scatter, the foretold range over the height and the band of the model explain.
+against the error that is foretold at its height. The lines of the program are the places; a line fails where its mean
+residual is beyond twice what scatter and the band of the model explain.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.cutting.compensation import places_beside
 from toolpath_stiff.cutting.cut import Cut
+from toolpath_stiff.cutting.cutters import radii_of
+from toolpath_stiff.cutting.passes import profile_at
 from toolpath_stiff.documents import certain, without_nan
 from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.nc.moves import Moves
@@ -23,7 +25,7 @@ from toolpath_stiff.readings.mapping import check_needed, mapped_table
 from toolpath_stiff.readings.rows import number
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.tables import Columns
-from toolpath_stiff.units import m_from_mm, m_from_um, um_from_m
+from toolpath_stiff.units import m_from_mm, m_from_um, mm_from_m, um_from_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,8 +75,10 @@ class WallComparison(FolderResult):
     ----------
     line, side
         (n,) line of the program that makes the wall; 0 left, 1 right of its feed.
-    measured, foretold, low, high, deviation
-        (n,) m, + material left: measured, the mean over the height, its extremes, the model's standard deviation.
+    height
+        (n,) m above the lower end of the wall.
+    measured, foretold, deviation
+        (n,) m, + material left: measured, foretold at the point's height, the model's standard deviation there.
     others
         Points that lie on no final wall of the program.
     notes
@@ -88,10 +92,9 @@ class WallComparison(FolderResult):
 
     line: IntArray
     side: IntArray
+    height: FloatArray
     measured: FloatArray
     foretold: FloatArray
-    low: FloatArray
-    high: FloatArray
     deviation: FloatArray
     others: int
     notes: tuple[str, ...]
@@ -115,8 +118,7 @@ class WallComparison(FolderResult):
         for number_of, (line, side) in enumerate(keys.T.tolist()):
             some = which == number_of
             residual, count = um_from_m((self.measured - self.foretold)[some]), int(some.sum())
-            uniform = um_from_m((self.high - self.low)[some]) ** 2 / 12.0  # a point's height is not looked at
-            scatter = max(float(residual.var(ddof=1)) if count > 1 else 0.0, float(uniform.mean())) / count
+            scatter = float(residual.var(ddof=1)) / count if count > 1 else 0.0
             sure = SURE * float(np.sqrt(scatter + um_from_m(self.deviation[some].mean()) ** 2))
             means = {name: float(um_from_m(getattr(self, name)[some].mean())) for name in ("measured", "foretold")}
             rows.append(
@@ -141,10 +143,10 @@ class WallComparison(FolderResult):
         return dict(certain(without_nan(document)))
 
     def to_frame(self) -> pd.DataFrame:
-        """A row a point: line, side, measured and foretold error, its extremes over the height, its deviation; um."""
-        names = ("measured", "foretold", "low", "high", "deviation")
-        columns = {f"{name}_um": um_from_m(getattr(self, name)) for name in names}
-        return frame_of({"line": self.line, "side": np.array(["left", "right"])[self.side], **columns})
+        """A row a point: line, side, height on the wall (mm), measured and foretold error, its deviation (um)."""
+        columns = {f"{name}_um": um_from_m(getattr(self, name)) for name in ("measured", "foretold", "deviation")}
+        place = {"line": self.line, "side": np.array(["left", "right"])[self.side], "height_mm": mm_from_m(self.height)}
+        return frame_of({**place, **columns})
 
     def _short(self) -> str:
         return f"{len(self.line)} points, measured {self.factor[0]:.2f} times the foretold"
@@ -159,9 +161,7 @@ def compare_walls(
     """
     station, side = np.nonzero(np.isfinite(cut.wall_mean))
     samples, sign = cut.samples.take(station), 1.0 - 2.0 * side
-    radius = np.zeros(len(station))
-    for tool, cutter in cut.cutters.items():
-        radius[samples.tool == tool] = cutter.radius
+    radius = radii_of(cut.cutters, samples.tool)
     flat = samples.tangent[:, :2] / np.linalg.norm(samples.tangent[:, :2], axis=1, keepdims=True)
     left = np.stack([-flat[:, 1], flat[:, 0]], axis=1)
     surface, outward = samples.position[:, :2] + (sign * radius)[:, None] * left, -sign[:, None] * left
@@ -182,16 +182,19 @@ def compare_walls(
     if not on.any():
         hint = "points are in program coordinates, mm, their normals point out of the part"
         raise MeasurementError("no measured point lies on a final wall of the program", hint=hint)
-    chosen = nearest[on]
-    rows, sides = station[chosen], side[chosen]
+    rows, sides = station[nearest[on]], side[nearest[on]]
+    ends, mean = cut.wall_heights[rows, sides], cut.wall_mean[rows, sides]
+    height = np.clip(points[on, 2] - cut.samples.position[rows, 2], ends[:, 0], ends[:, 1])
+    foretold = profile_at(cut.wall_profiles[rows, sides], ends, height[:, None])[:, 0]
+    known = np.abs(mean) > 0.0  # coefficients scatter the errors of all heights alike
+    scaled = np.divide(np.abs(foretold), np.abs(mean), out=np.ones(len(mean)), where=known)
     return WallComparison(
-        line=samples.line[chosen],
+        line=cut.samples.line[rows],
         side=sides,
+        height=height - ends[:, 0],
         measured=np.where(np.isnan(deviation), off, deviation)[on],
-        foretold=cut.wall_mean[rows, sides],
-        low=cut.wall_low[rows, sides],
-        high=cut.wall_high[rows, sides],
-        deviation=cut.deviation[rows, sides],
+        foretold=foretold,
+        deviation=cut.deviation[rows, sides] * scaled,
         others=int((~on).sum()),
         notes=notes,
     )

@@ -8,7 +8,7 @@ from toolpath_stiff.comparison.structure import FoundPattern, Pattern
 from toolpath_stiff.stiffness.sizes import about
 
 NOUGHT = 0.3  # of a course's change: a residual below is nothing beside it
-SHARE = "share_of_strut_"  # of the compliance; the strut's number follows
+SHARE = "share_of_"  # of the compliance; the element's name follows
 
 
 def sentence(finding: FoundPattern, residual: FloatArray, first: bool) -> tuple[str, float]:
@@ -42,9 +42,9 @@ def sentence(finding: FoundPattern, residual: FloatArray, first: bool) -> tuple[
 
 
 def _as_if(pattern: Pattern, first: float, last: float, low: float, high: float) -> str:
-    """Which strut of what stiffness would make such a course from its low to its high share of the compliance, or "".
+    """Which element of what stiffness would make such a course from its low to its high share of the compliance, or "".
 
-    A strut's stiffness times f adds share (1 / f - 1) to the compliance, and nothing where the share is nothing.
+    An element's stiffness times f adds share (1 / f - 1) to the compliance, and nothing where the share is nothing.
     """
     if not pattern.variable.startswith(SHARE) or pattern.direction != ALL or high <= low:
         return ""
@@ -53,8 +53,8 @@ def _as_if(pattern: Pattern, first: float, last: float, low: float, high: float)
     if softer <= 0.0 or abs(first - change * low / (high - low)) > NOUGHT * abs(change):
         return ""
     off = 100.0 * (1.0 / softer - 1.0)
-    strut = pattern.variable.removeprefix(SHARE)
-    return f"As if strut {strut} were about {about(off)} % too {'soft' if off < 0.0 else 'stiff'}"
+    element = pattern.variable.removeprefix(SHARE).replace("_", " ")
+    return f"As if {element} were about {about(off)} % too {'soft' if off < 0.0 else 'stiff'}"
 
 
 def _level(finding: FoundPattern, who: str, mean: float, readings: str, first: bool) -> tuple[str, float]:

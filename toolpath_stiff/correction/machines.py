@@ -38,6 +38,7 @@ def fitted_machine(
     widened: float = 1.0,
     setups: Iterable[str] = (),
     errors: ErrorModel | None = None,
+    known: Fit | None = None,
 ) -> Hexapod:
     """The machine with a fit's strut law and effects, their joint uncertainty, and where they come from.
 
@@ -55,6 +56,8 @@ def fitted_machine(
         Names of the set-ups that were measured: where an effect belongs to one, the machine file lists them all.
     errors
         Of the fit, for bands.
+    known
+        The fit that says how well law and sizes are known; None: the same.
     """
     effects, instruments = list(machine.effects), list(machine.instruments)
     for candidate, active in zip(fit.candidates, fit.effects, strict=True):
@@ -67,14 +70,14 @@ def fitted_machine(
         )
     # The fitted law's factors to digits on which all processors agree.
     law = scaled_law(machine.strut_law, np.round(fit.law, 8))
-    known = machine.setups
+    named = machine.setups
     if any(SETUP in active.waits_for for active in fit.effects):
-        known = (*known, *sorted({*setups} - {"", *known}))
+        named = (*named, *sorted({*setups} - {"", *named}))
     carrying = machine.with_changes(
         effects=tuple(effects),
         instruments=tuple(instruments),
-        setups=known,
-        uncertainty=_uncertainty(machine, law, fit, widened, errors),
+        setups=named,
+        uncertainty=_uncertainty(machine, law, fit, known or fit, widened, errors),
     )
     if not fit.law_free:
         return carrying
@@ -92,10 +95,10 @@ def _certain(value: float) -> float:
 
 
 def _uncertainty(
-    machine: Hexapod, law: StrutLaw, fit: Fit, widened: float, errors: ErrorModel | None
+    machine: Hexapod, law: StrutLaw, fit: Fit, known: Fit, widened: float, errors: ErrorModel | None
 ) -> Uncertainty | None:
     """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already."""
-    names = list(law.parameters) if fit.law_free else []
+    names = list(law.parameters) if known.law_free else []
     slopes = [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)][: len(names)]
     rows = [0, 1][: len(names)]
     owners = [candidate.name for candidate in fit.candidates for _ in candidate.components]
@@ -104,11 +107,11 @@ def _uncertainty(
             names.append(f"{owner}.{component.parameter.key}")
             # value = 1 / size for a stiffness whose neutral value is infinite.
             slopes.append((-1.0 / size**2 if component.inverse else 1.0) / component.parameter.si)
-            rows.append(2 + fit.free.index(index))
+            rows.append(2 + known.free.index(index))
     if not names:
         return machine.uncertainty
     scale = widened * np.array(slopes)
-    fitted = Uncertainty.of(names, np.outer(scale, scale) * fit.covariance[np.ix_(rows, rows)])
+    fitted = Uncertainty.of(names, np.outer(scale, scale) * known.covariance[np.ix_(rows, rows)])
     sd = np.array([_certain(float(sd)) for sd in fitted.sd])
     if errors is not None:
         of_keys = np.array(slopes) / np.where(sd > 0.0, sd, np.inf)

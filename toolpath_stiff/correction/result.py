@@ -24,6 +24,8 @@ from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.error_model import error_model
 from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent, errors_text
+from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.machine.model import Hexapod
@@ -40,6 +42,7 @@ NEEDED = 1.0  # standard errors by which the error at left-out points must fall
 # Share of the mean error, or of what scatter alone leaves of it, by which it may rise: a likelier strut law can raise
 # it a little (9.62 to 9.72 % on the paper's Table 1).
 WORSE = 0.05
+RISEN = 2.0  # standard errors by which the error at left-out points must rise under one of the conditions measured
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -130,6 +133,16 @@ class Update(FolderResult):
         return self.steps[-1] if self.changed else self.steps[0]
 
     @property
+    def kept_law(self) -> Support | None:
+        """Why the strut law stays as given beside effects, where the data do not support the refitted one."""
+        return next((support for support in self.turned_down if support.effect == LAW_REFITTED), None)
+
+    @property
+    def known(self) -> Fit:
+        """The fit that says how well law and sizes are known: a law that stays as given is no better known for it."""
+        return self.steps[-2].fit if self.changed and self.kept_law else self.last.fit
+
+    @property
     def changed(self) -> bool:
         """True where there is something to be written."""
         return bool(self.steps[-1].fit.names) or self.task.strut_law
@@ -144,10 +157,32 @@ class Update(FolderResult):
         before, after = self.steps[0].error, self.steps[-1].error
         return not after - before <= max(WORSE * before, WORSE * self.noise.floor_percent / 100.0)
 
+    @cached_property
+    def rises(self) -> list[str]:
+        """Conditions under which left-out points are foretold worse than as given, beyond chance: clauses.
+
+        Load, set-up and tool: a path is under one of each as a whole, and what falls on average may rise there.
+        """
+        data, first, last = self.task.data.of_tip, self.steps[0].held, self.steps[-1].held
+        conditions = {
+            "under {:g} N": data.force,
+            "in set-up {}": data.setup,
+            "with the tool {:+.4g} mm": mm_from_m(data.tool_extension),
+        }
+        clauses = []
+        for words, values in conditions.items():
+            groups = np.unique(values)
+            for value in groups.tolist() if len(groups) > 1 else ():
+                before, after = (held.of_readings(values == value) for held in (first, last))
+                if gain_in_standard_errors(before, after) < -RISEN:
+                    change = f"{100 * before.mean_error:.2f} to {100 * after.mean_error:.2f} %"
+                    clauses.append(f"{words.format(value)} the error at left-out points rises, {change}")
+        return clauses
+
     @property
     def supported(self) -> bool:
         """True where nothing speaks against what is to be changed."""
-        return not self.question and all(support.supported for support in self.supports)
+        return not self.question and not self.rises and all(support.supported for support in self.supports)
 
     @property
     def accepted(self) -> bool:
@@ -174,7 +209,7 @@ class Update(FolderResult):
         """How far the last model may be off at a pose; None where too little was measured to tell."""
         if self.task.objective != LIKELIHOOD:
             return None
-        return error_model(self.last.fit, self.task.problem.predictor.data, self.noise)
+        return error_model(self.known, self.task.problem.predictor.data, self.noise)
 
     @cached_property
     def corrected(self) -> Hexapod | None:
@@ -184,7 +219,8 @@ class Update(FolderResult):
     def fitted(self, provenance: Document) -> Hexapod:
         """The machine with the last model, which comes from there."""
         setups = self.task.data.setup.tolist()
-        return fitted_machine(self.task.machine, self.last.fit, provenance, self.widening, setups, self.errors)
+        fit = self.last.fit
+        return fitted_machine(self.task.machine, fit, provenance, self.widening, setups, self.errors, self.known)
 
     def _written(self) -> Hexapod:
         if self.corrected is None:
@@ -287,9 +323,10 @@ class Update(FolderResult):
         if self.worse:
             return f"{doubt}The new machine would fit worse than the one given: it is not written. {errors}"
         doubted = [support for support in self.supports if not support.supported]
-        against = "; ".join(f"{support.effect}: {', and '.join(support.reasons)}" for support in doubted)
+        doubts = [*(f"{support.effect}: {', and '.join(support.reasons)}" for support in doubted), *self.rises]
+        against = "; ".join(doubts)
         if verdict == REFUSED:
-            reason = f"The data do not support {against}." if against else "The machine stays as it is."
+            reason = f"The data speak against it: {against}." if against else "The machine stays as it is."
             return f"{doubt}{reason} (--force, force=True, writes it all the same.) {errors}"
         unconfirmed = "" if self.described is None else f"But {self.described.reason}. "
         if verdict == FORCED:
@@ -299,7 +336,8 @@ class Update(FolderResult):
             return f"Strut law refitted; no effect added. {errors}"
         cause = joined(last.fit.findings)
         word = "added" if self.described is None else "added as described, not as identified"
-        return f"{cause[:1].upper()}{cause[1:]} ({joined(last.fit.names)} {word}). {unconfirmed}{errors}"
+        law = f"The strut law stays: {'; '.join(self.kept_law.reasons)}. " if self.kept_law else ""
+        return f"{cause[:1].upper()}{cause[1:]} ({joined(last.fit.names)} {word}). {law}{unconfirmed}{errors}"
 
     @property
     def _errors(self) -> str:

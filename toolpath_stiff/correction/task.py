@@ -13,7 +13,7 @@ from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings
 
-MACHINE = "machine"
+MACHINE, INSTRUMENT = "machine", "instrument"
 LIKELIHOOD, MEAN_ERROR = "likelihood", "mean-error"
 
 
@@ -36,7 +36,7 @@ class UpdateTask:
     force
         Keep what the data do not support, or readings hardly of this machine; never what fits worse than `machine`.
     believe
-        `MACHINE`: what an error of the instrument would show as well is taken for the machine's; None: it is refused.
+        Where machine and instrument would show the same, which of them it is taken for; None: it is refused.
     objective
         `LIKELIHOOD`; or `MEAN_ERROR`, the paper's own estimation, of the strut law alone.
     noise, strut_spread, effect_files, seed, progress

@@ -8,8 +8,8 @@ An effect is supported if
 
 - the error at left-out points falls by more than one standard error of that fall, paired by point;
 - no parameter ends at its upper bound, and not all end at zero;
-- of an effect of the machine, no error of the instrument foretells left-out poses as well (`inference.votes`), unless
-  the user believes that it is the machine;
+- of an effect of the machine, no error of the instrument foretells left-out poses as well (`inference.votes`), and the
+  other way, unless the user says which to believe;
 - its gain in likelihood, the strut law refitted with and without it, is more than the best of all candidates reaches
   by chance in one campaign of twenty: the relative gate of the diagnosis. The gain is counted in units of the scatter
   that remains, so that data which no effect explains do not lend every effect significance.
@@ -19,7 +19,7 @@ Of several effects each is judged beside the others.
 The paper's own estimation (`--objective mean-error`) is a ladder of one step, the strut law of smallest mean error.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,7 +29,7 @@ from toolpath_stiff.correction.machines import data_hash, fitted_machine
 from toolpath_stiff.correction.result import NEEDED, Update
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.strut_law import bar_curve, leave_points_out, minimise_mean_error, resampled_covariance
-from toolpath_stiff.correction.task import MACHINE, MEAN_ERROR, UpdateTask
+from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, MEAN_ERROR, UpdateTask
 from toolpath_stiff.diagnosis.diagnose import check_measured
 from toolpath_stiff.diagnosis.examination import percent_of
 from toolpath_stiff.documents import json_number
@@ -39,19 +39,21 @@ from toolpath_stiff.inference.candidates import Candidate, testable_effects
 from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import add_effect, base_fit, baseline
+from toolpath_stiff.inference.fits import add_effect, base_fit, baseline, with_given_law
 from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import score_families, signatures, tables_of
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.left_out_votes import votes
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.votes import outvoted
-from toolpath_stiff.planning.plan import telling
+from toolpath_stiff.inference.rivals import rivals_of_law
+from toolpath_stiff.inference.votes import outvoted, vote_words
+from toolpath_stiff.planning.plan import reading_words, telling
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.stiffness.sizes import joined
 
 TRIED = 4  # candidates a step of `--auto`, the most likely first
 MOST_EFFECTS = 4  # that `--auto` adds
+LAW_GIVEN = "strut law as given"
 
 
 def update(task: UpdateTask) -> Update:
@@ -139,6 +141,11 @@ def build_ladder(task: UpdateTask) -> Update:
         steps.append(better)
         supports.append(tried[-1])
         tried = []
+    if steps[-1].fit.law_free and (steps[-1].fit.names or task.strut_law):
+        given, law = _law_support(task, steps[-1])
+        kept = not (law.supported or task.force) and steps[-1].fit.names
+        steps += [given] if kept else []
+        (tried if kept else supports).append(law)
     return Update(
         task, tuple(steps), refitted, tuple(supports), turned_down=tuple(tried), drawn=_drawn(task, steps[-1].fit)
     )
@@ -242,28 +249,61 @@ def _support(
             f"twice the log likelihood rises by {gained:.1f}: the best of all candidates gains {others.threshold:.1f} "
             "by chance once in twenty campaigns"
         )
-    instruments = _instruments(others.problem, none, alone)
-    if instruments and task.believe != MACHINE:
-        tells = joined([f"{tells} would tell {name}" for name, tells in instruments.items()])
-        reasons.append(
-            f"an error of the instrument foretells left-out poses as well: {joined(list(instruments))}; {tells}; "
-            "--believe machine (believe='machine') takes it for the machine's"
-        )
+    believed = INSTRUMENT if fit.candidates[j].effect.is_instrument else MACHINE
+    instruments = _as_well(others.problem, alone, _other_side(others.problem, none, believed))
+    reasons += _mistakable(task, instruments, believed)
     return Support(
         fit.names[j], not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
         json_number(in_se, 3), json_number(gained), json_number(others.threshold), tuple(instruments),
     )  # fmt: skip
 
 
-def _instruments(problem: Problem, none: Fit, alone: Fit) -> dict[str, str]:
-    """Errors of the instrument that an effect of the machine has not outvoted -> the reading that would tell."""
-    if alone.candidates[0].effect.is_instrument:
-        return {}
-    effects = [effect for effect in testable_effects(problem.predictor)[0] if effect.is_instrument]
-    bests = {family.name: family.best for family in score_families(problem, effects, none) if family.best is not None}
-    against = votes(problem, alone, bests)
-    told_by = {effect.name: telling(effect).removeprefix("none: ") for effect in effects}
-    return {name: told_by[name] for name, differences in against.items() if not outvoted(differences)}
+def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Support]:
+    """Judge the refitted strut law of a step; the same effects beside the file's law."""
+    task.progress("judging the strut law")
+    fit, problem = after.fit, task.problem
+    given = LadderStep.of(LAW_GIVEN, with_given_law(problem, fit), task.data)
+    differences = votes(problem, fit, {LAW_GIVEN: given.fit})[LAW_GIVEN]
+    reasons, instruments = [], dict[str, str]()
+    if outvoted(differences):
+        instruments = _as_well(problem, fit, rivals_of_law(problem, given.fit))
+        reasons = _mistakable(task, instruments, MACHINE)
+    else:
+        reasons.append(f"{vote_words('as given it', differences)} than refitted, no more than chance")
+    gained = 2.0 * (fit.log_posterior - given.fit.log_posterior) / dispersion(fit)
+    return given, Support(
+        LAW_REFITTED, not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
+        json_number(gain_in_standard_errors(given.held, after.held), 3), json_number(gained), None, tuple(instruments),
+    )  # fmt: skip
+
+
+def _other_side(problem: Problem, none: Fit, believed: str) -> dict[str, Fit]:
+    """Effects of the instrument, where the machine is believed, or of the machine, each on top of a fit, by name."""
+    wanted = believed == MACHINE
+    effects = [effect for effect in testable_effects(problem.predictor)[0] if effect.is_instrument == wanted]
+    return {family.name: family.best for family in score_families(problem, effects, none) if family.best is not None}
+
+
+def _as_well(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, str]:
+    """Rivals that a fit has not outvoted -> the reading that would tell."""
+    against = votes(problem, fit, rivals)
+    return {
+        name: reading_words(telling(rivals[name].candidates[-1].effect))
+        for name, differences in against.items()
+        if not outvoted(differences)
+    }
+
+
+def _mistakable(task: UpdateTask, rivals: Mapping[str, str], believed: str) -> list[str]:
+    """That what is taken for the machine's may be an instrument's, or the other way; nothing where the user knows."""
+    if not rivals or task.believe == believed:
+        return []
+    kind = "an error of the instrument" if believed == MACHINE else "an effect of the machine"
+    tells = joined([f"{tells} would tell {name}" for name, tells in rivals.items()])
+    return [
+        f"{kind} foretells left-out poses as well: {joined(list(rivals))}; {tells}; "
+        f"--believe {believed} (believe='{believed}') takes it for the {believed}'s"
+    ]
 
 
 def _next_effect(task: UpdateTask, before: LadderStep) -> tuple[LadderStep | None, list[Support]]:

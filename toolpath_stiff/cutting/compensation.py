@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from toolpath_stiff.cutting.cut import Cut
 
 LARGEST = 1e-4  # m, and half of the width of cut: a line that would be shifted by more is left alone
-SETTLED = 2e-7  # m, largest change of a shift that is worth another turn
+SETTLED = 5e-8  # m, half of the last decimal written: a change of the shift that is worth another turn
 MOST_TURNS, SWINGING = 6, 0.9
 CONTRACTION = 0.3  # of a turn's change to that of the turn before; a warning beyond
 SHORT = 3e-3  # m of a move, below which it is a part of a wall

@@ -66,6 +66,8 @@ class Cut:
         (n, 3) m, error of left wall, right wall, and the floor or a ball's contact: mean over it, extremes.
     deviation
         (n, 3) m, standard deviation of `errors`, from the coefficients and the machine.
+    wall_profiles
+        (n, 2, HEIGHTS) m, errors of the left and right wall from its lower to its upper end, at `surface_error.shares`.
     assumptions, warnings
         Sentences.
     """
@@ -89,6 +91,7 @@ class Cut:
     lowest: FloatArray
     highest: FloatArray
     deviation: FloatArray
+    wall_profiles: FloatArray
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
 
@@ -162,7 +165,8 @@ def evaluate_cut(
     made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
         values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
-    profiles = np.repeat(np.where(made[:, :2, None], 0.0, np.nan), HEIGHTS, axis=2)
+    profiles = cut.wall_profiles
+    profiles[made[:, :2]] = 0.0
     _note_engagement(cut, patches)
     engaged = np.zeros(len(samples), dtype=bool)
     engaged[patches.station] = True
@@ -170,13 +174,13 @@ def evaluate_cut(
     for number, cutter in cutters.items():
         rows = np.flatnonzero(engaged & ~repeated & (samples.tool == number))
         for start in range(0, len(rows), BLOCK):
-            _evaluate(cut, model, origin, cutter, patches, spindle, (strips, profiles), rows[start : start + BLOCK])
+            _evaluate(cut, model, origin, cutter, patches, spindle, strips, rows[start : start + BLOCK])
     again = np.flatnonzero(repeated)
     for values in (cut.mean_force, cut.peak_force, cut.deflection, cut.wall_force, profiles):
         values[again] = values[again - 1]
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
         values[again] = values[again - 1]
-    cut = _with_walls_of_all_passes(cut, own, profiles, step)
+    cut = _with_walls_of_all_passes(cut, own, step)
     return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=_warnings(cut))
 
 
@@ -212,6 +216,7 @@ def _nothing_cut(
         wall_heights=np.full((n, 2, 2), np.nan),
         wall_force=np.full((n, 2, 3), np.nan),
         **{name: np.full((n, 3), np.nan) for name in ("errors", "lowest", "highest", "deviation")},
+        wall_profiles=np.full((n, 2, HEIGHTS), np.nan),
         assumptions=(),
         warnings=(),
     )
@@ -240,12 +245,12 @@ def _evaluate(
     cutter: Cutter,
     patches: Patches,
     spindle: FloatArray,
-    surfaces: tuple[FloatArray, FloatArray],
+    strips: FloatArray,
     rows: IntArray,
 ) -> None:
     """Enter forces, deflections and errors of some samples (m,) that cut with one cutter, in their order.
 
-    `surfaces`: strips of floor (n, 2), and profiles of the walls (n, 2, HEIGHTS) to be entered.
+    `strips`: of floor (n, 2).
     """
     samples = cut.samples.take(rows)
     kept = patches.take(slice(*np.searchsorted(patches.station, (rows[0], rows[-1] + 1))))
@@ -262,8 +267,8 @@ def _evaluate(
     whole = with_tools(machine, samples, cut.cutters)
     cut.deflection[rows] = product(whole, mean[:, :, None])[..., 0]
     walls, of_walls, cut.wall_force[rows] = wall_error(*given, whole, cut.wall_heights[rows])
-    floors, of_floors = floor_error(*given, whole, surfaces[0][rows])
-    surfaces[1][rows] = walls
+    floors, of_floors = floor_error(*given, whole, strips[rows])
+    cut.wall_profiles[rows] = walls
     _enter(cut, rows, slice(0, 2), walls @ shares()[1], walls)
     _enter(cut, rows, slice(2, 3), floors.mean(axis=1)[:, None], floors[:, None])
     # Of the machine as a share of the compliance that acts along the normal.
@@ -273,16 +278,16 @@ def _evaluate(
     cut.deviation[rows] = np.hypot(of_coefficients, share * cut.errors[rows])
 
 
-def _with_walls_of_all_passes(cut: Cut, own: FloatArray, profiles: FloatArray, step: float) -> Cut:
-    """The cut with each wall at the pass that owns it; `own` as `Cut.wall_heights`, profiles as of `_evaluate`."""
-    values = walls_of_all_passes(cut.samples, cut.cutters, cut.wall_heights, own, profiles, step)
+def _with_walls_of_all_passes(cut: Cut, own: FloatArray, step: float) -> Cut:
+    """The cut with each wall at the pass that owns it; `own` as `Cut.wall_heights`."""
+    values = walls_of_all_passes(cut.samples, cut.cutters, cut.wall_heights, own, cut.wall_profiles, step)
     before, deviation = np.abs(cut.wall_mean), cut.deviation[:, :2].copy()
     share = deviation / np.where(before > 0.0, before, np.nan)  # the coefficients scatter all errors alike
     usual = float(np.median(share[np.isfinite(share)])) if np.isfinite(share).any() else 0.0
     _enter(cut, np.arange(len(own)), slice(0, 2), values @ shares()[1], values)
     after = np.abs(cut.wall_mean)
     cut.deviation[:, :2] = after * np.where(before > OTHER * after, share, usual)
-    return replace(cut, wall_heights=own)
+    return replace(cut, wall_heights=own, wall_profiles=values)
 
 
 def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: FloatArray) -> None:

@@ -42,7 +42,7 @@ def walls_of_all_passes(
     heights = own[..., :1] + (own[..., 1:] - own[..., :1]) * nodes
     owners, walls = np.nonzero(np.isfinite(own).all(axis=2))
     values = np.full((*own.shape[:2], HEIGHTS), np.nan)
-    values[owners, walls] = _at(profiles[owners, walls], made[owners, walls], heights[owners, walls])
+    values[owners, walls] = profile_at(profiles[owners, walls], made[owners, walls], heights[owners, walls])
     shared = np.isfinite(made).all(axis=2) & ~(np.abs(made - own).max(axis=2) <= SAME)
     rows, sides = np.nonzero(shared)
     if not len(rows) or not len(owners):
@@ -58,13 +58,13 @@ def walls_of_all_passes(
         known = known[samples.s[owners[known]] - samples.s[rows[column[known]]] > apart]
         last, wall, earlier, side = owners[known], walls[known], rows[column[known]], sides[column[known]]
         climb = samples.position[last, 2] - samples.position[earlier, 2]
-        left = _at(profiles[earlier, side], made[earlier, side], heights[last, wall] + climb[:, None])
+        left = profile_at(profiles[earlier, side], made[earlier, side], heights[last, wall] + climb[:, None])
         values[last, wall] = np.fmin(values[last, wall], left)
     return values
 
 
-def _at(profiles: FloatArray, ranges: FloatArray, heights: FloatArray) -> FloatArray:
-    """(m, HEIGHTS) errors at heights (m, HEIGHTS), from profiles over ranges (m, 2); nan beyond."""
+def profile_at(profiles: FloatArray, ranges: FloatArray, heights: FloatArray) -> FloatArray:
+    """(m, h) errors at heights (m, h), from profiles (m, HEIGHTS) over ranges (m, 2); nan beyond."""
     nodes, low, span = shares()[0], ranges[:, :1], np.maximum(ranges[:, 1:] - ranges[:, :1], SAME)
     share = (heights - low) / span
     place = np.clip(np.searchsorted(nodes, share) - 1, 0, HEIGHTS - 2)

@@ -36,6 +36,7 @@ def document_of(diagnosis: Examination) -> Document:
         "nuisances": diagnosis.nuisances,
         "plausible": diagnosis.plausible,
         "explanations": list(diagnosis.explanations),
+        "entries": [list(names) for names in diagnosis.entries],
         "best": diagnosis.best,
         "why": why(diagnosis),
         "cannot_test": [

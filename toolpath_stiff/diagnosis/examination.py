@@ -23,7 +23,7 @@ from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import fitted_nuisances
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.rivals import lowers_error
+from toolpath_stiff.inference.rivals import entries, lowers_error
 from toolpath_stiff.inference.slips import SuspectEntry
 from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.machine.model import Hexapod
@@ -196,6 +196,11 @@ class Examination:
         most = 1 if self.verdict in NAMING else None
         standing = (name for judgement in self.judgements.values() for name in judgement.explanations[:most])
         return tuple(dict.fromkeys(standing))
+
+    @property
+    def entries(self) -> list[tuple[str, ...]]:
+        """The explanations, those together that sit at one place and that these readings could not tell apart."""
+        return entries(self.main.problem, self.main.fits, self.explanations)
 
     @cached_property
     def best(self) -> str | None:

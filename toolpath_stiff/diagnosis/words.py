@@ -117,13 +117,20 @@ def _capital(text: str) -> str:
 
 def _rivals(diagnosis: Examination) -> str:
     """Explanations that stand beside each other."""
-    causes = [_cause(diagnosis, name) for name in diagnosis.explanations]
-    if len(causes) < 2:
+    causes = [
+        f"{_cause(diagnosis, first)}{f' - or, alike at these poses, {joined(same)}' if same else ''}"
+        for first, *same in diagnosis.entries
+    ]
+    if len(diagnosis.explanations) < 2:
         return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
     if diagnosis.explanations[0] not in (NONE, diagnosis.best):
         return f"What is likeliest lowers no error at points that are left out: {'; '.join(causes)}."
+    if diagnosis.explanations[0] == NONE and diagnosis.main.votes:
+        moved = float(np.mean(np.abs(diagnosis.base.jacobian @ diagnosis.base.law)))
+        causes[0] = f"the strut law is off and moves the stiffness by {100.0 * moved:.2g} %"
+        return f"Readings of the tip do not tell which of these it is: either {', or '.join(causes)}."
     first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
-    if first < POSITIVE * second:
+    if first < POSITIVE * second or len(causes) < 2:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
     return f"Most likely {causes[0]}; not ruled out: {'; '.join(causes[1:])}."
 

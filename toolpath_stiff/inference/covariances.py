@@ -130,6 +130,12 @@ class Covariance:
         common = (np.sqrt(self.common) * rng.standard_normal((draws, self.groups.count)))[:, self.groups.of]
         return np.asarray(common + rng.standard_normal((draws, len(self.shared))) @ self.shared)
 
+    @property
+    def blocks(self) -> Precision:
+        """C^-1."""
+        none = np.zeros((0, len(self.own_variance)))
+        return Precision(self.own_variance, self.groups, self.common, none, none)
+
     @cached_property
     def precision(self) -> Precision:
         """V^-1."""
@@ -142,9 +148,7 @@ class Covariance:
 
     @cached_property
     def _inverted(self) -> tuple[Precision, float]:
-        none = np.zeros((0, len(self.own_variance)))
-        blocks = Precision(self.own_variance, self.groups, self.common, none, none)
-        solved = blocks.times(self.shared)
+        blocks, solved = self.blocks, self.blocks.times(self.shared)
         lower = np.linalg.cholesky(np.eye(len(self.shared)) + solved @ self.shared.T)
         determinant = np.log(self.own_variance).sum() + np.log1p(self.common * blocks.weights).sum()
         determinant += 2.0 * np.log(np.diag(lower)).sum()

@@ -229,7 +229,7 @@ def _settled(problem: Problem, fit: Fit) -> Fit:
 
 def _without_zeros(fit: Fit) -> Fit:
     """The fit with sizes that have run into zero no longer counted as free."""
-    sizes = np.concatenate(fit.sizes)
+    sizes = np.concatenate([np.zeros(0), *fit.sizes])
     kept = [k for k, index in enumerate(fit.free) if sizes[index] != 0.0]
     if len(kept) == len(fit.free):
         return fit
@@ -246,6 +246,12 @@ def _without_zeros(fit: Fit) -> Fit:
         covariance=scaled_inverse(information),
         absent={fit.free[k]: (float(step[2 + k]), float(sd[2 + k])) for k in range(len(fit.free)) if k not in kept},
     )
+
+
+def with_given_law(problem: Problem, fit: Fit) -> Fit:
+    """The same effects, fitted beside the strut law of the machine file."""
+    given = fit_effects(problem, fit.candidates, fit.sizes, fit.free, np.zeros(2), fit.scatter, law_free=False)
+    return _without_zeros(_settled(problem, given))
 
 
 def baseline(problem: Problem) -> tuple[Fit, Fit]:

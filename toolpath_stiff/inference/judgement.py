@@ -36,16 +36,16 @@ from toolpath_stiff.inference.doubts import noise_doubt, question
 from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fair_forms import fair_rivals
-from toolpath_stiff.inference.fits import refine
+from toolpath_stiff.inference.fits import refine, with_given_law
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.left_out_votes import closest, votes
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import findings, fitted_nuisances
-from toolpath_stiff.inference.rivals import left_out_of, lowers_error, rivals_of
+from toolpath_stiff.inference.rivals import INSTRUMENT, entries, left_out_of, lowers_error, rivals_of, rivals_of_law
 from toolpath_stiff.inference.several import search_pairs, search_triples
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
-from toolpath_stiff.inference.votes import Votes, left_open, outvoted
+from toolpath_stiff.inference.votes import MOST_OPEN, Votes, left_open, outvoted
 from toolpath_stiff.stiffness.contract import Effect
 
 NONE = "none"
@@ -63,6 +63,9 @@ SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alo
 # Odds below which a second effect is not considered where one suffices: "positive" evidence begins at 3 (Kass and
 # Raftery 1995, Bayes factors).
 POSITIVE = 3.0
+# Share of the stiffness that `adequate` may leave along a path; assumed: a third of what cutting forces are known to.
+LEFT = 0.03
+ONE_SIDED = 1.645  # normal quantile of 95 %
 TAKEN_UP = ("joint_offset", "weak_strut")  # effects that the nuisances take up
 Evidence = dict[tuple[str, ...], float]  # of effects, pairs and triples by their names
 
@@ -409,9 +412,10 @@ def put_to_vote(
     base, fits = candidates.base, {family.name: best for family, best in candidates.offered} | gates.fits
     if verdict == "adequate":
         taken = [name for name in TAKEN_UP if name in fits] if findings(fitted_nuisances(base, noise)) else []
-        return (
-            ("ambiguous", tuple(dict.fromkeys([*explanations, *taken])), {}) if taken else (verdict, explanations, {})
-        )
+        instead, ballots = _instead_of_law(problem, base)
+        gates.fits |= instead
+        beside = _shortened(problem, fits | instead, (NONE, *taken, *instead))
+        return ("ambiguous", beside, ballots) if taken or instead else (verdict, explanations, {})
     if verdict not in ("identified", "ambiguous"):
         return verdict, explanations, {}
     data = problem.predictor.data
@@ -421,13 +425,37 @@ def put_to_vote(
     ]
     top = next((name for name in standing if name in fits), None)
     if top is None:
-        beside = tuple(dict.fromkeys([*explanations, NONE]))
+        beside = _shortened(problem, fits, (*explanations, NONE))
         return ("ambiguous", beside, {}) if gates.none_stands else ("unexplained", (), {})
     rivals = ({NONE: base} if gates.none_stands else {}) | rivals_of(fits[top], fits)
     ballots = votes(problem, fits[top], rivals)
     ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
     open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
-    return ("ambiguous" if open_rivals else verdict), left_open(top, standing, open_rivals, ballots), ballots
+    left = _shortened(problem, fits, left_open(top, standing, open_rivals, ballots))
+    return ("ambiguous" if open_rivals else verdict), left, ballots
+
+
+def _shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
+    """Explanations without those beyond the `MOST_OPEN` entries that come first; the model alone stays."""
+    groups = entries(problem, fits, tuple(dict.fromkeys(names)))
+    kept = groups[:MOST_OPEN]
+    if (NONE,) in groups[MOST_OPEN:]:
+        kept[-1] = (NONE,)
+    return tuple(name for group in kept for name in group)
+
+
+def _instead_of_law(problem: Problem, base: Fit) -> tuple[dict[str, Fit], Votes]:
+    """Effects beside the file's strut law that explain as well as a law that had to move, the closest first; the votes.
+
+    None where the law has moved the stiffness by less than an adequate model may leave along a path, beyond chance.
+    """
+    columns = base.jacobian[problem.predictor.data.tip]
+    spread = np.sqrt(np.einsum("ni,ij,nj->n", columns, base.covariance, columns))
+    if float(np.mean(np.abs(columns @ base.law) + ONE_SIDED * spread)) <= LEFT:
+        return {}, {}
+    rivals = rivals_of_law(problem, with_given_law(problem, base), (INSTRUMENT, "joints"))
+    ballots = votes(problem, base, rivals)
+    return {name: rivals[name] for name in ballots if not outvoted(ballots[name])}, ballots
 
 
 def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:

@@ -1,15 +1,12 @@
-"""The votes themselves: log predictive densities of left-out poses, of an explanation and its rivals (`votes`)."""
+"""The votes themselves: log densities of the readings, pose by pose, under an explanation and its rivals (`votes`)."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.covariances import Groups, Precision
-from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
-from toolpath_stiff.inference.noise import REST_COLUMNS
-from toolpath_stiff.inference.size_priors import EXPECTED
+from toolpath_stiff.inference.covariances import Covariance, Groups
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.votes import CERTAIN, Votes
 
 
@@ -19,35 +16,35 @@ def votes(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, Fl
     Readings that either of the two takes for wild scatter widely for both.
     """
     scatter, points = problem.scatter, Groups.by(problem.predictor.data.point)
-    # Other poses would tell how much the rest gives, at no price: as a free part that any explanation has beside it.
-    given = replace(scatter.covariance, shared=scatter.covariance.shared[:-REST_COLUMNS])
-    mine: dict[tuple[int, ...], tuple[Precision, FloatArray]] = {}
     against = {}
     for name, rival in rivals.items():
-        wild = tuple(sorted({*fit.scatter.wild, *rival.scatter.wild}))
-        if wild not in mine:
-            rows = np.array(wild, dtype=np.int64)
-            precision = given.widened(rows, scatter.widening[rows]).precision
-            mine[wild] = precision, _log_predictive(fit, precision, points)
-        precision, density = mine[wild]
+        rows = np.array(sorted({*fit.scatter.wild, *rival.scatter.wild}), dtype=np.int64)
+        covariance = scatter.covariance.widened(rows, scatter.widening[rows])
+        squares = _squares_by_point(np.stack([fit.residual, rival.residual]), covariance, points)
+        gain = 0.5 * (squares[1] - squares[0]) + (_price(rival) - _price(fit)) / points.count
         # Rounded: which of two rivals that do the same is the closer would be the processor's.
-        against[name] = np.round(density - _log_predictive(rival, precision, points), CERTAIN) + 0.0
+        against[name] = np.round(gain, CERTAIN) + 0.0
     return closest(against)
 
 
-def _log_predictive(fit: Fit, precision: Precision, points: Groups) -> FloatArray:
-    """(points,) log density of each point's readings given all others, up to a constant of the data."""
-    prior = law_prior(fit.jacobian.shape[1])
-    sizes = np.arange(2, len(prior))
-    # A size is expected to change the stiffness by no more than any effect does.
-    prior[sizes, sizes] = np.mean(fit.jacobian[:, 2:] ** 2, axis=0) / EXPECTED[1] ** 2
-    projected = precision.beside(fit.jacobian.T, prior)
-    pull, density = projected.times(fit.residual), np.zeros(points.count)
-    for which, out in points.by_size():
-        block = projected.block(out)
-        squares = (pull[out] * np.linalg.solve(block, pull[out][..., None])[..., 0]).sum(axis=-1)
-        density[which] = 0.5 * (np.linalg.slogdet(block)[1] - squares)
-    return density
+def _price(fit: Fit) -> float:
+    """1 for each fitted size and constant of the law (Akaike 1973), and the law's distance from the machine file."""
+    return len(fit.free) + (2.0 + 0.5 * float(fit.law @ fit.law) / LAW_PRIOR**2 if fit.law_free else 0.0)
+
+
+def _squares_by_point(residuals: FloatArray, covariance: Covariance, points: Groups) -> FloatArray:
+    """(k, points) weighted squares that each point adds to those before it, of residuals (k, n).
+
+    Of r^T V^-1 r = r^T C^-1 r - h^T (1 + S C^-1 S^T)^-1 h, h = S C^-1 r (`covariances`), each sum up to a point.
+    """
+    rows, count = np.concatenate([covariance.shared, residuals]), len(covariance.shared)
+    solved = covariance.blocks.times(rows)
+    products = np.cumsum([solved[:, out] @ rows[:, out].T for out in points.members()], axis=0)
+    known, pull = np.eye(count) + products[:, :count, :count], products[:, :count, count:]
+    whole = np.diagonal(products[:, count:, count:], axis1=1, axis2=2) - (pull * np.linalg.solve(known, pull)).sum(
+        axis=1
+    )
+    return np.diff(whole, axis=0, prepend=0.0).T
 
 
 def closest(*ballots: Votes) -> dict[str, FloatArray]:

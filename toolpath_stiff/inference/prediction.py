@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.model import Hexapod, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, MachineTool, StrutLaw, as_hexapod
 from toolpath_stiff.readings.measurements import Readings, measured_path, mechanical_stiffness, shown_by
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -132,10 +132,10 @@ class Predictor:
             return np.full(len(self.data), np.nan)
         return self._read(stiffness, model.instruments, model.machine)
 
-    def _read(self, stiffness: FloatArray, instruments: Sequence[ActiveEffect], machine: Hexapod) -> FloatArray:
+    def _read(self, stiffness: FloatArray, instruments: Sequence[ActiveEffect], machine: MachineTool) -> FloatArray:
         """(n,) ln of what the instruments show of stiffnesses (n,)."""
         if instruments:
-            path = replace(self.full_path, machine=machine)
+            path = replace(self.full_path, machine_tool=machine)
             for active in instruments:
                 stiffness = shown_by(active, stiffness, path, self.data)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -143,9 +143,9 @@ class Predictor:
 
     def _mechanics(self, model: StiffnessModel, prepared: _Prepared) -> FloatArray:
         """(m,) N/m at the distinct rows."""
-        given = self.base.machine
-        if model.machine.platform_joints is given.platform_joints and model.machine.frame_joints is given.frame_joints:
-            path = replace(prepared.path, machine=model.machine)
+        given, now = (as_hexapod(machine, "a prediction") for machine in (self.base.machine, model.machine))
+        if now.platform_joints is given.platform_joints and now.frame_joints is given.frame_joints:
+            path = replace(prepared.path, machine_tool=model.machine)
             return mechanical_stiffness(model, path, prepared.data, prepared.forces)
         return mechanical_stiffness(model, measured_path(model, prepared.data), prepared.data)
 

@@ -1,12 +1,18 @@
 """Which explanations a name must outvote, and whether one lowers the error at left-out points at all."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.candidates import candidates_of, testable_effects
+from toolpath_stiff.inference.evidence import Fit, Problem
+from toolpath_stiff.inference.fits import add_effect
 from toolpath_stiff.inference.left_out import HeldOut, held_out
+from toolpath_stiff.inference.votes import SMALL
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import SETUP, Effect
 
+INSTRUMENT = "instrument"
+# Effects that carry the tip's whole force to the floor as one body on springs (`contract.body_on_springs`).
+ONE_BODY = ("table_compliance", "frame_sway")
 UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
 
 
@@ -28,6 +34,46 @@ def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
     own, names = parts_of(fit), {*fit.names}
     others = {name: other for name, other in fits.items() if {*other.names} != names and len(other.names) <= len(names)}
     return {name: o for name, o in others.items() if parts_of(o) != own or {*o.names} < names}
+
+
+def rivals_of_law(problem: Problem, given: Fit, links: Sequence[str] = (INSTRUMENT,)) -> dict[str, Fit]:
+    """Effects of some links by name, each beside a fit with the file's strut law: what a refitted law may stand for.
+
+    Under one load a law that is softer by a share is at the tip the same as a load cell that reads too little by it.
+    """
+    effects = [effect for effect in testable_effects(problem.predictor)[0] if effect.link in links]
+    wanted = {e.name: candidates_of(e, problem.predictor.data) for e in effects if e.name not in given.names}
+    return {name: add_effect(problem, given, candidates, law_free=False) for name, candidates in wanted.items()}
+
+
+def place_of(effect: Effect) -> str:
+    """Where a user would look for an effect: its link, of what is measured by itself the effect."""
+    if effect.name in ONE_BODY:
+        return "body on springs"
+    return effect.name if effect.link in (INSTRUMENT, "geometry") else part_of(effect)
+
+
+def entries(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Explanations that sit at the same places and that votes on these readings could not tell apart, together.
+
+    In the order of `names`; one that is in no `fits` stands alone. The votes between two that differ by d in whitened
+    residuals come to d^2 / 2 where one of them is true.
+    """
+    groups: list[tuple[str, ...]] = []
+    for name in names:
+        for k, (first, *_) in enumerate(groups):
+            if name in fits and first in fits and _alike(problem, fits[name], fits[first]):
+                groups[k] = (*groups[k], name)
+                break
+        else:
+            groups.append((name,))
+    return groups
+
+
+def _alike(problem: Problem, fit: Fit, other: Fit) -> bool:
+    mine, others = (sorted(place_of(candidate.effect) for candidate in f.candidates) for f in (fit, other))
+    apart = float(problem.scatter.precision.squares(fit.residual - other.residual))
+    return mine == others and 0.5 * apart <= SMALL
 
 
 def left_out_of(fit: Fit, data: Readings) -> HeldOut:

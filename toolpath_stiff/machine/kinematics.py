@@ -44,6 +44,11 @@ class Struts(ArrayColumns):
     directions: FloatArray
     arms: FloatArray
 
+    @property
+    def joints(self) -> FloatArray:
+        """(n, 6) m, what the control moves: the lengths."""
+        return self.lengths
+
     @cached_property
     def jacobian(self) -> FloatArray:
         """(n, 6, 6) rows [u_i, r_i x u_i]: strut elongation rates per twist of the tip."""

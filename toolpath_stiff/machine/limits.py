@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
+from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.kinematics import (
     Struts,
     joint_angles,
@@ -14,15 +15,16 @@ from toolpath_stiff.machine.kinematics import (
     neutral_determinant,
     singularity_index,
     solve_struts,
-    solve_struts_at,
 )
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import Hexapod, Limits, MachineTool, as_hexapod
+from toolpath_stiff.poses import Pose
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 # What limits bound: strut lengths, swing of the joints at frame and platform, the tool tip, the singularity index.
-STRUT, FRAME, PLATFORM, SINGULARITY = "strut", "frame", "platform", "singularity"
+STRUT, FRAME, PLATFORM, SINGULARITY, JOINTS = "strut", "frame", "platform", "singularity", "joints"
 AXES = ("x", "y", "z")
+WIDEST, ROUNDS, DRAWN = 4.0, 9, 500  # m, rounds, draws in each, by which the middle of a workspace is sought
 
 
 @dataclass(frozen=True)
@@ -46,16 +48,16 @@ class Limit:
         return np.asarray((value - self.bound if self.lower else self.bound - value) / self.span)
 
 
-def machine_limits(machine: Hexapod) -> tuple[Limit, ...]:
+def machine_limits(machine: MachineTool) -> tuple[Limit, ...]:
     """The finite limits of a machine, in the order of `reach`'s columns."""
     return _finite_limits(machine)[0]
 
 
-def _finite_limits(machine: Hexapod) -> tuple[tuple[Limit, ...], list[int]]:
+def _finite_limits(machine: MachineTool) -> tuple[tuple[Limit, ...], list[int]]:
     """The finite limits, and which they are of all."""
 
     def finite() -> tuple[tuple[Limit, ...], list[int]]:
-        everything = _all_limits(machine)
+        everything = _all_limits(machine) if isinstance(machine, Hexapod) else _joint_limits(machine)
         rows = [i for i, limit in enumerate(everything) if np.isfinite(limit.bound)]
         return tuple(everything[i] for i in rows), rows
 
@@ -72,11 +74,32 @@ def _all_limits(machine: Hexapod) -> list[Limit]:
         bounds.append(Limit(f"strut{i} max length", STRUT, high, False, span, "mm"))
     for quantity, angle in ((FRAME, limits.frame_joint_angle), (PLATFORM, limits.platform_joint_angle)):
         bounds += [Limit(f"{quantity} joint{i} angle", quantity, angle, False, angle, "deg") for i in range(1, 7)]
-    for axis, lo, hi in zip(AXES, *limits.workspace.tolist(), strict=True):
-        both = hi - lo if np.isfinite(hi - lo) else 1.0
-        bounds.append(Limit(f"workspace {axis} min", axis, lo, True, both, "mm"))
-        bounds.append(Limit(f"workspace {axis} max", axis, hi, False, both, "mm"))
+    bounds += _workspace_limits(limits)
     return [*bounds, Limit("singularity", SINGULARITY, limits.singularity, True, 1.0 - limits.singularity, "")]
+
+
+def _workspace_limits(limits: Limits) -> list[Limit]:
+    sides = zip(AXES, *limits.workspace.tolist(), strict=True)
+    return [limit for axis, low, high in sides for limit in _both_ends(f"workspace {axis}", axis, low, high, "mm")]
+
+
+def _both_ends(name: str, quantity: str, low: float, high: float, unit: str) -> list[Limit]:
+    span = high - low if np.isfinite(high - low) else 1.0
+    return [
+        Limit(f"{name} min", quantity, low, True, span, unit),
+        Limit(f"{name} max", quantity, high, False, span, unit),
+    ]
+
+
+def _joint_limits(machine: MachineTool) -> list[Limit]:
+    """Of a machine of any kind: its joints, the workspace, singularities, and that there are joint values at all."""
+    bounds: list[Limit] = []
+    for name, kind, (low, high) in zip(machine.joint_names, machine.joint_kinds, machine.joint_limits, strict=True):
+        bounds += _both_ends(name, name, float(low), float(high), "mm" if kind == "linear" else "deg")
+    bounds += _workspace_limits(machine.limits)
+    measures = zip(machine.singularity_names, machine.singularity_margins, strict=True)
+    bounds += [Limit(name, SINGULARITY, least, True, 1.0 - least, "") for name, least in measures]
+    return [*bounds, Limit("reach", JOINTS, 0.0, True, 1.0, "")]
 
 
 @dataclass(frozen=True)
@@ -110,6 +133,8 @@ class Reach:
         if not self.limits:
             return "no limit"
         limit = self.limits[int(self.limit[i])]
+        if limit.quantity == JOINTS:
+            return "no joint values lead there" if self.margin[i] < 0.0 else "no limit"
         value, bound = _shown(limit, float(self.value[i])), _shown(limit, limit.bound)
         if self.margin[i] >= 0.0:
             return f"{limit.name} at {value}, limit {bound}"
@@ -125,7 +150,9 @@ def _shown(limit: Limit, value: float) -> str:
     return f"{value:.4f}"
 
 
-def reach(machine: Hexapod, position: ArrayLike, struts: Struts, rotation: ArrayLike | None = None) -> Reach:
+def reach(
+    machine: MachineTool, position: ArrayLike, struts: Struts | Stance, rotation: ArrayLike | None = None
+) -> Reach:
     """Margin to every limit at n poses.
 
     Parameters
@@ -133,9 +160,9 @@ def reach(machine: Hexapod, position: ArrayLike, struts: Struts, rotation: Array
     machine
         The machine.
     position
-        (n, 3) m, tool tip.
+        (n, 3) m, tool tip, work axes.
     struts
-        The struts at these poses.
+        How it stands at these poses.
     rotation
         (n, 3, 3); None: vertical.
 
@@ -156,29 +183,69 @@ def reach(machine: Hexapod, position: ArrayLike, struts: Struts, rotation: Array
     if not limits:
         nothing = np.full(len(tip), np.inf)
         return Reach(nothing, np.zeros(len(tip), dtype=np.int64), nothing, ())
-    frame, platform = joint_angles(machine, struts, rotation)
-    lengths, tips = np.repeat(struts.lengths, 2, axis=1), np.repeat(tip, 2, axis=1)
-    index = singularity_index(machine, struts)[:, None]
-    values = np.concatenate([lengths, frame, platform, tips, index], axis=1)[:, finite]
+    values = _values(machine, tip, struts, rotation)[:, finite]
     bound, span = (np.array([getattr(limit, name) for limit in limits]) for name in ("bound", "span"))
     sign = np.array([1.0 if limit.lower else -1.0 for limit in limits])
     margins = sign * (values - bound) / span
+    if not isinstance(machine, Hexapod):
+        margins[np.isnan(margins)] = np.inf  # no joint values: their own limit says so
     worst = np.argmin(margins, axis=1)
     rows = np.arange(len(tip))
     return Reach(margins[rows, worst], worst, values[rows, worst], limits)
 
 
-def stand(machine: Hexapod, pose: ArrayLike) -> tuple[FloatArray, Struts, Reach]:
-    """A pose (6,), m and rad, the struts there, and how it stands to the limits."""
+def _values(machine: MachineTool, tip: FloatArray, stance: Struts | Stance, rotation: ArrayLike | None) -> FloatArray:
+    """(n, l) what the machine's limits bound, those that are infinite too."""
+    joints, tips = np.repeat(stance.joints, 2, axis=1), np.repeat(tip, 2, axis=1)
+    if isinstance(stance, Struts):
+        hexapod = as_hexapod(machine, "a pose of struts")
+        index = singularity_index(hexapod, stance)[:, None]
+        return np.concatenate([joints, *joint_angles(hexapod, stance, rotation), tips, index], axis=1)
+    beyond = np.where(np.isnan(stance.joints).any(axis=1), -np.inf, np.inf)
+    return np.concatenate([joints, tips, machine.singularities(stance), beyond[:, None]], axis=1)
+
+
+def solved(
+    machine: MachineTool, position: FloatArray, rotation: FloatArray | None = None, tool_length: ArrayLike = np.nan
+) -> Struts | Stance:
+    """How a machine stands at n poses; arguments as of `MachineTool.solve`."""
+    if isinstance(machine, Hexapod):
+        return solve_struts(machine, position, rotation, tool_length)
+    return machine.solve(np.atleast_2d(position), rotation, tool_length)
+
+
+def stand(machine: MachineTool, pose: ArrayLike) -> tuple[FloatArray, Struts | Stance, Reach]:
+    """A pose (6,), m and rad, how the machine stands there, and how that is to the limits."""
     values = np.asarray(pose, dtype=float)
-    struts = solve_struts_at(machine, values)
-    return values, struts, reach(machine, values[:3], struts, rotation_matrices(values[None, 3:]))
+    turn = rotation_matrices(values[None, 3:])
+    stance = solved(machine, values[None, :3], turn)
+    return values, stance, reach(machine, values[:3], stance, turn)
+
+
+def upright_middle(machine: MachineTool) -> Pose:
+    """The place farthest from all limits with the tool upright, by draws in boxes around the best, each half as wide."""
+    rng, best = np.random.default_rng(0), np.zeros(3)
+    for half in WIDEST * 0.5 ** np.arange(ROUNDS):
+        places = best + half * rng.uniform(-1.0, 1.0, (DRAWN, 3))
+        places[0] = best
+        best = places[int(np.argmax(reach(machine, places, machine.solve(places)).margin))]
+    x, y, z = best.round(3).tolist()
+    return (x, y, z, 0.0, 0.0, 0.0)
+
+
+def working_box(machine: MachineTool) -> FloatArray:
+    """(2, 3) m, lower and upper corner of where program zero may sit: the stated workspace, else the reach from it."""
+    stated, origin = machine.limits.workspace, np.array(machine.default_origin[:3])
+    if isinstance(machine, Hexapod) or np.isfinite(stated).all():
+        return stated
+    ends = np.stack([reach_along(machine, origin, sign * np.eye(3), np.eye(3)) for sign in (-1.0, 1.0)])
+    return np.where(np.isfinite(stated), stated, origin + ends * [[-1.0], [1.0]])
 
 
 RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and how many: each goes on where the one before found a limit
 
 
-def reach_along(machine: Hexapod, start: FloatArray, directions: FloatArray, turn: FloatArray) -> FloatArray:
+def reach_along(machine: MachineTool, start: FloatArray, directions: FloatArray, turn: FloatArray) -> FloatArray:
     """(n,) m that the tool tip can go from a place (3,) along unit vectors (n, 3) before the first limit.
 
     `turn` (3, 3) is the orientation, which is kept. 0 where the place itself is out of reach.
@@ -188,7 +255,7 @@ def reach_along(machine: Hexapod, start: FloatArray, directions: FloatArray, tur
         tried = length[:, None] + step * np.arange(count + 1)
         tips = (start + tried[:, :, None] * directions[:, None]).reshape(-1, 3)
         turns = np.broadcast_to(turn, (len(tips), 3, 3))
-        good = reach(machine, tips, solve_struts(machine, tips, turns), turns).reachable.reshape(tried.shape)
+        good = reach(machine, tips, solved(machine, tips, turns), turns).reachable.reshape(tried.shape)
         length += step * np.where(good.all(axis=1), count, np.maximum(good.argmin(axis=1) - 1, 0))
     return length
 

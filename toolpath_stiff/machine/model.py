@@ -1,4 +1,4 @@
-"""What a six-strut machine is: joints, tool, strut law, platform bars, limits. SI units.
+"""What a machine is; a six-strut one: joints, tool, strut law, platform bars, limits. SI units.
 
 Every quantity carries its origin: "published", "recovered" (from published figures), "assumed", or "fitted" (to
 measurements, by `tps update`). How well fitted parameters are known is `Uncertainty`: standard deviations in the units
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +19,10 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
+from toolpath_stiff.machine.elements import Element, Stance
 from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.poses import Pose
+from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.units import n_per_m_from_n_per_um
 
 Derived = TypeVar("Derived")
@@ -214,24 +216,19 @@ class EffectEntry:
         return EffectError(text, expected=expected, hint=hint, file=self.file or None, line=line)
 
 
-@dataclass(frozen=True)
-class Hexapod:
-    """A six-strut platform machine, SI units.
+@dataclass(frozen=True, kw_only=True)
+class MachineTool:
+    """What every machine has, whatever holds its tool, SI units.
+
+    A kind is a subclass: `Hexapod`, or one whose file describes what of its load path gives way (`elements`).
 
     Attributes
     ----------
     name, title, source
         Short name, title for headings, where the figures come from.
-    frame_joints
-        (6, 3) m, base frame; row i belongs to strut i + 1.
-    platform_joints
-        (6, 3) m, platform frame, relative to the tip of the reference tool.
     reference_tool_length
-        m, from the spindle nose to the tip that `platform_joints` refers to.
-    strut_law
-        Stiffness of a strut over its length.
-    platform_bar_stiffness
-        N/m of each bar of the platform truss; inf: rigid.
+        m, from the spindle nose to the tip that the geometry refers to; nan where nobody says: tools of a program then
+        do not move the machine.
     limits
         Reach.
     default_origin
@@ -250,16 +247,16 @@ class Hexapod:
         Physical effects that the machine file carries; instruments act on readings only.
     uncertainty
         Of parameters that were fitted to measurements; None if none were.
+    text
+        The machine file; "" where there is none.
     """
+
+    kind: ClassVar[str]
 
     name: str
     title: str
     source: str
-    frame_joints: FloatArray
-    platform_joints: FloatArray
-    reference_tool_length: float
-    strut_law: StrutLaw
-    platform_bar_stiffness: float = np.inf
+    reference_tool_length: float = np.nan
     limits: Limits = field(default_factory=Limits)
     default_origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     rapid_feed: float = defaults.RAPID_FEED
@@ -271,6 +268,7 @@ class Hexapod:
     effects: tuple[EffectEntry, ...] = ()
     instruments: tuple[EffectEntry, ...] = ()
     uncertainty: Uncertainty | None = None
+    text: str = field(default="", repr=False)
 
     def once(self, key: object, make: Callable[[], Derived]) -> Derived:
         """What `make` computes of this machine, computed once: it never changes, `with_changes` makes another."""
@@ -279,6 +277,123 @@ class Hexapod:
             known[key] = make()
         derived: Derived = known[key]
         return derived
+
+    def with_changes(self, **changes: Any) -> Self:
+        """A copy with some attributes replaced."""
+        return replace(self, **changes)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Of the j joints that the control moves."""
+        raise NotImplementedError
+
+    @property
+    def joint_kinds(self) -> tuple[str, ...]:
+        """Of each joint "linear" or "rotary"."""
+        return ("linear",) * len(self.joint_names)
+
+    @property
+    def joint_limits(self) -> FloatArray:
+        """(j, 2) m or rad, low and high; -inf and inf: none."""
+        return np.tile([-np.inf, np.inf], (len(self.joint_names), 1))
+
+    @property
+    def configurations(self) -> tuple[str, ...]:
+        """Names of the ways to hold the same pose, one where there is no choice."""
+        return ("",)
+
+    @property
+    def singularity_names(self) -> tuple[str, ...]:
+        """Of the s measures that vanish where the machine is singular."""
+        return ()
+
+    @property
+    def singularity_margins(self) -> tuple[float, ...]:
+        """Smallest admissible value of each measure, which is 1 at most."""
+        return ()
+
+    def singularities(self, stance: Stance) -> FloatArray:
+        """(n, s) the measures at n poses."""
+        return np.empty((len(stance.joints), 0))
+
+    @property
+    def elements(self) -> tuple[Element, ...]:
+        """What gives way, in the order of `Stance.loads`."""
+        raise NotImplementedError
+
+    def rotation_of(self, abc: FloatArray) -> FloatArray:
+        """(n, 3, 3) orientation of the tool in work axes of programmed angles (n, 3) rad: roll, pitch, yaw."""
+        return rotation_matrices(abc)
+
+    def angles_of(self, abc: FloatArray) -> FloatArray:
+        """(n, 3) rad, roll, pitch, yaw of the tool in work axes of programmed angles (n, 3) rad."""
+        plain = type(self).rotation_of is MachineTool.rotation_of or not abc.any()
+        return abc if plain else roll_pitch_yaw(self.rotation_of(abc))
+
+    def solve(
+        self,
+        position: FloatArray,
+        rotation: FloatArray | None = None,
+        tool_length: ArrayLike = np.nan,
+        configuration: int | None = None,
+        start: FloatArray | None = None,
+    ) -> Stance:
+        """How the machine stands at n poses, the inverse kinematics.
+
+        Parameters
+        ----------
+        position, rotation
+            (n, 3) m, the tip, and (n, 3, 3), the tool's axes, in work axes; None: upright.
+        tool_length
+            m, scalar or (n,); nan: the reference tool.
+        configuration
+            Index into `configurations`, kept at all poses; None: at each pose that furthest from the joints' limits.
+        start
+            (j,) joints before the first pose of a path, from which turns are counted on; None: nearest the middle.
+        """
+        raise NotImplementedError
+
+    def forward(self, joints: FloatArray, tool_length: ArrayLike = np.nan) -> tuple[FloatArray, FloatArray]:
+        """(n, 3) m, the tip, and (n, 3, 3), the tool's axes, in work axes, of joints (n, j) m or rad."""
+        raise NotImplementedError
+
+    def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
+        """Bodies of a drawing by name, (n, p, 3) m in base axes."""
+        raise NotImplementedError
+
+    def extension(self, tool_length: ArrayLike) -> FloatArray:
+        """M by which tools are longer than the reference tool; nan of either, the reference tool's: 0."""
+        return np.nan_to_num(np.asarray(tool_length, dtype=float) - self.reference_tool_length)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hexapod(MachineTool):
+    """A six-strut platform machine, SI units.
+
+    Attributes
+    ----------
+    frame_joints
+        (6, 3) m, base frame; row i belongs to strut i + 1.
+    platform_joints
+        (6, 3) m, platform frame, relative to the tip of the reference tool.
+    strut_law
+        Stiffness of a strut over its length.
+    platform_bar_stiffness
+        N/m of each bar of the platform truss; inf: rigid.
+    """
+
+    kind: ClassVar[str] = "hexapod"
+
+    reference_tool_length: float
+    frame_joints: FloatArray
+    platform_joints: FloatArray
+    strut_law: StrutLaw
+    platform_bar_stiffness: float = np.inf
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The struts."""
+        return tuple(f"strut{i}" for i in range(1, 7))
 
     def platform_joints_for(self, tool_length: ArrayLike) -> FloatArray:
         """(6, 3) m, or (n, 6, 3) for n lengths: platform joints relative to the tip of such a tool, nan: of reference.
@@ -293,9 +408,13 @@ class Hexapod:
         extension = np.where(np.isnan(length), 0.0, length - self.reference_tool_length)
         return np.asarray(self.platform_joints + extension[..., None, None] * np.array([0.0, 0.0, 1.0]))
 
-    def with_changes(self, **changes: Any) -> Hexapod:
-        """A copy with some attributes replaced."""
-        return replace(self, **changes)
+
+def as_hexapod(machine: MachineTool, asking: str) -> Hexapod:
+    """The machine of six struts. Raises `InputError` of another kind: `asking` begins the sentence."""
+    if isinstance(machine, Hexapod):
+        return machine
+    mistake = f"{asking} knows machines of six struts only: {machine.name} is of kind {machine.kind}"
+    raise InputError(mistake, expected="a hexapod; other kinds are analyzed, mapped, placed and compared")
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """What a machine file may hold: sections, keys, units, bounds; and values held against it, one fault a message."""
 
 import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,9 @@ class MachineToml(TomlReader):
         """An error at a key of a section, or at the section itself."""
         label = f"[{section}] {key}".strip() if section else key
         line = self.line_of(section, key)
+        if section.endswith("]"):  # a row of a list of tables
+            name, _, number = section[:-1].partition("[")
+            label, line = f"[[{name}]] {number} {key}".strip(), line or self.line_at(section)
         return InputError(f"{label}{mistake}", expected=expected, hint=hint, file=self.file, line=line)
 
 
@@ -73,9 +77,18 @@ JOINTS = {
 }
 ANGLE = Key(unit="deg", low=0.0, high=180.0, open_low=True, infinite=True)
 CORNER = Key(unit="mm", shape=(3,))
+# Sections of every kind of machine.
+NAMES = {"name": Key(text=True), **dict.fromkeys(("kind", "title", "source"), Key(text=True, required=False))}
+SETUP = {
+    "default_origin_mm": Key(unit="mm[, deg]", shape=(3,), also_length=6),
+    "rapid_mm_per_min": Key(unit="mm/min", low=0.0, high=1e6, open_low=True),
+    "name": Key(text=True, required=False),
+    "names": Key(text=True, shape=(0,), required=False),
+    "temperature_C": Key(unit="degrees C", low=-50.0, high=200.0, required=False),
+}
 
 SECTIONS: dict[str, dict[str, Key]] = {
-    "": {"name": Key(text=True), "title": Key(text=True, required=False), "source": Key(text=True, required=False)},
+    "": NAMES,
     **dict.fromkeys(("frame_joints", "platform_joints"), JOINTS),
     "reference_tool": {"length_mm": Key(unit="mm", low=0.0, high=2000.0)},
     "strut_law": {
@@ -91,49 +104,47 @@ SECTIONS: dict[str, dict[str, Key]] = {
     },
     "limits.workspace": {"min_mm": CORNER, "max_mm": CORNER},
     "limits.singularity": {"min_index": Key(low=0.0, high=1.0)},
-    "setup": {
-        "default_origin_mm": Key(unit="mm[, deg]", shape=(3,), also_length=6),
-        "rapid_mm_per_min": Key(unit="mm/min", low=0.0, high=1e6, open_low=True),
-        "name": Key(text=True, required=False),
-        "names": Key(text=True, shape=(0,), required=False),
-        "temperature_C": Key(unit="degrees C", low=-50.0, high=200.0, required=False),
-    },
+    "setup": SETUP,
 }
 OPTIONAL_SECTIONS = ("limits.joint_angle", "limits.workspace", "limits.singularity", "platform", "setup")
 BESIDE = ("effect", "instrument", "uncertainty")  # sections that others read
 
+Schema = Mapping[str, Mapping[str, Key]]
 Sections = dict[str, Document]  # section -> key -> value in the units of the file; lists as arrays
 
 
-def read_sections(toml: MachineToml) -> Sections:
-    """The sections of the schema, each key checked; unknown and missing ones are errors."""
+def read_sections(toml: MachineToml, schema: Schema, optional: Collection[str], stated: bool = True) -> Sections:
+    """The sections of a file, each key checked; unknown and missing ones are errors.
+
+    `schema` is section -> keys, "" the keys above all sections, `[]` after the name of a list of tables, which
+    `read_rows` reads; sections that may be missing are `optional`. `stated`: each says where its figures come from.
+    """
     top: dict[str, object] = {}
     sections: Sections = {"": top}
     for name, content in toml.data.items():
-        nested = name == "limits" and isinstance(content, dict)
+        nested = name == "limits" and isinstance(content, dict) and "limits" not in schema
         for full, part in ((f"limits.{key}", part) for key, part in content.items()) if nested else [(name, content)]:
-            if full in BESIDE:
+            if full in BESIDE or f"{full}[]" in schema:
                 continue
-            if full in SECTIONS:
+            if full in schema:
                 if not isinstance(part, dict):
                     raise toml.fault("", full, f" = {part!r}", expected=f"a section [{full}]")
                 sections[full] = part
             elif nested or isinstance(part, dict):
-                known = ", ".join(f"[{section}]" for section in SECTIONS if section)
+                known = ", ".join(f"[[{name[:-2]}]]" if name[-2:] == "[]" else f"[{name}]" for name in schema if name)
                 expected = f"one of {known}, [[effect]], [[instrument]], [uncertainty]"
                 line = toml.line_at(full)
                 raise InputError(f"unknown section [{full}]", expected=expected, file=toml.file, line=line)
             else:
                 top[full] = part
-    for name in SECTIONS:
-        if name not in sections and name not in OPTIONAL_SECTIONS:
+    for name in schema:
+        if name not in sections and name not in optional and name[-2:] != "[]":
             hint = "`tps machine new template.toml` writes a template with every section"
             raise InputError(f"section [{name}] is missing", hint=hint, file=toml.file)
-    return {name: _section(toml, name, content) for name, content in sections.items()}
+    return {name: _section(toml, name, content, schema[name], stated) for name, content in sections.items()}
 
 
-def _section(toml: MachineToml, name: str, content: Document) -> Document:
-    keys = SECTIONS[name]
+def _section(toml: MachineToml, name: str, content: Document, keys: Mapping[str, Key], stated: bool) -> Document:
     allowed = [*keys, *(("origin", "remark") if name else ())]
     for key in content:
         if key not in allowed:
@@ -141,10 +152,19 @@ def _section(toml: MachineToml, name: str, content: Document) -> Document:
     for key, rule in keys.items():
         if rule.required and key not in content:
             raise toml.fault(name, key, " is missing", expected=rule.expected)
-    if name and name != "setup" and content.get("origin") not in ORIGINS:
+    needed = stated and name not in ("", "setup")
+    if (needed or "origin" in content) and name != "setup" and content.get("origin") not in ORIGINS:
         mistake = f" = {content['origin']!r}" if "origin" in content else " is missing"
         raise toml.fault(name, "origin", mistake, expected=f"one of {', '.join(ORIGINS)}")
     return {key: _value(toml, name, key, v, keys[key]) if key in keys else str(v) for key, v in content.items()}
+
+
+def read_rows(toml: MachineToml, name: str, keys: Mapping[str, Key]) -> list[Document]:
+    """The tables `[[name]]` of a file, each key checked as of a section; errors name the row."""
+    rows = toml.data.get(name, [])
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise toml.fault("", name, f" is not a list of tables; write [[{name}]]")
+    return [_section(toml, f"{name}[{nth}]", row, keys, stated=False) for nth, row in enumerate(rows, 1)]
 
 
 def _value(toml: MachineToml, section: str, key: str, raw: Any, rule: Key) -> Any:

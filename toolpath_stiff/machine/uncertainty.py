@@ -7,7 +7,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.error_model import GEOMETRY, ErrorModel, coordinates
-from toolpath_stiff.machine.model import EffectEntry, StrutLaw, Uncertainty
+from toolpath_stiff.machine.model import EffectEntry, Uncertainty
 from toolpath_stiff.machine.schema import MachineToml, as_array
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
@@ -23,8 +23,10 @@ ERROR_KEYS = {
 NOT_NEGATIVE = -1e-8  # smallest eigenvalue of a correlation matrix that rounding in a file may leave
 
 
-def read_uncertainty(toml: MachineToml, law: StrutLaw, entries: Sequence[EffectEntry]) -> Uncertainty | None:
-    """The section of a file with this strut law and these effects; None where there is none. Raises `InputError`."""
+def read_uncertainty(
+    toml: MachineToml, parameters: Sequence[str], entries: Sequence[EffectEntry]
+) -> Uncertainty | None:
+    """The section of a file with these parameters and effects; None where there is none. Raises `InputError`."""
 
     def fault(key: str, mistake: str, expected: str) -> InputError:
         return toml.fault("uncertainty", key, mistake, expected)
@@ -40,7 +42,7 @@ def read_uncertainty(toml: MachineToml, law: StrutLaw, entries: Sequence[EffectE
     for key in KEYS:
         if key not in table:
             raise fault(key, " is missing", "parameters, sd and correlation")
-    names, known = table["parameters"], [*law.parameters, *(f"{e.name}.{key}" for e in entries for key in e.parameters)]
+    names, known = table["parameters"], [*parameters, *(f"{e.name}.{key}" for e in entries for key in e.parameters)]
     if not isinstance(names, list) or not names or len(set(map(str, names))) != len(names):
         raise fault("parameters", f" = {names!r}", "a list of parameters, each once")
     for name in names:

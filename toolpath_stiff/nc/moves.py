@@ -216,6 +216,11 @@ class ReadProgram:
     parametric: bool = False
     stock: Blank | None = None
 
+    @property
+    def native(self) -> bool:
+        """Whether its words A, B, C are those of the machine that it runs on, not recovered from another one's."""
+        return not self.kinematics and self.dialect != CUTTER_LOCATION
+
     def __repr__(self) -> str:
         return f"<ReadProgram {self.name}: {len(self.moves)} moves, read as {self.dialect}>"
 

@@ -5,7 +5,7 @@ Samples follow the true path: lines, arcs, helices, spirals; all moves at once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.rotations import along_tool_axis
 from toolpath_stiff.units import mm_from_m, rad_from_deg
 
+Orient = Callable[[FloatArray], FloatArray]  # programmed angles (n, 3) rad to roll, pitch, yaw on the machine
 ANGULAR_STEP = rad_from_deg(1.0)  # largest turn of a rotary axis between two samples
 BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cache
 BORDER = np.cos(defaults.PLUNGE_ANGLE) - 1e-12  # of the cosine; beyond it a sample is a cut whatever rounding does
@@ -122,6 +123,7 @@ def sample_moves(
     step: float,
     rapid_feed: float = defaults.RAPID_FEED,
     origin: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    angles_of: Orient | None = None,
 ) -> Samples:
     r"""Sample moves along their true path, both ends of every move included.
 
@@ -138,6 +140,8 @@ def sample_moves(
         m/s of rapid moves, for the time.
     origin
         The placement that `moves` were placed with: it turns the orientations.
+    angles_of
+        Roll, pitch, yaw of the tool (n, 3) of programmed angles (n, 3); None: they are these.
 
     Raises
     ------
@@ -157,7 +161,11 @@ def sample_moves(
     """
     length = move_lengths(moves)
     pieces = _pieces(moves, length, step)
-    border = _plunge_borders(moves, pieces, length, origin)
+
+    def orient(programmed: FloatArray) -> FloatArray:
+        return place_orientations(programmed if angles_of is None else angles_of(programmed), origin)
+
+    border = _plunge_borders(moves, pieces, length, orient)
     counts = pieces.astype(np.int64) + 1 + np.bincount(border[0], minlength=len(moves))
     duration = move_durations(moves, rapid_feed)
     columns = {
@@ -175,7 +183,7 @@ def sample_moves(
         some = {name: column[block] for name, column in columns.items()}
         put = slice(*np.searchsorted(border[0], (block.start, block.stop)))
         extra = border[0][put] - block.start, border[1][put]
-        _sample_block(moves.take(block), counts[block], some, extra, block.start, origin, samples.take(rows))
+        _sample_block(moves.take(block), counts[block], some, extra, block.start, orient, samples.take(rows))
     return replace(samples, **{name: held_once(getattr(samples, name)) for name in HELD})
 
 
@@ -190,23 +198,23 @@ def _blocks(counts: IntArray) -> Iterator[slice]:
 
 
 def _plunge_borders(
-    moves: Moves, pieces: FloatArray, length: FloatArray, origin: ArrayLike
+    moves: Moves, pieces: FloatArray, length: FloatArray, orient: Orient
 ) -> tuple[IntArray, FloatArray]:
     """(k,) move and (k,) share of it where a plunge becomes a cut or a cut a plunge, in order along the path."""
-    upright = along_tool_axis(moves.arc_normal, place_orientations(moves.start[:, 3:], origin))
+    upright = along_tool_axis(moves.arc_normal, orient(moves.start[:, 3:]))
     turn = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).sum(axis=1)
     # An arc across the axis keeps its angle to it.
     leaning = (moves.arc_sweep != 0.0) & (np.abs(upright) < 1.0 - ROUNDED)
     rows = np.flatnonzero((moves.motion != RAPID) & (length > 0.0) & (leaning | (turn > 0.0)))
     # Lines lean by no more than the axes turn.
-    lean = np.arccos(np.minimum(np.abs(_along(moves, rows, np.zeros(len(rows)), origin)), 1.0))
+    lean = np.arccos(np.minimum(np.abs(_along(moves, rows, np.zeros(len(rows)), orient)), 1.0))
     near = np.abs(lean - defaults.PLUNGE_ANGLE) <= turn[rows] + ROUNDED
     rows = rows[near | (moves.arc_sweep[rows] != 0.0)]
     # A plunge within a small arc may be narrower than the step.
     finer = np.maximum(np.ceil(np.abs(moves.arc_sweep[rows]) / ANGULAR_STEP / pieces[rows]), 1.0).astype(np.int64)
     counts = finer * pieces[rows].astype(np.int64)
     borders = [
-        _borders_of_block(moves, rows[block], counts[block], finer[block], origin) for block in _blocks(counts + 1)
+        _borders_of_block(moves, rows[block], counts[block], finer[block], orient) for block in _blocks(counts + 1)
     ]
     return (
         np.concatenate([np.empty(0, dtype=np.int64), *(move for move, _ in borders)]),
@@ -215,27 +223,27 @@ def _plunge_borders(
 
 
 def _borders_of_block(
-    moves: Moves, rows: IntArray, counts: IntArray, finer: IntArray, origin: ArrayLike
+    moves: Moves, rows: IntArray, counts: IntArray, finer: IntArray, orient: Orient
 ) -> tuple[IntArray, FloatArray]:
     """The same of some moves divided into `counts` pieces, of which `finer` lie between two samples."""
     moves, move = moves.take(rows), np.repeat(np.arange(len(rows)), counts + 1)
     index = np.arange(len(move)) - np.repeat(np.cumsum(counts + 1) - counts - 1, counts + 1)
-    plunge = np.abs(_along(moves, move, index / counts[move], origin)) >= BORDER
+    plunge = np.abs(_along(moves, move, index / counts[move], orient)) >= BORDER
     before = np.flatnonzero((plunge[1:] != plunge[:-1]) & (move[1:] == move[:-1]))
     move, cut = move[before], index[before + plunge[before]]
     inner, outer = index[before + ~plunge[before]] / counts[move], cut / counts[move]
     for _ in range(HALVINGS):
         middle = 0.5 * (inner + outer)
-        plunges = np.abs(_along(moves, move, middle, origin)) >= BORDER
+        plunges = np.abs(_along(moves, move, middle, orient)) >= BORDER
         inner, outer = np.where(plunges, middle, inner), np.where(plunges, outer, middle)
     new = (outer != cut / counts[move]) | (cut % finer[move] != 0)  # else it is a sample anyway
     return rows[move[new]], outer[new]
 
 
-def _along(moves: Moves, move: IntArray, u: FloatArray, origin: ArrayLike) -> FloatArray:
+def _along(moves: Moves, move: IntArray, u: FloatArray, orient: Orient) -> FloatArray:
     """(n,) cosine of the angle between the motion of the tip and the tool axis at shares u of moves."""
     first = moves.start[move, 3:]
-    abc = place_orientations(first + u[:, None] * (moves.end[move, 3:] - first), origin)
+    abc = orient(first + u[:, None] * (moves.end[move, 3:] - first))
     return along_tool_axis(points_along(moves, move, u)[1], abc)
 
 
@@ -273,7 +281,7 @@ def _sample_block(
     columns: dict[str, FloatArray],
     border: tuple[IntArray, FloatArray],
     first_move: int,
-    origin: ArrayLike,
+    orient: Orient,
     into: Samples,
 ) -> None:
     """Samples of some moves, into their rows. `columns` holds what is known of each move, `border` further shares."""
@@ -291,7 +299,7 @@ def _sample_block(
     if turned.any():
         programmed += u[:, None] * np.repeat(turned, counts, axis=0)
         programmed[last] = moves.end[:, 3:]
-    angles = place_orientations(programmed, origin)
+    angles = orient(programmed)
     if angles.any():  # pages of zeros that nobody writes to take no memory
         into.abc[:] = angles
     into.move[:] = move + first_move

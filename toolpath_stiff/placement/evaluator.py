@@ -13,11 +13,13 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from toolpath_stiff.analysis.evaluation import evaluate
+from toolpath_stiff.analysis.evaluation import MOST_TRIED, WorkPoses, evaluate, evaluate_stance
 from toolpath_stiff.analysis.loads import Load, geometric_directions
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, product
+from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Extremes, reach
+from toolpath_stiff.machine.model import NO_END, Hexapod, as_hexapod
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
@@ -114,6 +116,12 @@ class Evaluator:
         turn = rotation_matrices(placements[:, 3:])
         position = _turned(turn, self.position) + placements[:, :3].T[:, :, None]
         motion, rotation = _turned(turn, self.tangent), self._orientations(placements, turn)
+        clearance = np.broadcast_to(np.inf, (k, n))
+        for box in self.keepouts:
+            clearance = np.minimum(clearance, box.clearances(np.moveaxis(position, 0, -1)))
+        if not isinstance(self.model.machine, Hexapod):
+            stiffness, margin = self._of_elements(position, motion, rotation)
+            return PlacedRows(stiffness, np.full((k, n), NO_END), margin, clearance)
         along, margin, law = np.empty((3, k, n))
         for tool, rows in self.of_one_tool:
             some = None if rotation is None else rotation[:, :, rows].reshape(9, -1)
@@ -127,9 +135,6 @@ class Evaluator:
         else:
             stiffness = np.full((k, n), np.nan)
             stiffness[:, self.head] = self._with_effects(position, motion, rotation, margin)
-        clearance = np.broadcast_to(np.inf, (k, n))
-        for box in self.keepouts:
-            clearance = np.minimum(clearance, box.clearances(np.moveaxis(position, 0, -1)))
         return PlacedRows(stiffness, law, margin, clearance)
 
     def summary(self, rows: PlacedRows) -> PlacementFigures:
@@ -181,11 +186,50 @@ class Evaluator:
         rotation[:, 1] = sine * first + cosine * second
         return rotation.reshape(9, k, n)
 
+    def _of_elements(
+        self, position: FloatArray, motion: FloatArray, rotation: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """(k, n) N/m at headline samples where all cuts are within reach, and (k, n) margins; a machine of elements."""
+        machine, (k, n) = self.model.machine, position.shape[1:]
+        stiffness, margin = np.full((k, n), np.nan), np.empty((k, n))
+
+        def poses(columns: FloatArray, where: tuple[IntArray, IntArray]) -> FloatArray:
+            return np.ascontiguousarray(columns[:, where[0]][:, :, where[1]]).reshape(len(columns), -1)
+
+        def stand(rows: IntArray, samples: IntArray, configuration: int | None) -> tuple[Stance, WorkPoses]:
+            where = (rows, samples)
+            turns = None if rotation is None else _matrices(poses(rotation, where))
+            tip, towards = poses(position, where).T, poses(motion, where).T
+            tools = np.tile(self.path.tool_length[samples], len(rows))
+            return machine.solve(tip, turns, tools, configuration), (tip, turns, towards)
+
+        every, chosen = np.arange(k), np.zeros(k, dtype=np.int64)
+        if (count := len(machine.configurations)) > 1:
+            few = np.unique(np.linspace(0, n - 1, MOST_TRIED).round().astype(np.int64))
+            tried = (stand(every, few, i) for i in range(count))
+            margins = [
+                reach(machine, in_work[0], stance).margin.reshape(k, -1).min(axis=1) for stance, in_work in tried
+            ]
+            chosen = np.argmax(margins, axis=0)
+        for configuration in np.unique(chosen).tolist():
+            rows = np.flatnonzero(chosen == configuration)
+            stance, in_work = stand(rows, np.arange(n), configuration)
+            margin[rows] = reach(machine, in_work[0], stance).margin.reshape(-1, n)
+            possible = np.asarray(margin[rows][:, self.cuts] >= 0.0).all(axis=1)
+            wanted = np.flatnonzero((possible[:, None] & self.path.headline).ravel())
+            if len(wanted):
+                tip, turns, towards = in_work
+                some = tip[wanted], None if turns is None else turns[wanted], towards[wanted]
+                values = np.full(len(rows) * n, np.nan)
+                values[wanted] = evaluate_stance(self.model, stance.take(wanted), some, self.load).stiffness
+                stiffness[rows] = values.reshape(-1, n)
+        return stiffness, margin
+
     def _kernel_rows(
         self, tool: float, tip: FloatArray, motion: FloatArray, rotation: FloatArray | None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Compliance along the load, margin and law of n poses with one tool; (3, n), (3, n), (9, n)."""
-        machine, turns = self.model.machine, _matrices(rotation)
+        machine, turns = as_hexapod(self.model.machine, "the closed form"), _matrices(rotation)
         direction = motion
         if self.direct and self.load.kind != "tangential":
             direction = np.ascontiguousarray(geometric_directions(self.load, tip.T, turns, motion.T)[0].T)

@@ -14,6 +14,7 @@ import numpy as np
 from toolpath_stiff.analysis.loads import Load, headline_rows, plunging_rows
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.path.sampling import Samples, sample_moves
@@ -61,7 +62,9 @@ class WorkPath(ArrayColumns):
         return replace(some, headline=np.ones(len(some), dtype=bool))
 
 
-def work_path(program: ReadProgram, step: float, load: Load | None = None) -> WorkPath:
+def work_path(
+    program: ReadProgram, step: float, load: Load | None = None, machine: MachineTool | None = None
+) -> WorkPath:
     """Sample a program in the set-up frame.
 
     Parameters
@@ -72,6 +75,8 @@ def work_path(program: ReadProgram, step: float, load: Load | None = None) -> Wo
         Distance of the samples, m.
     load
         Says which samples the headline figures are about; tangential unless given.
+    machine
+        What the program's words A, B, C mean; None: roll, pitch, yaw.
 
     Raises
     ------
@@ -88,7 +93,8 @@ def work_path(program: ReadProgram, step: float, load: Load | None = None) -> Wo
             line=int(moves.line[np.argmax(fixed)]),
         )
     bound[:1] |= moves.motion[:1] == RAPID
-    samples = sample_moves(moves, step)
+    words = machine.angles_of if machine is not None and program.native else None
+    samples = sample_moves(moves, step, angles_of=words)
     samples = samples.take(~bound[samples.move])
     counted = samples.cutting & (samples.weight > 0.0)
     headline = headline_rows(counted, plunging_rows(load or Load(), samples.tangent, samples.abc, counted))

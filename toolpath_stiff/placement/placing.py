@@ -55,7 +55,7 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     'WORSE: at the recommended placement the mean is lower than at the present one'
     """
     _check(task)
-    path = work_path(task.program, task.step, task.load)
+    path = work_path(task.program, task.step, task.load, task.model.machine)
     search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, np.array(task.present))
     search.report, search.errors = progress or search.report, task.errors
     found = search_placements(search)

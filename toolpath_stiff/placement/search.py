@@ -13,8 +13,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import UnreachableError
-from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import reach
+from toolpath_stiff.machine.limits import reach, solved
 from toolpath_stiff.placement.climb import Climber
 from toolpath_stiff.placement.evaluator import PlacementFigures
 from toolpath_stiff.placement.goals import Goal
@@ -368,7 +367,7 @@ def _infeasible(search: Search, placement: FloatArray) -> UnreachableError:
     path, rules, machine = search.path, search.rules, search.model.machine
     position, _, abc = placed_path(path, placement)
     rotation = rotation_matrices(abc)
-    limits = reach(machine, position, solve_struts(machine, position, rotation, path.tool_length), rotation)
+    limits = reach(machine, position, solved(machine, position, rotation, path.tool_length), rotation)
     rows, row = search.whole.rows(placement[None]), int(np.argmin(limits.margin))
     margin, clearance = float(limits.margin[row]), rows.clearance[0]
     hint = "widen the bounds, or cut the part in two set-ups"

@@ -245,7 +245,7 @@ class Ground:
         """(n, 6, 6) of the tip, forces and moments."""
         machine = self.path.machine
         machine = machine.with_changes(strut_law=scaled_law(machine.strut_law, self.law))
-        path = replace(self.path, machine=machine)
+        path = replace(self.path, machine_tool=machine)
         links = exact.assemble_links(replace(self.predictor.base, machine=machine), path)
         return exact.respond(path, *links, np.broadcast_to(np.eye(6), (len(path), 6, 6)))[0]
 

@@ -22,8 +22,12 @@ from toolpath_stiff.units import m_from_mm, s_from_min
 FORCES = ("fx_N", "fy_N", "fz_N")
 FEEDS = ("feed_per_tooth_mm", "feed_mm_per_min")
 ComplexArray = NDArray[np.complex128]
-COLUMNS = Columns(numbers=("time_s", *FORCES, *FEEDS, "spindle_rpm", "depth_mm"), texts=("record",))
-LAYOUT = "time_s, fx_N, fy_N, fz_N, feed_per_tooth_mm or feed_mm_per_min, spindle_rpm, depth_mm; record, if several"
+RATE = "sample_rate_Hz"  # instead of time_s
+COLUMNS = Columns(numbers=("time_s", RATE, *FORCES, *FEEDS, "spindle_rpm", "depth_mm"), texts=("record",))
+LAYOUT = (
+    "time_s or sample_rate_Hz, fx_N, fy_N, fz_N, feed_per_tooth_mm or feed_mm_per_min, spindle_rpm, depth_mm; record, "
+    "if several"
+)
 CUTS, AIR = 0.5, 1.5  # swing of turns that cut, of the strongest ones'; of turns in air, of the quietest ones'
 STRONG = 90.0  # per cent of the turns that are weaker than the strongest, and stronger than the quietest
 LEAST_TURNS = 5  # of the full slot
@@ -43,10 +47,13 @@ def read_records(
     """
     table = mapped_table(file, "records of forces", COLUMNS, columns)
     feed = next((name for name in FEEDS if name in table.heading), FEEDS[0])
-    check_needed(table, ("time_s", "fy_N", "spindle_rpm", "depth_mm", feed), LAYOUT)
+    clock = RATE if RATE in table.heading else "time_s"
+    check_needed(table, (clock, "fy_N", "spindle_rpm", "depth_mm", feed), LAYOUT)
     cells = [table.record(row) for _, row in table.rows]
     names, lines = np.array([row.get("record", "") for row in cells]), np.array([line for line, _ in table.rows])
-    signal = np.stack([_numbers(table, cells, name) for name in ("time_s", *FORCES)], axis=1)
+    signal = np.stack([_numbers(table, cells, name) for name in (clock, *FORCES)], axis=1)
+    if clock == RATE:
+        signal[:, 0] = np.arange(len(signal)) / signal[:, 0]
     rate, depth, fed = (_numbers(table, cells, name) for name in ("spindle_rpm", "depth_mm", feed))
     for name in dict.fromkeys(names.tolist()):
         rows = np.flatnonzero(names == name)

@@ -27,7 +27,9 @@ PARTS = {"YYYY": "%Y", "YY": "%y", "MM": "%m", "DD": "%d", "hh": "%H", "mm": "%M
 
 
 def mapped_table(path: str, what: str, columns: Columns, mapping: Mapped = None) -> Table:
-    """A table, its columns named by the mapping, or by the one that is kept beside the file; dates in ISO 8601.
+    """A table, its columns named by the mapping and by the one that is kept beside the file; dates in ISO 8601.
+
+    Where both name a column the mapping holds.
 
     Raises
     ------
@@ -36,10 +38,11 @@ def mapped_table(path: str, what: str, columns: Columns, mapping: Mapped = None)
     """
     beside = Path(split_name(path)[0] + BESIDE)
     remarks: tuple[str, ...] = ()
-    if mapping is None and beside.is_file():
-        mapping = TomlReader.read(beside, "a mapping of columns", MeasurementError).data
+    sources: dict[str, Source] = {}
+    if beside.is_file():
+        sources = sources_of(TomlReader.read(beside, "a mapping of columns", MeasurementError).data, columns)
         remarks = (f"as {beside} says",)
-    sources = sources_of(mapping, columns) if mapping else {}
+    sources |= sources_of(mapping, columns) if mapping else {}
     table = read_table(path, what, replace(columns, sources=sources))
     form = sources[DATE].unit if DATE in sources else ""
     if form:

@@ -1,14 +1,15 @@
 """Poses of readings, held against what the machine can be: beyond a limit is doubtful, singular is impossible."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputErrors, MeasurementError
-from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
-from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.elements import Stance
+from toolpath_stiff.machine.kinematics import Struts, singularity_index
+from toolpath_stiff.machine.limits import reach, solved
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
@@ -18,7 +19,7 @@ SECTIONS = ("strut_length", "joint_angle", "workspace", "singularity")
 
 
 def pose_warnings(
-    machine: Hexapod,
+    machine: MachineTool,
     position: FloatArray,
     angles: FloatArray,
     tool_extension: FloatArray,
@@ -40,24 +41,15 @@ def pose_warnings(
     InputErrors
         Singular and impossible poses, all of them.
     """
-    rotation = rotation_matrices(angles)
-    struts = solve_struts(machine, position, rotation, tool_extension + machine.reference_tool_length)
-    index, poses = singularity_index(machine, struts), [*map(_shown, position, angles)]
-    stiffness = machine.strut_law.stiffness(struts.lengths)
-    errors = []
-    for i in range(len(position)):
-        if not index[i] >= SINGULAR:
-            mistake = f"pose {poses[i]} is singular: the struts cannot hold the platform"
-        elif stiffness[i].min() <= 0.0:
-            mistake = (
-                f"pose {poses[i]} is impossible: strut {int(np.argmin(stiffness[i])) + 1} would have no stiffness left"
-            )
-        else:
-            continue
-        errors.append(MeasurementError(mistake, hint="check the pose's unit", file=places[i][0], line=places[i][1]))
+    rotation, poses = rotation_matrices(angles), [*map(_shown, position, angles)]
+    stance = solved(machine, position, rotation, tool_extension + machine.reference_tool_length)
+    stand, errors = reach(machine, position, stance, rotation), []
+    for i, reason in enumerate(_impossible(machine, stance)):
+        if reason:
+            mistake, (file, line) = f"pose {poses[i]} is {reason}", places[i]
+            errors.append(MeasurementError(mistake, hint="check the pose's unit", file=file, line=line))
     if errors:
         raise InputErrors(errors)
-    stand = reach(machine, position, struts, rotation)
     beyond: dict[str, list[int]] = {}
     for row in np.flatnonzero(~stand.reachable).tolist():
         beyond.setdefault(stand.limits[int(stand.limit[row])].name, []).append(row)
@@ -69,6 +61,23 @@ def pose_warnings(
             f"first of {len({poses[i] for i in rows})} poses. {stand.describe(rows[0])}"
         )
     return tuple(warnings)
+
+
+def _impossible(machine: MachineTool, stance: Struts | Stance) -> Iterator[str]:
+    """Of each pose why the machine cannot be there at all, or ""."""
+    if not isinstance(machine, Hexapod) or not isinstance(stance, Struts):
+        for row in stance.joints:
+            yield "impossible: no joint values lead there" if np.isnan(row).any() else ""
+        return
+    stiffness = machine.strut_law.stiffness(stance.lengths)
+    for index, of_struts in zip(singularity_index(machine, stance), stiffness, strict=True):
+        softest = int(np.argmin(of_struts))
+        if not index >= SINGULAR:
+            yield "singular: the struts cannot hold the platform"
+        elif of_struts[softest] <= 0.0:
+            yield f"impossible: strut {softest + 1} would have no stiffness left"
+        else:
+            yield ""
 
 
 def _shown(position: FloatArray, angles: FloatArray) -> str:

@@ -16,14 +16,15 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.elements import Stance
+from toolpath_stiff.machine.model import MachineTool, as_hexapod
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, offsets
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measured_poses import pose_warnings
 from toolpath_stiff.readings.rows import ANGLES, COLUMNS, LABELS, OPTIONAL, POSITION, VECTOR, Row, duplicates, read_rows
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness import element_sum, exact
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import Effect, LoadPath
 from toolpath_stiff.stiffness.loop_response import loop_compliance
@@ -156,7 +157,7 @@ class Readings:
 
 
 def read_measurements(
-    paths: str | Path | Iterable[str | Path], machine: Hexapod, planned: bool = False, columns: Mapped = None
+    paths: str | Path | Iterable[str | Path], machine: MachineTool, planned: bool = False, columns: Mapped = None
 ) -> Readings:
     """Read measurement files.
 
@@ -221,7 +222,7 @@ def _table_1() -> Table:
     )
 
 
-def _columns(rows: list[Row], notes: Sequence[str], machine: Hexapod) -> Readings:
+def _columns(rows: list[Row], notes: Sequence[str], machine: MachineTool) -> Readings:
     """Readings as columns; those of loops in m/N until `with_offsets`."""
 
     def numbers(name: str) -> FloatArray:
@@ -283,7 +284,7 @@ def _columns(rows: list[Row], notes: Sequence[str], machine: Hexapod) -> Reading
     )
 
 
-def with_offsets(data: Readings, machine: Hexapod, widest: float = WIDEST) -> Readings:
+def with_offsets(data: Readings, machine: MachineTool, widest: float = WIDEST) -> Readings:
     """The same with the readings of loops, until then m/N with their sd in m/N, as stiffnesses with offsets.
 
     `widest`: relative sd that no loop reading with its offset has more of.
@@ -292,7 +293,7 @@ def with_offsets(data: Readings, machine: Hexapod, widest: float = WIDEST) -> Re
         return data
     rows, loops = data.beside.beside, data.beside.loops
     read, sd = np.where(rows, data.stiffness, np.nan), np.where(rows, data.sd, np.nan)
-    plain = StiffnessModel(machine)
+    plain = StiffnessModel(as_hexapod(machine, "a reading beside the tip"))
     path = measured_path(plain, data)
     # A joint moves the way its strut does, which the plain machine's joints, being rigid, do not say.
     moving = [replace(loop, kind="strut", where="") if loop.kind == "joint" else loop for loop in loops]
@@ -394,7 +395,7 @@ def measured_path(model: StiffnessModel, data: Readings) -> LoadPath:
     path = load_path(model, data.position[first], data.rotation[first], length).take(which)
     return replace(
         path,
-        struts=path.struts if data.beside is None else data.beside.on_lengths(path.struts),
+        stance=path.stance if data.beside is None else data.beside.on_lengths(path.struts),
         force=data.force,
         direction=data.direction,
         setup=None if "setup" in data.missing else data.setup,
@@ -426,6 +427,8 @@ def mechanical_stiffness(
     `equilibrium`: strut forces as of `exact.compliance_along`.
     """
     if data.beside is None:
+        if isinstance(path.stance, Stance):
+            return np.asarray(1.0 / element_sum.compliance_along(model, path, data.direction))
         return np.asarray(1.0 / exact.compliance_along(model, path, data.direction, equilibrium))
     compliance = loop_compliance(model, path, data.direction, data.beside.loops, data.beside.which)
     joined = data.beside.joined(compliance)

@@ -24,12 +24,11 @@ from toolpath_stiff.report.tables import LABEL
 from toolpath_stiff.report.words import WIDTH, labelled
 from toolpath_stiff.results import one_of
 
-# Of `samples.csv`, Parquet and the DataFrame, with their decimals.
+# Of `samples.csv`, Parquet and the DataFrame, with their decimals; those of joints have 6.
 COLUMNS: dict[str, int | None] = {
     **PATH_COLUMNS,
     "stiffness_N_per_mm": 4,
     "deflection_um": 6,
-    **{f"strut{i}_mm": 6 for i in range(1, 7)},
     "margin": 6,
     **dict.fromkeys(("margin_limit", "operation", "cut")),
 }
@@ -46,7 +45,8 @@ def unwritten(table: str, cut: bool) -> tuple[str, ...]:
 
 def samples_csv(analysis: Analysis) -> Iterator[bytes]:
     """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
-    return csv_pieces(partial(sample_columns, analysis), len(analysis.samples), COLUMNS)
+    decimals = {name: COLUMNS.get(name, 6) for name in sample_columns(analysis, slice(0))}
+    return csv_pieces(partial(sample_columns, analysis), len(analysis.samples), decimals)
 
 
 def samples_parquet(analysis: Analysis) -> Iterator[bytes]:

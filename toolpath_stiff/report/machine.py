@@ -3,9 +3,12 @@
 from collections.abc import Iterable
 from typing import NamedTuple
 
+import numpy as np
+
 from toolpath_stiff.machine.limits import Reach
-from toolpath_stiff.machine.model import Hexapod, StrutLaw
+from toolpath_stiff.machine.model import Hexapod, MachineTool, StrutLaw
 from toolpath_stiff.poses import pose_in_mm
+from toolpath_stiff.report.machine_elements import Row, element_rows
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m
 
 
@@ -28,36 +31,20 @@ def _law_figures(law: StrutLaw) -> tuple[str, str]:
     return ", ".join([f"{first} mm", *rest]), "mm, linear between" if law.shape else "mm, linear"
 
 
-def machine_figures(machine: Hexapod) -> list[MachineFigure]:
+def machine_figures(machine: MachineTool) -> list[MachineFigure]:
     """All figures of a machine."""
+    rows = _hexapod_rows(machine) if isinstance(machine, Hexapod) else element_rows(machine)
     limits = machine.limits
-
-    def numbers(values: Iterable[float]) -> str:
-        return ", ".join(f"{round(float(v), 3) + 0.0:g}" if abs(v) < 1e5 else f"{v:g}" for v in values)
-
-    def joints(section: str, unit: str) -> list[tuple[str, str, str, str]]:
-        name = section.removesuffix("s").replace("_", " ")
-        rows = enumerate(mm_from_m(getattr(machine, section)), 1)
-        return [(section, f"{name} {i}", numbers(joint), unit) for i, joint in rows]
-
-    frame_angle, platform_angle = (
-        f"{deg_from_rad(angle):g}" for angle in (limits.frame_joint_angle, limits.platform_joint_angle)
-    )
     low, high = mm_from_m(limits.workspace)
-    rows = [
-        *joints("frame_joints", "mm"),
-        *joints("platform_joints", "mm from the tool tip"),
-        ("reference_tool", "reference tool length", f"{mm_from_m(machine.reference_tool_length):g}", "mm"),
-        ("strut_law", "strut stiffness", *_law_figures(machine.strut_law)),
-        ("platform", "platform bar stiffness", f"{machine.platform_bar_stiffness:g}", "N/m"),
-        ("limits.strut_length", "strut length", numbers(map(mm_from_m, limits.strut_length)), "mm"),
-        ("limits.joint_angle", "frame joint angle up to", frame_angle, "deg"),
-        ("limits.joint_angle", "platform joint angle up to", platform_angle, "deg"),
-        ("limits.joint_angle", "neutral pose of the joints", numbers(pose_in_mm(limits.neutral_pose)), "mm, deg"),
-        ("limits.workspace", "workspace from", numbers(low), "mm"),
-        ("limits.workspace", "workspace to", numbers(high), "mm"),
-        ("limits.singularity", "singularity index at least", f"{limits.singularity:g}", ""),
-        ("setup", "default origin (program zero)", numbers(pose_in_mm(machine.default_origin)), "mm, deg"),
+    if isinstance(machine, Hexapod) or np.isfinite(limits.workspace).all():
+        rows += [
+            ("limits.workspace", "workspace from", _numbers(low), "mm"),
+            ("limits.workspace", "workspace to", _numbers(high), "mm"),
+        ]
+    if isinstance(machine, Hexapod):
+        rows.append(("limits.singularity", "singularity index at least", f"{limits.singularity:g}", ""))
+    rows += [
+        ("setup", "default origin (program zero)", _numbers(pose_in_mm(machine.default_origin)), "mm, deg"),
         ("setup", "rapid feed", f"{mm_per_min_from_m_per_s(machine.rapid_feed):g}", "mm/min"),
     ]
     origins, remarks = machine.origins, machine.remarks
@@ -67,7 +54,35 @@ def machine_figures(machine: Hexapod) -> list[MachineFigure]:
     ]
 
 
-def text(machine: Hexapod, stand: Reach) -> str:
+def _numbers(values: Iterable[float]) -> str:
+    return ", ".join(f"{round(float(v), 3) + 0.0:g}" if abs(v) < 1e5 else f"{v:g}" for v in values)
+
+
+def _hexapod_rows(machine: Hexapod) -> list[Row]:
+    limits = machine.limits
+
+    def joints(section: str, unit: str) -> list[Row]:
+        name = section.removesuffix("s").replace("_", " ")
+        rows = enumerate(mm_from_m(getattr(machine, section)), 1)
+        return [(section, f"{name} {i}", _numbers(joint), unit) for i, joint in rows]
+
+    frame_angle, platform_angle = (
+        f"{deg_from_rad(angle):g}" for angle in (limits.frame_joint_angle, limits.platform_joint_angle)
+    )
+    return [
+        *joints("frame_joints", "mm"),
+        *joints("platform_joints", "mm from the tool tip"),
+        ("reference_tool", "reference tool length", f"{mm_from_m(machine.reference_tool_length):g}", "mm"),
+        ("strut_law", "strut stiffness", *_law_figures(machine.strut_law)),
+        ("platform", "platform bar stiffness", f"{machine.platform_bar_stiffness:g}", "N/m"),
+        ("limits.strut_length", "strut length", _numbers(map(mm_from_m, limits.strut_length)), "mm"),
+        ("limits.joint_angle", "frame joint angle up to", frame_angle, "deg"),
+        ("limits.joint_angle", "platform joint angle up to", platform_angle, "deg"),
+        ("limits.joint_angle", "neutral pose of the joints", _numbers(pose_in_mm(limits.neutral_pose)), "mm, deg"),
+    ]
+
+
+def text(machine: MachineTool, stand: Reach) -> str:
     """Figures with their origin, remarks, and how the pose that is drawn stands to the limits."""
     rows = machine_figures(machine)
     width = max(len(row[0]) for row in rows)

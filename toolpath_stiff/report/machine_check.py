@@ -3,7 +3,7 @@
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.machine_check import BEYOND, MACHINING_CENTRE, ROBOT, MachineCheck
 from toolpath_stiff.analysis.poses import PoseStiffness
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.stiffness.model import acting_names, condition_warnings
@@ -32,7 +32,7 @@ def text(check: MachineCheck) -> str:
     return "\n".join(lines)
 
 
-def neutral_words(machine: Hexapod, report: PoseStiffness) -> str:
+def neutral_words(machine: MachineTool, report: PoseStiffness) -> str:
     """Stiffness at the neutral pose as one would say it."""
     neutral = pose_in_mm(machine.limits.neutral_pose)
     pose = [f"{axis}{value + 0.0:g}" for axis, value in zip("XYZABC", neutral, strict=True)][

@@ -21,7 +21,7 @@ def text(comparison: WallComparison) -> str:
         [
             f"{document['points']} points on final walls{others}",
             f"  measured    {document['mean_measured_um']:.2f} um in the mean of sizes",
-            f"  residual    {document['mean_residual_um']:.2f} um, measured less foretold mean over the height",
+            f"  residual    {document['mean_residual_um']:.2f} um, measured less foretold at the height of each point",
             f"  factor      {factor:.2f} +- {2.0 * spread:.2f}, measured over foretold",
             "",
             *ShownTable([*COLUMNS], cells).lines(least=4),

@@ -88,7 +88,7 @@ class ActiveEffect:
         if not is_foreign(self.effect):
             return method(*arguments, self.values)
         for path in (argument for argument in arguments if isinstance(argument, LoadPath)):
-            for array in (*vars(path).values(), *vars(path.struts).values()):
+            for array in (*vars(path).values(), *vars(path.stance).values()):
                 if isinstance(array, np.ndarray):
                     array.flags.writeable = False  # an effect that writes there would falsify the others
         try:

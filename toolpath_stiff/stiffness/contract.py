@@ -22,8 +22,9 @@ from typing import Any, Literal
 import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
+from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.kinematics import Struts
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
 from toolpath_stiff.stiffness.sizes import about, sizes_in_words
 from toolpath_stiff.units import mm_from_m
@@ -121,12 +122,12 @@ class LoadPath(ArrayColumns):
 
     Attributes
     ----------
-    machine
-        The machine, geometry effects included.
+    machine_tool
+        The machine, geometry effects included; `machine` where it has six struts.
     position, rotation
         (n, 3) m, (n, 3, 3): the tool tip and the platform.
-    struts
-        Lengths, directions, arms of the struts.
+    stance
+        How the machine stands; `struts` of six struts, their lengths, directions, arms.
     tool_extension
         (n,) m, how much longer the tool is than the machine's reference tool.
     force
@@ -142,10 +143,10 @@ class LoadPath(ArrayColumns):
         (n,) s since the indicator was zeroed, (n,) degrees C; or None.
     """
 
-    machine: Hexapod
+    machine_tool: MachineTool
     position: FloatArray
     rotation: FloatArray
-    struts: Struts
+    stance: Struts | Stance
     tool_extension: FloatArray
     force: FloatArray
     strut_forces: FloatArray | None = None
@@ -159,7 +160,18 @@ class LoadPath(ArrayColumns):
 
     def take(self, rows: IntArray | BoolArray | slice) -> LoadPath:
         """Some of the poses; repeated as an index says."""
-        return replace(super().take(rows), struts=self.struts.take(rows))
+        return replace(super().take(rows), stance=self.stance.take(rows))
+
+    @property
+    def machine(self) -> Hexapod:
+        """The machine of six struts. Raises `InputError` of another kind."""
+        return as_hexapod(self.machine_tool, "an effect on struts")
+
+    @property
+    def struts(self) -> Struts:
+        """The struts of such a machine."""
+        assert isinstance(self.stance, Struts)
+        return self.stance
 
 
 def at_pose(path: LoadPath, i: int) -> str:
@@ -256,6 +268,8 @@ class Effect:
         A reading that tells it from what looks the same at the tip, words for people; "" where its link says it.
     vector
         Whether its real parameters are one vector, which is there as a whole or not at all.
+    every_kind
+        Whether it holds on machines of every kind: it asks neither struts nor their joints.
     described_from
         Of an effect whose form was read off measurements: the marks of those readings (`measurements.reading_marks`).
         A diagnosis of the same readings calls it `described`, not `identified`, until others confirm it.
@@ -290,6 +304,7 @@ class Effect:
     parts: tuple[tuple[str, str], ...] = ()  # parameter, words after its size, where the clause says {sizes}
     told_by: str = ""
     vector: bool = False
+    every_kind: bool = False
     described_from: tuple[str, ...] = ()
     file: str = ""  # that declares it without code
 

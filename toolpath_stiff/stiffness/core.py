@@ -13,8 +13,8 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
-from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.stiffness import closed_form, exact
+from toolpath_stiff.machine.model import Hexapod, as_hexapod
+from toolpath_stiff.stiffness import closed_form, element_sum, exact
 from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.geometry_slopes import geometry_slopes
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
@@ -31,14 +31,20 @@ Tools = FloatArray | float  # m, length of the tool; N, size of the load: of all
 def is_closed_form(model: StiffnessModel) -> bool:
     """Whether struts on a rigid platform are all that acts, so that the closed form holds."""
     acting = replace(model, effects=acting_effects(model))
-    return acting.is_plain and all(np.isinf(active.values["bar_stiffness"]) for active in acting.effects)
+    return (
+        isinstance(model.machine, Hexapod)
+        and acting.is_plain
+        and all(np.isinf(active.values["bar_stiffness"]) for active in acting.effects)
+    )
 
 
 def choose_route(model: StiffnessModel, poses: int) -> str:
     """The route for so many poses along one direction each: "exact", "closed_form" or "compiled"."""
     if poses < CLOSED_FORM_FROM or not is_closed_form(model):
         return "exact"
-    straight = not model.machine.strut_law.shape  # the compiled loops know no other law
+    straight = not as_hexapod(
+        model.machine, "the compiled loops"
+    ).strut_law.shape  # the compiled loops know no other law
     return "compiled" if poses >= COMPILED_FROM and straight and find_spec("numba") else "closed_form"
 
 
@@ -77,6 +83,9 @@ def tip_compliance(
         towards = np.where((load == 0.0).all(axis=1)[:, None], (0.0, 0.0, 1.0), load)
         towards = towards / np.linalg.norm(towards, axis=1)[:, None]
     for rows, path in _paths(model, position, rotation, tool_length, size):
+        if not isinstance(model.machine, Hexapod):
+            compliance[rows] = element_sum.tip_compliance(model, path)
+            continue
         compliance[rows] = exact.tip_compliance(model, path, None if towards is None else towards[rows])
     return compliance
 
@@ -92,7 +101,8 @@ def compliance_along(
     """Compliance of the tip along unit vectors (n, 3), load-dependent effects included: (n,) m/N."""
     compliance = np.empty(len(position))
     for rows, path in _paths(model, position, rotation, tool_length, force):
-        compliance[rows] = exact.compliance_along(model, path, direction[rows])
+        solver = exact if isinstance(model.machine, Hexapod) else element_sum
+        compliance[rows] = solver.compliance_along(model, path, direction[rows])
     return compliance
 
 
@@ -179,7 +189,7 @@ def compliance_with_effects(
     (n,) m/N; nan where the exact route must be asked. Columns as of `compliance_along_columns`.
     """
     compliance = np.full(position.shape[1], np.nan)
-    kernel = closed_form.prepare(model.machine, tool_length)
+    kernel = closed_form.prepare(as_hexapod(model.machine, "the closed form"), tool_length)
     turns = None if rotation is None else rotation.T.reshape(-1, 3, 3)
     upright = rotation is None and model.control is None  # else the platform may stand elsewhere
     for rows, path in _paths(model, position.T, turns, tool_length, force):

@@ -31,6 +31,7 @@ import numpy as np
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line
+from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.stiffness.contract import LoadPath, at_pose
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
 from toolpath_stiff.stiffness.model import StiffnessModel
@@ -286,6 +287,8 @@ def possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> F
 
 
 def _is_singular(path: LoadPath) -> BoolArray:
+    if isinstance(path.stance, Stance):
+        return np.ones(len(path), dtype=bool)  # of elements each of which gives way by itself
     screws = path.struts.jacobian.copy()
     with np.errstate(divide="ignore", invalid="ignore"):
         screws[:, :, 3:] /= np.linalg.norm(path.struts.arms, axis=-1).mean(axis=-1)[:, None, None]
@@ -311,7 +314,7 @@ def _impossible(model: StiffnessModel, path: LoadPath, row: int, part: str) -> E
     effects = [active.effect for active in model.effects]
     foreign = [effect for effect in effects if is_foreign(effect)]
     names = ", ".join(effect.name for effect in foreign or effects)
-    cause, hint = f"machine {path.machine.name}", "check the parameters of the effects, strut law and joints"
+    cause, hint = f"machine {path.machine_tool.name}", "check the parameters of the effects, strut law and joints"
     if foreign:
         hint = f"`{command_line('effects', 'check', file_of(foreign[0]))}` tries an effect by itself"
     return EffectError(

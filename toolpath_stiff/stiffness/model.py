@@ -15,10 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
+from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
-from toolpath_stiff.machine.model import EffectEntry, Hexapod
+from toolpath_stiff.machine.limits import solved
+from toolpath_stiff.machine.model import EffectEntry, Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.active import ActiveEffect, read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
@@ -55,11 +58,11 @@ class StiffnessModel:
         What every result says of effects that fail `effects check` and were allowed all the same.
     """
 
-    machine: Hexapod
+    machine: MachineTool
     effects: tuple[ActiveEffect, ...] = ()
     instruments: tuple[ActiveEffect, ...] = ()
-    control: Hexapod | None = None
-    given: Hexapod | None = None
+    control: MachineTool | None = None
+    given: MachineTool | None = None
     conditions: Conditions = field(default_factory=Conditions)
     unchecked: tuple[str, ...] = ()
 
@@ -75,7 +78,7 @@ class StiffnessModel:
 
 
 def build_model(
-    machine: Hexapod,
+    machine: MachineTool,
     effect_files: Iterable[str | Path] = (),
     extra: Iterable[ActiveEffect] = (),
     conditions: Conditions | None = None,
@@ -120,10 +123,14 @@ def build_model(
         known_effects(files)  # a file that cannot be loaded is an error even if the machine names none of its effects
     kinds = (("effect", machine.effects), ("instrument", machine.instruments))
     actives = [_activate(machine, kind, entry, files) for kind, entries in kinds for entry in entries]
-    if np.isfinite(machine.platform_bar_stiffness):
+    if isinstance(machine, Hexapod) and np.isfinite(machine.platform_bar_stiffness):
         actives.insert(0, ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness}))
     actives += extra
     names = [active.effect.name for active in actives]
+    for active in () if isinstance(machine, Hexapod) else actives:
+        if not active.effect.every_kind:
+            mistake = f"effect {active.effect.name} holds on hexapods only, {machine.name} is of kind {machine.kind}"
+            raise EffectError(mistake, hint="leave it out")
     for name in names:
         if names.count(name) > 1:
             hint = "keep one of them (finite platform bars count as platform_flexibility)"
@@ -131,14 +138,14 @@ def build_model(
     return _assembled(machine, actives, conditions or Conditions(machine.setup, machine.temperature))
 
 
-def _assembled(given: Hexapod, actives: Sequence[ActiveEffect], conditions: Conditions) -> StiffnessModel:
+def _assembled(given: MachineTool, actives: Sequence[ActiveEffect], conditions: Conditions) -> StiffnessModel:
     """Geometry effects applied one after the other, to the true machine and to what the control takes it for."""
     effects = tuple(active for active in actives if not active.effect.is_instrument)
     machine = control = given
-    for active in effects:
-        machine = active.geometry(machine)
+    for active in effects if isinstance(given, Hexapod) else ():
+        machine = active.geometry(as_hexapod(machine, "a geometry"))
         if not active.effect.unknown_to_control:
-            control = active.geometry(control)
+            control = active.geometry(as_hexapod(control, "a geometry"))
     return StiffnessModel(
         machine,
         effects,
@@ -167,7 +174,7 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
     if model.given is None:
         raise EffectError(f"a model without its machine has no parameter {name!r}")
     given, actives = model.given, [*model.effects, *model.instruments]
-    if name in given.strut_law.parameters:
+    if isinstance(given, Hexapod) and name in given.strut_law.parameters:
         return _assembled(given.with_changes(strut_law=given.strut_law.moved(name, change)), actives, model.conditions)
     for i, active in enumerate(actives):
         for parameter in active.effect.parameters:
@@ -181,7 +188,7 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
     raise EffectError(f"machine {given.name} has no parameter {name!r}")
 
 
-def _activate(machine: Hexapod, kind: str, entry: EffectEntry, files: tuple[str | Path, ...]) -> ActiveEffect:
+def _activate(machine: MachineTool, kind: str, entry: EffectEntry, files: tuple[str | Path, ...]) -> ActiveEffect:
     try:
         effect = find_effect(entry.name, files)
     except InputError as error:
@@ -198,7 +205,7 @@ def _activate(machine: Hexapod, kind: str, entry: EffectEntry, files: tuple[str 
 def load_path(
     model: StiffnessModel,
     position: ArrayLike,
-    rotation: ArrayLike | None = None,
+    rotation: FloatArray | None = None,
     tool_length: ArrayLike = np.nan,
     force: ArrayLike = defaults.FORCE,
     **seen: Any,
@@ -216,18 +223,43 @@ def load_path(
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     n = len(tip)
     length = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    if model.control is not None and n:  # the struts get the lengths that the control computes; it may not know all
+    if isinstance(model.control, Hexapod) and n:  # the struts get the lengths that it computes; it may not know all
+        hexapod = as_hexapod(model.machine, "a control")
         turn = np.broadcast_to(np.eye(3) if rotation is None else np.asarray(rotation, dtype=float), (n, 3, 3))
         lengths = solve_struts(model.control, tip, turn, length).lengths
-        poses = forward_kinematics(model.machine, lengths, np.hstack([tip, roll_pitch_yaw(turn)]), length)
+        poses = forward_kinematics(hexapod, lengths, np.hstack([tip, roll_pitch_yaw(turn)]), length)
         tip, rotation = poses[:, :3], rotation_matrices(poses[:, 3:])
+    stance = solved(model.machine, tip, rotation, length)
+    if isinstance(stance, Stance):
+        return path_of_stance(model, stance, length, force, **seen)
     turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
     return LoadPath(
-        machine=model.machine,
+        machine_tool=model.machine,
         position=tip,
         rotation=np.broadcast_to(turn, (n, 3, 3)),
-        struts=solve_struts(model.machine, tip, rotation, length),
+        stance=stance,
         tool_extension=np.where(np.isnan(length), 0.0, length - model.machine.reference_tool_length),
+        force=np.broadcast_to(np.asarray(force, dtype=float), (n,)),
+        **seen,
+    )
+
+
+def path_of_stance(
+    model: StiffnessModel,
+    stance: Stance,
+    tool_length: ArrayLike = np.nan,
+    force: ArrayLike = defaults.FORCE,
+    **seen: Any,
+) -> LoadPath:
+    """What the effects see of a machine of elements that stands at n poses; arguments as of `load_path`."""
+    n = len(stance)
+    extension = np.asarray(tool_length, dtype=float) - model.machine.reference_tool_length
+    return LoadPath(
+        machine_tool=model.machine,
+        position=stance.position,
+        rotation=np.broadcast_to(np.eye(3) if stance.rotation is None else stance.rotation, (n, 3, 3)),
+        stance=stance,
+        tool_extension=np.broadcast_to(np.where(np.isnan(extension), 0.0, extension), (n,)),
         force=np.broadcast_to(np.asarray(force, dtype=float), (n,)),
         **seen,
     )

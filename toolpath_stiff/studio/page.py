@@ -11,7 +11,7 @@ from toolpath_stiff.studio.picture import document
 from toolpath_stiff.studio.session import Session
 
 SHARED = ("stage.js", "viewer.js", "profile.js")  # of the static pages
-OWN = ("machine.js", "panels.js", "studio.js")
+OWN = ("solids.js", "machine.js", "panels.js", "studio.js")
 
 
 def page() -> str:

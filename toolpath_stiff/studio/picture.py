@@ -11,6 +11,7 @@ import numpy as np
 import toolpath_stiff as tps
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
+from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.studio.session import Session
 
 MERIDIANS, PARALLELS = 36, 9  # of the reach boundary
@@ -207,9 +208,10 @@ def origin(session: Session) -> list[float]:
 
 
 def placement(session: Session) -> Document:
-    """The figures where the program sits; the front of the last search and the set-up sheet, if there are."""
-    now, place = None, origin(session)
+    """The figures where the program sits and where it sat; the front of the last search and the set-up sheet."""
+    now, before, place = None, None, origin(session)
     with suppress(TpsError):
-        key = (session.key("place"), tuple(place))
-        now = session.once("placed", key, lambda: session.trial().at(place))
-    return {**(result(session, "place") or {}), "now": now, "set_up": result(session, "set_up")}
+        key, trial = session.key("place"), session.trial()
+        now = session.once("placed", (key, tuple(place)), lambda: trial.at(place))
+        before = session.once("unplaced", key, lambda: trial.at(pose_in_mm(trial.program.origin)))
+    return {**(result(session, "place") or {}), "now": now, "before": before, "set_up": result(session, "set_up")}

@@ -3,6 +3,7 @@
 //
 // A scene has
 //   box()                [low, high] of X, Y and Z that the view is fitted to
+//   outline()            points that it is fitted to instead (where there are any)
 //   paths                `Path`s, which the viewer projects before anything is drawn
 //   squeeze              factor on heights (1 where it is absent)
 //   draw(g, viewer)      whatever it draws, below the axes
@@ -39,14 +40,14 @@ class Viewer extends Stage {
     this.middle = this.box.map(([low, high]) => (low + high) / 2);
     this.zoom = 1;
     this.cx = this.cy = 0;
-    const seen = cornersOf(this.box).map((corner) => this.project(corner));
-    const wide = Math.max(...seen.map((p) => Math.abs(p[0]))) * 2,
-      tall = Math.max(...seen.map((p) => Math.abs(p[1]))) * 2;
+    const seen = (this.scene.outline?.() ?? cornersOf(this.box)).map((corner) => this.project(corner));
+    const [[left, right], [top, bottom]] = [0, 1].map((k) => [Math.min(...seen.map((p) => p[k])),
+      Math.max(...seen.map((p) => p[k]))]), wide = right - left, tall = bottom - top;
     const beside = Math.min(this.scene.beside ?? 90, 0.45 * this.width);
-    this.zoom = Math.max(1e-6, Math.min((this.width - beside) / Math.max(wide, 1e-3), (this.height - 70) / Math.max(
-      tall, 1e-3)));
-    this.cx = this.width / 2;
-    this.cy = this.height / 2;
+    this.zoom = Math.max(1e-6, Math.min((this.width - beside) / Math.max(wide, 1e-3), (this.height - (this.scene.frame === false
+      ? 24 : 70)) / Math.max(tall, 1e-3)));
+    this.cx = this.width / 2 - this.zoom * (left + right) / 2;
+    this.cy = this.height / 2 - this.zoom * (top + bottom) / 2;
   }
   resized() { this.fit(); }
   turnTo(name) {

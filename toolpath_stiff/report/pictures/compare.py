@@ -20,6 +20,7 @@ from toolpath_stiff.units import n_per_mm_from_n_per_m
 SIDE = 2.6  # inches, of a map
 SIDES = 2.0  # standard deviations of the bars and bands: 95 %
 ACROSS = 5  # panels in a row
+LEAST_SHOWN = 2 * ACROSS  # panels of `variables`: two rows, or all that are significant
 PITCH = 2.15  # inches from one row of panels to the next
 MOST_NAMES = 8  # levels of a label that are written out
 WIDE = 7.5  # median deviations, some 5 standard deviations: readings further off stand at the edge
@@ -70,7 +71,7 @@ def where_it_fails(comparison: Comparison) -> Figure:
 
 
 def variables(comparison: Comparison) -> Figure:
-    """Residual against each variable, the strongest first; readings far off stand at the edge."""
+    """Residual against the strongest variables in their order; readings far off stand at the edge."""
     limits = _limits(comparison)
     panels: list[tuple[float, float, Variable | ReadingNames]] = []
     held_against: list[Variable | ReadingNames] = [*comparison.numbers, *comparison.names]
@@ -79,10 +80,12 @@ def variables(comparison: Comparison) -> Figure:
         strongest = max((abs(test.statistic) for test in tests), default=0.0)
         panels.append((-strongest, min((test.p_adjusted for test in tests), default=1.0), variable))
     panels.sort(key=lambda panel: panel[0])
+    tried = len(panels)
+    panels = panels[: max(LEAST_SHOWN, sum(p < SIGNIFICANT for _, p, _ in panels))]
     height = 1.0 + PITCH * max(-(-len(panels) // ACROSS), 1)
     figure = new_figure(
         15.0, height, "Which variable is missing?", f"{RESIDUAL_AXIS}; lines: a direction's own trend; p: of the "
-        "strongest pattern, corrected for all that were looked for; triangles: beyond the frame",
+        f"strongest pattern, corrected for all {tried} variables; triangles: beyond the frame",
     )  # fmt: skip
     for k, (_, p, variable) in enumerate(panels):
         i, j = divmod(k, ACROSS)

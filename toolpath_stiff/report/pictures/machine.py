@@ -4,10 +4,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from toolpath_stiff.analysis.evaluation import joint_columns
 from toolpath_stiff.analysis.machine_check import MachineCheck
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.kinematics import solve_struts_at
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.limits import stand as stand_at
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.report.colours import BLUE
 from toolpath_stiff.report.pictures.style import Look, new_figure, panel
@@ -17,15 +20,15 @@ STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"
 LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
 
 
-def machine_at(_: object, *, machine: Hexapod, pose: FloatArray) -> Figure:
+def machine_at(_: object, *, machine: MachineTool, pose: FloatArray) -> Figure:
     """A machine at one pose (6,) in m and rad."""
-    return _views(machine, pose)
+    return _views(machine, pose) if isinstance(machine, Hexapod) else _views_of_elements(machine, pose)
 
 
 def machine_checked(check: MachineCheck) -> Figure:
     """The machine at its neutral pose."""
     machine = check.model.machine
-    return _views(machine, np.array(machine.limits.neutral_pose))
+    return machine_at(check, machine=machine, pose=np.array(machine.limits.neutral_pose))
 
 
 def _views(machine: Hexapod, pose: FloatArray) -> Figure:
@@ -47,6 +50,37 @@ def _views(machine: Hexapod, pose: FloatArray) -> Figure:
     return figure
 
 
+def _views_of_elements(machine: MachineTool, pose: FloatArray) -> Figure:
+    """From above and from the front at a pose (6,): the bodies by name, the joints' values beside."""
+    _, stance, stand = stand_at(machine, pose)
+    assert isinstance(stance, Stance)
+    where = "tool tip at X{:g} Y{:g} Z{:g} mm, A {:g}, B {:g}, C {:g} degrees".format(*pose_in_mm(pose.tolist()))
+    beyond = "" if stand.reachable[0] else f": out of reach, {stand.describe(0)}"
+    figure = new_figure(14.0, 7.4, machine.title, where + beyond)
+    bodies = [(name, mm_from_m(points[0])) for name, points in machine.lines(stance)]
+    colours = dict(zip(dict(bodies), (STRUT, FRAME, PLATFORM, TOOL), strict=False))
+    for k, (first, second, title) in enumerate(((0, 1, "from above"), (0, 2, "from the front"))):
+        axes = panel(figure, 0.84 + 6.86 * k, 0.67, 5.88, 5.2)
+        for name, points in bodies:
+            axes.plot(*points[:, [first, second]].T, "o-", color=colours.get(name, PLATFORM), lw=1.8, ms=5)
+            middle = points[:, [first, second]].mean(axis=0)
+            axes.annotate(name, tuple(middle), fontsize=9, color=colours.get(name, PLATFORM), bbox=LABEL)
+        _finish(axes, mm_from_m(stance.position[0])[[first, second]])
+        axes.set(title=title, xlabel=f"{'XYZ'[first]} mm", ylabel=f"{'XYZ'[second]} mm")
+    words = [f"{name} {values[0]:.1f}" for name, values in joint_columns(machine, stance.joints).items()]
+    figure.text(0.97, 0.9, "; ".join(words), ha="right", size=9, color=PLATFORM)
+    return figure
+
+
+def _finish(axes: Axes, tip: FloatArray) -> None:
+    """The tool tip, and the look of the axes."""
+    axes.plot(*tip, "o", color=TOOL, ms=8)
+    axes.annotate("tool tip", tuple(tip), xytext=(8, -4), textcoords="offset points", fontsize=9, color=TOOL)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.06)
+    axes.grid(True, color="#e5e7eb", lw=0.6)
+
+
 def _draw_view(axes: Axes, frame: FloatArray, joints: FloatArray, tip: FloatArray, seen: list[int]) -> None:
     for body, colour in ((frame, FRAME), (joints, PLATFORM)):
         beside = body[:, :2] - body[:, :2].mean(axis=0)
@@ -59,11 +93,7 @@ def _draw_view(axes: Axes, frame: FloatArray, joints: FloatArray, tip: FloatArra
         place = start + (0.25 + 0.1 * i) * (end - start)
         style: Look = {"color": STRUT, "ha": "center", "va": "center", "bbox": LABEL}
         axes.text(place[0], place[1], f"{i + 1}", fontsize=10, weight="bold", **style)
-    axes.plot(*tip[seen], "o", color=TOOL, ms=8)
-    axes.annotate("tool tip", tuple(tip[seen]), xytext=(8, -4), textcoords="offset points", fontsize=9, color=TOOL)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.06)
-    axes.grid(True, color="#e5e7eb", lw=0.6)
+    _finish(axes, tip[seen])
 
 
 PICTURES = {"machine.png": machine_at}

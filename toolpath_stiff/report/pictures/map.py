@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from toolpath_stiff.analysis.grid import StiffnessMap
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import number
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.report.colours import INK, NOWHERE, RED, STIFFNESS
 from toolpath_stiff.report.map import heading
 from toolpath_stiff.report.pictures.style import colour_scale, new_figure, panel
@@ -59,7 +60,8 @@ def _slice(axes: Axes, planes: StiffnessMap, i: int, stiffness: FloatArray, low:
     axes.set(facecolor=NOWHERE, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), aspect="equal")
     axes.grid(visible=False)
     axes.set_title(f"z = {mm_from_m(planes.z[i]):g} mm", fontsize=10)
-    _directions(axes, mm_from_m(planes.model.machine.frame_joints[:, :2]))
+    if isinstance(planes.model.machine, Hexapod):
+        _directions(axes, mm_from_m(planes.model.machine.frame_joints[:, :2]))
     if np.nanmax(stiffness) > np.nanmin(stiffness):
         axes.contour(x, y, stiffness, levels=CONTOURS, colors="white", linewidths=0.7, alpha=0.9)
     return mesh

@@ -9,17 +9,10 @@ function turnOf([, , , a, b, c]) {
   ];
 }
 const moved = (pose, turn, [x, y, z]) => turn.map((row, i) => pose[i] + row[0] * x + row[1] * y + row[2] * z);
-const between = (a, b, t) => a.map((v, i) => v + (b[i] - v) * t);
 // Blue is stiffer, orange softer than modelled; grey in between, and the size says how much: no colour is needed.
 function errorColour(percent, scale) {
   const share = Math.min(1, Math.abs(percent) / scale), to = percent < 0 ? ink.second : ink.curve;
   return mix(ink.rapid, to, 0.15 + 0.85 * share);
-}
-function mix(a, b, t) {
-  const parse = (c) => { const h = c.length === 4 ? c.replace(/[\da-f]/gi, "$&$&") : c;
-    return [1, 3, 5].map((i) => parseInt(h.slice(i, i + 2), 16)); };
-  const [p, q] = [parse(a), parse(b)];
-  return `rgb(${p.map((v, i) => Math.round(v + (q[i] - v) * t)).join(",")})`;
 }
 
 // More readings than this are drawn without bars; dots stand so many pixels beside their pose; shades of each colour.
@@ -42,16 +35,37 @@ class MachineScene {
     const see = (p) => p.forEach((v, i) => { if (i < 3 && v !== null) { box[i][0] = Math.min(box[i][0], v);
       box[i][1] = Math.max(box[i][1], v); } });
     if (!this.state) return box.map(() => [-1, 1]);
-    if (this.focus === "machine") this.joints.frame.forEach(see);
+    const path = this.paths[0];
+    if (this.focus === "part" && path) {
+      for (let i = 0; i < path.n; i++) if (path.of[i] !== PATH_RAPID()) see(path.xyz.map((of) => of[i]));
+      const room = 0.35 * Math.max(...box.map(([low, high]) => high - low));
+      return box.map(([low, high]) => [low - room, high + room]);
+    }
+    if (this.focus === "machine") {
+      this.joints.frame.forEach(see);
+      see([...this.joints.frame[0].slice(0, 2), this.floor()]);
+      return box;
+    }
     for (const row of this.state.machine.reach) row.forEach(see);
-    // The boundary is round: a view that holds three quarters of its box holds all of it.
-    if (this.focus === "work") return box.map(([low, high]) => [low + 0.13 * (high - low), high - 0.13 * (high - low)]);
     return box;
+  }
+  // What the view is fitted to where the box would leave too much room: a ring and a ball do not reach its corners.
+  outline() {
+    if (!this.state || this.focus === "part") return null;
+    const reach = this.state.machine.reach.flat(), floor = this.floor();
+    return this.focus === "work" ? reach
+      : [...reach, ...this.joints.frame, ...this.joints.frame.map(([x, y]) => [x, y, floor])];
+  }
+  // mm, the height that legs and table stand on: as far below the reach as the reach is high at its middle.
+  floor() { return Math.min(...this.state.machine.reach.flat().map((p) => p[2])); }
+  // mm, the size of the machine, by which what the file does not say is drawn: struts, joints, platform, spindle.
+  size() {
+    const joints = this.joints.frame, middle = centreOf(joints);
+    return joints.reduce((sum, p) => sum + Math.hypot(...minus(p, middle)), 0) / joints.length;
   }
   platform() {
     const turn = turnOf(this.pose), joints = this.joints.platform.map((p) => moved(this.pose, turn, p));
-    const middle = joints[0].map((_, i) => joints.reduce((sum, p) => sum + p[i], 0) / joints.length);
-    return { turn, joints, middle, nose: moved(this.pose, turn, [0, 0, this.joints.tool]) };
+    return { turn, joints, middle: centreOf(joints), nose: moved(this.pose, turn, [0, 0, this.joints.tool]) };
   }
   islit(link, number) {
     return this.lit.some((one) => one.link === link && (one.number === undefined || number === undefined
@@ -60,11 +74,10 @@ class MachineScene {
   draw(g, view) {
     if (!this.state) return;
     this.spots = [];
-    this.drawReach(g, view);
-    this.drawFrame(g, view);
-    this.drawPath(g, view);
-    const items = [...this.solids(view), ...this.dots(view)].sort((a, b) => a.depth - b.depth);
-    for (const item of items) item.paint(g);
+    if (this.focus !== "part") this.drawReach(g, view);
+    const items = [...this.solids(view), ...this.dots(view), this.pathItem(view)].filter(Boolean);
+    for (const item of items.sort((a, b) => a.depth - b.depth)) item.paint(g);
+    if (this.focus !== "machine") fadeOut(g, view);
   }
   polyline(g, view, points, colour, width, close = false) {
     g.beginPath();
@@ -80,74 +93,62 @@ class MachineScene {
     for (let k = 0; k < rows[0].length; k += 3) this.polyline(g, view, rows.map((row) => row[k]), lit, 1);
     g.globalAlpha = 1;
   }
-  // Joints of one vertex stand above each other: the frame is a ring through the vertices, with legs to the floor.
-  drawFrame(g, view) {
-    const joints = this.joints.frame, floor = Math.min(...this.state.machine.reach.flat().map((p) => p[2]));
-    const order = joints.map((p, i) => i).sort((i, k) => Math.atan2(joints[i][1], joints[i][0])
-      - Math.atan2(joints[k][1], joints[k][0]) || i - k);
-    const colour = this.islit("frame") ? ink.accent : ink.rapid, width = Math.max(2, Math.min(9, 160 * view.zoom));
-    g.globalAlpha = 0.55;
-    this.polyline(g, view, order.map((i) => joints[i]), colour, width, true);
-    if (this.focus === "machine") for (const i of order) this.polyline(g, view, [joints[i], [joints[i][0], joints[i][1],
-      floor]], colour, width * 0.6);
-    g.globalAlpha = 1;
-    if (this.islit("table")) {
-      const [x, y] = this.state.machine.origin, z = floor;
-      this.polyline(g, view, [[x - 400, y - 400, z], [x + 400, y - 400, z], [x + 400, y + 400, z],
-        [x - 400, y + 400, z]], ink.accent, 3, true);
-    }
-  }
-  drawPath(g, view) {
+  pathItem(view) {
     const path = this.paths[0];
-    if (!path) return;
+    if (!path) return null;
     const colours = theme.dark ? COLOURS.dark : COLOURS.light;
-    path.stroke(g, colours.length, ink.rapid, 1);
-    colours.forEach((colour, i) => path.stroke(g, i, colour, 2.4));
-    path.stroke(g, colours.length + 1, ink.plunge, 1.6);
-    path.stroke(g, colours.length + 2, ink.bad, 3);
+    return { depth: view.project(this.pose.slice(0, 3))[2], paint: (g) => {
+      path.stroke(g, colours.length, ink.rapid, 1);
+      colours.forEach((colour, i) => path.stroke(g, i, colour, 2.4));
+      path.stroke(g, colours.length + 1, ink.plunge, 1.6);
+      path.stroke(g, colours.length + 2, ink.bad, 3);
+    } };
   }
+  // Frame, table, struts, joints, platform, spindle and tool; what the suspects are is lit, what stands before the work
+  // lets it show through.
   solids(view) {
-    const { joints, middle, nose } = this.platform(), items = [], tip = this.pose.slice(0, 3);
-    const width = (mm, low, high) => Math.max(low, Math.min(high, mm * view.zoom));
-    const bar = (a, b, mm, colour, core, low = 2, high = 15) => {
-      const [p, q] = [view.project(a), view.project(b)];
-      items.push({ depth: (p[2] + q[2]) / 2, paint: (g) => {
-        const wide = width(mm, low, high);
-        for (const [c, w] of [[ink.panel, wide + 2], [colour, wide], [core, wide * 0.35]]) {
-          g.lineCap = "butt"; g.beginPath(); g.moveTo(p[0], p[1]); g.lineTo(q[0], q[1]); stroke(g, c, w);
-        }
-      } });
-    };
+    const { joints, middle, nose, turn } = this.platform(), items = [], tip = this.pose.slice(0, 3), size = this.size();
+    const work = view.project(tip)[2], close = this.focus !== "machine", metal = mix(ink.rapid, ink.panel, 0.25);
+    const through = (item, at) => (close && view.project(at)[2] > work + 0.02 * size ? 0.3 : 1);
+    const tube = (a, b, radius, colour) => items.push(cylinder(view, a, b, radius * size, colour, through(null,
+      between(a, b, 0.5))));
+    const colour = (on, plain) => (on ? ink.accent : plain);
+    this.base(view, size, tube, items, colour(this.islit("table"), mix(metal, ink.panel, 0.4)));
     this.joints.frame.forEach((top, i) => {
-      const lit = this.islit("struts", i + 1), colour = lit ? ink.accent : mix(ink.plunge, ink.panel, 0.15), core = lit
-        ? ink.panel : mix(ink.rapid, ink.panel, 0.55);
-      const cut = between(top, joints[i], 0.58);
-      bar(top, cut, 150, colour, core, 4, 16);
-      bar(cut, joints[i], 85, lit ? ink.accent : ink.rapid, core, 2.5, 9);
-      for (const [at, frame] of [[top, true], [joints[i], false]]) {
-        const [x, y, depth] = view.project(at), on = this.islit("joints", i + 1);
-        items.push({ depth: depth + 20, paint: (g) => {
-          g.beginPath(); g.arc(x, y, width(frame ? 130 : 75, 3, 10), 0, 7); g.fillStyle = on ? ink.accent : ink.plunge;
-            g.fill();
-          g.strokeStyle = ink.panel; g.lineWidth = 1; g.stroke();
-        } });
-      }
-      const [nx, ny, depth] = view.project(between(top, joints[i], 0.72));
-      items.push({ depth: depth + 40, paint: (g) => view.write(g, String(i + 1), nx, ny, "middle") });
+      const lit = this.islit("struts", i + 1), cut = between(top, joints[i], 0.58), on = this.islit("joints", i + 1);
+      tube(top, cut, 0.03, colour(lit, metal));
+      tube(cut, joints[i], 0.019, colour(lit, mix(ink.plunge, ink.panel, 0.45)));
+      for (const [at, radius] of [[top, 0.045], [joints[i], 0.032]]) items.push(ball(view, at, radius * size,
+        colour(on || lit, ink.plunge), through(null, at)));
+      const place = between(top, joints[i], close ? 0.82 : 0.6), [nx, ny, depth] = view.project(place);
+      if (nx > 0 && nx < view.width && ny > 0) items.push({ depth: depth + size,
+        paint: (g) => view.write(g, String(i + 1), nx, ny, "middle") });
     });
-    const outline = joints.map((p) => view.project(p)), centre = view.project(middle);
-    items.push({ depth: centre[2], paint: (g) => {
-      g.beginPath();
-      outline.forEach(([x, y], i) => { if (i) g.lineTo(x, y); else g.moveTo(x, y); });
-      g.closePath();
-      g.globalAlpha = 0.82; g.fillStyle = this.islit("platform") || this.islit("geometry") ? ink.accent
-        : mix(ink.plunge, ink.panel, 0.35); g.fill(); g.globalAlpha = 1;
-      stroke(g, ink.ink, 1.2);
-    } });
-    const tool = this.islit("tool") ? ink.accent : ink.plunge;
-    bar(middle, nose, 130, tool, mix(ink.rapid, ink.panel, 0.5), 4, 16);
-    bar(nose, tip, 40, this.islit("tool") || this.islit("instrument") ? ink.accent : ink.ink, ink.rapid, 2, 6);
+    const thick = [0, 0, 0.035 * size].map((_, k) => 0.035 * size * turn[k][2]), around = byAngle(joints, middle, turn);
+    items.push(prism(view, around.map((p) => minus(p, thick)), around.map((p) => p.map((v, k) => v + thick[k])),
+      colour(this.islit("platform") || this.islit("geometry"), mix(metal, ink.plunge, 0.35)), close ? 0.8 : 1));
+    tube(between(middle, nose, -0.45), nose, 0.05, colour(this.islit("tool"), mix(metal, ink.plunge, 0.25)));
+    tube(nose, between(nose, tip, 0.45), 0.025, colour(this.islit("tool"), metal));
+    tube(between(nose, tip, 0.45), tip, 0.005, colour(this.islit("tool") || this.islit("instrument"), ink.plunge));
     return items;
+  }
+  // The ring that the struts hang from with its legs, and the table with the work on it: as far as the path goes.
+  base(view, size, tube, items, table) {
+    const around = byAngle(this.joints.frame, centreOf(this.joints.frame)), floor = this.floor(), path = this.paths[0];
+    const frame = this.islit("frame") ? ink.accent : mix(ink.rapid, ink.panel, 0.45);
+    around.forEach((p, i) => tube(p, around[(i + 1) % around.length], 0.022, frame));
+    if (this.focus === "machine") for (const p of around) tube(p, [p[0], p[1], floor], 0.016, frame);
+    const ends = path ? path.xyz.map((of) => [Math.min(...of.filter((_, i) => path.of[i] !== PATH_RAPID())),
+      Math.max(...of.filter((_, i) => path.of[i] !== PATH_RAPID()))]) : null;
+    const [x, y] = ends ? ends.slice(0, 2).map(([low, high]) => (low + high) / 2) : this.state.machine.origin;
+    const low = ends ? ends[2][0] - 0.012 * size : floor, half = ends ? 1.1 * Math.max(...ends.slice(0, 2)
+      .map(([a, b]) => b - a)) : 0.22 * size;
+    const far = (v) => [v - half, v + half], below = this.focus === "machine" ? Math.min(floor, low - 0.05 * size) : low
+      - 0.04 * size;
+    const slab = block(view, [far(x), far(y), [below, low]], table);
+    items.push({ ...slab, depth: -1e9 });  // all else stands on it
+    if (ends) items.push({ ...block(view, [...ends.slice(0, 2).map(([a, b]) => [a - 0.01 * size, b + 0.01 * size]),
+      [low, Math.max(ends[2][0], low) + 1e-3]], mix(ink.curve, ink.panel, 0.75)), depth: -9e8 });
   }
   // A dot a reading, larger where the error is; its bar lies along the load.
   dots(view) {
@@ -220,4 +221,21 @@ class MachineScene {
     return found;
   }
 }
+// What reaches beyond the picture fades at its upper edge.
+function fadeOut(g, view) {
+  const fade = g.createLinearGradient(0, 0, 0, 70);
+  fade.addColorStop(0, "rgba(0,0,0,1)");
+  fade.addColorStop(1, "rgba(0,0,0,0)");
+  Object.assign(g, { globalCompositeOperation: "destination-out", fillStyle: fade });
+  g.fillRect(0, 0, view.width, 70);
+  g.globalCompositeOperation = "source-over";
+}
+const centreOf = (points) => points[0].map((_, i) => points.reduce((sum, p) => sum + p[i], 0) / points.length);
+// Points in their order about a middle, counterclockwise seen along the third column of a turn.
+function byAngle(points, middle, turn = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) {
+  const angle = (p) => { const d = minus(p, middle), along = (k) => dot3(d, turn.map((row) => row[k]));
+    return Math.atan2(along(1), along(0)); };
+  return [...points].sort((a, b) => angle(a) - angle(b));
+}
+const PATH_RAPID = () => COLOURS.light.length;  // the class of rapids, after those of the colours
 const PATH_FROM = 1e7;  // numbers of samples come after those of the readings

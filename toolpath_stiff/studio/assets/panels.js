@@ -58,6 +58,7 @@ function effectsPanel(state, act) {
   }
   const on = state.effects.some((one) => one.on), fit = state.fit;
   return [
+    guide(act),
     h("h2", {}, "Which effect is missing?"),
     h("div", { class: "actions" }, button("Fit", () => act({ do: "fit" }), { id: "fit", class: "main live",
       disabled: !on || !state.readings }),
@@ -72,6 +73,21 @@ function effectsPanel(state, act) {
     rows,
     ownEffects(state, act),
   ];
+}
+// What one does first, until it is put away.
+const GUIDE = ["Read the verdict above: what is off, how sure that is, how large the error is against the noise.",
+  "Switch an effect on and move its slider: bars and dots show at once what it would explain.",
+  "Press Fit; what the data support can be accepted into the machine.",
+  "Where the verdict is open, Next says what to measure.",
+  "Program and Placement show what the part loses by it, and where it should sit."];
+let guided = false;
+try { guided = Boolean(localStorage.getItem("guided")); } catch { /* a page that may keep nothing */ }
+function guide(act) {
+  if (guided || act.readonly) return null;
+  const away = () => { guided = true; try { localStorage.setItem("guided", "yes"); } catch { /* as above */ }
+    act.redraw(); };
+  return h("div", { class: "guide", id: "guide" }, h("b", {}, "The loop in five steps"),
+    h("ol", {}, GUIDE.map((text) => h("li", {}, text))), button("Put this away", away, { id: "guided" }));
 }
 // What no effect explains, as far as the readings describe it.
 function portrait(p, act) {
@@ -299,11 +315,17 @@ function setUp(p, state, act) {
   ];
 }
 function placementFigures(now, state, id) {
-  const v = (value, digits = 0) => (value === null || value === undefined ? "\u2013" : group(value, digits));
-  return h("div", { id }, figures([["mean N/mm", v(now?.mean_N_per_mm), "pl-mean"],
-    ["range N/mm", v(now?.range_N_per_mm), "pl-range"], ["weakest N/mm", v(now?.min_N_per_mm), "pl-min"],
-    ["margin of cuts, %", now ? v(100 * now.margin, 1) : "\u2013", "pl-margin"], ["margin of rapids, %", now
-      ? v(100 * now.rapid_margin, 1) : "\u2013"]]),
+  const before = state.placement?.before;
+  const v = (key, of = (value) => group(value)) => {
+    const [here, there] = [now, before].map((one) => (Number.isFinite(one?.[key]) ? of(one[key]) : "\u2013"));
+    return [here, there === here ? "" : ` before ${there}`];
+  };
+  const share = (value) => group(100 * value, 1);
+  const shown = [["mean N/mm", v("mean_N_per_mm"), "pl-mean"], ["range N/mm", v("range_N_per_mm"), "pl-range"],
+    ["weakest N/mm", v("min_N_per_mm"), "pl-min"], ["margin of cuts, %", v("margin", share), "pl-margin"],
+    ["margin of rapids, %", v("rapid_margin", share)]];
+  return h("div", { id }, h("div", { class: "figures" }, shown.map(([name, [here, there], key]) => h("div", {},
+    h("b", key ? { id: key } : {}, here), h("span", {}, name), h("span", { class: "before" }, there)))),
     now && now.mean_N_per_mm === null ? h("p", { class: "warning" }, "A cut is out of reach here.") : null);
 }
 // The boundary of the reach at the height of program zero, from above: the farthest crossing of each meridian.
@@ -397,10 +419,21 @@ function historyPanel(state, act) {
   // broken between words alone
   const words = (text) => text.split(" ").flatMap((word, k) => [k ? " " : "", h("span", {}, word)]);
   const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, words(text)), copy(text)) : null);
-  const step = (one) => h("div", { class: "step" }, h("b", {}, one.text), line(one.command), line(one.python));
+  const step = (one) => h("div", { class: "step" }, h("b", {}, one.stops > 1 ? `${one.text} (${one.stops} stops)`
+    : one.text), line(one.command), line(one.python));
   return [h("h2", {}, "What was done"), h("p", { class: "muted" },
     "Commands run in the case's folder; Python lines on case = tps.Case.open(folder)."),
-    [...state.history].reverse().map(step)];
+    folded([...state.history].reverse()).map(step)];
+}
+// Steps, latest first: of the stops of one slider, or of one move of the work, the latest stands for all.
+function folded(steps) {
+  const rows = [], of = (one) => (["switch", "place_at"].includes(one.kind) ? `${one.kind} ${one.text.split(" ")[0]}`
+    : null);
+  for (const one of steps) {
+    if (rows.length && of(one) && of(one) === of(rows.at(-1))) rows.at(-1).stops++;
+    else rows.push({ ...one, stops: 1 });
+  }
+  return rows;
 }
 const PANELS = [["effects", "Effects", effectsPanel], ["why", "Why believe it?", whyPanel], ["next", "Next", nextPanel],
   ["program", "Program", programPanel], ["placement", "Placement", placementPanel], ["exercise", "Exercise",

@@ -293,11 +293,15 @@ function draw() {
   drawPanel();
   if (view.width) { if (!scene.fitted) { scene.fitted = true; view.fit(); } view.redraw(); }
 }
+let began = { of: "", at: 0, done: 0 };  // the work that runs, when it was first seen, how far it was then
 function drawJob(job) {
   if (readonly) return;
+  const name = job ? job.text || job.kind : "", now = performance.now();
+  if (name !== began.of || (job && job.done < began.done)) began = { of: name, at: now, done: job?.done ?? 0 };
+  const run = job?.total ? (now - began.at) / 1000 * (job.total - job.done) / Math.max(job.done - began.done, 1e-9) : 0;
   $("job").classList.toggle("busy", Boolean(job));
-  $("job").textContent = job
-    ? `${job.text || job.kind}${job.total ? `, ${Math.round(100 * job.done / job.total)} %` : ""}` : "";
+  $("job").textContent = !job ? "" : [name, job.total ? `${Math.round(100 * job.done / job.total)} %` : "",
+    job.total && job.done > began.done && run > 1 ? `about ${Math.ceil(run)} s left` : ""].filter(Boolean).join(", ");
   $("cancel").hidden = !job;
 }
 let asking = null;

@@ -1,0 +1,61 @@
+"""What a machine of elements says that readings should show, and how that hangs on what each element gives."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.prediction import NO_CHANGE, Predictor, idle_on
+from toolpath_stiff.machine.model import MachineTool
+from toolpath_stiff.readings.measurements import Readings, measured_path, mechanical_stiffness, shown_by
+from toolpath_stiff.stiffness.active import ActiveEffect
+from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.element_sum import energies, stance_of
+from toolpath_stiff.stiffness.model import build_model
+
+
+class ElementPredictor(Predictor):
+    """The answer of a machine of elements to n readings of the tip; it has no strut law that could change."""
+
+    def __init__(self, machine: MachineTool, data: Readings, effect_files: Sequence[str | Path] = ()) -> None:
+        self.effect_files, self.base = tuple(effect_files), build_model(machine, effect_files)
+        warnings = [*data.warnings, *idle_on(self.base, data).values()]
+        self.data = replace(data, warnings=tuple(dict.fromkeys(warnings)))
+        self.tables: dict[tuple[Any, ...], Any] = {}
+
+    @property
+    def distinct(self) -> NDArray[np.int64]:
+        """(n,) numbers of the readings: each is worked out."""
+        return np.arange(len(self.data))
+
+    @cached_property
+    def full_path(self) -> LoadPath:
+        """What instruments see of every row."""
+        return measured_path(self.base, self.data)
+
+    def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
+        """(n,) ln(N/m) that the readings should show."""
+        stiffness = np.exp(self._base_log)
+        for active in self.base.instruments:
+            stiffness = shown_by(active, stiffness, self.full_path, self.data)
+        return np.asarray(np.log(stiffness))
+
+    def strut_columns(self) -> FloatArray:
+        """(n, e) d ln k / d ln(stiffness of element i): its share of the compliance."""
+        shares = energies(stance_of(self.full_path), self.data.direction)
+        return np.stack(shares, axis=1) * np.exp(self._base_log)[:, None]
+
+    @cached_property
+    def joint_columns(self) -> FloatArray:
+        """(n, 0): the places of its joints are taken as the file has them."""
+        return np.empty((len(self.data), 0))
+
+    @cached_property
+    def _base_log(self) -> FloatArray:
+        """(n,) ln k before instruments."""
+        return np.asarray(np.log(mechanical_stiffness(self.base, self.full_path, self.data)))

@@ -1,0 +1,162 @@
+"""Linear deltas: three carriages on vertical rails, each with a parallelogram of two rods to the effector.
+
+Kinematics of lineardeltakins(9): towers at 90, 210 and 330 degrees, z + sqrt(L^2 - (R cos f - x)^2 - (R sin f - y)^2).
+The rods keep the effector level; a tool does not turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.machine.elements import Element, Stance
+from toolpath_stiff.machine.parallel import Carriage, Legs, Parallel
+from toolpath_stiff.machine.parallel_file import (
+    GIVE,
+    HEIGHT,
+    LENGTH,
+    OPTIONAL,
+    PER_ROD,
+    SHARED,
+    TOP,
+    shared_fields,
+    span,
+)
+from toolpath_stiff.machine.schema import Key, MachineToml, read_sections
+from toolpath_stiff.machine.words import refuse_words
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.units import m_from_mm, m_from_nm
+
+TOWERS = np.deg2rad([90.0, 210.0, 330.0])
+OUTWARDS = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in TOWERS])
+SIDEWAYS = np.cross([0.0, 0.0, 1.0], OUTWARDS)
+
+
+SCHEMA = {
+    "": {
+        **TOP,
+        **dict.fromkeys(("carriage_joint_radius_mm", "effector_joint_radius_mm"), LENGTH),
+        **dict.fromkeys(("rod_length_mm", "rod_spacing_mm"), LENGTH),
+        "effector_joint_height_mm": HEIGHT,
+    },
+    "limits": {"carriage_mm": Key(unit="mm", shape=(2,))},
+    "rod": {"compliance_nm_per_N": PER_ROD},
+    "carriage": {"rail_radius_mm": LENGTH, "centre_height_mm": HEIGHT, **GIVE},
+    **SHARED,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delta(Parallel):
+    """A linear delta.
+
+    Attributes
+    ----------
+    carriage_radius, effector_radius
+        m, of the rods' joints about the machine's axis.
+    joint_height
+        m, of the effector's joints above the tip of the reference tool.
+    rod_length, spacing
+        m; of the two rods of a parallelogram.
+    rod_compliance
+        m/N of one rod with its joints.
+    """
+
+    kind: ClassVar[str] = "delta"
+
+    carriage_radius: float
+    effector_radius: float
+    joint_height: float
+    rod_length: float
+    spacing: float
+    rod_compliance: float
+
+    def rotation_of(self, abc: FloatArray) -> FloatArray:
+        """(n, 3, 3) of words A, B, C (n, 3), which must be 0."""
+        refuse_words(self.name, abc, "")
+        return rotation_matrices(abc)
+
+    def _joints(self, radius: float) -> FloatArray:
+        """(6, 3) m, joints of the rods on a circle, both of a tower together."""
+        return _rod_joints(radius, self.spacing)
+
+    def legs_at(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> Legs:
+        """The six rods; nan where a carriage is too far away, or the tool is turned."""
+        up = np.array([0.0, 0.0, 1.0])
+        arms = self._joints(self.effector_radius) + (self.joint_height + extension)[:, None, None] * up
+        towers = (self.carriage_radius - self.effector_radius) * OUTWARDS[:, :2]
+        apart = ((towers - tip[:, None, :2]) ** 2).sum(axis=-1)
+        level = np.abs(axes - np.eye(3)).max(axis=(1, 2)) < 1e-9
+        carriages = tip[:, 2:] + arms[:, :1, 2] + np.sqrt(np.where(level[:, None], self.rod_length**2 - apart, np.nan))
+        rods = (
+            self._joints(self.carriage_radius) + np.repeat(carriages, 2, axis=1)[..., None] * up - tip[:, None] - arms
+        )
+        return Legs(carriages, rods / self.rod_length, arms, np.full((len(tip), 6), self.rod_compliance))
+
+    def forward(self, joints: ArrayLike, tool_length: ArrayLike = np.nan) -> tuple[FloatArray, FloatArray]:
+        """Tip (n, 3) m and tool axes (n, 3, 3) of carriages (n, 3) m: where three spheres meet below them."""
+        heights = np.atleast_2d(np.asarray(joints, dtype=float)) - self.joint_height
+        heights = heights - np.reshape(self.extension(tool_length), (-1, 1))
+        radius = self.carriage_radius - self.effector_radius
+        centres = radius * OUTWARDS + heights[..., None] * np.array([0.0, 0.0, 1.0])
+        across, over = centres[:, 1] - centres[:, 0], centres[:, 2] - centres[:, 0]
+        normal = np.cross(across, over)
+        size = (normal**2).sum(axis=1, keepdims=True)
+        # The circumcentre of the carriages, and down from it.
+        middle = ((across**2).sum(axis=1, keepdims=True) * np.cross(over, normal)) - (
+            (over**2).sum(axis=1, keepdims=True) * np.cross(across, normal)
+        )
+        middle = 0.5 * middle / size
+        with np.errstate(invalid="ignore"):
+            depth = np.sqrt((self.rod_length**2 - (middle**2).sum(axis=1, keepdims=True)) / size)
+        tip = centres[:, 0] + middle - depth * normal * np.sign(normal[:, 2:])
+        return tip, np.broadcast_to(np.eye(3), (len(tip), 3, 3))
+
+    def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
+        """(n, 6, 3) m each: the rods' joints on the carriages and on the effector."""
+        up = np.array([0.0, 0.0, 1.0])
+        begin = self._joints(self.carriage_radius) + np.repeat(stance.joints, 2, axis=1)[..., None] * up
+        return begin, stance.position[:, None] + self._joints(self.effector_radius) + self.joint_height * up
+
+
+def _rod_joints(radius: float, spacing: float) -> FloatArray:
+    sides = 0.5 * spacing * np.array([-1.0, 1.0])
+    return np.concatenate([radius * OUTWARDS[i] + sides[:, None] * SIDEWAYS[i] for i in range(3)])
+
+
+def read(toml: MachineToml) -> Delta:
+    """A delta of a machine file. Raises `InputError`."""
+    values = read_sections(toml, SCHEMA, OPTIONAL, stated=False)
+    top, carriage = values[""], values["carriage"]
+    radius, effector, rod, spacing = (
+        m_from_mm(top[f"{key}_mm"])
+        for key in ("carriage_joint_radius", "effector_joint_radius", "rod_length", "rod_spacing")
+    )
+    if rod <= abs(radius - effector):
+        mistake, least = f" = {top['rod_length_mm']:g}: the rods do not reach the effector", abs(radius - effector)
+        raise toml.fault("", "rod_length_mm", mistake, expected=f"more than {1e3 * least:g} mm")
+    centre, height = m_from_mm(carriage["rail_radius_mm"]), m_from_mm(carriage["centre_height_mm"])
+    compliance = m_from_nm(np.concatenate([carriage["translation_nm_per_N"], carriage["rotation_nrad_per_Nm"]]))
+    carriages = []
+    for i in range(3):
+        place = centre * OUTWARDS[i] + np.array([0.0, 0.0, height])
+        axes = np.column_stack([OUTWARDS[i], SIDEWAYS[i], [0.0, 0.0, 1.0]])
+        rods = (2 * i, 2 * i + 1)
+        joints = _rod_joints(radius, spacing)[list(rods)] - place
+        carriages.append(Carriage(Element(f"carriage {i + 1}", "frame"), rods, axes, compliance, joints))
+    return Delta(
+        **shared_fields(toml, values),
+        joint_range=span(toml, "limits", ("carriage_mm", "carriage_mm"), *values["limits"]["carriage_mm"]),
+        legs=tuple(Element(f"rod {i + 1}", "struts", ("axial",)) for i in range(6)),
+        carriages=tuple(carriages),
+        carriage_radius=radius,
+        effector_radius=effector,
+        joint_height=m_from_mm(top["effector_joint_height_mm"]),
+        rod_length=rod,
+        spacing=spacing,
+        rod_compliance=m_from_nm(values["rod"]["compliance_nm_per_N"]),
+    )

@@ -1,0 +1,46 @@
+"""Newton's method with bounded steps, many poses at a time; starts spread evenly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+
+Equations = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+TOLERANCE, MOST_STEPS = 1e-12, 60  # of the residuals, m and rad; steps
+DAMPING = 1e-9  # of the squared size of a jacobian: steps stay finite where it is singular, and do not slow down else
+
+
+def newton(equations: Equations, start: FloatArray, largest: FloatArray | float) -> FloatArray:
+    """(n, k) unknowns at which residuals vanish, from a start (n, k); nan where no step leads there.
+
+    `equations` gives residuals (n, m) and their slopes (n, m, k); a step is at most `largest`, in all or (k,).
+    """
+    values = start.copy()
+    residual = np.empty((len(start), 0))
+    for _ in range(MOST_STEPS):
+        residual, slopes = equations(values)
+        if not (np.abs(residual).max(axis=1) > TOLERANCE).any():
+            break
+        transposed = np.swapaxes(slopes, 1, 2)
+        normal = transposed @ slopes
+        size = np.trace(normal, axis1=1, axis2=2)[:, None, None]
+        normal = normal + DAMPING * (size + DAMPING) * np.eye(start.shape[1])
+        step = np.linalg.solve(normal, transposed @ residual[..., None])[..., 0]
+        values = values - step / np.maximum(1.0, np.abs(step / largest).max(axis=1))[:, None]
+    good = np.abs(residual).max(axis=1) < 1e3 * TOLERANCE
+    return np.where(good[:, None], values, np.nan)
+
+
+def halton(count: int, bases: Sequence[int] = (2, 3, 5, 7, 11, 13, 17)) -> FloatArray:
+    """(count, 7) points spread over the unit cube (Halton, Numerische Mathematik 2, 1960)."""
+    points = np.zeros((count, len(bases)))
+    for column, base in enumerate(bases):
+        share, left = 1.0, np.arange(1, count + 1)
+        while left.any():
+            share /= base
+            points[:, column] += share * (left % base)
+            left = left // base
+    return points

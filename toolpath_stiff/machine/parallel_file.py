@@ -1,0 +1,57 @@
+"""What files of machines with six legs share: limits, tool, bodies at base and tip."""
+
+from typing import Any
+
+import numpy as np
+
+from toolpath_stiff.machine.common_sections import common_fields, pose_of
+from toolpath_stiff.machine.model import Limits
+from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections
+from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
+from toolpath_stiff.units import m_from_mm
+
+STILL: tuple[tuple[()], tuple[()]] = ((), ())  # no joints on either side: base and tip alone
+LENGTH = Key(unit="mm", low=0.0, open_low=True)
+HEIGHT, PER_ROD = Key(unit="mm"), Key(unit="nm/N", low=0.0, high=1e7)
+CORNER = Key(unit="mm", shape=(3,), required=False)
+GIVE = {
+    "translation_nm_per_N": Key(unit="nm/N", shape=(3,), low=0.0, high=1e7),
+    "rotation_nrad_per_Nm": Key(unit="nrad/(N m)", shape=(3,), low=0.0, high=1e9),
+}
+SHARED = {
+    "reference_tool": {"length_mm": Key(unit="mm", low=0.0, high=2000.0)},
+    "workspace": {"min_mm": CORNER, "max_mm": CORNER},
+    "singularity": {"min_index": Key(low=0.0, high=1.0), "neutral_pose_mm_deg": Key(shape=(6,), required=False)},
+    "setup": SETUP,
+    "element[]": ELEMENT,
+    "pose[]": {},
+}
+OPTIONAL = ("reference_tool", "workspace", "singularity", "setup")
+TOP = {**NAMES, "convention": Key(text=True, required=False)}
+
+
+def shared_fields(toml: MachineToml, values: Sections) -> dict[str, Any]:
+    """Arguments of a machine of six legs that its own sections do not give."""
+    common = common_fields(toml, values)
+    singularity, box = values.get("singularity", {}), values.get("workspace", {})
+    corners = np.array([box.get("min_mm", np.full(3, -np.inf)), box.get("max_mm", np.full(3, np.inf))])
+    if not (corners[0] < corners[1]).all():
+        raise toml.fault("workspace", "max_mm", ": not above min_mm", expected="max_mm > min_mm in x, y and z")
+    neutral = singularity.get("neutral_pose_mm_deg")
+    limits = Limits(
+        workspace=m_from_mm(corners), neutral_pose=common["default_origin"] if neutral is None else pose_of(neutral)
+    )
+    return {
+        **common,
+        "limits": limits,
+        "reference_tool_length": m_from_mm(values.get("reference_tool", {}).get("length_mm", np.nan)),
+        "bodies": read_bodies(toml, STILL)[0],
+        "least_index": singularity.get("min_index", 0.0),
+    }
+
+
+def span(toml: MachineToml, section: str, keys: tuple[str, str], low: float, high: float) -> tuple[float, float]:
+    """M of two limits in mm, the first below the second."""
+    if not low < high:
+        raise toml.fault(section, keys[1], f": {high:g} is not above {low:g}", expected="min below max, in mm")
+    return m_from_mm(float(low)), m_from_mm(float(high))

@@ -1,0 +1,185 @@
+"""`[[element]]` of serial machines: springs, joints and beams, in the frames of the chain."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.bodies import Body, SpanningBeam
+from toolpath_stiff.machine.chain import STILL, ChainJoint, Placement
+from toolpath_stiff.machine.elements import Element, beam_axes, beam_compliance
+from toolpath_stiff.machine.schema import Key, MachineToml, read_rows
+from toolpath_stiff.units import m_from_mm, m_from_nm
+
+TEXT, NAMES = Key(text=True, required=False), Key(text=True, shape=(0,), required=False)
+POINT, DIRECTION = Key(unit="mm", shape=(3,), required=False), Key(shape=(3,), low=-1.0, high=1.0, required=False)
+ALONG = Key(unit="nm/N", shape=(3,), low=0.0, high=1e7, required=False)
+ABOUT = Key(unit="nrad/(N m)", shape=(3,), low=0.0, high=1e9, required=False)
+PER_JOINT = Key(unit="nrad/(N m)", shape=(1,), many=True, or_one=True, low=0.0, high=1e9, required=False)
+BEAM = ("EA_MN", "EIy_MNm2", "EIz_MNm2", "GJ_MNm2")
+ELEMENT = {
+    "name": Key(text=True),
+    "type": Key(text=True),
+    **dict.fromkeys(("side", "at", "centre", "frame", "link", "origin", "remark"), TEXT),
+    **dict.fromkeys(("moves_with", "to_moves_with"), NAMES),
+    **dict.fromkeys(("centre_mm", "from_mm", "to_mm"), POINT),
+    **dict.fromkeys(("x_axis", "z_axis"), DIRECTION),
+    "translation_nm_per_N": ALONG,
+    "rotation_nrad_per_Nm": ABOUT,
+    **dict.fromkeys(("torsion_nrad_per_Nm", "bending_nrad_per_Nm"), PER_JOINT),
+    **dict.fromkeys(BEAM, Key(low=0.0, high=1e9, open_low=True, infinite=True, required=False)),
+}
+USED = {
+    "spring": ("side", "at", "centre", "centre_mm", "frame", "moves_with", "x_axis", "z_axis", "translation_nm_per_N",
+               "rotation_nrad_per_Nm"),
+    "joint": ("torsion_nrad_per_Nm", "bending_nrad_per_Nm"),
+    "beam": ("side", "frame", "from_mm", "to_mm", "moves_with", "to_moves_with", "z_axis", *BEAM),
+}  # fmt: skip
+LINKS = ("tool", "joints", "struts", "frame", "table")
+Part = Body | SpanningBeam
+
+
+class ElementReader:
+    """Reads one element after the other; frames of each side are numbered from the base, the last one tip or work."""
+
+    def __init__(self, toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[Placement]) -> None:
+        self.toml, self.chains, self.section = toml, chains, ""
+        self.row: Document = {}
+        self.homes = []
+        for joints, end in zip(chains, ends, strict=True):
+            homes = [STILL]
+            for joint in joints:
+                homes.append(homes[-1].then(joint.place))
+            self.homes.append([*homes, homes[-1].then(end)])
+
+    def fault(self, key: str, mistake: str, expected: str = "") -> InputError:
+        """An error at a key of the row."""
+        return self.toml.fault(self.section, key, mistake, expected)
+
+    def read(self, nth: int, row: Document) -> tuple[list[Part], list[Part]]:
+        """Parts of the tool's and of the work's side of one row."""
+        self.section, self.row = f"element[{nth}]", row
+        kind, side = row["type"], row.get("side", "tool")
+        if kind not in USED:
+            raise self.fault("type", f" = {kind!r}", f"one of {', '.join(USED)}")
+        for key in row:
+            if key not in (*USED[kind], "name", "type", "link", "origin", "remark"):
+                raise self.fault(key, f": a {kind} has no such key", f"one of {', '.join(USED[kind])}")
+        if side not in ("tool", "work"):
+            raise self.fault("side", f" = {side!r}", "tool or work")
+        if row.get("link", LINKS[0]) not in LINKS:
+            raise self.fault("link", f" = {row['link']!r}", f"one of {', '.join(LINKS)}")
+        if kind == "joint":
+            return self._joints()
+        part = self._beam(side == "work") if kind == "beam" else self._spring(side == "work")
+        return ([], [part]) if side == "work" else ([part], [])
+
+    def needed(self, key: str) -> FloatArray:
+        """The value of a key that must be there."""
+        if key not in self.row:
+            raise self.fault(key, " is missing", ELEMENT[key].expected)
+        return np.asarray(self.row[key])
+
+    def element(self, link: str) -> Element:
+        """Its name as results show it, and its link unless the file names one."""
+        return Element(self.row["name"].replace("_", " "), self.row.get("link", link))
+
+    def _joints(self) -> tuple[list[Part], list[Part]]:
+        """Torsion about the axis of each rotary joint, and the same bending about both others."""
+        rotary = [(work, i) for work in (False, True) for i, j in enumerate(self.chains[work]) if not j.linear]
+        parts: tuple[list[Part], list[Part]] = ([], [])
+        given = {}
+        for key in USED["joint"]:
+            values = self.needed(key) if key.startswith("torsion") else np.asarray(self.row.get(key, 0.0))
+            if values.ndim and len(values) != len(rotary):
+                raise self.fault(key, f": {len(values)} numbers", f"{len(rotary)}, one a rotary joint")
+            given[key] = np.broadcast_to(m_from_nm(values), (len(rotary),))
+        for (work, i), torsion, bending in zip(rotary, *given.values(), strict=True):
+            name = self.chains[work][i].name
+            name = f"joint {name[1:]}" if name[:1] in "Jj" and name[1:].isdigit() else f"joint {name}"
+            element = Element(name, self.row.get("link", "joints"))
+            compliance = np.array([0.0, 0.0, 0.0, bending, bending, torsion])
+            parts[work].append(Body(element, i + 1, STILL, compliance))
+        return parts
+
+    def _spring(self, work: bool) -> Part:
+        ways = [key for key in ("at", "centre", "centre_mm") if key in self.row]
+        if len(ways) != 1:
+            raise self.fault("centre_mm", f": {' and '.join(ways) or 'no place'}", "one of at, centre, centre_mm")
+        compliance = m_from_nm(
+            np.concatenate([self.needed("translation_nm_per_N"), self.needed("rotation_nrad_per_Nm")])
+        )
+        homes = self.homes[work]
+        if ways == ["at"]:
+            places = {"base": 0, "tip": len(homes) - 1}
+            if self.row["at"] not in places or work:
+                raise self.fault("at", f" = {self.row['at']!r}", "base or tip, on the tool's side")
+            frame, place = places[self.row["at"]], STILL
+        elif ways == ["centre"]:
+            frame, place = self._centre(work)
+        else:
+            frame, place = self._placed("centre_mm", "moves_with", work)
+        if "x_axis" in self.row or "z_axis" in self.row:
+            place = Placement(beam_axes(self.needed("x_axis"), self.needed("z_axis")), place.origin)
+        tip = frame == len(homes) - 1 and not work
+        return Body(self.element("tool" if tip else "table" if work else "frame"), frame, place, compliance)
+
+    def _centre(self, work: bool) -> tuple[int, Placement]:
+        """On the axis of a rotary joint, in the frame that carries it: machine axes with all joints at 0."""
+        names = [joint.name for joint in self.chains[work]]
+        if self.row["centre"] not in names:
+            raise self.fault("centre", f" = {self.row['centre']!r}", f"one of {', '.join(names)}")
+        carrier = names.index(self.row["centre"])
+        homes = self.homes[work]
+        return carrier, homes[carrier].inverse().then(Placement(np.eye(3), homes[carrier + 1].origin))
+
+    def _placed(self, key: str, moving: str, work: bool) -> tuple[int, Placement]:
+        """A point in a joint's frame, or in machine axes with all joints at 0 and moving with some of the axes."""
+        point = Placement(np.eye(3), m_from_mm(self.needed(key)))
+        joints = self.chains[work]
+        if "frame" in self.row:
+            names = [joint.name for joint in joints]
+            if self.row["frame"] not in names:
+                raise self.fault("frame", f" = {self.row['frame']!r}", f"one of {', '.join(names)}")
+            number = names.index(self.row["frame"])
+            return number + 1, joints[number].given.then(point)
+        moved = {name.lstrip("-") for name in self.row.get(moving, ())}
+        frame = len(moved)
+        if {joint.name for joint in joints[:frame]} != moved:
+            order = ", ".join(joint.name for joint in joints)
+            mistake = f" = {sorted(moved)}: no part of the {'work' if work else 'tool'}'s axes moves so"
+            raise self.fault(moving, mistake, f"the first ones of {order}")
+        signs = {name.startswith("-") for name in self.row.get(moving, ())}
+        if moved and signs != {work}:
+            raise self.fault(moving, f" = {sorted(self.row[moving])}", "-X on the work's side, X on the tool's")
+        return frame, self.homes[work][frame].inverse().then(point)
+
+    def _beam(self, work: bool) -> Part:
+        stiffness = [1e6 * float(self.needed(key)) for key in BEAM]
+        (first, start), (second, end) = (
+            self._placed(f"{key}_mm", f"{prefix}moves_with", work) for key, prefix in (("from", ""), ("to", "to_"))
+        )
+        element = self.element("table" if work else "frame")
+        z_axis = start.axes @ self.needed("z_axis")
+        if first != second:
+            return SpanningBeam(element, (first, second), start.origin, end.origin, z_axis, stiffness)
+        along = end.origin - start.origin
+        if np.linalg.norm(np.cross(along, z_axis)) < 1e-6 * np.linalg.norm(along) or not along.any():
+            raise self.fault("z_axis", " lies along the beam", "a direction across it")
+        place = Placement(beam_axes(along, z_axis), 0.5 * (start.origin + end.origin))
+        return Body(element, first, place, beam_compliance(float(np.linalg.norm(along)), stiffness))
+
+
+def read_bodies(
+    toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[Placement] = (STILL, STILL)
+) -> tuple[tuple[Part, ...], tuple[Part, ...]]:
+    """What gives way on the tool's and on the work's side."""
+    reader = ElementReader(toml, chains, ends)
+    sides: tuple[list[Part], list[Part]] = ([], [])
+    for nth, row in enumerate(read_rows(toml, "element", ELEMENT), 1):
+        of_tool, of_work = reader.read(nth, row)
+        sides[0].extend(of_tool)
+        sides[1].extend(of_work)
+    return tuple(sides[0]), tuple(sides[1])

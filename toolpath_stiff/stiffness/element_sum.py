@@ -1,0 +1,107 @@
+"""Compliance of a machine of elements: the sum over the load path, C = sum S^T diag(c) S, effects included.
+
+Along a direction d the tip gives sum c (s . d)^2 for a force along it (Castigliano's second theorem; equilibrium alone
+gives what each element carries). That runs over columns, poses last: three numbers a spring, no matrix a pose.
+"""
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.machine.elements import Spring, Stance
+from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.model import StiffnessModel
+
+
+def stance_of(path: LoadPath) -> Stance:
+    """How a machine of elements stands on a load path."""
+    assert isinstance(path.stance, Stance)
+    return path.stance
+
+
+def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
+    """(n, 3, 3) m/N, base axes: displacements of the tip under forces at it; nan where nothing holds the tip."""
+    compliance = stance_of(path).tip_compliance()[:, :3, :3] + _of_effects(model, path)
+    return exact.possible(model, path, compliance)
+
+
+def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> FloatArray:
+    """(n,) m/N, displacement along unit vectors (n, 3), base axes, per force along them."""
+    along = elements_along(stance_of(path), direction)
+    if model.effects:
+        along = along + np.einsum("ni,nij,nj->n", direction, _of_effects(model, path), direction)
+    return exact.possible(model, path, along[:, None, None])[:, 0, 0]
+
+
+def _of_effects(model: StiffnessModel, path: LoadPath) -> FloatArray:
+    """(n, 3, 3) m/N that effects add at the tip."""
+    added = np.zeros((len(path), 3, 3))
+    for active in model.effects:
+        form = active.adds("load_compliance", path)
+        if form is not None:
+            added += form[:, 6:9, 6:9]
+    return added
+
+
+def elements_along(stance: Stance, direction: FloatArray) -> FloatArray:
+    """(n,) m/N of the elements alone along unit vectors (n, 3), base axes."""
+    total = np.zeros(len(stance))
+    for energy in energies(stance, direction):
+        total += energy
+    return total
+
+
+def energies(stance: Stance, direction: FloatArray) -> list[FloatArray]:
+    """(n,) m/N of each element along unit vectors (n, 3), base axes: twice the energy under a force of 1 N."""
+    tip, along = (np.ascontiguousarray(values.T) for values in (stance.position, direction))
+    shares = []
+    for load in stance.loads:
+        if isinstance(load, Spring):
+            shares.append(_spring_energy(load, tip, along))
+        else:
+            forces = np.einsum("nki,ni->nk", load.loads[:, :, :3], direction)
+            shares.append(np.asarray((load.compliance * forces**2).sum(axis=1)))
+    return shares
+
+
+def _spring_energy(spring: Spring, tip: FloatArray, force: FloatArray) -> FloatArray:
+    """(n,) of a spring under forces (3, n) at the tip (3, n)."""
+    axes = (
+        spring.axes
+        if spring.axes is None
+        else np.moveaxis(spring.axes, 0, -1)
+        if spring.axes.ndim == 3
+        else spring.axes
+    )
+    compliance = spring.compliance.T  # (6,) or (6, n)
+    energy = _quadratic(compliance[:3], axes, force)
+    if compliance[3:].any():
+        arm = tip - (spring.place.T if spring.place.ndim == 2 else spring.place[:, None])
+        moment = np.empty_like(arm)
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            np.multiply(arm[j], force[k], out=moment[i])
+            moment[i] -= arm[k] * force[j]
+        energy = energy + _quadratic(compliance[3:], axes, moment)
+    return np.broadcast_to(energy, tip.shape[1:])
+
+
+def _quadratic(compliance: FloatArray, axes: FloatArray | None, vector: FloatArray) -> FloatArray | float:
+    """(n,) sum of c_k (a_k . v)^2 over three axes; what two or three axes have alike is counted by the length of v."""
+    if compliance.ndim == 2:
+        alike, rest = 0.0, list(enumerate(compliance))
+    else:
+        values = compliance.tolist()
+        alike = max(values, key=lambda value: (values.count(value), -value))
+        rest = [(k, value - alike) for k, value in enumerate(values) if value != alike]
+    total: FloatArray | float = 0.0
+    if alike:
+        total = alike * (vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+    for k, value in rest:
+        if axes is None:
+            part = vector[k]
+        else:
+            part = axes[0, k] * vector[0]
+            part += axes[1, k] * vector[1]
+            part += axes[2, k] * vector[2]
+        total = total + value * (part * part)
+    return total
