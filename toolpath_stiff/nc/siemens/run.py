@@ -239,6 +239,9 @@ class SiemensRun(ParametricRun):
 
     # Flow
 
+    def _ends_before(self, row: int) -> bool:
+        return False  # each file ends with a line of its own
+
     def _step(self, kind: str) -> Step | None:
         return SIEMENS_STEPS.get(kind) or super()._step(kind)
 
