@@ -46,7 +46,7 @@ class Reader:
 
     def value(self, text: str) -> float:
         text = re.sub(r"R\[(\d+)\]", r"R\1", text)
-        return float(eval(text.replace("<>", "!="), {"__builtins__": {}}, SCOPE | self.names))  # noqa: S307
+        return float(eval(text.replace("<>", "!="), {"__builtins__": {}}, SCOPE | self.names))
 
     def run(self, row: int, stop: int) -> None:
         left: dict[int, int] = {}
@@ -230,7 +230,9 @@ class Reader:
             return
         if "I" in words or "J" in words:
             for axis, letter in enumerate("IJ"):
-                center[axis] = self.coordinate(words.get(letter, "IC(0)"), start[axis], letter in words and "AC" not in words[letter])
+                center[axis] = self.coordinate(
+                    words.get(letter, "IC(0)"), start[axis], letter in words and "AC" not in words[letter]
+                )
             if "AR" in words:
                 sweep = sign * math.radians(self.value(words["AR"]))
                 end[:2] = center[:2] + about(2, math.degrees(sweep))[:2, :2] @ (start - center)[:2]
@@ -261,9 +263,7 @@ class Reader:
         middle = a + half * x + ((px**2 + py**2 - 2.0 * half * px) / (2.0 * py)) * y
         first, last = (math.atan2((p - middle) @ y, (p - middle) @ x) for p in (a, c))
         radius, sweep = np.linalg.norm(a - middle), (last - first) % math.tau
-        points = [
-            middle + radius * (math.cos(first + sweep * s) * x + math.sin(first + sweep * s) * y) for s in SHARES
-        ]
+        points = [middle + radius * (math.cos(first + sweep * s) * x + math.sin(first + sweep * s) * y) for s in SHARES]
         self.moves.append(("F", np.array(points), self.tilt[:3, 2]))
         self.heading = None
 
@@ -298,7 +298,11 @@ class Reader:
             at, stroke = plane - others[1], others[1]
             path.append(("G1", at))
             while at > depth + 1e-9:
-                path += [("G0", top), ("G0", min(top, at + max(0.6, (plane - depth) / 50)))] if others[6] else [("G1", at + 1)]
+                path += (
+                    [("G0", top), ("G0", min(top, at + max(0.6, (plane - depth) / 50)))]
+                    if others[6]
+                    else [("G1", at + 1)]
+                )
                 at = max(depth, at - stroke)
                 path.append(("G1", at))
         else:
@@ -361,7 +365,13 @@ def random_program(seed: int) -> str:
     def statements(depth: int = 0) -> list[str]:
         kind = chance.randrange(17 if depth < 2 else 9)
         if kind == 0:
-            return [f"G1 X{n()} Y{n()}", f"X={value()} Y={value()} Z=AC({value()})", f"G91 X{n()}", "Y2 Z=AC(3.5)", "G90"]
+            return [
+                f"G1 X{n()} Y{n()}",
+                f"X={value()} Y={value()} Z=AC({value()})",
+                f"G91 X{n()}",
+                "Y2 Z=AC(3.5)",
+                "G90",
+            ]
         if kind == 1:
             return [arc(), arc()]
         if kind == 2:
@@ -375,10 +385,17 @@ def random_program(seed: int) -> str:
         if kind == 3:
             return [f"G1 {step('X', 'Y')}", f"CT {step('X', 'Y')}", f"{step('X', 'Y')}", "G1"]
         if kind == 4:
-            return [f"G111 X{n()} Y{n()}", f"G1 RP={n(5, 30)} AP={n(0, 360)}", f"G3 AP=IC({n(10, 90)})", f"G1 AP={n(0, 90)}"]
+            return [
+                f"G111 X{n()} Y{n()}",
+                f"G1 RP={n(5, 30)} AP={n(0, 360)}",
+                f"G3 AP=IC({n(10, 90)})",
+                f"G1 AP={n(0, 90)}",
+            ]
         if kind == 5:
-            frames = (f"TRANS X{n()} Y{n()}", f"ATRANS Z={n()}", f"ROT Z{n()}", f"AROT X{n()} Y{n()} Z{n()}", f"ROT RPL={n()}",
-                      "MIRROR X0", "AMIRROR Y0", f"ASCALE X{n(1, 2)[:3]} Y1 Z1", "TRANS", "ROT")  # fmt: skip
+            frames = (
+                *(f"TRANS X{n()} Y{n()}", f"ATRANS Z={n()}", f"ROT Z{n()}", f"AROT X{n()} Y{n()} Z{n()}"),
+                *(f"ROT RPL={n()}", "MIRROR X0", "AMIRROR Y0", f"ASCALE X{n(1, 2)[:3]} Y1 Z1", "TRANS", "ROT"),
+            )
             frame = chance.choice(frames)
             frame = re.sub(r"X(\S+) Y1 Z1", r"X\1 Y\1 Z\1", frame)
             return [frame, away()]
@@ -387,8 +404,13 @@ def random_program(seed: int) -> str:
         if kind == 7:
             numbers = f"30,{n(-2, 2)},{n(1, 3)},{n(-20, -5)}"
             cycle = chance.choice(
-                (f"CYCLE81({numbers})", f"CYCLE82({numbers},{n(1, 9)},0)", f"CYCLE85({numbers},,0,100,100)",
-                 f"CYCLE83({numbers},,,{n(1, 4)},0,0,0,1,{chance.randrange(2)})", f"CYCLE89({numbers},,0)")  # fmt: skip
+                (
+                    f"CYCLE81({numbers})",
+                    f"CYCLE82({numbers},{n(1, 9)},0)",
+                    f"CYCLE85({numbers},,0,100,100)",
+                    f"CYCLE83({numbers},,,{n(1, 4)},0,0,0,1,{chance.randrange(2)})",
+                    f"CYCLE89({numbers},,0)",
+                )
             )
             if chance.random() < 0.4:
                 return [away(), cycle]

@@ -3,6 +3,7 @@
 Paths (`siemens_paths.txt`) are written as those of `test_heidenhain`.
 """
 
+import math
 import random
 import re
 from pathlib import Path
@@ -21,6 +22,7 @@ from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE
 from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.rewriting.program import rewrite_program
 
 TOOLS = Controller(
     DIALECTS["siemens"],
@@ -155,7 +157,7 @@ def test_subprograms_in_files_and_skipped_blocks(tmp_path):
     (tmp_path / "Side.spf").write_text("PROC SIDE(REAL A)\nG91 G1 X=A\nIF A<3\nSIDE(A+1)\nENDIF\nG90\nM17\n")
     control = Controller(DIALECTS["siemens"], subprograms=str(tmp_path), switches=frozenset({3}))
     check_path(read("F100\n/3 X99\n/1 Y1\nSIDE(1)\nX0", control), "F 0 1 0; F 1 1 0; F 3 1 0; F 6 1 0; F 0 1 0")
-    with pytest.raises(InputError, match="calls within|subprograms within") as caught:
+    with pytest.raises(InputError, match="subprograms within each other") as caught:
         (tmp_path / "AGAIN.SPF").write_text("\nAGAIN\n")
         read("F100\nAGAIN", control)
     assert caught.value.line == 2
@@ -177,7 +179,71 @@ def test_check_says_the_language_and_why(capsys, tmp_path):
     file = tmp_path / "part.nc"
     file.write_text("G17 G90\nG0 X1\n" * 40 + "MCALL CYCLE81(10,0,2,-5)\nX5 F100\nMCALL\n")
     assert main(["check", str(file)]) == 0
-    assert "language: Siemens' own language (Sinumerik) (line 81: 'MCALL CYCLE81(10,0,2,-5)')" in capsys.readouterr().out
+    assert (
+        "language: Siemens' own language (Sinumerik) (line 81: 'MCALL CYCLE81(10,0,2,-5)')" in capsys.readouterr().out
+    )
     (tmp_path / "part.mpf").write_text("G1 X5 F100\n")
     assert main(["check", str(tmp_path / "part.mpf")]) == 0
     assert "(its ending)" in capsys.readouterr().out
+
+
+WRITTEN = """%_N_P_MPF
+N1 G17 G90 G71 T1 D1 M6
+N2 G54 F200 S1000 M3
+N3 G0 X10 Y0 Z2 ; start
+N4 G1 Z-2
+N5 G3 X0 Y10 I-10 J0
+N6 G1 X5 RND=1
+N7 X=IC(2) Y=IC(-3)
+N8 G2 X20 Y20 CR=30
+N9 CT X30 Y=AC(35)
+N10 G3 X20 Y45 I=AC(20) J=AC(35)
+N11 G91 G1 X5 Y=AC(50)
+N12 X-3
+N13 G90 MCALL CYCLE81(10,0,2,-5)
+N14 X60 Y60
+N15 MCALL
+N16 TRAORI
+N17 G1 X70 Y0 A3=0.1 B3=0.2 C3=1
+N18 TRAFOOF
+N19 SUPA G0 Z100 D0
+M30
+"""
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "z", "degrees"), [(100, 20, 0, 0), (0, 0, 0, 90), (12.5, -7, 0, 33.3), (5, 5, 0, -150)]
+)
+def test_a_program_is_written_for_another_placement(x, y, z, degrees):
+    program, turn = read(WRITTEN), math.radians(degrees)
+    text = rewrite_program(program, (x / 1e3, y / 1e3, z / 1e3, 0.0, 0.0, turn), (0.0,) * 6, control=TOOLS).text
+    assert text.count("\n") == WRITTEN.count("\n") and "; start" in text and "N19 SUPA G0 Z100 D0" in text
+    before, after = (cuts_by_line(moves) for moves in (program.moves, read(text).moves))
+    assert before.keys() == after.keys()
+    for line, (a, b, c, lean, sweep) in before.items():
+        there = (a * math.cos(turn) - b * math.sin(turn) + x, a * math.sin(turn) + b * math.cos(turn) + y, c)
+        assert after[line] == pytest.approx((*there, lean, sweep), abs=3e-3), line
+
+
+def cuts_by_line(moves) -> dict:
+    """Where the last cut of each line ends in mm, how far the tool leans there, its sweep."""
+    cuts = moves.take(moves.motion > 0)
+    lean = np.cos(cuts.end[:, 3]) * np.cos(cuts.end[:, 4])
+    rows = zip(cuts.line.tolist(), cuts.end[:, :3] * 1e3, lean, cuts.arc_sweep, strict=True)
+    return {line: (*end.tolist(), float(leaning), float(sweep)) for line, end, leaning, sweep in rows}
+
+
+@pytest.mark.parametrize(
+    ("body", "placement", "line"),
+    [
+        ("LA:\nG1 X1 F9\nREPEAT LA P=1", (0, 0, 0, 0, 0, 0.5), 2),
+        ("TRANS X5\nG1 X1 Y1 F9", (0.1, 0, 0, 0, 0, 0), 1),
+        ("R1=5\nG1 X=R1 F9", (0.1, 0, 0, 0, 0, 0), 2),
+        ("F9\nCYCLE81(9,0,2,-4)", (0, 0, 0.1, 0, 0, 0), 2),
+        ("G1 X1 Y1 F9", (0, 0, 0, 0.1, 0, 0), 1),
+    ],
+)
+def test_what_cannot_be_written_is_refused_by_line(body, placement, line):
+    with pytest.raises(InputError) as caught:
+        rewrite_program(read(body), placement, (0.0,) * 6, control=TOOLS)
+    assert caught.value.line == line and "--write" in str(caught.value)

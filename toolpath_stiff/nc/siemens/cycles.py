@@ -82,7 +82,7 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
         if values.get(name):
             state.note(block.line, block.values[name], SHIFT)
     if "MCALL" in block.codes:
-        state.plain.modal, state.plain.cycle = True, (int(values["number"]), values, block.line)
+        state.plain.modal, state.plain.cycle = True, (int(values["number"]), values)
     else:
         drill(state, block, values)
 

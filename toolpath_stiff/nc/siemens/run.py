@@ -166,7 +166,9 @@ class SiemensRun(ParametricRun):
         elif isinstance(local.get(name), bool):
             scope[name] = bool(value)
         else:
-            scope[name] = float(math.floor(value + 0.5)) if {name, array} & self._whole and value == value else value
+            scope[name] = (
+                float(math.floor(value + 0.5)) if {name, array} & self._whole and math.isfinite(value) else value
+            )
 
     # Blocks
 
