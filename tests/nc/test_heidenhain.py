@@ -192,7 +192,7 @@ REFUSALS = {
     "CC X+0 Y+0\nCYCL DEF 7.1 X+5\nLP PR+5 PA+0": ("after a change of the coordinates", 5),
     "PLANE SPATIAL SPA+0 SPB+9 SPC+0 STAY\nL X+1": ("tool's place is not known", 4),
     "M140 MB MAX\nL X+1": ("tool's place is not known", 4),
-    "M128\nL X+1 A+5": ("under M128", 4),
+    "M128\nL X+1 A+5": ("under tool centre point control", 4),
     "M99": ("calls a cycle, and none is defined", 3),
     "CYCL DEF 200 D Q200=2 Q201=-5\nM99": ("without Q206", 3),
     "CYCL DEF 200 D Q200=2 Q201=5 Q206=9 Q202=5 Q203=0": ("above the surface", 3),

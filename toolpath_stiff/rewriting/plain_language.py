@@ -5,6 +5,7 @@ where the run comes from (a coordinate alone in a turned program, behind a label
 """
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -19,6 +20,7 @@ from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.reader import read
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.words import Word
+from toolpath_stiff.rewriting import siemens_blocks
 from toolpath_stiff.rewriting.controls import DECIMALS_INCH, DECIMALS_MM
 from toolpath_stiff.rewriting.turn import Turn
 from toolpath_stiff.units import MM_PER_INCH, mm_from_m
@@ -31,18 +33,23 @@ KEPT = ("", "BEGIN PGM", "END PGM", "BLK FORM 0.1", "BLK FORM 0.2", "TOOL CALL",
 DRILLING = tuple(f"CYCL DEF {number}" for number in (200, 201, 202, 203, 205, 206, 207, 209, 240))  # at a height
 FORGETS = ("LBL", "CALL LBL", "DEP LT", "DEP LN", "DEP CT", "LP", "CP")  # after which X and Y are not known
 COORDINATES = ("X", "Y", "Z", "IX", "IY", "PA")
+INCH = re.compile(r"\bG70{1,2}\b")
 MOST_ROUNDINGS = 100  # by which rounded numbers of a path of steps may add up
 HINT = "place it without --write, and set the datum that is printed"
 
 
 def write_placed(program: ReadProgram, text: str, turn: Turn, decimals: int | None, control: Controller) -> str:
-    """Heidenhain's text at its new place, read again: where the path is not the placed one, it is refused."""
-    lines, inch = split_lines(text, program.name), in_inches(program.source)
+    """Heidenhain's or Siemens' text at its new place, read again: it is refused where the path is not the placed one."""
+    siemens = program.dialect == "siemens"
+    lines, inch = split_lines(text, program.name), (INCH.search(text) if siemens else in_inches(program.source))
     unit, usual = (MM_PER_INCH, DECIMALS_INCH) if inch else (1.0, DECIMALS_MM)
     decimals = usual if decimals is None else decimals
-    placed = placed_lines(turn, lines, program.name, unit, decimals)
+    write = siemens_blocks.placed_lines if siemens else placed_lines
+    placed = write(turn, lines, program.name, unit, decimals)
     control = replace(control, dialect=DIALECTS[program.dialect])
     again, moves = read(Request(tuple(placed), program.name, controller=control)).moves, program.moves
+    if len(again) != len(moves):  # a turned tool axis may take other parts to a move
+        again, moves = (m.take(np.append(np.diff(m.line) != 0, True)) for m in (again, moves))
     wrong = np.zeros(1, dtype=int)
     if np.array_equal(again.motion, moves.motion):
         ends = np.array([turn.point(mm_from_m(end[:3]).tolist()) for end in moves.end])
