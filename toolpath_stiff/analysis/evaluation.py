@@ -287,15 +287,10 @@ def kept_configuration(machine: MachineTool, position: FloatArray, abc: FloatArr
     return int(np.argmax([reach(machine, position[few], stance).margin.min() for stance in stances]))
 
 
-def evaluate_stance(
-    model: StiffnessModel,
-    stance: Stance,
-    in_work: WorkPoses,
-    load: Load,
-) -> Evaluation:
+def evaluate_stance(model: StiffnessModel, stance: Stance, in_work: WorkPoses, load: Load) -> Evaluation:
     """A machine of elements where it stands; tip, tool axes and tangent in work axes."""
-    machine, n, (position, _, tangent) = model.machine, len(stance), in_work
-    stand = reach(machine, position, stance)
+    position, _, tangent = in_work
+    n, stand = len(stance), reach(model.machine, position, stance)
     along, substituted = np.full(n, np.nan), np.zeros(n, dtype=bool)
     direction, known = geometric_directions(load, *in_work)
     if stance.work_axes is not None and load.kind in OF_THE_WORK:
