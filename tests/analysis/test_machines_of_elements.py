@@ -171,18 +171,59 @@ def test_what_knows_hexapods_only_says_so(words: list[str], tmp_path: Path, caps
     assert not (tmp_path / "out").exists()
 
 
-EFFECT = '\n[[effect]]\nname = "spindle_compliance"\nradial_nm_per_N = 500.0\naxial_nm_per_N = 100.0\n'
+def entry(name: str, **values: object) -> str:
+    """An `[[effect]]` of a machine file."""
+    return "\n".join(["", "[[effect]]", f'name = "{name}"', *(f"{k} = {json.dumps(v)}" for k, v in values.items()), ""])
 
 
-def test_effects_at_the_tip_hold_on_every_kind_and_others_are_refused(tmp_path: Path) -> None:
-    plain, value = poses("robot200")[0], VALUES["robot200"][0]
-    found = tps.pose(plain, changed(tmp_path, "robot200", more=EFFECT))
-    frame = np.array(value["tip_frame"])
-    expected = np.array(value["tip_compliance_nm_per_N"]) + frame @ np.diag([500.0, 500.0, 100.0]) @ frame.T
-    assert 1e9 * found.tip_compliance[0] == pytest.approx(expected, rel=1e-8)
-    weak = changed(tmp_path, "robot200", more='\n[[effect]]\nname = "weak_strut"\nstrut = 1\nfactor = 0.5\n')
+def torsion(joint: int) -> np.ndarray:
+    """(3, 3) compliance in nm/N at the first pose for 1 nrad/(N m) about a joint, by turning it a little."""
+    machine, value = tps.Machine.load(file("robot200")).stated, VALUES["robot200"][0]
+    angles, step = np.radians(value["joints"]), 1e-6
+    turned = [machine.forward((angles + sign * step * np.eye(6)[joint])[None])[0][0] for sign in (1, -1)]
+    column = (turned[0] - turned[1]) / (2 * step)  # m by which the tip goes for each radian of the joint
+    return np.outer(column, column)
+
+
+@pytest.mark.parametrize(
+    ("effect", "added"),
+    [
+        (entry("spindle_compliance", radial_nm_per_N=500.0, axial_nm_per_N=100.0), "tip"),
+        (entry("joint_torsion", element="joint 3", compliance_nrad_per_N_per_m=700.0), 700.0),
+        (entry("weak_element", element="joint 3", factor=0.5), "bending too"),
+        (entry("gear_backlash", element="joint 3", gap_arcsec=20.0), "gap"),
+    ],
+)
+def test_effects_of_elements_add_what_the_mechanics_says(effect: str, added: object, tmp_path: Path) -> None:
+    """The tip goes by dp/dq for each radian of a joint, and the joint carries the moment F . dp/dq (virtual work)."""
+    pose, value = poses("robot200")[0], VALUES["robot200"][0]
+    machine, frame = changed(tmp_path, "robot200", more=effect), np.array(value["tip_frame"])
+    tensor, third = np.array(value["tip_compliance_nm_per_N"]), torsion(2)
+    found = 1e9 * tps.pose(pose, machine, force_N=2000).tip_compliance[0] - tensor
+    if added == "tip":
+        assert found == pytest.approx(frame @ np.diag([500.0, 500.0, 100.0]) @ frame.T, rel=1e-6)
+    elif added == "bending too":  # the file's 460 of torsion and 220 of bending once more
+        rest = found - 460.0 * third
+        across = tps.pose(pose, changed(tmp_path, "robot200", more=entry(
+            "joint_bending", element="joint 3", compliance_nrad_per_N_per_m=220.0)))  # fmt: skip
+        assert rest == pytest.approx(1e9 * across.tip_compliance[0] - tensor, rel=1e-5, abs=1e-4)
+        assert np.linalg.eigvalsh(rest).min() > -1e-4
+    elif added == "gap":  # m of the tip per N along X: gap times its lever over the load
+        along = 1e9 * math.radians(20 / 3600) * math.sqrt(third[0, 0]) / 2000
+        seen = 1e9 / tps.pose(pose, machine, force_N=2000).along_axes[0, 0] - tensor[0, 0]
+        assert seen == pytest.approx(along, rel=1e-4)
+    else:
+        assert found == pytest.approx(float(added) * third, rel=1e-5, abs=1e-4)
+
+
+def test_effects_are_held_to_their_machines(tmp_path: Path) -> None:
+    weak = changed(tmp_path, "robot200", more=entry("weak_strut", strut=1, factor=0.5))
     with pytest.raises(tps.InputError, match="weak_strut holds on hexapods only, robot200 is of kind serial"):
-        tps.pose(plain, weak)
+        tps.Machine.load(weak)
+    nowhere = changed(tmp_path, "robot200", more=entry("weak_element", element="joint 9", factor=0.5))
+    with pytest.raises(tps.InputError, match="has no element 'joint 9'; expected one of base mount, joint 1"):
+        tps.pose(poses("robot200")[0], nowhere)
+    assert "joint_torsion" not in {effect.name for effect in tps.effects().effects}
 
 
 def test_a_path_out_of_the_arms_reach_is_told_by_line() -> None:

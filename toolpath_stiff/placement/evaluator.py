@@ -221,7 +221,7 @@ class Evaluator:
                 tip, turns, towards = in_work
                 some = tip[wanted], None if turns is None else turns[wanted], towards[wanted]
                 values = np.full(len(rows) * n, np.nan)
-                values[wanted] = evaluate_stance(self.model, stance.take(wanted), some, self.load).stiffness
+                values[wanted] = evaluate_stance(self.model, stance.take(wanted), some, self.load, self.force).stiffness
                 stiffness[rows] = values.reshape(-1, n)
         return stiffness, margin
 
