@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
@@ -23,6 +23,7 @@ from toolpath_stiff.analysis.statistics import (
     sample_columns,
     share,
 )
+from toolpath_stiff.analysis.turning import FIXED, TurnChoice, choose_turn
 from toolpath_stiff.analysis.uncertainty import band_figures
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.cutting.cut import Cut
@@ -59,6 +60,8 @@ class Analysis(EvaluatedPath, FolderResult):
 
     Attributes
     ----------
+    turn
+        The turn about the tool's axis, where it is not as programmed.
     required
         Stiffness that every cut must have, N/m; None: none.
     on_other
@@ -90,6 +93,7 @@ class Analysis(EvaluatedPath, FolderResult):
     command: ClassVar[str] = "analyze"
     shown_by: ClassVar[str] = "analysis"
 
+    turn: TurnChoice | None = None
     required: float | None = None
     on_other: Analysis | None = None
     cut: Cut | None = None
@@ -200,6 +204,7 @@ def analyze(
     step: float = defaults.STEP,
     force: float = defaults.FORCE,
     partial: bool = False,
+    turn: str = FIXED,
     progress: Progress | None = None,
 ) -> Analysis:
     r"""Stiffness along the path of a program.
@@ -220,6 +225,8 @@ def analyze(
         Size of the load, N: for deflections, and for effects that depend on it.
     partial
         Keep the reachable samples of a program that leaves the workspace.
+    turn
+        How the tool is turned about its axis: "fixed", "feed" or "best", see `turning`.
     progress
         Called with (samples done, samples in all).
 
@@ -243,6 +250,12 @@ def analyze(
     place_at, source = _effective_origin(model.machine, program, origin)
     words = model.machine.angles_of if program.native else None
     samples = sample_moves(place(program.moves, place_at), step, model.machine.rapid_feed, place_at, words)
+    choice = None
+    if turn != FIXED:
+        poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+        choice = choose_turn(model, *poses, direction, turn)
+        samples = replace(samples, abc=choice.abc)
+        model = replace(model, machine=choice.kept(model.machine))
     poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
     analysis = Analysis(
         program=program,
@@ -254,6 +267,7 @@ def analyze(
         step=step,
         samples=samples,
         at=evaluate(model, *poses, direction, force, progress),
+        turn=choice,
     )
     _check_reach(analysis, partial)
     return analysis
@@ -278,6 +292,9 @@ def _effective_origin(machine: MachineTool, program: ReadProgram, origin: Pose |
 def _warnings(analysis: Analysis) -> list[str]:
     """What the evaluation itself has to say."""
     warnings, samples, there = [], analysis.samples, analysis.at
+    if analysis.turn is not None and len(changes := np.unique(samples.line[analysis.turn.changes])):
+        lines = ", ".join(map(str, changes[:MOST_NAMED]))
+        warnings.append(f"lines {lines}: the joints cannot go on as they stand, the configuration has to change there")
     rapids, swapped = ~samples.cutting & ~there.reachable, samples.cutting & there.substituted
     if rapids.any():
         first = int(np.argmax(rapids))
@@ -356,7 +373,7 @@ def _summary(analysis: Analysis) -> Document:
         **_of_kind(analysis, cutting),
         **effects_stated(analysis.model),
         "unsupported": to_dict(program.unsupported),
-        "assumptions": assumptions_of(analysis),
+        "assumptions": assumptions_of(analysis, analysis.turn.sentence if analysis.turn else ""),
         "warnings": analysis.warnings,
         "version": defaults.VERSION,
     }
