@@ -154,7 +154,8 @@ def compare(
     teller(progress)("comparing")
     comparison = compare_readings(question.model, question.readings, **question.common)
     following = hint("which effect would explain it", question.request.command("diagnose"))
-    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=(following,)))
+    following = (following,) if isinstance(question.model, Hexapod) else ()
+    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=following))
 
 
 @checked

@@ -30,7 +30,7 @@ def pose(
     pose: Annotated[Sequence[float], Option("X Y Z [A B C]", read=finite_number, count="*")] = (),
     csv: Annotated[str | None, Option("--csv", "FILE")] = None,
 ) -> int:
-    """Stiffness, softest and stiffest direction, strut lengths at single poses.
+    """Stiffness, softest and stiffest direction, joint values at single poses.
 
     for example:
       tps pose -300 300 300 -30 0 0

@@ -229,7 +229,7 @@ def upright_middle(machine: MachineTool) -> Pose:
         places = best + half * rng.uniform(-1.0, 1.0, (DRAWN, 3))
         places[0] = best
         best = places[int(np.argmax(reach(machine, places, machine.solve(places)).margin))]
-    x, y, z = best.round(3).tolist()
+    x, y, z = (best.round(2) + 0.0).tolist()  # to 10 mm
     return (x, y, z, 0.0, 0.0, 0.0)
 
 
