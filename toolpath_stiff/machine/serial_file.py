@@ -285,9 +285,12 @@ def _trunnion(
         if not low < high:
             raise toml.fault("limits", f"{name}_deg", ": min is not below max", expected="min below max")
     first = aligned(axis)
-    turn = ChainJoint(letter, False, Placement(np.eye(3), point + offset).then(first), *map(float, bounds[letter]))
-    table = ChainJoint("C", False, first.inverse().then(Placement(np.eye(3), -offset)), *map(float, bounds["C"]))
-    return (turn, table), tip, Placement(np.eye(3), -point)
+    places = Placement(np.eye(3), point + offset).then(first), first.inverse().then(Placement(np.eye(3), -offset))
+    joints = tuple(
+        ChainJoint(name, False, place, float(bounds[name][0]), float(bounds[name][1]))
+        for name, place in zip((letter, "C"), places, strict=True)
+    )
+    return joints, tip, Placement(np.eye(3), -point)
 
 
 def _check_solvable(toml: MachineToml, machine: Serial) -> None:
