@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import toolpath_stiff as tps
-from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.file import load_machine
 
 DATA = Path(__file__).parents[1] / "machine" / "data"

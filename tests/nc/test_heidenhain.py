@@ -151,7 +151,8 @@ REFUSALS = {
     "FC DR- R10": ("FC is free contour programming", 3),
     "CYCL DEF 251 POCKET": ("cycle that is not supported", 3),
     "CYCL DEF 208 BORE Q200=2": ("draws without numbers", 3),
-    "TCH PROBE 412 X": ("probing", 3),
+    "Q5 = 1\nTCH PROBE 0.0 PLANE Q5 X-\nTCH PROBE 0.1 X+5\nL X+Q5": ("Q5 is read before it is set", 6),
+    "TCH PROBE 412 X ~\n Q320=5\nL X+1": ("place is not known", 5),
     "PATTERN DEF POS1": ("points of other files or patterns|no statement", 3),
     "PLANE VECTOR BX1": ("given otherwise", 3),
     "G1 X10": ("no statement that is known", 3),
@@ -228,7 +229,16 @@ def test_every_statement_and_function_has_its_source_and_meaning():
     bodies = "\n".join(body for body, _ in PATHS.values())
     silent = (functions.nothing, functions.listed)
     unproved = [name for name, row in STATEMENTS.items() if row.act not in silent and name not in bodies]
-    other = {"BEGIN PGM", "BLK FORM 0.1", "BLK FORM 0.2", "CYCL DEF 247", "CYCL DEF 240", "STOP"}
+    other = {
+        "BEGIN PGM",
+        "BLK FORM 0.1",
+        "BLK FORM 0.2",
+        "CYCL DEF 247",
+        "CYCL DEF 240",
+        "STOP",
+        "TCH PROBE",
+        "CYCL DEF 300",
+    }
     assert {*unproved} == other | {f"CYCL DEF 7.{n}" for n in (3, 4, 5, 6)} | {"FUNCTION RESET TCPM"}
 
 
@@ -255,6 +265,8 @@ def test_blank_tools_and_what_is_said():
     assert program.moves.tool_length[-1] == 0.05 and ("M8", 9) in [(u.word, u.line) for u in program.unsupported]
     assert program.moves.end[-1, 2] == pytest.approx(0.002 - 0.05)  # the numbers of the tip change with the length
     assert any("cycle 247" in text for text in program.assumptions)
+    left_out = read("CYCL DEF 392 ATC ~\n Q240=2\nBLK FORM 0.1 Z X+Q7 Y+0 Z-20\nL X+1")
+    assert "392 is left out" in left_out.warnings[0].text and left_out.stock is None and len(left_out.moves) == 1
 
 
 def test_programs_that_are_called(tmp_path):

@@ -282,7 +282,7 @@ def test_where_it_is_missing_the_message_says_how_to_get_it(monkeypatch, tmp_pat
     with pytest.raises(InputError, match="apt install linuxcnc-uspace"):
         linuxcnc("G1 X1 F100\n")
     program = tmp_path / "part.nc"
-    program.write_text("G1 X1 F100\nM70\n")
+    program.write_text("G1 X1 F100\nG7\n")
     assert main(["path", str(program), "--interpreter", "auto"]) == 2
     message = capsys.readouterr().err
     assert "part.nc:2:1" in message and "apt install linuxcnc-uspace" in message
@@ -293,7 +293,7 @@ def test_where_it_is_missing_the_message_says_how_to_get_it(monkeypatch, tmp_pat
 @needs_rs274
 def test_auto_takes_the_second_only_where_the_first_refuses(monkeypatch):
     assert parse_program("G1 X1 F100\n", interpreter="auto").interpreter == "builtin"
-    program = parse_program("#1 = 5\nG1 X#1 F100\nM70\n", interpreter="auto")
+    program = parse_program("#1 = 5\nG1 X#1 F100\nG7\n", interpreter="auto")
     assert program.interpreter == "linuxcnc"
     assert program.moves.end[0, 0] == pytest.approx(5e-3)
     assert any("rs274" in sentence for sentence in program.assumptions)
@@ -314,7 +314,7 @@ def test_an_unknown_interpreter_is_an_error():
 @needs_rs274
 def test_the_report_names_who_read_the_program(tmp_path, capsys):
     program = tmp_path / "part.nc"
-    program.write_text("G21 G90 F500 M70\n#1 = 5\no1 repeat [3]\nG1 X#1\n#1 = [#1 + 5]\no1 endrepeat\nG1 Y4\n")
+    program.write_text("G21 G90 F500 G7\nG8\n#1 = 5\no1 repeat [3]\nG1 X#1\n#1 = [#1 + 5]\no1 endrepeat\nG1 Y4\n")
     common = ["analyze", str(program), "--interpreter", "auto", "--no-plots", "--out", str(tmp_path / "out")]
     assert main([*common, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["interpreter"] == "linuxcnc"

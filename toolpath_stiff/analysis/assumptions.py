@@ -12,8 +12,8 @@ from toolpath_stiff.stiffness.model import acting_effects, conditions_stated
 from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s
 
 
-def assumptions_of(analysis: EvaluatedPath) -> list[str]:
-    """Everything that was assumed or recovered rather than published or given."""
+def assumptions_of(analysis: EvaluatedPath, turned: str = "") -> list[str]:
+    """Everything that was assumed or recovered rather than published or given; `turned`: how the tool was turned."""
     machine, model = analysis.machine, analysis.model
     sentences = list(analysis.program.assumptions)
     if words_turn_the_platform(analysis.program) and isinstance(machine, Hexapod):
@@ -42,7 +42,7 @@ def assumptions_of(analysis: EvaluatedPath) -> list[str]:
         range_of_law = f"the strut law is extrapolated outside {low:.1f} to {high:.1f} mm of strut length"
         sentences.append("the stiffness of a strut is the same at every length" if law.constant else range_of_law)
     else:
-        sentences += _of_elements(analysis)
+        sentences += _of_elements(analysis, turned)
     if analysis.parameter_band is not None:
         whole = ", of struts, joints and what the model lacks, as `[uncertainty.errors]` of the machine file has them"
         beside = whole if analysis.parameter_band.form.any() else " alone"
@@ -55,15 +55,15 @@ def assumptions_of(analysis: EvaluatedPath) -> list[str]:
     return sentences
 
 
-def _of_elements(analysis: EvaluatedPath) -> list[str]:
+def _of_elements(analysis: EvaluatedPath, turned: str) -> list[str]:
     """What is assumed of a machine of elements on a path."""
     machine = analysis.machine
     names = ", ".join(dict.fromkeys(element.name for element in machine.elements))
     sentences = [f"what gives way is {names}; everything else is rigid"]
     if analysis.at.configuration:
         sentences.append(f"the configuration of the joints is kept over the program: {analysis.at.configuration}")
-    if analysis.turn is not None:
-        sentences.append(analysis.turn.sentence)
+    if turned:
+        sentences.append(turned)
     elif len(machine.joint_names) > 5:
         sentences.append("the tool's turn about its own axis is as programmed (C; 0 unless said) and not chosen")
     if np.isnan(machine.reference_tool_length) and not np.isnan(analysis.samples.tool_length).all():

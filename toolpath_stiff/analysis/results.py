@@ -23,7 +23,7 @@ from toolpath_stiff.analysis.statistics import (
     sample_columns,
     share,
 )
-from toolpath_stiff.analysis.turning import FIXED, choose_turn
+from toolpath_stiff.analysis.turning import FIXED, TurnChoice, choose_turn
 from toolpath_stiff.analysis.uncertainty import band_figures
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.cutting.cut import Cut
@@ -60,6 +60,8 @@ class Analysis(EvaluatedPath, FolderResult):
 
     Attributes
     ----------
+    turn
+        The turn about the tool's axis, where it is not as programmed.
     required
         Stiffness that every cut must have, N/m; None: none.
     on_other
@@ -91,6 +93,7 @@ class Analysis(EvaluatedPath, FolderResult):
     command: ClassVar[str] = "analyze"
     shown_by: ClassVar[str] = "analysis"
 
+    turn: TurnChoice | None = None
     required: float | None = None
     on_other: Analysis | None = None
     cut: Cut | None = None
@@ -372,7 +375,7 @@ def _summary(analysis: Analysis) -> Document:
         **_of_kind(analysis, cutting),
         **effects_stated(analysis.model),
         "unsupported": to_dict(program.unsupported),
-        "assumptions": assumptions_of(analysis),
+        "assumptions": assumptions_of(analysis, analysis.turn.sentence if analysis.turn else ""),
         "warnings": analysis.warnings,
         "version": defaults.VERSION,
     }

@@ -8,7 +8,6 @@ import numpy as np
 from toolpath_stiff.analysis.evaluation import Evaluation, joint_columns
 from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_rows
 from toolpath_stiff.analysis.poses import POSE_COLUMNS
-from toolpath_stiff.analysis.turning import TurnChoice
 from toolpath_stiff.analysis.uncertainty import ParameterBand, parameter_band
 from toolpath_stiff.arrays import AnyArray, BoolArray, IntArray
 from toolpath_stiff.documents import Document
@@ -47,8 +46,6 @@ class EvaluatedPath:
         Where program zero sits (m, rad) and who said so: "option", "program" or "default".
     step
         Largest distance of two samples in m.
-    turn
-        The turn about the tool's axis, where it is not as programmed.
     """
 
     program: ReadProgram
@@ -60,7 +57,6 @@ class EvaluatedPath:
     origin: Pose
     origin_source: str
     step: float
-    turn: TurnChoice | None = None
 
     @property
     def machine(self) -> MachineTool:

@@ -245,9 +245,9 @@ def update(
     add
         Effects to add: "weak_strut", or with what they act on, "weak_strut:strut=3".
     strut_law
-        Write the refitted strut law even without an effect.
+        Write the refitted strut law even without an effect, if the data support it.
     keep_strut_law
-        Keep the strut law as given; else its two stiffnesses are refitted along with every effect.
+        Keep the strut law as given; else it is refitted along with every effect, and written if the data support it.
     auto
         Add effects as long as the error at left-out points falls and the data support it.
     force
@@ -274,7 +274,7 @@ def update(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> update = tps.update("nist-table1", "nist", strut_law=True)
+    >>> update = tps.update("nist-table1", "nist", strut_law=True)  # refused: no left-out point asks for another law
     >>> update.to_frame()["name"].tolist()
     ['as given', 'strut law refitted']
     """

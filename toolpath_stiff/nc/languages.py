@@ -26,7 +26,7 @@ STATEMENT = re.compile(
 
 G_CODE, CUTTER_LOCATION_FILE = "G code", "cutter-location file (APT)"
 _HEIDENHAIN = LANGUAGES["heidenhain"]
-_SIEMENS = "Siemens' own language (Sinumerik)"
+_SIEMENS = LANGUAGES["siemens"]
 _ISG = "ISG's own language (Beckhoff TwinCAT CNC)"
 _ACRAMATIC = "the language of Acramatic controls (Cincinnati, Vickers)"
 _SUB = "neither LinuxCNC's language (o<name> sub) nor Fanuc's"

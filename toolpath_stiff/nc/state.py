@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import RadiusCompensation
@@ -30,7 +30,7 @@ Group = Literal[
     "units", "feed mode", "F", "S", "T", "M tool change", "dwell", "plane", "polar", "tool length", "M subprogram",
     "work offset", "path control", "exact stop", "look-ahead", "dynamic offset", "spindle mode", "distance",
     "arc distance", "cycle return", "cutter compensation", "lathe diameter", "scaling", "mirror image", "stroke check",
-    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M rigid tapping",
+    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M saved modes", "M rigid tapping",
     "rotation", "non-modal", "M stop", "motion", "corner",
 ]  # fmt: skip
 STEPS: dict[Group, int] = {group: place for place, group in enumerate(get_args(Group))}
@@ -158,7 +158,7 @@ START = "before its first move the tool stands at 0, 0, 0 of the control, as Lin
 
 @dataclass
 class Conversational:
-    """What a control of Heidenhain's keeps besides, in its plain language; mm and degrees, points in program axes.
+    """What controls with words of their own (Heidenhain, Siemens) keep besides; mm and degrees, points in program axes.
 
     Attributes
     ----------
@@ -185,7 +185,17 @@ class Conversational:
     kept
         Position, shift and linear part of the frames for which the present point was worked out last, and that point.
     preset, names, stock, parameters
-        The datum of cycle 247; numbers given to tools of a name; the corners of BLK FORM; Q parameters.
+        The datum of cycle 247; numbers given to tools of a name; the corners of the blank; Q parameters.
+    inner
+        Siemens' programmable frame without its shift: turn, mirror image, scale.
+    renumbered
+        Axes whose numbers changed while they stood, until they are named.
+    side, entry
+        G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450.
+    base
+        G500 in force: "machine", or "zero" where the program takes no other offset; "": it is not.
+    offsets_named, changes_by_t, orientation
+        Whether the program takes settable offsets, and changes tools by T alone; ORIVECT, ORIAXES.
     """
 
     pole: tuple[str, complex] | None = None
@@ -213,6 +223,14 @@ class Conversational:
     names: dict[str, int] = field(default_factory=dict)
     stock: dict[str, list[float]] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
+    inner: list[list[float]] = field(default_factory=lambda: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    renumbered: set[int] = field(default_factory=set)
+    side: str = ""
+    entry: str = ""
+    base: str = ""
+    offsets_named: bool = False
+    changes_by_t: bool = False
+    orientation: str = ""
     kept: tuple[tuple[object, object, object], list[float]] = (
         (None, None, None),
         [],
@@ -284,7 +302,7 @@ class State:
     turning
         What makes the program look like a lathe's, with its line.
     plain
-        What Heidenhain's plain language keeps besides.
+        What controls with words of their own keep besides.
     """
 
     name: str
@@ -326,6 +344,7 @@ class State:
     beside: list[float] | None = None
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
+    saved: list[dict[str, Any] | None] = field(default_factory=lambda: [None])
     plain: Conversational = field(default_factory=Conversational)
 
     def __post_init__(self) -> None:

@@ -13,6 +13,7 @@ from toolpath_stiff.nc.codes.motion import machine_move, record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
 from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
+from toolpath_stiff.nc.elements import direction as direction_of
 from toolpath_stiff.nc.geometry import PLANES, ArcError
 from toolpath_stiff.nc.heidenhain.points import (
     ON_CIRCLE_MM,
@@ -71,7 +72,8 @@ def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> No
 def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
     """The tool beside the contour from the next move on, by its radius in the tool table or TOOL DEF and its DR."""
     radius = state.plain.radius
-    hint = f"give it in a tool table (--tools FILE), or TOOL DEF {state.tool} L.. R.."
+    table, own = "give it in a tool table (--tools FILE)", f", or TOOL DEF {state.tool} L.. R.."
+    hint = table + own * (state.dialect.name == "heidenhain")
     block.refuse_if(math.isnan(radius), side, f"needs the radius of tool {state.tool}", hint=hint)
     state.assume(COMPENSATED)
     scale = state.plain.scale
@@ -313,6 +315,9 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     first, second, _ = PLANES[state.plane]
     size, rounded = corner_block.values["size"].value, corner_block.block.words[0].text == "RND"
     after.refuse_if(rapid or there.keys() - {first, second}, None, *_NO_CORNER)
+    if "across" in corner_block.values:  # the chamfer's own length, not that along the lines
+        turned = cmath.phase(direction_of(element, held[1]) / direction_of(held, held[1]))
+        size /= 2.0 * max(math.cos(turned / 2.0), STRAIGHT_ON)
     lines = held[2] is None and element[2] is None
     corner_block.refuse_if(not rounded and not lines, None, "beside an arc", "CHF between two lines")
     try:

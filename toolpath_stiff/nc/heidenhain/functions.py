@@ -155,3 +155,13 @@ def listed(state: State, block: CurrentBlock, code: str) -> None:
     """A statement that leaves the path alone; its words go with it."""
     block.free.clear()
     state.note(block.line, block.block.words[0], "leaves the path as it is")
+
+
+def left_out(state: State, block: CurrentBlock, code: str) -> None:
+    """A cycle that makes no cut and whose moves are the control's: after probing the tool's place is not known."""
+    probes, shown = code.startswith("TCH"), block.block.words[0].text
+    block.free.clear()
+    what = "probing; where it sets the datum, that is program zero" if probes else "a cycle of the machine builder's"
+    state.warnings.append(Remark(f"{shown} is left out of the path: {what}", block.line))
+    if probes:
+        state.plain.unknown |= {0, 1, 2}

@@ -39,7 +39,7 @@ _OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|17)\.[1-5])")
 _VALUES = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
 # Heads whose rest has another form, or does not matter.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
+    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|TCH|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
     r"|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 
