@@ -129,7 +129,7 @@ def test_every_pose_is_in_the_panel_of_its_own_height(heights):
     visits = visits_at(np.array([*heights, heights[0]]))
     count = len(heights) + 1
     with files.house_style():
-        figure = visits_drawn(visits, range(count), ["vertical"] * count, None, ("title", "text"))
+        figure = visits_drawn(visits, range(count), ["vertical"] * count, ("title", "text"))
     found = {}
     for axes in figure.axes:
         z = float(re.match(r"z = ([\d.]+) mm", axes.get_title(loc="left")).group(1))
