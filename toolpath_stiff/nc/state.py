@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import RadiusCompensation
@@ -340,7 +340,7 @@ class State:
     beside: list[float] | None = None
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
-    saved: list[dict[str, Any] | None] = field(default_factory=lambda: [None])
+    saved: list[tuple[str, "State", int, float] | None] = field(default_factory=lambda: [None])
     plain: Conversational = field(default_factory=Conversational)
 
     def __post_init__(self) -> None:
