@@ -39,7 +39,7 @@ HINT = "place it without --write, and set the datum that is printed"
 
 
 def write_placed(program: ReadProgram, text: str, turn: Turn, decimals: int | None, control: Controller) -> str:
-    """Heidenhain's or Siemens' text at its new place, read again: it is refused where the path is not the placed one."""
+    """Heidenhain's or Siemens' text at its new place, read again: refused where the path is not the placed one."""
     siemens = program.dialect == "siemens"
     lines, inch = split_lines(text, program.name), (INCH.search(text) if siemens else in_inches(program.source))
     unit, usual = (MM_PER_INCH, DECIMALS_INCH) if inch else (1.0, DECIMALS_MM)

@@ -50,8 +50,9 @@ def placed_lines(turn: Turn, lines: Sequence[str], name: str, unit: float, decim
         if words and not machine:
             values = {key: float(word[2] or word[5]) for key, word in words.items()}
             new, here = _placed(turn, values, here, unit, place)
-            line = _edited(line, words, new, absolute, decimals)
-        written.append(line)
+            written.append(_edited(line, words, new, absolute, decimals))
+        else:
+            written.append(line)
     return written
 
 
