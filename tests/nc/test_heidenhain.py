@@ -23,6 +23,7 @@ from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.heidenhain import functions
 from toolpath_stiff.nc.heidenhain.vocabulary import REFUSED, STATEMENTS
+from toolpath_stiff.nc.kinematics import TABLE, PostedKinematics, RotaryAxis
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import ToolEntry
@@ -267,6 +268,24 @@ def test_blank_tools_and_what_is_said():
     assert any("cycle 247" in text for text in program.assumptions)
     left_out = read("CYCL DEF 392 ATC ~\n Q240=2\nBLK FORM 0.1 Z X+Q7 Y+0 Z-20\nL X+1")
     assert "392 is left out" in left_out.warnings[0].text and left_out.stock is None and len(left_out.moves) == 1
+
+
+def test_m128_holds_the_tip_of_a_machine_that_kinematics_describe():
+    """A table that turns about X through zero: at A90 the point Z100 of the axes is Y-100 of the part."""
+    table = RotaryAxis("A", TABLE, direction=(1.0, 0.0, 0.0), point=(0.0, 0.0, 0.0))
+    control = Controller(kinematics=PostedKinematics("table", (table,), tcp=False))
+    text = "L Z+100 FMAX\nL A+90 F100\nL Y+20\nM128\nL X+5 Y+6 Z+7 A+45\nM129\nL A+0"
+    moves = read(text, controller=control).moves
+    ends = [[0, 0, 100], [0, -100, 0], [0, -100, 20], [5, 6, 7], [5, 13 / math.sqrt(2), 1 / math.sqrt(2)]]
+    last = np.flatnonzero(np.append(np.diff(moves.line), 1))  # the way of a turning table is cut into pieces
+    assert moves.end[last, :3] * 1e3 == pytest.approx(np.array(ends), abs=1e-9)
+    assert np.degrees(moves.end[last, 3]) == pytest.approx([0, 90, 90, 45, 0])
+
+
+def test_m13_and_m14_turn_the_spindle():
+    assert (read("L X+1 M13\nL X+2 M14\nL X+3 M5").moves.spindle * 30 / math.pi).round(6).tolist() == [1000, -1000, 0]
+    spindle = parse_program("G21 S500 F100 M13\nG1 X1\nM14 X2\n", "p.nc").moves.spindle
+    assert (spindle * 30 / math.pi).round(6).tolist() == [500, -500]
 
 
 def test_programs_that_are_called(tmp_path):

@@ -105,9 +105,12 @@ def test_fanuc_counts_holes_with_k():
 
 def test_g70_and_g71():
     assert ends_mm("G70 G1 F1. X1.", FANUC) == [[25.4, 0, 0]]
-    for controller, words in ((PLAIN, "on some controls"), (LINUXCNC, "lathe"), (HAAS, "pattern of holes")):
+    assert ends_mm("N20 G70 G91.1\nG1 F1. X1.", PLAIN) == [[25.4, 0, 0]]  # Mach3's posts
+    for controller, text, words in (
+        (PLAIN, "G71 P5", "on some controls"), (LINUXCNC, "G71", "lathe"), (HAAS, "G71", "pattern of holes"),
+    ):  # fmt: skip
         with pytest.raises(InputError, match=words):
-            moves_of("G71\nG1 F1. X1.", controller)
+            moves_of(f"{text}\nG1 F1. X1.", controller)
 
 
 def test_subprograms_with_repeats_in_p():

@@ -66,7 +66,7 @@ REFUSALS = [
     ("F100\nG82 X1 Z-5 R5", 2, 1, "without its dwell"),
     ("F100\nG81 X1 Z5 R1", 2, 1, "below the bottom"),
     ("F100\nG81 X1 Z-5 R1 L20000", 2, 15, "number of repeats"),
-    ("G4 F2", 1, 1, "needs its time"),
+    ("G4 F2 X5", 1, 7, "may count milliseconds"),
     ("G4 P-1", 1, 1, "needs its time"),
     ("G10 L2 P12 X1", 1, 1, "needs the number of a tool or a work offset"),
     ("G10 L5 P1", 1, 1, "with L5"),
@@ -76,7 +76,6 @@ REFUSALS = [
     ("G0 G92 X1", 1, 4, "axis words"),
     ("G1 F100 X1 K4", 1, 12, "not used"),
     ("G1 F100 X1 N5", 1, 12, "line number"),
-    ("T1.5 M6", 1, 1, "cannot be read"),
     ("G95 F0.1\nG1 X5", 2, 1, "S0"),
     ("G93\nG1 X5", 2, 1, "without F"),
 ]

@@ -19,6 +19,7 @@ from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
 
 COORDINATES = frozenset((*AXES, "@"))
+NAMES = {"O": "program number", "$": "a setting of grbl or TinyG"}
 WORDS_THAT_ACT = ("F", "S", "T")
 TAKERS: tuple[Group, ...] = ("non-modal", "rotation", "tool length")  # groups whose codes may take the axis words
 
@@ -76,8 +77,8 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
     for word in block.words:
         if word.letter in "GM":
             _sort_code(state, current, word)
-        elif word.letter == "O":
-            state.note(block.line, word, "program number")
+        elif word.letter in NAMES:
+            state.note(block.line, word, NAMES[word.letter])
         elif word.letter in current.values:
             raise current.fail(word, f"repeats the word {word.letter} of its block", "each word once")
         else:

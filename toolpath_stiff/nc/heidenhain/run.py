@@ -21,8 +21,9 @@ from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
-from toolpath_stiff.nc.program_run import ProgramRun, Subprogram, Tally, beyond_the_end
+from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.state import CurrentBlock, Flow
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import Block, Word

@@ -22,8 +22,9 @@ from toolpath_stiff.nc.parametric.macro_calls import MACRO_CALLS, call_of
 from toolpath_stiff.nc.parametric.statements import Assignment, Statement, Steering, read_statement, worked_out
 from toolpath_stiff.nc.parametric.structure import Structure, structure_of
 from toolpath_stiff.nc.parametric.variables import Variables
-from toolpath_stiff.nc.program_run import HEAD, ProgramRun, Subprogram, Tally, beyond_the_end
+from toolpath_stiff.nc.program_run import HEAD, ProgramRun
 from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
 from toolpath_stiff.nc.words import Block, Word
 

@@ -16,8 +16,8 @@ from toolpath_stiff.nc.parametric.run import ParametricRun, Step
 from toolpath_stiff.nc.parametric.statements import Statement, Steering
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
-from toolpath_stiff.nc.program_run import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.siemens.cycles import repeated
 from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner, Value
 from toolpath_stiff.nc.siemens.motion import move, moves
