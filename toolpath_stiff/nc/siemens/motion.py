@@ -220,7 +220,8 @@ def _machine(state: State, block: CurrentBlock, code: str, mode: str) -> None:
     if lost:
         state.warnings.append(Remark(UNKNOWN_HOME, block.line))
         block.free -= {AXES[axis] for axis in lost}
-    mark(block, "M91", code), mark(block, "FMAX")
+    mark(block, "M91", code)
+    mark(block, "FMAX")
     length, frames.tool = frames.tool, 0.0
     if moved > lost:
         contour.line(state, block, "L")

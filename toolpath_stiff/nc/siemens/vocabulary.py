@@ -154,7 +154,7 @@ REFUSED: dict[str, Refused] = {
         ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
         ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
          f"{PLANNING}, Orientation"),
-        ("WHEN WHENEVER EVERY DO ID IDS", "a synchronised action", "the program without it", f"{PLANNING}"),
+        ("WHEN WHENEVER EVERY DO ID IDS CASE", "a synchronised action, or a choice", "IF with GOTOF", PLANNING),
         ("EXTCALL PCALL CALL CALLPATH ISOCALL", "a call by path", "the subprogram's name, with --subprograms",
          f"{PLANNING}, Subprogram technique"),
     )

@@ -22,8 +22,15 @@ PREFIX = {"IC": "I", "AC": "@", "DC": "DC", "ACP": "ACP", "ACN": "ACN", "": ""}
 JUMP = re.compile(r"(GOTO[FBC]?)\s+([A-Z_]\w*|:?\d+)\s*$", re.ASCII)
 SECTION = re.compile(r"REPEATB?\s+(?!P\s*=)[A-Z_:]\w*", re.ASCII)
 TYPES: dict[str, Value] = {"REAL": 0.0, "INT": 0.0, "BOOL": False, "CHAR": "", "STRING": ""}
-ADDRESSES = {*AXES, *VECTOR, *CORNERS, *WORDS, *"IJKFSTDMGH", *["RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL"]}
-STEERING = ("ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "CASE", "FOR", "IF", "WHILE", "UNTIL")
+ADDRESSES = {
+    *AXES,
+    *VECTOR,
+    *CORNERS,
+    *WORDS,
+    *"IJKFSTDMGH",
+    *["RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL"],
+}
+STEERING = ("ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "FOR", "IF", "WHILE", "UNTIL")
 OTHERWISE = {"T": "#", "RP": "PR", "AP": "PA", "CR": "R"}  # names that words then have
 SPINDLE = re.compile(r"([SM])1")  # of the master spindle
 Define = Callable[[str, Value, int, str], None]  # sets a variable: name, value, column, its type if it is declared
