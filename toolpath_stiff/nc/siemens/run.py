@@ -108,7 +108,7 @@ class SiemensRun(ParametricRun):
             slash = begin[1] or begin[4] or ""
             block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
             steering = None
-            if PROGRAM.match(begin.string) is None and begin.string.strip() != "%":
+            if PROGRAM.match(begin.string) is None and begin.string.lstrip()[:1] != "%":
                 steering = steering_of(self._scanner(row, begin.end()), lambda place: self._at_place(row, place))
             self._statements[row] = Statement(block, steering=steering)
         return self._statements[row]
@@ -120,7 +120,7 @@ class SiemensRun(ParametricRun):
     def _read(self, row: int) -> Block:
         statement, code = self._statement(row), self._begins[row].string
         line = row + 1 if row < self._main_lines else self._line_of_call()
-        if PROGRAM.match(code) is not None or code.strip() == "%":
+        if PROGRAM.match(code) is not None or code.lstrip()[:1] == "%":
             return Block(line, ())
         self._homes = IN_MACHINE.search(code) is not None
         words = read_words(self._scanner(row, self._begins[row].end()), self._define)

@@ -23,13 +23,9 @@ JUMP = re.compile(r"(GOTO[FBC]?)\s+([A-Z_]\w*|:?\d+)\s*$", re.ASCII)
 SECTION = re.compile(r"REPEATB?\s+(?!P\s*=)[A-Z_:]\w*", re.ASCII)
 TYPES: dict[str, Value] = {"REAL": 0.0, "INT": 0.0, "BOOL": False, "CHAR": "", "STRING": ""}
 ADDRESSES = {
-    *AXES,
-    *VECTOR,
-    *CORNERS,
-    *WORDS,
-    *"IJKFSTDMGH",
-    *["RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL"],
-}
+    *AXES, *VECTOR, *CORNERS, *WORDS, *"IJKFSTDMGH", "RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL", "FP", "X1",
+    "Y1", "Z1",
+}  # fmt: skip
 STEERING = ("ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "FOR", "IF", "WHILE", "UNTIL")
 OTHERWISE = {"T": "#", "RP": "PR", "AP": "PA", "CR": "R"}  # names that words then have
 SPINDLE = re.compile(r"([SM])1")  # of the master spindle
@@ -81,8 +77,8 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
         spindle = SPINDLE.fullmatch(name)
         name = spindle[1] if spindle else name
         if name in REFUSED:
-            words.append(Word(name, 0.0, column, name))
-            scanner.result()
+            if scanner.result():  # a zero switches it off
+                words.append(Word(name, 0.0, column, name))
         elif name in ADDRESSES:
             words.append(_addressed(scanner, name, column, begin))
         else:
@@ -105,6 +101,7 @@ def _addressed(scanner: SiemensScanner, name: str, column: int, begin: int) -> W
 
 def _named(scanner: SiemensScanner, name: str, column: int) -> list[Word]:
     """A word without a number, and the parameters in its brackets where these are known by name."""
+    scanner.take(BLANK)
     words, begin = [Word(name, 0.0, column, name)], scanner.position
     if name in SIGNATURES and scanner.begins("("):
         names, values = SIGNATURES[name].split(), scanner.arguments()
