@@ -24,6 +24,12 @@ def to_dict(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value  # of numpy, which is not imported for it
 
 
+def records(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows of columns (arrays or lists of one length), each by their names."""
+    values = (to_dict(column) for column in columns.values())
+    return [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
+
+
 def without_nan(value: Any) -> Any:
     """The same with None for every float that JSON cannot hold."""
     if isinstance(value, dict):

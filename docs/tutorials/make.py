@@ -26,7 +26,7 @@ TUTORIALS = sorted(HERE.glob("[0-9]*.md"))
 ELLIPSIS = "..."
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 BLOCK = re.compile(r"```console\n(.*?)```", re.DOTALL)
-DRAWS = ("analyze", "compare", "diagnose", "plan", "update")  # commands that know --no-plots
+DRAWS = ("analyze", "compare", "diagnose", "forces", "plan", "update")  # commands that know --no-plots
 WIDTH, COLOURS = 1000, 255  # pixels and palette of a committed picture: below 150 kB each
 
 # Picture in pictures/ -> the tutorial, the file in its folder, and how much of it is shown, from the top.
@@ -39,6 +39,8 @@ PICTURES = {
     "2_ladder_again.png": ("2_after_a_plan.md", "ex2/second/ladder.png", 1.0),
     "3_portrait.png": ("3_outside_the_catalogue.md", "ex3/first/portrait.png", 1.0),
     "3_before_after.png": ("3_outside_the_catalogue.md", "ex3/update/before_after.png", 1.0),
+    "5_part.png": ("5_micrometres.md", "shop/analyze/cut.png", 1.0),
+    "5_forces.png": ("5_micrometres.md", "shop/forces/forces.png", 1.0),
 }
 
 

@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import toolpath_stiff as tps
@@ -684,6 +685,36 @@ def test_a_program_out_of_reach_is_told(running, browser, tmp_path):
     assert "out of reach" in tab.text("#out-of-reach")
     tab.page.click("#undo")
     tab.until("!document.querySelector('#machine-name').textContent.includes('far.nc')")
+    assert tab.faults == []
+    tab.close()
+
+
+WALL = "G21 G90\nT1 M6\nS8000 M3\nG0 X-20 Y-15 Z5\nG1 Z-4 F300\nY-4.5\nX120 F900\nY-15\nG0 Z5\nM2\n"
+CUT = (
+    "[stock]\nbox_mm = [100, 40, 20]\ncorner_mm = [0, 0, -20]\n[coefficients]\nmaterial = 'Al7075'\n"
+    "[[tool]]\nnumber = 1\ndiameter_mm = 10\nflutes = 3\nhelix_deg = 30\nstick_out_mm = 30\n"
+)
+
+
+def test_error_width_and_compensated_path_are_layers_of_the_path(running, browser, tmp_path):
+    tab = Tab(browser, running.address)
+    tab.page.wait_for_selector("#sw-table_compliance")
+    for name, text in (("wall.nc", WALL), ("cut.toml", CUT)):
+        (tmp_path / name).write_text(text)
+        tab.page.set_input_files("#file", tmp_path / name)
+    tab.page.wait_for_selector("#which-shift")
+    program = running.idle()["program"]
+    path, case = program["path"], tps.Case.open(running.folder)
+    same = tps.compensate(case.program, case.machine_with(case.state.on), cut=case.cut)
+    assert (running.folder / program["compensated"]["written"]).read_bytes() == same.rewritten.content
+    assert max(path["shift"]) == pytest.approx(max(same.shift) * 1e6, abs=0.01)
+    assert max(filter(None, path["error"])) == pytest.approx(np.nanmax(same.before.errors) * 1e6, abs=0.01)
+    assert max(filter(None, path["width"])) == pytest.approx(0.5, abs=1e-3)
+    for name, unit in (("error", "\u00b5m"), ("width", "mm"), ("shift", "its shift 1\u202f000 times")):
+        tab.page.click(f"#which-{name}")
+        assert unit in tab.text("#legend")
+    tab.page.click("#undo")
+    tab.page.click("#undo")
     assert tab.faults == []
     tab.close()
 

@@ -16,7 +16,7 @@ from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.report.update import page as update_html
 
-WEAK = ("--add", "weak_strut:strut=3", "--strut-law")
+WEAK = ("--add", "weak_strut:strut=3", "--believe", "machine")
 
 
 @pytest.fixture(scope="module")

@@ -154,7 +154,8 @@ def compare(
     teller(progress)("comparing")
     comparison = compare_readings(question.model, question.readings, **question.common)
     following = hint("which effect would explain it", question.request.command("diagnose"))
-    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=(following,)))
+    following = (following,) if isinstance(question.model, Hexapod) else ()
+    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=following))
 
 
 @checked
@@ -244,9 +245,9 @@ def update(
     add
         Effects to add: "weak_strut", or with what they act on, "weak_strut:strut=3".
     strut_law
-        Write the refitted strut law even without an effect.
+        Write the refitted strut law even without an effect, if the data support it.
     keep_strut_law
-        Keep the strut law as given; else its two stiffnesses are refitted along with every effect.
+        Keep the strut law as given; else it is refitted along with every effect, and written if the data support it.
     auto
         Add effects as long as the error at left-out points falls and the data support it.
     force
@@ -273,15 +274,15 @@ def update(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> update = tps.update("nist-table1", "nist", strut_law=True)
+    >>> update = tps.update("nist-table1", "nist", strut_law=True)  # refused: no left-out point asks for another law
     >>> update.to_frame()["name"].tolist()
     ['as given', 'strut law refitted']
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     task = UpdateTask(
         question.hexapod("update"), question.readings, [add] if isinstance(add, str) else list(add),
-        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe, objective=objective,
-        files=question.request.data, machine_file=str(machine_file), request=question.request,
+        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe,
+        objective=objective, files=question.request.data, machine_file=str(machine_file), request=question.request,
         progress=teller(progress), **question.common,
     )  # fmt: skip
     return replace(update_machine(task), inputs=question.inputs, opened=question.on.carrying)

@@ -24,6 +24,7 @@ from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.api.trust import agree, is_agreed
 from toolpath_stiff.case.files import copied, free_name, kept_if_read, measurements_csv, without_lines
 from toolpath_stiff.case.state import CASE_FILE, READING, TABLES, CaseState, Step, call, case_text, read_steps
+from toolpath_stiff.cutting.setup import read_setup
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
@@ -176,6 +177,11 @@ class Case:
         if not on:
             return self.machine
         return self.preview.machine(on) if self.state.data else with_effects(self.machine, on)
+
+    @property
+    def cut(self) -> str | None:
+        """The setup file of the cut; None without one."""
+        return self.path(self.state.cut) if self.state.cut else None
 
     @property
     def data(self) -> tps.Measurements:
@@ -428,8 +434,26 @@ class Case:
         required = 0.0 if stiffness_N_per_mm == 0 else float(option.check(stiffness_N_per_mm) or 0)
         self.record("require", f"{required:g} N/mm required", call("require", required), require=required)
 
+    def set_cut(self, file: str | Path) -> None:
+        """Say how programs cut: stock, tools and coefficients, from a setup file that names no other files.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import toolpath_stiff as tps
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     case = tps.Case.open(folder)
+        ...     case.set_cut(tps.cut_template("part.toml").save(pathlib.Path(folder, "part.toml")))
+        ...     case.state.cut, case.history[-1].python
+        ('programs/part.toml', "case.set_cut('part.toml')")
+        """
+        name = copied(self.folder, file, "programs")
+        with kept_if_read(self.folder, [name]):
+            read_setup(self.folder / name)
+        self.record("cut", f"cuts as {Path(file).name} says", call("set_cut", file), cut=name)
+
     def find(self, kind: str, progress: Progress | None = None, **given: Any) -> Any:
-        """A result as a step, kept in results/: of analyze, compare, diagnose, update, plan, place, draft, set_up.
+        """A result as a step, in results/: analyze, compensate, compare, diagnose, update, plan, place, draft, set_up.
 
         What the public function of that name gives for the machine, readings and program of the case, with further
         arguments of it; `draft_effect` for "draft", whose effect the case uses from then on. "set_up" is the program
@@ -500,12 +524,20 @@ def find(case: Case, kind: str, result: str, progress: Progress | None = None, *
 def _analyze(case: Case, result: str, progress: Progress | None, machine: str = "") -> Found:
     state, on = case.state, case.machine_of(machine) if machine else case.machine_with(case.state.on)
     stated: Document = {"origin_mm_deg": state.origin or None, "require_N_per_mm": state.require or None}
-    analysis = tps.analyze(case.program, on, partial=True, progress=progress, **stated)
+    analysis = tps.analyze(case.program, on, cut=case.cut, partial=True, progress=progress, **stated)
     analysis.save(case.folder / result, plots=case.plots)
     if not machine and state.on:
         machine = f"{result}/machine.toml"
         on.save(case.folder / machine)
     return analysis, state.program_line(machine=machine)
+
+
+def _compensate(case: Case, result: str, progress: Progress | None) -> Found:
+    state, on, origin = case.state, case.machine_with(case.state.on), case.state.origin or None
+    kept = tps.compensate(case.program, on, cut=case.cut, origin_mm_deg=origin, progress=progress)
+    file = Path(state.program)
+    kept.save(case.folder / result / f"{file.stem}_comp{file.suffix}")
+    return kept, state.program_line("compensate")
 
 
 def _place(case: Case, result: str, progress: Progress | None, **bounds: Any) -> Found:
@@ -540,4 +572,10 @@ def _draft(case: Case, result: str, progress: Progress | None) -> Found:
     return draft, case.state.question("effects draft", "", *options(output=file))
 
 
-FINDERS: dict[str, Callable[..., Found]] = {"analyze": _analyze, "place": _place, "set_up": _set_up, "draft": _draft}
+FINDERS: dict[str, Callable[..., Found]] = {
+    "analyze": _analyze,
+    "compensate": _compensate,
+    "place": _place,
+    "set_up": _set_up,
+    "draft": _draft,
+}

@@ -41,6 +41,8 @@ class CaseState:
         Where program zero sits, mm and degrees; empty: where the program or the machine has it.
     require
         Stiffness that every cut should have, N/mm; 0: none is asked for.
+    cut
+        Setup file of its cut; "": none.
     """
 
     machine: str = MACHINE
@@ -53,6 +55,7 @@ class CaseState:
     reading: Document = field(default_factory=dict)
     origin: tuple[float, ...] = ()
     require: float = 0.0
+    cut: str = ""
     exercise: str = ""
 
     @property
@@ -72,8 +75,9 @@ class CaseState:
 
     def program_line(self, name: str = "analyze", machine: str = "", **given: Any) -> str:
         """The command line that asks this of the program; "" without one."""
-        stated = {"origin_mm_deg": self.origin or None, "require_N_per_mm": self.require or None}
-        stated |= {"partial": name == "analyze", **given}
+        cut = self.cut if name in ("analyze", "compensate") else ""
+        stated: Document = {"origin_mm_deg": self.origin or None, "require_N_per_mm": self.require or None,
+                            "partial": name == "analyze", "cut": cut or None, **given}  # fmt: skip
         words = [*words_of(tps.Program.read, self.reading), *words_of(getattr(tps, name), stated)]
         return self.question(name, machine, *words, files=[self.program]) if self.program else ""
 
@@ -145,4 +149,4 @@ def _files(step: Step) -> list[str]:
     state = step.state
     tables = [state.reading[name] for name in TABLES if name in state.reading]
     many = (*state.effects, *state.data, *state.data_files, *tables)
-    return [step.result, state.machine, state.program, state.exercise, *many]
+    return [step.result, state.machine, state.program, state.exercise, state.cut, *many]

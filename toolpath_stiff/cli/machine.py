@@ -30,7 +30,7 @@ def pose(
     pose: Annotated[Sequence[float], Option("X Y Z [A B C]", read=finite_number, count="*")] = (),
     csv: Annotated[str | None, Option("--csv", "FILE")] = None,
 ) -> int:
-    """Stiffness, softest and stiffest direction, strut lengths at single poses.
+    """Stiffness, softest and stiffest direction, joint values at single poses.
 
     for example:
       tps pose -300 300 300 -30 0 0
@@ -133,7 +133,7 @@ def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Pi
     return run.show(args, check, written, code=0 if check.good else NOT_GOOD)
 
 
-@command("machine new", "machine_template", REPLACE, without=["file"])
+@command("machine new", "machine_template", REPLACE)
 def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     """Write a commented template."""
     text = tps.machine_template(file, kind=args.kind).text

@@ -18,7 +18,7 @@ from toolpath_stiff.cutting.compensation import places_beside
 from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.cutting.cutters import radii_of
 from toolpath_stiff.cutting.passes import profile_at
-from toolpath_stiff.documents import certain, without_nan
+from toolpath_stiff.documents import certain, records, without_nan
 from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.readings.mapping import check_needed, mapped_table
@@ -114,19 +114,18 @@ class WallComparison(FolderResult):
     def lines(self) -> list[dict[str, Any]]:
         """Of each line and side: points, measured and foretold error, residual, what is sure of it, and the verdict."""
         keys, which = np.unique(np.stack([self.line, self.side]), axis=1, return_inverse=True)
-        rows = []
-        for number_of, (line, side) in enumerate(keys.T.tolist()):
-            some = which == number_of
-            residual, count = um_from_m((self.measured - self.foretold)[some]), int(some.sum())
-            scatter = float(residual.var(ddof=1)) / count if count > 1 else 0.0
-            sure = SURE * float(np.sqrt(scatter + um_from_m(self.deviation[some].mean()) ** 2))
-            means = {name: float(um_from_m(getattr(self, name)[some].mean())) for name in ("measured", "foretold")}
-            rows.append(
-                {"line": line, "side": ("left", "right")[side], "points": count}
-                | {f"{name}_um": value for name, value in means.items()}
-                | {"residual_um": float(residual.mean()), "sure_um": sure, "fails": bool(abs(residual.mean()) > sure)}
-            )
-        return rows
+        count = np.bincount(which)
+        residuals = um_from_m(self.measured - self.foretold)
+        values = {"measured": um_from_m(self.measured), "foretold": um_from_m(self.foretold), "residual": residuals}
+        means = {name: np.bincount(which, column) / count for name, column in values.items()}
+        squares = np.bincount(which, (residuals - means["residual"][which]) ** 2)
+        pooled = squares.sum() / max(len(residuals) - len(count), 1)  # a line of few points scatters as the others do
+        scatter = np.maximum(squares / np.maximum(count - 1, 1), pooled) / count
+        sure = SURE * np.sqrt(scatter + (np.bincount(which, um_from_m(self.deviation)) / count) ** 2)
+        fails = np.abs(means["residual"]) > sure
+        columns = {"line": keys[0], "side": np.array(["left", "right"])[keys[1]], "points": count}
+        columns |= {f"{name}_um": column for name, column in means.items()} | {"sure_um": sure, "fails": fails}
+        return records(columns)
 
     def to_dict(self) -> dict[str, Any]:
         """The content of compare.json."""

@@ -76,9 +76,9 @@ class Update(FolderResult):
     --------
     >>> import pathlib, tempfile
     >>> import toolpath_stiff as tps
-    >>> update = tps.update("nist-table1", "nist", strut_law=True, noise_percent=5)
+    >>> update = tps.update("nist-table1", "nist", strut_law=True, noise_percent=5, force=True)
     >>> update
-    <Update: updated, mean error 9.62 to 9.62 %>
+    <Update: forced, mean error 9.62 to 9.62 %>
     >>> update.accepted, update.to_dict()["objective"]
     (True, 'likelihood')
     >>> update.to_frame()["mean_abs_error_percent"].round(2).tolist()

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray
-from toolpath_stiff.documents import Document, certain, to_dict, without_nan
+from toolpath_stiff.documents import Document, certain, records, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.courses import move_lengths, points_along
@@ -186,6 +186,8 @@ class Compensation(Result):
         the height, which no shift removes; left_alone, the reason or "".
     before, after
         Surface errors of the untouched and of the written program.
+    shift
+        (n,) m to the left of the feed at each sample of `before`.
     turns
         Of the iteration, the programs that were written and cut.
     contraction
@@ -203,6 +205,7 @@ class Compensation(Result):
     lines: Mapping[str, list[Any]]
     before: Cut
     after: Cut
+    shift: FloatArray
     turns: int
     contraction: float
     course_error_um: float
@@ -238,8 +241,8 @@ class Compensation(Result):
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
         names = ("turns", "contraction", "course_error_um", "notes")
-        rows = [dict(zip(self.lines, row, strict=True)) for row in zip(*self.lines.values(), strict=True)]
-        document = {"program": self.rewritten.name, "changed": self.changed, "walls": self.walls, "lines": rows}
+        document = {"program": self.rewritten.name, "changed": self.changed, "walls": self.walls}
+        document["lines"] = records(self.lines)
         return dict(certain(without_nan(to_dict(document | {name: getattr(self, name) for name in names}))))
 
     def to_frame(self) -> pd.DataFrame:
@@ -312,12 +315,14 @@ def compensate_program(
         # A wall that was not shifted is spoilt by its neighbours: they stay too, or all do.
         beside = {other for row in spoilt for other in (row - 1, row + 1)} & finals
         alone |= dict.fromkeys(spoilt - alone.keys() or beside - alone.keys() or finals, WORSE)
+    shift = np.zeros(len(before_cut.samples))
+    shift[np.isfinite(before_cut.wall_mean).any(axis=1)] = _intended(shifts, before)
     was, now = figures_of_walls(before, len(moves)), figures_of_walls(after, len(moves))
     ratios = [later / sooner for sooner, later in itertools.pairwise(changes) if later > SETTLED]
     contraction = max(ratios, default=float("nan"))
     return Compensation(
-        rewritten, _lines(moves, was, now, alone), before_cut, cut, turn, contraction, um_from_m(m_from_mm(side.error)),
-        _notes(changes[-1], contraction, rewritten),
+        rewritten, _lines(moves, was, now, alone), before_cut, cut, shift, turn, contraction,
+        um_from_m(m_from_mm(side.error)), _notes(changes[-1], contraction, rewritten),
     )  # fmt: skip
 
 

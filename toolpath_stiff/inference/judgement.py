@@ -403,7 +403,7 @@ def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str
 def put_to_vote(
     problem: Problem, noise: Noise, candidates: Candidates, gates: Gates, verdict: str, explanations: tuple[str, ...]
 ) -> tuple[str, tuple[str, ...], Votes]:
-    """Verdict and explanations after the votes of left-out poses, and the votes for the first explanation.
+    """Verdict and explanations after the votes of the readings, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer. A name that has not outvoted every rival of another part is
     one of several; the closest of these stand beside it. A model that passes because its nuisances have taken up more
@@ -449,11 +449,12 @@ def _instead_of_law(problem: Problem, base: Fit) -> tuple[dict[str, Fit], Votes]
 
     None where the law has moved the stiffness by less than an adequate model may leave along a path, beyond chance.
     """
-    columns = base.jacobian[problem.predictor.data.tip]
+    columns, given = base.jacobian[problem.predictor.data.tip], with_given_law(problem, base)
     spread = np.sqrt(np.einsum("ni,ij,nj->n", columns, base.covariance, columns))
-    if float(np.mean(np.abs(columns @ base.law) + ONE_SIDED * spread)) <= LEFT:
+    moved = float(np.mean(np.abs(columns @ base.law) + ONE_SIDED * spread)) > LEFT
+    if not moved or not outvoted(votes(problem, base, {NONE: given})[NONE]):
         return {}, {}
-    rivals = rivals_of_law(problem, with_given_law(problem, base), (INSTRUMENT, "joints"))
+    rivals = rivals_of_law(problem, given, (INSTRUMENT, "joints"))
     ballots = votes(problem, base, rivals)
     return {name: rivals[name] for name in ballots if not outvoted(ballots[name])}, ballots
 

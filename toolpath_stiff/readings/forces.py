@@ -14,7 +14,7 @@ from toolpath_stiff.cutting.coefficients import SHOWN, SYMBOLS, Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.forces import TURN, force_at
 from toolpath_stiff.cutting.identification import SURE, least_squares, left_out, slot_patches, slot_responses
-from toolpath_stiff.documents import Document, json_number, without_nan
+from toolpath_stiff.documents import Document, json_number, records, without_nan
 from toolpath_stiff.errors import InputError, MeasurementError
 from toolpath_stiff.readings.force_records import ComplexArray, harmonics, mean_force, read_records
 from toolpath_stiff.results import FolderResult, frame_of
@@ -111,7 +111,7 @@ class CoefficientFit(FolderResult):
                 for symbol, value, half in zip(SYMBOLS, values.tolist(), deviation.tolist(), strict=True)
             },
             "run_out_um": [json_number(value) for value in um_from_m(self.run_out).tolist()],
-            "records": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
+            "records": records(columns),
             "not_told": self.silent,
             "notes": list(self.notes),
         }

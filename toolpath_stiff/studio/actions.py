@@ -9,6 +9,7 @@ from typing import cast
 
 import toolpath_stiff as tps
 from toolpath_stiff.case.state import TABLES
+from toolpath_stiff.cutting.setup import SECTIONS
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.nc.controller import KEYS
@@ -105,7 +106,7 @@ def _sent(session: Session, name: str, content: bytes) -> Iterator[Path]:
 
 
 def take_file(session: Session, name: str, content: bytes, run: bool) -> Document:
-    """A file that was dropped: measurements, a machine, effects, else a program."""
+    """A file that was dropped: measurements, a machine, effects, the setup of a cut, else a program."""
     plain = Path(name.replace("\\", "/")).name or "file"
     if "\0" in plain or len(plain.encode()) > LONGEST_NAME:
         raise InputError(f"a file called {plain[:40]!r}", expected=f"{LONGEST_NAME} bytes at most, none of them zero")
@@ -121,6 +122,7 @@ def take_file(session: Session, name: str, content: bytes, run: bool) -> Documen
                 "data": case.add_data,
                 "effects": case.add_effects,
                 "machine": case.set_machine,
+                "cut": case.set_cut,
             }
             takers.get(kind, case.add_program)(file)
         session.message = f"{plain}: {case.history[-1].text}"
@@ -139,6 +141,8 @@ def _kind(suffix: str, content: bytes) -> str:
             keys = set(tomllib.loads(content.decode("utf-8-sig")))
         except ValueError:
             keys = set()
+        if keys and keys <= set(SECTIONS):
+            return "cut"
         return "controller" if keys and keys <= set(KEYS) else "machine"
     return SUFFIXES.get(suffix, "program")
 

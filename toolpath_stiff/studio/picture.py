@@ -185,16 +185,21 @@ def program(session: Session) -> Document:
     """The program's text and, once it is analyzed, its path."""
     state, analysis = session.case.state, session.found("analyze")
     lines = session.once("lines", session.program_key, lambda: list(session.case.program.lines))
+    path, shifted = analysis.path if analysis else None, session.found("compensate")
+    if path and shifted:
+        shift = np.interp(path["s_mm"], shifted.path["s_mm"], shifted.path["shift"])
+        path = {**path, "shift": np.round(shift, 3).tolist()}
     return {
         "name": state.program.rpartition("/")[2],
         "lines": lines[:MOST_LINES],
         "origin": origin(session),
         "require": state.require,
         "placed": bool(state.origin),
-        "path": analysis.path if analysis else None,
+        "path": path,
+        "compensated": result(session, "compensate"),
         "summary": analysis.document if analysis else None,
         "result": analysis.result if analysis else "",
-        "error": "" if analysis else session.failed("analyze"),
+        "error": session.failed("compensate") if analysis else session.failed("analyze"),
     }
 
 

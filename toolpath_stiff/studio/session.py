@@ -13,6 +13,7 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.studio.work import Job, Reply
 
 READING = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz", "stiffness_N_per_mm", "force_N")
+OF_PATH = ("analyze", "compensate")
 OF_READINGS = ("diagnose", "update", "plan")  # results that a studio takes up again
 
 Made = TypeVar("Made")
@@ -95,7 +96,7 @@ class Session:
         state = self.case.state
         fitted = bool(state.on) and self.is_fitted  # a fit knows how well it knows: its machine has a band
         on = state.judged if state.on else (state.machine, state.effects)
-        return (on, str(state.on), fitted, self.program_key, state.origin, state.require)
+        return (on, str(state.on), fitted, self.program_key, state.origin, state.require, state.cut)
 
     @property
     def program_key(self) -> tuple[str, str]:
@@ -176,7 +177,7 @@ class Session:
         state = self.case.state
         if kind in ("place", "set_up"):
             return (state.machine, state.effects, self.program_key, state.origin if kind == "set_up" else ())
-        return self.path_key if kind == "analyze" else state.judged
+        return self.path_key if kind in OF_PATH else state.judged
 
     def queue(self, kind: str, **given: Any) -> None:
         """Ask for a result before all that waits."""
@@ -188,7 +189,8 @@ class Session:
         state, running = self.case.state, self._running
         if running and running.key != self.key(running.kind):
             running.stop()
-        for kind in [*(["diagnose"] if state.data else []), *(["analyze"] if state.program else [])]:
+        of_path = OF_PATH[: 1 + bool(state.cut)] if state.program else ()
+        for kind in [*(["diagnose"] if state.data else []), *of_path]:
             busy = running and running.kind == kind and running.key == self.key(kind)
             waiting = kind in [waiting for waiting, _ in self._jobs]
             if self.found(kind) is None and not busy and not self.failed(kind) and not waiting:

@@ -19,6 +19,7 @@ import toolpath_stiff as tps
 from toolpath_stiff.case.case import Case, find
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
+from toolpath_stiff.units import mm_from_m, um_from_m
 
 COARSE_SAMPLES = 6000  # of a path in the page; the statistics are those of all samples
 REPORTS_EVERY = 0.2  # s
@@ -135,6 +136,7 @@ def answer(
     files = {
         "draft": (f"{getattr(kept, 'name', '')}.toml",),
         "set_up": (Path(case.state.program).name, "not_written.txt"),
+        "compensate": (f"{Path(case.state.program).stem}_comp{Path(case.state.program).suffix}",),
     }
     written = [f"{result}/{name}" for name in files.get(kind, ()) if (case.folder / result / name).is_file()]
     reply = Reply(repr(kept).strip("<>"), command, kept.to_dict(), result, file="".join(written[:1]))
@@ -142,6 +144,9 @@ def answer(
         given_machine, origin = case.machine_of(first), case.state.origin or None
         before = tps.analyze(case.program, given_machine, origin_mm_deg=origin, partial=True, progress=tell)
         return replace(reply, path=_columns(kept, before))
+    if kind == "compensate":
+        shift = {"s_mm": mm_from_m(kept.before.samples.s).tolist(), "shift": um_from_m(kept.shift).tolist()}
+        return replace(reply, path=shift)
     return replace(reply, accepted=kind == "update" and kept.accepted)
 
 
@@ -159,8 +164,20 @@ def _columns(analysis: tps.Analysis, before: tps.Analysis) -> Document:
         "now": _plain(stiffness[rows], 1),
         "given": _plain(given[rows], 1) if len(given) == len(stiffness) else None,
         "sd": None if band is None else _plain(band[rows], 1),
+        **_cut_columns(analysis, rows),
         "samples": len(frame),
     }
+
+
+def _cut_columns(analysis: tps.Analysis, rows: Any) -> Document:
+    """Error of the surface (um), that of the largest size at each sample, and width of cut (mm); nothing without."""
+    cut = analysis.cut
+    if cut is None:
+        return {}
+    sizes = np.nan_to_num(np.abs(cut.errors), nan=-1.0)
+    error = np.take_along_axis(cut.errors, sizes.argmax(axis=1)[:, None], axis=1)[:, 0]
+    width = np.where(cut.ap > 0.0, cut.ae, np.nan)
+    return {"error": _plain(um_from_m(error[rows]), 2), "width": _plain(mm_from_m(width[rows]), 3)}
 
 
 def _thinned(values: Any, starts: Any) -> Any:

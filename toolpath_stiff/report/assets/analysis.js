@@ -33,20 +33,12 @@ const operations = data.operations;
 let chosenOperation = -1;
 const operationRange = (k) => [operations[k][0], k + 1 < operations.length ? operations[k + 1][0] : n];
 const operationName = (k) => `${k + 1} ${operations[k][1]}`;
-function operationOf(i) {
-  let low = 0, high = operations.length;
-  while (low < high) { const middle = (low + high) >> 1; if (operations[middle][0] <= i) low = middle + 1;
-    else high = middle; }
-  return low - 1;
-}
+const starts = operations.map(([start]) => start), operationOf = (i) => rowAt(starts, i + 1) - 1;
 // Colours.
 const CLASSES = data.colours.length;
 const scaleNow = () => plungesBox.checked && data.scale_with_plunges || data.scale;
 const coloursNow = () => (theme.dark ? data.colours_dark : data.colours);
-function classOf(k) {
-  const [low, high] = scaleNow().ends;
-  return Math.max(0, Math.min(CLASSES - 1, Math.floor((k - low) / (high - low) * CLASSES)));
-}
+const classOf = (k) => classAt(k, scaleNow().ends, CLASSES);
 // Classes 0..CLASSES-1 of the scale, then rapids, plunges beside the scale, out of reach.
 const RAPIDS = CLASSES, PLUNGES = CLASSES + 1, UNREACHED = CLASSES + 2;
 const path = new Path(xyz);
@@ -154,12 +146,10 @@ const scene = {
   // The weakest places, ringed and named.
   label(g) {
     const taken = data.weakest.map((i) => { const [x, y] = path.at(i); return [x - 7, y, 14, 13]; });
-    g.textAlign = "left";
-    g.textBaseline = "middle";
+    aligned(g, "left", "middle");
     for (const i of data.weakest) {
       const [x, y] = path.at(i), text = `line ${line[i]}`, wide = g.measureText(text).width;
-      ring(g, x, y, 6, ink.panel, 4);
-      ring(g, x, y, 6, ink.ink, 1.6);
+      mark(g, x, y, 6, ink.ink, 1.6);
       let ty = y - 14;
       while (taken.some(([a, b, w, h]) => Math.abs(b - ty) < h && x + 11 < a + w + 6 && a < x + 11 + wide + 6)) ty +=
         17;
@@ -183,9 +173,7 @@ const scene = {
       stroke(g, ink.accent, 4);
       g.globalAlpha = 1;
     }
-    if (here < 0) return;
-    ring(g, ...path.at(here), 5, ink.panel, 5);
-    ring(g, ...path.at(here), 5, ink.accent, 2.5);
+    if (here >= 0) mark(g, ...path.at(here), 5);
   },
   nearest: (x, y) => path.nearest(x, y, (i) => cutting(i) || rapidsBox.checked),
 };

@@ -39,15 +39,8 @@ const scene = {
       }
     });
     quads.sort((one, other) => one.near - other.near);
-    for (const { corners, v } of quads) {
-      g.beginPath();
-      corners.forEach(([x, y], i) => g[i ? "lineTo" : "moveTo"](x, y));
-      g.closePath();
-      g.lineWidth = 1;
-      g.fillStyle = g.strokeStyle = colourOf(v);
-      g.fill();
-      g.stroke();
-    }
+    g.lineWidth = 1;
+    for (const { corners, v } of quads) fill(g, corners, colourOf(v));
   },
   // Planes, their heights at the right, X and Y at the corners of the lowest; the hindmost corner is behind the
   // surfaces.
@@ -55,9 +48,7 @@ const scene = {
     const corners = [[0, 0], [across - 1, 0], [across - 1, deep - 1], [0, deep - 1]];
     planes.forEach((z, layer) => {
       const at = corners.map(([i, j]) => viewer.project([xs[i], ys[j], z]));
-      g.beginPath();
-      at.forEach(([x, y], i) => g[i ? "lineTo" : "moveTo"](x, y));
-      g.closePath();
+      trace(g, at);
       g.globalAlpha = 0.45;
       stroke(g, ink.ink, 1);
       g.globalAlpha = 1;
@@ -74,9 +65,7 @@ const scene = {
     });
   },
   overlay(g) {
-    if (!here) return;
-    ring(g, here.seen[0], here.seen[1], 4, ink.panel, 4);
-    ring(g, here.seen[0], here.seen[1], 4, ink.accent, 2.5);
+    if (here) mark(g, here.seen[0], here.seen[1], 4);
   },
   // Of the points within 12 pixels the nearest, and of those that lie over each other the foremost.
   nearest(x, y) {

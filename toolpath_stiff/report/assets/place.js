@@ -51,8 +51,7 @@ function boxOf(place) {
   });
 }
 // A placement in the viewer.
-const classOf = (v) => Math.min(CLASSES - 1,
-  Math.max(0, Math.floor((v - d.scale[0]) / (d.scale[1] - d.scale[0]) * CLASSES)));
+const classOf = (v) => classAt(v, d.scale, CLASSES);
 let here = -1;  // the point of the path that is pointed at, in both placements
 const known = (i, place) => place.stiffness[i] !== null && place.stiffness[i - 1] !== null && d.cut[i] === d.cut[i - 1];
 function sceneOf(placeNow) {
@@ -83,8 +82,7 @@ function sceneOf(placeNow) {
         if (Math.hypot(x - x0, y - y0) < 3) return;
         viewer.segment(g, place.zero, tip, ink.second, 2);
         g.fillStyle = ink.second;
-        g.textAlign = "center";
-        g.textBaseline = "middle";
+        aligned(g, "center", "middle");
         g.fillText("XYZ"[k], x + 6, y - 6);
       });
     },
@@ -106,9 +104,7 @@ function sceneOf(placeNow) {
       if (x > 0 && x < viewer.width && y > 0 && y < viewer.height) viewer.write(g, name, x, y - 9, "middle");
     },
     overlay(g) {
-      if (here < 0) return;
-      ring(g, ...path.at(here), 5, ink.panel, 5);
-      ring(g, ...path.at(here), 5, ink.accent, 2.5);
+      if (here >= 0) mark(g, ...path.at(here), 5);
     },
     nearest: (x, y) => path.nearest(x, y),
   };
@@ -128,8 +124,7 @@ function grid(svg, { values, digits }, vertical, map, a, b) {
 }
 const title = (node, text) => make(node, "title", {}, text);
 const weakest = rowsShown.map((r) => r.min_N_per_mm), weakEnds = [Math.min(...weakest), Math.max(...weakest)];
-const weakColour = (v) => coloursNow()[Math.min(d.colours.length - 1,
-  Math.floor((v - weakEnds[0]) / (weakEnds[1] - weakEnds[0] || 1) * d.colours.length))];
+const weakColour = (v) => coloursNow()[classAt(v, weakEnds, CLASSES)];
 const nameOf = (row, i) =>
   `number ${row.number}: mean ${group(row.mean_N_per_mm)}, range ${group(row.range_N_per_mm)}, `
     + `weakest ${group(row.min_N_per_mm)} N/mm` + (i === d.recommended ? ", recommended" : "");
@@ -156,9 +151,9 @@ function drawFront() {
   const best = d.front[d.recommended];
   make(front, "text", { x: X(best.mean_N_per_mm), y: Y(best.range_N_per_mm) - 8, "text-anchor": "middle",
     class: "star" }, "\u2605");
-  mark(); if (focused) dots[chosen].focus();
+  markChosen(); if (focused) dots[chosen].focus();
 }
-function mark() {
+function markChosen() {
   dots.forEach((dot, k) => { dot.classList.toggle("on", k === chosen); dot.setAttribute("aria-checked", k === chosen);
     dot.setAttribute("tabindex", k === chosen ? 0 : -1); });
 }
@@ -249,7 +244,7 @@ function draw() {
   refit();
   profile.redraw();
   drawFacts(place.row);
-  mark();
+  markChosen();
   $("chosen-title").textContent = (chosen === d.recommended ? "Recommended placement, "
     : "Placement ") + `${chosen + 1} of ${places.length}`;
   chosenView.overlay.setAttribute("aria-label", "Path, coloured by stiffness; " + nameOf(place.row, chosen));

@@ -56,8 +56,7 @@ class Profile extends Stage {
         this.drawBeyond(g, beside, top, bottom);
       }
       for (const { s, k, colour } of model.curves()) this.curve(g, s, k, colour);
-      for (const i of model.rings?.() ?? []) { ring(g, ...this.at(i), 5, ink.panel, 4);
-        ring(g, ...this.at(i), 5, ink.ink, 1.6); }
+      for (const i of model.rings?.() ?? []) mark(g, ...this.at(i), 5, ink.ink, 1.6);
     });
     this.drawTools(g, left, right, top);
     if (this.strip) this.drawOperations(g, left, right, top);
@@ -111,8 +110,7 @@ class Profile extends Stage {
     g.lineWidth = 1;
     g.strokeStyle = ink.line;
     g.fillStyle = ink.muted;
-    g.textBaseline = "middle";
-    g.textAlign = "right";
+    aligned(g, "right", "middle");
     const up = ticks(this.low, this.high, 5), across = ticks(this.from, this.to, (right - left) / 110);
     for (const value of up.values) {
       g.beginPath();
@@ -121,13 +119,11 @@ class Profile extends Stage {
       g.stroke();
       if (this.y(value) > top + 9) g.fillText(group(value, up.digits), left - 6, this.y(value));  // clear of the unit
     }
-    g.textBaseline = "top";
-    g.textAlign = "center";
+    aligned(g, "center", "top");
     for (const value of across.values) g.fillText(group(value, across.digits), this.x(value), bottom + 5);
     g.strokeRect(left, top, right - left, bottom - top);
-    g.textAlign = "left";
-    g.textBaseline = "bottom";
-    g.fillText("N/mm", 4, top - 2);
+    aligned(g, "left", "bottom");
+    g.fillText(this.model.unit?.() ?? "N/mm", 4, top - 2);
     g.textAlign = "right";
     g.fillText("path length, mm (rapids included)", right, this.height - 2);
   }
@@ -136,8 +132,7 @@ class Profile extends Stage {
     g.setLineDash([2, 3]);
     g.lineWidth = 1;
     g.strokeStyle = g.fillStyle = ink.muted;
-    g.textAlign = "left";
-    g.textBaseline = "bottom";
+    aligned(g, "left", "bottom");
     let last = -Infinity;
     for (const [start, number] of this.model.tools ?? []) {
       const x = this.x(s[start]);
@@ -153,8 +148,7 @@ class Profile extends Stage {
   }
   drawOperations(g, left, right, top) {
     const { s, operations } = this.model;
-    g.textAlign = "left";
-    g.textBaseline = "middle";
+    aligned(g, "left", "middle");
     g.lineWidth = 1;
     g.strokeStyle = ink.line;
     let last = -Infinity;
@@ -217,8 +211,7 @@ class Profile extends Stage {
     const [x, y] = this.at(here);
     if (x < this.pad.left - 1 || x > this.width - this.pad.right + 1) return;
     g.fillRect(x - 0.5, this.pad.top, 1, bottom - this.pad.top);
-    ring(g, x, y, 4, ink.panel, 4);
-    ring(g, x, y, 4, ink.accent, 2.5);
+    mark(g, x, y, 4);
   }
   rowUnder(x) {
     const { s } = this.model, value = this.from + (x - this.pad.left) / (this.width - this.pad.left

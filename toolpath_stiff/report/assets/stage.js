@@ -35,6 +35,24 @@ function ring(g, x, y, radius, colour, width) {
   g.arc(x, y, radius, 0, 2 * Math.PI);
   stroke(g, colour, width);
 }
+const aligned = (g, textAlign, textBaseline) => Object.assign(g, { textAlign, textBaseline });
+// The outline through points [x, y, ...] on the screen, to stroke or fill.
+function trace(g, points, close = true) {
+  g.beginPath();
+  points.forEach(([x, y], i) => g[i ? "lineTo" : "moveTo"](x, y));
+  if (close) g.closePath();
+}
+function fill(g, points, colour) {
+  trace(g, points);
+  g.fillStyle = g.strokeStyle = colour;
+  g.fill();
+  g.stroke();
+}
+// A ring that is seen on any ground.
+function mark(g, x, y, radius, colour = ink.accent, width = 2.5) {
+  ring(g, x, y, radius, ink.panel, 2 + width);
+  ring(g, x, y, radius, colour, width);
+}
 function stroke(g, colour, width, dash = []) {
   g.setLineDash(dash);
   Object.assign(g, { strokeStyle: colour, lineWidth: width });
@@ -64,6 +82,9 @@ function watchTheme(changed) {
   addEventListener("beforeprint", again(true));
   addEventListener("afterprint", again(false));
 }
+// The class of a value on a scale of so many colours.
+const classAt = (v, [low, high], count) =>
+  Math.max(0, Math.min(count - 1, Math.floor((v - low) / (high - low || 1) * count)));
 const ramp = (colours) => `linear-gradient(to right, ${colours.join(",")})`;
 // A pair of stacked canvases, and a tip over them.
 class Stage {

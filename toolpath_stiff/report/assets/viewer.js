@@ -56,10 +56,10 @@ class Viewer extends Stage {
     this.redraw();
     this.on.moved?.(this);
   }
-  // Look from where another viewer looks, as near.
-  follow(other) {
-    if (this.yaw === other.yaw && this.pitch === other.pitch && this.zoom === other.zoom) return;
-    [this.yaw, this.pitch, this.zoom] = [other.yaw, other.pitch, other.zoom];
+  // Look from where another viewer looks, as near unless it is said how near.
+  follow(other, zoom = other.zoom) {
+    if (this.yaw === other.yaw && this.pitch === other.pitch && this.zoom === zoom) return;
+    [this.yaw, this.pitch, this.zoom] = [other.yaw, other.pitch, zoom];
     this.settle();
   }
   draw() {
@@ -79,8 +79,7 @@ class Viewer extends Stage {
     this.edges(g, this.box, ink.line, 1);
     const flat = ["top", "front", "side"].find((name) => VIEWS[name][0] === this.yaw && VIEWS[name][1] === this.pitch);
     g.fillStyle = ink.muted;
-    g.textAlign = "left";
-    g.textBaseline = "top";
+    aligned(g, "left", "top");
     const text = this.box.map(([low, high], axis) => `${"XYZ"[axis]} ${low.toFixed(1)} to ${high.toFixed(1)}`)
       .join("    ");
     g.fillText(`${text}  mm`, 4, 4);
@@ -95,13 +94,11 @@ class Viewer extends Stage {
     g.lineWidth = 1;
     const line = (x, y, dx, dy) => { g.beginPath(); g.moveTo(x, y); g.lineTo(x + dx, y + dy); g.stroke(); };
     const horizontal = ticks(...this.box[across], Math.max(2, Math.abs(right - left) / 60));
-    g.textAlign = "center";
-    g.textBaseline = "top";
+    aligned(g, "center", "top");
     for (const v of horizontal.values) { const [x] = at(across, v); line(x, bottom, 0, 4);
       g.fillText(v.toFixed(horizontal.digits), x, bottom + 6); }
     const vertical = ticks(...this.box[up], Math.max(2, Math.abs(bottom - top) / 40));
-    g.textAlign = "right";
-    g.textBaseline = "middle";
+    aligned(g, "right", "middle");
     for (const v of vertical.values) { const [, y] = at(up, v); line(left, y, -4, 0);
       g.fillText(v.toFixed(vertical.digits), left - 6, y); }
   }
@@ -116,17 +113,13 @@ class Viewer extends Stage {
     stroke(g, colour, width, dash);
   }
   segment(g, from, to, colour, width, dash = []) {
-    const [a, b] = [this.project(from), this.project(to)];
-    g.beginPath();
-    g.moveTo(a[0], a[1]);
-    g.lineTo(b[0], b[1]);
+    trace(g, [this.project(from), this.project(to)], false);
     stroke(g, colour, width, dash);
   }
   drawTriad(g) {
     const [r, u] = this.axes(), x0 = 46, y0 = this.height - 46;
     g.lineWidth = 1.5;
-    g.textBaseline = "middle";
-    g.textAlign = "center";
+    aligned(g, "center", "middle");
     ["X", "Y", "Z"].forEach((name, axis) => {
       const dx = r[axis] * 30, dy = -u[axis] * 30;
       if (Math.hypot(dx, dy) < 3) return;
@@ -144,8 +137,7 @@ class Viewer extends Stage {
     x -= side === "left" ? 0 : side === "right" ? wide : wide / 2;
     x = Math.max(3, Math.min(this.width - wide - 3, x));
     y = Math.max(9, Math.min(this.height - 9, y));
-    g.textAlign = "left";
-    g.textBaseline = "middle";
+    aligned(g, "left", "middle");
     g.lineWidth = 4;
     g.strokeStyle = ink.panel;
     g.strokeText(text, x, y);

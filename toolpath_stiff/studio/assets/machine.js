@@ -9,6 +9,7 @@ function turnOf([, , , a, b, c]) {
   ];
 }
 const moved = (pose, turn, [x, y, z]) => turn.map((row, i) => pose[i] + row[0] * x + row[1] * y + row[2] * z);
+const coloursNow = () => (theme.dark ? COLOURS.dark : COLOURS.light);
 // Blue is stiffer, orange softer than modelled; grey in between, and the size says how much: no colour is needed.
 function errorColour(percent, scale) {
   const share = Math.min(1, Math.abs(percent) / scale), to = percent < 0 ? ink.second : ink.curve;
@@ -80,9 +81,7 @@ class MachineScene {
     if (this.focus !== "machine") fadeOut(g, view);
   }
   polyline(g, view, points, colour, width, close = false) {
-    g.beginPath();
-    points.forEach((p, i) => { const [x, y] = view.project(p); if (i) g.lineTo(x, y); else g.moveTo(x, y); });
-    if (close) g.closePath();
+    trace(g, points.map((p) => view.project(p)), close);
     stroke(g, colour, width);
   }
   drawReach(g, view) {
@@ -96,12 +95,13 @@ class MachineScene {
   pathItem(view) {
     const path = this.paths[0];
     if (!path) return null;
-    const colours = theme.dark ? COLOURS.dark : COLOURS.light;
+    const colours = coloursNow();
     return { depth: view.project(this.pose.slice(0, 3))[2], paint: (g) => {
       path.stroke(g, colours.length, ink.rapid, 1);
       colours.forEach((colour, i) => path.stroke(g, i, colour, 2.4));
       path.stroke(g, colours.length + 1, ink.plunge, 1.6);
       path.stroke(g, colours.length + 2, ink.bad, 3);
+      for (const run of this.shifted?.runs ?? []) this.polyline(g, view, run, ink.second, 1.6);
     } };
   }
   // Frame, table, struts, joints, platform, spindle and tool; what the suspects are is lit, what stands before the work
@@ -189,12 +189,12 @@ class MachineScene {
     }
     const paths = shades.map((spots, k) => ({ spots, percent: (k / SHADES - 1) * this.scale }))
       .sort((a, b) => Math.abs(a.percent) - Math.abs(b.percent));
-    const trace = (g, spots, radius) => { g.beginPath(); for (const [x, y] of spots) { g.moveTo(x + radius, y);
+    const dots = (g, spots, radius) => { g.beginPath(); for (const [x, y] of spots) { g.moveTo(x + radius, y);
       g.arc(x, y, radius, 0, 7); } };
     return { depth: 1e5, paint: (g) => {
-      for (const { spots, percent } of paths) { trace(g, spots, this.radius(false, percent));
+      for (const { spots, percent } of paths) { dots(g, spots, this.radius(false, percent));
         g.fillStyle = errorColour(percent, this.scale); g.fill(); }
-      trace(g, gone, this.radius(true, 0)); stroke(g, ink.muted, 1.4);
+      dots(g, gone, this.radius(true, 0)); stroke(g, ink.muted, 1.4);
       const chosen = this.spots[this.selected];
       if (chosen) ring(g, chosen[0], chosen[1], this.radius(r.aside[this.selected], this.deviation[this.selected] ?? 0)
         + 4, ink.ink, 2);
@@ -204,14 +204,13 @@ class MachineScene {
     return (this.state.plan?.visits ?? []).map((v) => {
       const [x, y, depth] = view.project([v.x_mm, v.y_mm, v.z_mm]);
       return { depth: depth + 80, paint: (g) => {
-        g.beginPath(); g.moveTo(x, y - 8); g.lineTo(x + 8, y); g.lineTo(x, y + 8); g.lineTo(x - 8, y); g.closePath();
+        trace(g, [[x, y - 8], [x + 8, y], [x, y + 8], [x - 8, y]]);
         stroke(g, ink.accent, 2.2);
       } };
     });
   }
   overlay(g, view) {
-    if (this.sample >= 0 && this.paths[0]) { const [x, y] = this.paths[0].at(this.sample);
-      ring(g, x, y, 7, ink.panel, 4); ring(g, x, y, 7, ink.ink, 2); }
+    if (this.sample >= 0 && this.paths[0]) mark(g, ...this.paths[0].at(this.sample), 7, ink.ink, 2);
   }
   nearest(x, y) {
     let best = 11 * 11, found = -1;

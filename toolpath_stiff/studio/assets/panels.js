@@ -239,8 +239,8 @@ function programPanel(state, act) {
   const p = state.program;
   if (!p) return [h("h2", {}, "The program"),
     h("p", {}, "Drop an NC program on the page, or open one: its path is coloured by stiffness, "
-      + "and profile and text are linked.")];
-  const s = p.summary, n = (v) => group(v);
+      + "and profile and text are linked. With the setup of its cut (cut.toml) by the error of its surface too.")];
+  const s = p.summary, n = group;
   const need = h("input", { type: "number", id: "require", min: 0, step: 1000, value: p.require || "",
     placeholder: "none", onchange: (e) => act({ do: "require", value: Number(e.target.value || 0) }),
     disabled: act.readonly });
@@ -254,6 +254,11 @@ function programPanel(state, act) {
         `${s.out_of_reach_samples} samples of cuts are out of reach: red in the path`) : null,
       s.warnings.map((text) => h("p", { class: "warning" }, text))] : h("p", { class: "muted" }, p.error ? ""
         : "It is being analyzed."),
+    s?.cut?.walls ? figures([["error of walls, mean \u00b5m", n(s.cut.walls.mean_um, 1), "p-error"],
+      ["95 % within \u00b5m", n(s.cut.walls.p95_um, 1)], ...(p.compensated ? [["compensated, mean size \u00b5m",
+      n(p.compensated.walls.mean_after_um, 2), "p-compensated"]] : [])]) : null,
+    p.compensated ? h("p", { class: "live" }, h("a", { class: "button", href: `/case/${p.compensated.written}` },
+      "Compensated program")) : null,
     h("div", { class: "actions" }, h("label", { for: "require" }, "required N/mm "), need, s?.required
       ? h("span", { id: "below", class: s.required.lines?.length ? "bad" : "good" }, s.required.lines?.length
       ? `${s.required.lines.length} lines are below` : "every cut has it") : null),

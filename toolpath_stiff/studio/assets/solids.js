@@ -64,9 +64,7 @@ function prism(view, lower, upper, colour, alpha = 1) {
   return { depth: view.project(middle.map((v) => v / (2 * lower.length)))[2], paint: (g) => {
     g.globalAlpha = alpha;
     for (const [points, fill] of faces) {
-      g.beginPath();
-      points.forEach(([x, y], i) => { if (i) g.lineTo(x, y); else g.moveTo(x, y); });
-      g.closePath();
+      trace(g, points);
       g.fillStyle = fill;
       g.fill();
       stroke(g, fill, 0.7);  // no seams between faces

@@ -124,16 +124,34 @@ function classify() {
   for (const v of known) { low = Math.min(low, v); high = Math.max(high, v); }
   const count = COLOURS.light.length;
   scene.ends = [low, high];
+  scene.shifted = which === "shift" ? shifted(path) : null;
   lines.classify((i) => {
     if (!path.cut[i]) return count;
     if (shown[i] === null) return count + 2;
-    return path.plunge[i] ? count + 1
-      : Math.max(0, Math.min(count - 1, Math.floor((shown[i] - low) / (high - low || 1) * count)));
+    return path.plunge[i] ? count + 1 : classAt(shown[i], scene.ends, count);
   }, count + 3);
   scene.paths = [lines];
 }
+// Of a cut, what path and profile may show instead of stiffness: its unit and digits, what it is.
+const LAYERS = { error: ["\u00b5m", 1, "error of the surface, + material left"], width: ["mm", 2, "width of cut"],
+  shift: ["\u00b5m", 1, "shift of the compensated path, + to the left"] };
+const layer = () => (state.program?.path?.[which] && LAYERS[which]) || ["N/mm", 0, ""];
+// The compensated path beside the other, with its shift so many times larger that it is seen: stretches of points.
+function shifted(path) {
+  const most = Math.max(...path.shift.map(Math.abs)) / 1000 || 1, times = 10 ** Math.round(Math.log10(4 / most)),
+    runs = [], last = path.s_mm.length - 1;
+  path.shift.forEach((v, i) => {
+    if (!v || !path.cut[i]) { if (runs.at(-1)?.length) runs.push([]); return; }
+    const [a, b] = [Math.max(0, i - 1), Math.min(last, i + 1)], by = v / 1000 * times;
+    const dx = path.x_mm[b] - path.x_mm[a], dy = path.y_mm[b] - path.y_mm[a], long = Math.hypot(dx, dy) || 1;
+    if (!runs.length) runs.push([]);
+    runs.at(-1).push([path.x_mm[i] - by * dy / long, path.y_mm[i] + by * dx / long, path.z_mm[i]]);
+  });
+  return { times, runs };
+}
 function curve() {
   const path = state.program.path;
+  if (layer()[2]) return path[which];
   if (which === "difference" && path.given) return path.now.map((v, i) => (v === null || path.given[i] === null ? null
     : v - path.given[i]));
   return which === "given" && path.given ? path.given : path.now;
@@ -154,28 +172,31 @@ function drawProfile() {
     return [...found, { s, k: shown, colour: ink.curve }];
   };
   const model = {
-    s, value: (i) => shown[i], curves, ends: () => scene.ends, here: () => here,
+    s, value: (i) => shown[i], curves, ends: () => scene.ends, unit: () => layer()[0],
+    here: () => here,
     beside: () => null,
-    levels: () => (state.program?.require && which !== "difference" ? [{ value: state.program.require, colour: ink.bad,
-      dash: [6, 4], held: true }] : []),
+    levels: () => (state.program?.require && which !== "difference" && !layer()[2]
+      ? [{ value: state.program.require, colour: ink.bad, dash: [6, 4], held: true }] : []),
   };
   if (profile) { profile.model = model; profile.all(); profile.redraw(); }
   else {
     profile = new Profile($("profile"), model,
       { point: goTo, step: (by) => goTo(Math.max(0, Math.min(s.length - 1, here + by))) });
     profile.drawOverlay = function () { const g = this.clear(this.overlay);
-      if (here >= 0 && here < this.model.s.length) { ring(g, ...this.at(here), 5, ink.panel, 4);
-      ring(g, ...this.at(here), 5, ink.ink, 2); } };
+      if (here >= 0 && here < this.model.s.length) mark(g, ...this.at(here), 5, ink.ink, 2); };
   }
   $("scrub").max = path.s_mm.length - 1;
   const focus = document.activeElement?.id;
-  $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : [])]
+  $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : []),
+    ...Object.keys(LAYERS).filter((name) => path[name])]
     .map((name) => h("button", { type: "button", id: `which-${name}`, "aria-pressed": String(which === name),
-    onclick: () => { which = name; classify(); drawProfile(); drawLegend(); view.redraw(); } }, name)));
+    onclick: () => { which = name; classify(); drawProfile(); drawLegend(); view.redraw();
+      drawText(path.line[Math.max(0, here)]); } }, name)));
   refocus(focus, "");
   const other = which === "now" && path.given?.some((v, i) => v !== path.now[i]);
-  $("curves").textContent = [other ? "orange: as given" : "", which === "now" && path.sd
-    ? "grey: 95 % band of what was fitted" : "", state.program.require ? "dashed: required" : ""].filter(Boolean)
+  $("curves").textContent = [layer()[2], other ? "orange: as given" : "", which === "now" && path.sd
+    ? "grey: 95 % band of what was fitted" : "", state.program.require && !layer()[2]
+    ? "dashed: required" : ""].filter(Boolean)
     .join(", ");
 }
 function goTo(i) {
@@ -190,7 +211,9 @@ function goTo(i) {
       + `${path.sd?.[here] ? ` \u00b1 ${group(1.96 * path.sd[here])} (95 %)` : ""}`
       + `${path.given?.[here] ? `, as given ${group(path.given[here])}` : ""} \u00b7 X${path.x_mm[here].toFixed(1)} `
       + `Y${path.y_mm[here].toFixed(1)} Z${path.z_mm[here].toFixed(1)} mm `
-      + `\u00b7 margin ${path.margin[here]?.toFixed(3) ?? "\u2013"}`;
+      + `\u00b7 margin ${path.margin[here]?.toFixed(3) ?? "\u2013"}`
+      + Object.entries(LAYERS).map(([name, [unit, digits]]) => (typeof path[name]?.[here] === "number"
+        ? ` \u00b7 ${name} ${path[name][here].toFixed(digits)} ${unit}` : "")).join("");
   view.redraw();
   profile?.drawOverlay();
   drawText(path.line[here]);
@@ -199,19 +222,20 @@ const lowest = { of: null, lines: new Map() };
 function drawText(line) {
   const box = $("text"), p = state.program;
   if (!box || !p) return;
-  if (lowest.of !== p.path) {
-    Object.assign(lowest, { of: p.path, lines: new Map() });
-    p.path?.line.forEach((n, i) => { if (p.path.cut[i] && p.path.now[i] !== null) lowest.lines.set(n,
-      Math.min(lowest.lines.get(n) ?? Infinity, p.path.now[i])); });
+  const shown = p.path && (layer()[2] ? curve() : p.path.now), [unit, digits] = layer();
+  if (lowest.of !== shown) {
+    Object.assign(lowest, { of: shown, lines: new Map() });
+    const worse = (a, b) => (digits ? Math.abs(a) > Math.abs(b) : a < b);
+    p.path?.line.forEach((n, i) => { if (p.path.cut[i] && shown[i] !== null
+      && (!lowest.lines.has(n) || worse(shown[i], lowest.lines.get(n)))) lowest.lines.set(n, shown[i]); });
   }
-  const from = Math.max(1, Math.min(line - 8, p.lines.length - 16)), colours = theme.dark ? COLOURS.dark
-    : COLOURS.light, [low, high] = scene.ends ?? [0, 1];
+  const from = Math.max(1, Math.min(line - 8, p.lines.length - 16)), colours = coloursNow();
   const focus = document.activeElement?.id;
   box.replaceChildren(...p.lines.slice(from - 1, from + 16).map((text, k) => {
     const n = from + k, v = lowest.lines.get(n), c = v === undefined ? "transparent"
-      : colours[Math.max(0, Math.min(colours.length - 1, Math.floor((v - low) / (high - low || 1) * colours.length)))];
+      : colours[classAt(v, scene.ends ?? [0, 1], colours.length)];
     return h("button", { type: "button", id: `line-${n}`, class: n === line ? "here" : "", title: v === undefined ? ""
-      : `${group(v)} N/mm`, onclick: () => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i);
+      : `${group(v, digits)} ${unit}`, onclick: () => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i);
       else drawText(n); } }, h("i", { style: `background:${c}` }), h("span", {}, String(n)), h("span", {}, text));
   }));
   refocus(focus, "");
@@ -230,9 +254,10 @@ function drawLegend() {
     h("span", { class: "ramp",
     style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }),
     `+${scene.scale} % stiffer than modelled`));
-  if (state.program?.path) parts.push(h("div", {}, `path ${group(scene.ends[0])}`,
-    h("span", { class: "ramp", style: `background:${ramp(theme.dark ? COLOURS.dark : COLOURS.light)}` }),
-    `${group(scene.ends[1])} N/mm`));
+  if (state.program?.path) { const [unit, digits] = layer(); parts.push(h("div", {},
+    `path ${group(scene.ends[0], digits)}`, h("span", { class: "ramp", style: `background:${ramp(coloursNow())}` }),
+    `${group(scene.ends[1], digits)} ${unit}`)); }
+  if (scene.shifted) parts.push(h("div", {}, `orange: compensated, its shift ${group(scene.shifted.times)} times`));
   $("legend").replaceChildren(...parts);
 }
 function drawPanel() {
