@@ -7,6 +7,7 @@ are those of the SINUMERIK 840D sl (Fundamentals, Job Planning) and of the 840D 
 from toolpath_stiff.nc.codes.code import Act, Code, Refused, holds_anyway
 from toolpath_stiff.nc.codes.feeds import time_word
 from toolpath_stiff.nc.codes.registry import CODES, code_meaning
+from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.siemens import coordinates, cycles, tools
 from toolpath_stiff.nc.siemens.motion import SIDES
 from toolpath_stiff.nc.state import CurrentBlock, Flow, Group, State
@@ -54,6 +55,13 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
     state.recorder.add_dwell(seconds)
 
 
+def fixed_point(state: State, block: CurrentBlock, code: str) -> None:
+    """G74, G75: to points that the machine has: left out, and where the tool then stands is not known."""
+    state.warnings.append(Remark(f"{code} goes to points of the machine: left out of the path", block.line))
+    state.plain.unknown |= {0, 1, 2}
+    block.free.clear()
+
+
 def back(state: State, block: CurrentBlock, code: str) -> None:
     """M17: the end of a subprogram."""
     block.flow = Flow.RETURN
@@ -69,6 +77,7 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
     )),
     ("motion", f"{PLANNING}, Spline interpolation", (("ASPLINE CSPLINE", mode, "spline, as chords of its points"),)),
     ("non-modal", f"{BASICS}, Suppress frames", (("SUPA G53 G153", mode, "machine coordinates"),)),
+    ("non-modal", f"{BASICS}, Reference point, fixed point", (("G74 G75", fixed_point, "to points of the machine"),)),
     ("polar", f"{BASICS}, Travel commands with polar coordinates", (("G110 G111 G112", coordinates.pole, "pole"),)),
     ("work offset", f"{BASICS}, Settable zero offset", (
         (" ".join(["G54 G55 G56 G57", *(f"G{n}" for n in range(505, 600))]), coordinates.offset, "settable offset"),
@@ -116,7 +125,7 @@ LISTED = {
             "G9 G60 G64 G601 G602 G603 G641 G642 G643 G644 G645 G62 G621 BRISK BRISKA SOFT SOFTA DRIVE FFWON FFWOF "
             "COMPON COMPCURV COMPCAD COMPSURF COMPOF CYCLE832 DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC "
             "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CFC CFCIN CFTCP FGROUP ORISON "
-            "ORISOF ORIWKS ORIMKS ORIRESET VELOLIM CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 HIGH_SPEED",
+            "ORISOF ORIWKS ORIMKS ORIRESET CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 HIGH_SPEED",
         "message, stop of the look-ahead, display":
             "MSG STOPRE GROUP_BEGIN GROUP_END GROUP_ADDEND DISPLOF DISPLON NEWCONF WRITE SETAL PARAM_END EXTERN WAITM "
             "SETMS STOPREOF SAVE SBLOF SBLON ENDLABEL",
@@ -129,7 +138,7 @@ LISTED = {
 }  # fmt: skip
 WORDS = frozenset((
     "ADIS", "ADISPOS", "SPOS", "SPOSA", "OVR", "OVRRAP", "FGREF", "CTOL", "OTOL", "ACC", "H", "FRC", "FL", "LIMS",
-    "DISC",
+    "DISC", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF",
 ))  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
 REFUSED: dict[str, Refused] = {
@@ -146,7 +155,6 @@ REFUSED: dict[str, Refused] = {
         ("TRANSMIT TRACYL TRAANG TRACON TOFRAME TOROT PAROT TCARR TCOFR CUTMOD", "a transformation of the machine's",
          "post X, Y, Z, A3, B3, C3 of the tool's tip", f"{PLANNING}, Transformations"),
         ("G58 G59", "an offset axis by axis", "TRANS, ATRANS", _FRAMES),
-        ("G74 G75", "the approach of a fixed point, which the machine has", "SUPA", f"{BASICS}, Reference point"),
         ("G63 G331 G332", "tapping without a cycle", "CYCLE84", f"{BASICS}, Tapping"),
         ("G140 G141 G142 G143 G147 G148 G247 G248 G340 G341 G347 G348", "smooth approach and retraction",
          "post its moves", f"{BASICS}, Smooth approach and retraction"),
@@ -154,7 +162,7 @@ REFUSED: dict[str, Refused] = {
         ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
         ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
          f"{PLANNING}, Orientation"),
-        ("WHEN WHENEVER EVERY DO ID IDS", "a synchronised action", "the program without it", f"{PLANNING}"),
+        ("WHEN WHENEVER EVERY DO ID IDS CASE", "a synchronised action, or a choice", "IF with GOTOF", PLANNING),
         ("EXTCALL PCALL CALL CALLPATH ISOCALL", "a call by path", "the subprogram's name, with --subprograms",
          f"{PLANNING}, Subprogram technique"),
     )
