@@ -337,7 +337,8 @@ def test_a_program_is_written_for_another_placement(x, y, z, degrees):
     program, turn = parse_program(WRITTEN, "p.h", controller=TOOLS), math.radians(degrees)
     placement = (x / 1e3, y / 1e3, z / 1e3, 0.0, 0.0, turn)
     text = rewrite_program(program, placement, (0.0,) * 6, control=TOOLS).text
-    assert text.count("\n") == WRITTEN.count("\n") and "; start" in text and "15 L X+0 Y+0 Z+50 R0 FMAX M91" in text
+    frame = text.replace(WRITTEN[: WRITTEN.index("2 L")], "").partition("2 L")[0]
+    assert frame.count("\n") == (6 if degrees else 4) and text.replace(frame, "") == WRITTEN
     again, cuts = parse_program(text, "p.h", controller=TOOLS).moves, program.moves.motion > 0
     a, b = program.moves.end[cuts, 0] * 1e3, program.moves.end[cuts, 1] * 1e3
     there = np.column_stack([a * math.cos(turn) - b * math.sin(turn) + x, a * math.sin(turn) + b * math.cos(turn) + y])
@@ -346,15 +347,23 @@ def test_a_program_is_written_for_another_placement(x, y, z, degrees):
     assert again.arc_sweep == pytest.approx(program.moves.arc_sweep, abs=1e-3)
 
 
+def test_cycles_parameters_and_repeats_are_placed_by_the_frame():
+    body = "Q1 = 5\nLBL 1\nL X+Q1 Y+2 Z+9 F9\n" + DRILL.format(depth=4, far=9) + "L IX+1 M99\nCALL LBL 1 REP 1"
+    program = read(body)
+    text = rewrite_program(program, (0.1, 0, 0.003, 0, 0, math.pi / 2), (0.0,) * 6, control=TOOLS).text
+    cuts, again = program.moves.end[:, :3], parse_program(text, "p.h", controller=TOOLS).moves.end[:, :3]
+    assert again == pytest.approx(np.column_stack([0.1 - cuts[:, 1], cuts[:, 0], cuts[:, 2] + 0.003]), abs=1e-7)
+
+
 @pytest.mark.parametrize(
     ("body", "placement", "line"),
     [
-        ("LBL 1\nL X+1 F9\nCALL LBL 1 REP 1", (0, 0, 0, 0, 0, 0.5), 4),
-        ("CYCL DEF 7.1 X+5\nL X+1 Y+1 F9", (0.1, 0, 0, 0, 0, 0), 3),
-        ("Q1 = 5\nL X+Q1 F9", (0.1, 0, 0, 0, 0, 0), 4),
-        (DRILL.format(depth=4, far=9) + "L X+1 Y+1 F9 M99", (0, 0, 0.1, 0, 0, 0), 3),
+        ("CYCL DEF 7.1 X+5\nL X+1 Y+1 F9", (0.1, 0, 0, 0, 0, 0), 4),
+        ("L X+1 Y+1 Z+1 F9\nCYCL DEF 7.1 X+5\nL X+1 Y+1", (0.1, 0, 0, 0, 0, 0), 5),
         ("L X+1 Y+1 F9", (0, 0, 0, 0.1, 0, 0), 1),
-        ("LBL 1\nL IX+1 F9\nL Y+3\nCALL LBL 1 REP 1", (0.1, 0, 0, 0, 0, 0.5), 5),
+        ("L IX+1 F9\nL Y+3", (0.1, 0, 0, 0, 0, 0.5), 3),
+        ("L X+1 Y+1 Z+1 F9\nL A+5", (0, 0, 0, 0, 0, 0.5), 4),
+        ("PLANE SPATIAL SPA+0 SPB+9 SPC+0 STAY\nL X+1 Y+1 Z+1 FMAX\nL X+5 F9", (0, 0, 0, 0, 0, 0.5), 3),
     ],
 )
 def test_what_cannot_be_written_is_refused_by_line(body, placement, line):
