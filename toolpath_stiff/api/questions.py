@@ -154,8 +154,8 @@ def compare(
     teller(progress)("comparing")
     comparison = compare_readings(question.model, question.readings, **question.common)
     following = hint("which effect would explain it", question.request.command("diagnose"))
-    following = (following,) if isinstance(question.model, Hexapod) else ()
-    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=following))
+    onwards = (following,) if isinstance(question.model, Hexapod) else ()
+    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=onwards))
 
 
 @checked
