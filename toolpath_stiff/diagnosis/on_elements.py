@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import AnyArray, FloatArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.element_fits import (
@@ -121,7 +121,7 @@ class ElementDiagnosis(FolderResult):
         """One row a reading, as in `residuals.csv`."""
         return frame_of(self.columns())
 
-    def columns(self) -> dict[str, object]:
+    def columns(self) -> dict[str, AnyArray]:
         """Column of `residuals.csv` -> values."""
         pulls = self.pulls
         return {

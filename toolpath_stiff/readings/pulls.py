@@ -7,6 +7,7 @@ a dial's reading). All in base axes; where the force acts and what is read may l
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
         if FORCE[0] not in table.heading and TENSION not in table.heading:
             scalar.append(name)
             continue
-        of_file, errors = parsed_rows(table, lambda line, record, name=name: _Pull.of(record, name, line, joints))
+        of_file, errors = parsed_rows(table, partial(_Pull.of, name, joints))
         if errors:
             raise InputErrors(errors)
         rows += of_file
@@ -102,7 +103,9 @@ class _Pull:
     line: int
 
     @classmethod
-    def of(cls, record: Mapping[str, str], file: str, line: int, joints: Mapping[str, tuple[int, bool]]) -> "_Pull":
+    def of(cls, file: str, joints: Mapping[str, tuple[int, bool]], line: int, record: Mapping[str, str]) -> "_Pull":
+        """A row of a file. Raises `MeasurementError`."""
+
         def mm(names: Sequence[str]) -> tuple[float, ...]:
             return tuple(m_from_mm(number(record, name)) if record.get(name) else 0.0 for name in names)
 
@@ -177,8 +180,10 @@ def _stances(machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: S
     if by_joints.any():
         there, turn = machine.forward(joints[by_joints])
         apart = np.linalg.norm(there - position[by_joints], axis=1)
-        for row in np.flatnonzero(by_joints)[apart > SAME_PLACE]:
-            text = f"pose and joints are {mm_from_m(float(apart[np.flatnonzero(by_joints) == row][0])):.1f} mm apart"
+        for row, off in zip(np.flatnonzero(by_joints).tolist(), apart.tolist(), strict=True):
+            if not off > SAME_PLACE:
+                continue
+            text = f"pose and joints are {mm_from_m(off):.1f} mm apart"
             errors.append(MeasurementError(text, file=rows[row].file, line=rows[row].line))
         position[by_joints], rotation[by_joints] = there, turn
     stances = [machine.solve(position, rotation, configuration=i) for i in range(len(machine.configurations))]
@@ -187,7 +192,7 @@ def _stances(machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: S
     for i, stance in enumerate(stances):
         off = np.abs(np.exp(1j * stance.joints) - np.exp(1j * joints)).max(axis=1)
         chosen[by_joints & (off < 1e-6)] = i
-    for row in np.flatnonzero(np.isnan(best.joints).any(axis=1)):
+    for row in np.flatnonzero(np.isnan(best.joints).any(axis=1)).tolist():
         errors.append(MeasurementError("no joint values lead to the pose", file=rows[row].file, line=rows[row].line))
     if errors:
         raise InputErrors(errors)
@@ -198,25 +203,29 @@ def _stances(machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: S
 def _joined(parts: Sequence[Stance]) -> Stance:
     """Stances one after the other, in whatever configuration."""
 
-    def whole(name: str, inner: tuple[int, ...]) -> FloatArray:
-        given = [getattr(load, name) for load in loads]
-        arrays = [np.eye(3) if array is None else array for array in given]
-        return np.concatenate([np.broadcast_to(a, (len(s), *inner)) for a, s in zip(arrays, parts, strict=True)])
+    def whole(values: Sequence[FloatArray | None], *inner: int) -> FloatArray:
+        full = [np.eye(3) if value is None else value for value in values]
+        return np.concatenate([np.broadcast_to(v, (len(s), *inner)) for v, s in zip(full, parts, strict=True)])
 
-    arrays = {}
-    for name, unit in (("rotation", np.eye(3)), ("work_axes", np.eye(3)), ("joints", None), ("position", None)):
-        values = [getattr(part, name) for part in parts]
-        full = [unit if value is None else value for value in values]
-        shape = full[0].shape[-2:] if unit is not None else full[0].shape[-1:]
-        arrays[name] = np.concatenate([np.broadcast_to(v, (len(s), *shape)) for v, s in zip(full, parts, strict=True)])
-    joined = []
+    joined: list[Spring | LoadRows] = []
     for loads in zip(*(part.loads for part in parts), strict=True):
-        if isinstance(loads[0], Spring):
-            joined.append(Spring(whole("place", (3,)), whole("axes", (3, 3)), whole("compliance", (6,))))
+        k = loads[0].compliance.shape[-1]
+        compliance = whole([load.compliance for load in loads], k)
+        springs = [load for load in loads if isinstance(load, Spring)]
+        if springs:
+            axes = whole([spring.axes for spring in springs], 3, 3)
+            joined.append(Spring(whole([spring.place for spring in springs], 3), axes, compliance))
         else:
-            k = loads[0].compliance.shape[-1]
-            joined.append(LoadRows(whole("loads", (k, 6)), whole("compliance", (k,))))
-    return Stance(**arrays, configuration=np.concatenate([part.configuration for part in parts]), loads=tuple(joined))
+            rows = [load.loads for load in loads if isinstance(load, LoadRows)]
+            joined.append(LoadRows(whole(rows, k, 6), compliance))
+    return Stance(
+        joints=np.concatenate([part.joints for part in parts]),
+        position=np.concatenate([part.position for part in parts]),
+        rotation=whole([part.rotation for part in parts], 3, 3),
+        work_axes=whole([part.work_axes for part in parts], 3, 3),
+        configuration=np.concatenate([part.configuration for part in parts]),
+        loads=tuple(joined),
+    )
 
 
 def _of_stiffnesses(files: Sequence[str], machine: MachineTool, mapping: Mapped) -> Pulls:
