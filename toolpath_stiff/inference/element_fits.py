@@ -77,7 +77,7 @@ class PullModel:
             if element.link == "joints" and element.directions == SIX:
                 names.append(element.name)
                 columns.append(part[:, 5])
-        return names, np.stack(columns, axis=1)
+        return names, np.stack(columns, axis=1) if columns else np.empty((len(self.pulls), 0))
 
     def candidates(self) -> list[tuple[str, str, list[str], FloatArray]]:
         """Effect, element, parameters and (m, k) columns per SI unit of each, of what changes anything."""
