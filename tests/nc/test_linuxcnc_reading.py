@@ -346,7 +346,14 @@ def test_a_placement_is_found_but_no_program_rewritten(tmp_path, capsys):
 
 
 @needs_rs274
-@pytest.mark.parametrize("block", ["M150", "M1 50", "M200 M150", "M99.9", "M[100+50]", "M200 M0150 P1"])
+@pytest.mark.parametrize("block", ["M200 M150", "M99.9", "M[100+50]", "M200 M0150 P1"])
 def test_leaving_words_out_opens_no_gap_in_the_fence(block):
-    with pytest.raises(InputError, match=r"is not started on such a program|not an M code"):
+    with pytest.raises(InputError, match=r"is not started on such a program|not an M code|M-code greater than 199"):
         parse_program(f"F100\nG1 X1\n{block}\nM2\n", interpreter="linuxcnc")
+
+
+@needs_rs274
+def test_user_codes_are_nothing_with_a_warning():
+    program = parse_program("F100\nG1 X1\nM150 P1 Q2\nG1 X2 M101\nM2\n", interpreter="linuxcnc")
+    assert [(remark.line, remark.text[:4]) for remark in program.warnings] == [(3, "M150"), (4, "M101")]
+    assert (program.moves.end[:, 0] * 1e3).round(6).tolist() == [1, 2]

@@ -15,7 +15,7 @@ from toolpath_stiff.inference.fair_forms import fair_rivals
 from toolpath_stiff.inference.left_out_votes import closest, votes
 from toolpath_stiff.inference.nuisances import findings, fitted_nuisances, nuisance_words
 from toolpath_stiff.inference.rivals import entries, place_of
-from toolpath_stiff.inference.votes import SMALL, chance_of_losing, left_open, outvoted, standard_error, vote_words
+from toolpath_stiff.inference.votes import SMALL, chance_of_losing, outvoted, standard_error, vote_words
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 
@@ -110,12 +110,7 @@ def test_untilted_a_table_is_a_tool_whose_axes_differ():
     assert judgement.verdict == "ambiguous" and "spindle_compliance" in judgement.explanations
 
 
-def test_explanations_left_open():
-    against = {"b": np.full(9, -1.0), "c": np.full(9, 0.1), "d": np.full(9, 1.0), "e": np.full(9, 0.2)}
-    assert left_open("a", ["a"], [], against) == ("a",)
-    # b foretells better than a and has outvoted c, which stood by its probability.
-    assert left_open("a", ["a", "c"], ["b", "c", "e"], against) == ("a", "b", "e")
-    assert left_open("a", ["a", "c", "f"], ["c"], {"c": against["c"]}) == ("a", "f", "c")
+def test_votes_against_a_rival_are_those_of_its_strongest_form():
     assert list(closest({"x": np.ones(3)}, {"x": np.zeros(3), "w": np.full(3, 2.0)})) == ["x", "w"]
 
 

@@ -293,8 +293,10 @@ def _warnings(analysis: Analysis) -> list[str]:
     """What the evaluation itself has to say."""
     warnings, samples, there = [], analysis.samples, analysis.at
     if analysis.turn is not None and len(changes := np.unique(samples.line[analysis.turn.changes])):
-        lines = ", ".join(map(str, changes[:MOST_NAMED]))
-        warnings.append(f"lines {lines}: the joints cannot go on as they stand, the configuration has to change there")
+        at_lines = ", ".join(map(str, changes[:MOST_NAMED]))
+        warnings.append(
+            f"lines {at_lines}: the joints cannot go on as they stand, the configuration has to change there"
+        )
     rapids, swapped = ~samples.cutting & ~there.reachable, samples.cutting & there.substituted
     if rapids.any():
         first = int(np.argmax(rapids))

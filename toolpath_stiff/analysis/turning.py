@@ -133,7 +133,7 @@ def choose_turn(
     if mode == FEED:
         return replace(_kept(rotation, feed_turns(rotation, tangent)), mode=FEED)
     nodes = np.unique(np.linspace(0, len(abc) - 1, NODES).round().astype(np.int64))
-    angles = TURN / turns * np.arange(turns)
+    angles = np.asarray(TURN / turns * np.arange(turns), dtype=np.float64)
     poses = (position[nodes], rotation[nodes], tangent[nodes])
     joints, cost = _candidates(model, poses, tool_length[nodes], load, angles)
     if not np.isfinite(cost).any():

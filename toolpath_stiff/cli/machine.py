@@ -19,6 +19,7 @@ from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, command
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.options import Option, finite_number, numbers
+from toolpath_stiff.results import TextFile
 
 OUT_OF_REACH = NOT_GOOD = 1  # exit codes
 MOST_NAMED = 10
@@ -140,22 +141,37 @@ def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     return run.write_text(args, file, text, "edit it, then", "machine", "check", file, fresh=True)
 
 
-@command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
-def from_linuxcnc(
-    args: Namespace,
-    file: Annotated[str, Option("FILE.hal")],
-    out: Annotated[str | None, Option("-o --out", "FILE")] = None,
-) -> int:
-    """Read the genhexkins pins of a LinuxCNC HAL file.
+Made = Annotated[str | None, Option("-o --out", "FILE", help="machine file to write (default: standard output)")]
 
-    Parameters
-    ----------
-    out
-        Machine file to write (default: standard output).
-    """
-    machine_file = tps.machine_from_linuxcnc(file, args.units)
+
+def _made(args: Namespace, machine_file: TextFile, out: str | None) -> int:
+    """Write or print a machine file that was made from another description."""
     run.tell("note", machine_file.notes)
     if out:
         return run.write_text(args, out, machine_file.text, "next", "machine", "check", out)
     sys.stdout.write(machine_file.text)
     return 0
+
+
+@command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
+def from_linuxcnc(args: Namespace, file: Annotated[str, Option("FILE.hal")], out: Made = None) -> int:
+    """Read the kinematics pins of a LinuxCNC HAL file."""
+    return _made(args, tps.machine_from_linuxcnc(file, args.units), out)
+
+
+@command("machine from-urdf", "machine_from_urdf", REPLACE)
+def from_urdf(args: Namespace, file: Annotated[str, Option("FILE.urdf")], out: Made = None) -> int:
+    """Read a robot of a URDF file."""
+    return _made(args, tps.machine_from_urdf(file, args.tip), out)
+
+
+@command("machine from-dh", "machine_from_dh", REPLACE)
+def from_dh(args: Namespace, file: Annotated[str, Option("TABLE")], out: Made = None) -> int:
+    """Read a robot of a table of Denavit-Hartenberg rows."""
+    return _made(args, tps.machine_from_dh(file, args.convention), out)
+
+
+@command("machine from-freecad", "machine_from_freecad", REPLACE)
+def from_freecad(args: Namespace, file: Annotated[str, Option("FILE.fcm")], out: Made = None) -> int:
+    """Read a mill of FreeCAD."""
+    return _made(args, tps.machine_from_freecad(file, args.order), out)

@@ -209,7 +209,8 @@ class Update(FolderResult):
         """How far the last model may be off at a pose; None where too little was measured to tell."""
         if self.task.objective != LIKELIHOOD:
             return None
-        return error_model(self.known, self.task.problem.predictor.data, self.noise)
+        given = self.last.fit if self.kept_law else None
+        return error_model(self.known, self.task.problem.predictor.data, self.noise, given)
 
     @cached_property
     def corrected(self) -> Hexapod | None:

@@ -14,13 +14,13 @@ from toolpath_stiff.cutting.engagement import engage
 from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.passes import walls_of_all_passes
-from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.patches import Patches, of_stations
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
 from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
-from toolpath_stiff.cutting.workpiece import Workpiece, workpiece_of
+from toolpath_stiff.cutting.workpiece import Workpiece, stages_of
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.path.sampling import Samples, sample_moves
@@ -33,7 +33,7 @@ BLOCK = 16_384  # stations at a time
 MOST_NAMED = 5  # lines in a warning
 OTHER = 0.1  # of the error of a wall: where a pass has less of it by itself, most is of an earlier one
 ROUNDED = 1e-12  # of a cosine
-TURN = 0.02  # rad between two moves, below which the second begins as the first ends: chords of a curve
+SAME_WALL = 1e-6  # m, ranges of height closer than this are one
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -149,50 +149,37 @@ def evaluate_cut(
     spindle = spindle_of(setup, program, samples)
     stock = stock_of(setup, program.moves, cutters)
     try:
-        work = workpiece_of(stock, program.moves, cutters)
+        engaged = engage(stages_of(stock, program.moves, cutters), program.moves, samples, cutters, progress)
     except ProgramError as error:  # which knows no file
         raise error.in_line(program.name, error.line or 0) from None
-    cut = _nothing_cut(samples, cutters, work, setup.coefficients, spindle)
-    given, parts, removed = (work, program.moves, samples, cutters), [], np.zeros(len(samples))
-    for block, some, volume in engage(*given, progress):
-        removed[block] = volume
-        parts.append(some)
-    patches = Patches.joined(parts)
-    repeated = _repeats_the_one_before(samples)
-    first, few = np.cumsum(~repeated) - 1, (work, program.moves, samples.take(~repeated), cutters)
-    (walls, own), strips = (made[first] for made in walls_of_passes(*few)), final_strip(*few)[first]
-    cut = replace(cut, removed=removed, wall_heights=walls)
+    cut = replace(_nothing_cut(samples, cutters, engaged.work, setup.coefficients, spindle), removed=engaged.removed)
+    walls, own = walls_of_passes(engaged.work, samples, cutters)
+    # Samples that share a contact are computed once, but where their walls differ.
+    source = engaged.source.copy()
+    apart = ~np.isclose(walls, walls[source], rtol=0.0, atol=SAME_WALL, equal_nan=True).all(axis=(1, 2))
+    source[apart] = np.flatnonzero(apart)
+    rows = np.unique(source)
+    strips = np.full((len(samples), 2), np.nan)
+    strips[rows] = final_strip(engaged.work, samples.take(rows), cutters)
+    patches = of_stations(engaged.patches, engaged.source[rows])
+    patches = replace(patches, station=rows[patches.station])
+    cut = replace(cut, wall_heights=walls)
     made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
         values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
-    profiles = cut.wall_profiles
-    profiles[made[:, :2]] = 0.0
+    cut.wall_profiles[made[:, :2]] = 0.0
     _note_engagement(cut, patches)
-    engaged = np.zeros(len(samples), dtype=bool)
-    engaged[patches.station] = True
-    repeated[1:] &= engaged[1:] == engaged[:-1]
+    cutting = np.unique(patches.station)
     for number, cutter in cutters.items():
-        rows = np.flatnonzero(engaged & ~repeated & (samples.tool == number))
-        for start in range(0, len(rows), BLOCK):
-            _evaluate(cut, model, origin, cutter, patches, spindle, strips, rows[start : start + BLOCK])
-    again = np.flatnonzero(repeated)
-    for values in (cut.mean_force, cut.peak_force, cut.deflection, cut.wall_force, profiles):
-        values[again] = values[again - 1]
-    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
-        values[again] = values[again - 1]
+        some = cutting[samples.tool[cutting] == number]
+        for start in range(0, len(some), BLOCK):
+            _evaluate(cut, model, origin, cutter, patches, spindle, strips, some[start : start + BLOCK])
+    for values in (cut.ap, cut.ae, cut.entry, cut.exit, cut.mean_force, cut.peak_force, cut.deflection, cut.wall_force):
+        values[:] = values[source]
+    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation, cut.wall_profiles):
+        values[:] = values[source]
     cut = _with_walls_of_all_passes(cut, own, step)
     return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=_warnings(cut))
-
-
-def _repeats_the_one_before(samples: Samples) -> BoolArray:
-    """(n,) samples where a move goes on from the one before with hardly a turn, and nothing else differs."""
-    first, second = slice(None, -1), slice(1, None)
-    straight = (samples.tangent[first] * samples.tangent[second]).sum(axis=1) >= np.cos(TURN)
-    straight &= (samples.position[first] == samples.position[second]).all(axis=1) & samples.cutting[first]
-    straight &= (samples.tool[first] == samples.tool[second]) & (samples.feed[first] == samples.feed[second])
-    straight &= samples.spindle[first] == samples.spindle[second]
-    straight[1:] &= ~straight[:-1]
-    return np.concatenate([[False], straight])
 
 
 def _nothing_cut(

@@ -1,6 +1,8 @@
 """Where a cutter touches the stock: rectangles on its envelope, height above the tip over the angle of the edge."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray
 
@@ -27,3 +29,11 @@ class Patches(ArrayColumns):
     high: FloatArray
     entry: FloatArray
     exit: FloatArray
+
+
+def of_stations(patches: Patches, stations: IntArray) -> Patches:
+    """The patches of some stations (n,), counted among these; a station may come more than once."""
+    first, last = (np.searchsorted(patches.station, stations, side) for side in ("left", "right"))
+    station = np.repeat(np.arange(len(stations)), last - first)
+    rows = np.arange(len(station)) + np.repeat(last - np.cumsum(last - first), last - first)
+    return replace(patches.take(rows), station=station)

@@ -17,7 +17,7 @@ A rival is outvoted where the sum of them is
   error sees where one pose carries it all; or more than `SURE`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -28,7 +28,6 @@ SMALL = 4.0
 CHANCE = 0.05  # one-sided
 DRAWS = 2000
 CERTAIN = 4  # decimals of a vote on which all processors agree
-MOST_OPEN = 3  # explanations that a verdict lists for their votes; all votes are in the document
 FEWEST_POSES = 6  # below, no spread over poses can be told
 Votes = Mapping[str, FloatArray]  # rival -> (poses,) log predictive density of the explanation above the rival's
 
@@ -68,24 +67,3 @@ def vote_words(rival: str, differences: FloatArray) -> str:
     """The same as a clause."""
     gain, error = float(differences.sum()), standard_error(differences)
     return f"{rival} foretells pose after pose {'worse' if gain > 0.0 else 'better'} by {abs(gain):.1f} +- {error:.1f}"
-
-
-def left_open(first: str, standing: Sequence[str], rivals: Sequence[str], against: Votes) -> tuple[str, ...]:
-    """Explanations that are left: the first, then the others from the closest by votes on.
-
-    Parameters
-    ----------
-    first, standing
-        The explanation that is voted for; all that stand by their probability.
-    rivals, against
-        Those that it has not outvoted, the closest first; the votes against each. They fill up to `MOST_OPEN`; one that
-        foretells better than the first is told in any case, and what it has outvoted itself stands no more.
-    """
-    if not rivals:
-        return tuple(standing)
-    closest_rival, kept = against[rivals[0]], [name for name in standing if name != first]
-    if better := bool(closest_rival.sum() < 0.0):
-        kept = [n for n in kept if n in rivals[:1] or n not in against or not outvoted(against[n] - closest_rival)]
-    new = [name for name in rivals if name not in standing][: max(MOST_OPEN - 1 - len(kept), int(better))]
-    gains = {name: round(float(np.sum(against.get(name, 0.0))), CERTAIN - 1) for name in (*kept, *new)}
-    return first, *sorted(gains, key=lambda name: (gains[name], name))

@@ -14,7 +14,7 @@ WHOLE = 2.0 * np.pi
 
 def turned_about_tool(rotation: FloatArray, turn: FloatArray) -> FloatArray:
     """(..., 3, 3) tool axes (..., 3, 3) turned about their own z by angles (...) rad."""
-    return product(rotation, rotation_about_z(turn))
+    return np.asarray(product(rotation, rotation_about_z(turn)))
 
 
 def feed_turns(rotation: FloatArray, tangent: FloatArray) -> FloatArray:
@@ -27,7 +27,7 @@ def feed_turns(rotation: FloatArray, tangent: FloatArray) -> FloatArray:
     if not len(moving):
         return np.zeros(len(tangent))
     turns = np.unwrap(np.arctan2(local[moving, 1], local[moving, 0]))
-    return turns[np.clip(np.searchsorted(moving, np.arange(len(tangent)), side="right") - 1, 0, None)]
+    return np.asarray(turns[np.clip(np.searchsorted(moving, np.arange(len(tangent)), side="right") - 1, 0, None)])
 
 
 def unwound(joints: FloatArray, winds: BoolArray) -> FloatArray:

@@ -62,8 +62,8 @@ def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def turn_spindle(state: State, block: CurrentBlock, code: str) -> None:
-    """M3: clockwise, M4: the other way, M5, M19: it stands."""
-    state.turn = {"M3": 1, "M4": -1}.get(code, 0)
+    """M3: clockwise, M4: the other way, M5, M19: it stands; M13, M14: as M3, M4, with coolant."""
+    state.turn = {"M3": 1, "M13": 1, "M4": -1, "M14": -1}.get(code, 0)
 
 
 def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: list[float], arc: Arc | None) -> float:

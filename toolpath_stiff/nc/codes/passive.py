@@ -57,6 +57,7 @@ _OFF = "none is on, since switching it on is refused"
 _ZONE, _SPEED = "the zone that the tool must not enter", "the spindle's speed"
 FANUC_ONLY, HAAS_ONLY = ("generic", "fanuc"), ("generic", "haas")
 _SPINDLE = {"M3": "spindle on", "M4": "spindle on, reversed", "M5": "spindle off"}
+_BOTH = {"M13": "spindle on, with coolant", "M14": "spindle on, reversed, with coolant"}
 _COOLANT = {"M7": "mist coolant on", "M8": "flood coolant on", "M9": "coolant off"}
 _OVERRIDES = dict.fromkeys(("M48", "M49", "M50", "M51", "M52", "M53"), "speed and feed overrides")
 _WATCHED = {"G25": "spindle speed not watched", "G26": "spindle speed watched"}
@@ -77,6 +78,7 @@ PASSIVE_CODES = (
     Code("G64", "path control", take_words, "path blending", g_codes("G64"), listed=_BLENDED),
     *family(_SPINDLE, "M spindle", turn_spindle, m_codes("M3 M4 M5")),
     Code("M19", "M spindle", turn_spindle, "spindle orientation", m_codes("M19"), listed="spindle orientation"),
+    *family(_BOTH, "M spindle", turn_spindle, f"{FANUC}, builders' M codes", FANUC_ONLY, listed="coolant"),
     *family(_COOLANT, "M coolant", holds_anyway, m_codes("M7 M8 M9"), listed="coolant"),
     *family(_OVERRIDES, "M overrides", holds_anyway, m_codes("M48 - M53"), listed="overrides"),
     Code(

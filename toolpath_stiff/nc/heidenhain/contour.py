@@ -173,7 +173,9 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
     block.refuse_if(all(inner[:2]), None, "under cycle 8 and cycle 10: their order decides the path", "one of them")
     if plain.held_tip and state.frames.posted is None:
         leans = any(state.frames.position[3:]) or any(there.get(axis) for axis in (3, 4, 5))
-        block.refuse_if(leans, None, "turns rotary axes under M128 (FUNCTION TCPM)", hint=HOLDS_HINT)
+        block.refuse_if(
+            leans, None, "turns rotary axes under tool centre point control (M128, TRAORI)", hint=HOLDS_HINT
+        )
 
 
 def line(state: State, block: CurrentBlock, code: str) -> None:

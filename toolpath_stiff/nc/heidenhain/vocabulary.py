@@ -114,7 +114,6 @@ STATEMENTS: dict[str, Code] = {
     for name in names.split("|")
 }
 OWN = {
-    "M13": "spindle on, coolant", "M14": "spindle on, reversed, coolant",
     "M89": "the cycle after each positioning", "M99": "the cycle here", "M91": "machine coordinates",
     "M92": "points of the machine builder", "M126": "rotary axes go the shorter way", "M127": "they go as programmed",
     "M128": "tool centre point control", "M129": "tool centre point control off", "M140": "retract along the tool",

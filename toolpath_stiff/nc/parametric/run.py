@@ -139,7 +139,7 @@ class ParametricRun(ProgramRun):
     def _steered(self, row: int) -> int | None:
         """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
         self._at = row
-        if any(row == first for first, *_ in self._files):  # the end of the file before it
+        if self._ends_before(row):
             return len(self.lines)
         self._count_block(row)
         statement = self._statement(row)
@@ -157,6 +157,10 @@ class ParametricRun(ProgramRun):
         act = self._step(steering.kind)
         to = act(self, row, steering) if act else None
         return row + 1 if to is None else self._jump(row, to)
+
+    def _ends_before(self, row: int) -> bool:
+        """Whether a line is the first of a file: the one before it has ended there."""
+        return any(row == first for first, *_ in self._files)
 
     def _step(self, kind: str) -> Step | None:
         """What carries out a kind of block that steers."""

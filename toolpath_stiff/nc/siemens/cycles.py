@@ -17,15 +17,17 @@ from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import SECONDS_PER_DAY
 
-_HEIGHTS = "RTP RFP SDIS DP DPR"
+_HEIGHTS, _MODES = "RTP RFP SDIS DP DPR", "GMODE DMODE AMODE"
+_THREAD = f"AXN PITA TECHNO VARI DAM VRT PITM PTAB PTABA {_MODES}"
 SIGNATURES = {
-    "CYCLE81": f"{_HEIGHTS} DTB", "CYCLE82": f"{_HEIGHTS} DTB",
-    "CYCLE83": f"{_HEIGHTS} FDEP FDPR DAM DTB DTS FRF VARI AXN MDEP VRT DTD DIS1",
-    "CYCLE84": f"{_HEIGHTS} DTB SDAC MPIT PIT POSS SST SST1 AXN PITA TECHNO VARI DAM VRT",
-    "CYCLE840": f"{_HEIGHTS} DTB SDR SDAC ENC MPIT PIT", "CYCLE85": f"{_HEIGHTS} DTB FFR RFF",
-    "CYCLE86": f"{_HEIGHTS} DTB SDIR RPA RPO RPAP POSS", "CYCLE87": f"{_HEIGHTS} SDIR",
-    "CYCLE88": f"{_HEIGHTS} DTB SDIR", "CYCLE89": f"{_HEIGHTS} DTB",
-    "HOLES1": "SPCA SPCO STA1 FDIS DBH NUM", "HOLES2": "CPA CPO RAD STA1 INDA NUM",
+    "CYCLE81": f"{_HEIGHTS} DTB {_MODES}", "CYCLE82": f"{_HEIGHTS} DTB {_MODES}",
+    "CYCLE83": f"{_HEIGHTS} FDEP FDPR DAM DTB DTS FRF VARI AXN MDEP VRT DTD DIS1 {_MODES}",
+    "CYCLE84": f"{_HEIGHTS} DTB SDAC MPIT PIT POSS SST SST1 {_THREAD}",
+    "CYCLE840": f"{_HEIGHTS} DTB SDR SDAC ENC MPIT PIT {_THREAD.replace('VARI DAM VRT ', '')}",
+    "CYCLE85": f"{_HEIGHTS} DTB FFR RFF {_MODES}", "CYCLE86": f"{_HEIGHTS} DTB SDIR RPA RPO RPAP POSS {_MODES}",
+    "CYCLE87": f"{_HEIGHTS} SDIR", "CYCLE88": f"{_HEIGHTS} DTB SDIR", "CYCLE89": f"{_HEIGHTS} DTB {_MODES}",
+    "HOLES1": "SPCA SPCO STA1 FDIS DBH NUM VARI UMODE HIDE NSP DMODE",
+    "HOLES2": "CPA CPO RAD STA1 INDA NUM VARI UMODE HIDE NSP DMODE",
     "CYCLE800": "FR TC ST MODE X0 Y0 Z0 A B C X1 Y1 Z1 DIR FRI DMODE",
     "WORKPIECE": "WP REF HOLD FORM MODE Z0 Z1 ZB X0 Y0 X1 Y1",
 }  # fmt: skip
@@ -60,24 +62,27 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     values["DP"] = bottom
     block.refuse_if(values["RTP"] < values["TOP"], None, f"{code}: RTP is below RFP and SDIS", "a higher RTP")
     block.refuse_if(not 0.0 <= values.get("DTB", 0.0) <= SECONDS_PER_DAY, "DTB", "is no time in seconds", "0 or more")
+    shank = values.get("GMODE", 0.0) // 10 % 10
+    block.refuse_if(shank, "GMODE", "counts the depth from a diameter or the shank", "0: from the tip")
     if code == "CYCLE83":
         first = values["RFP"] - abs(values["FDPR"]) if values.get("FDPR") else values.get("FDEP", bottom)
         block.refuse_if(not bottom <= first < values["RFP"], None, "CYCLE83 whose first depth does not fit", "FDPR")
-        least = values["RFP"] - first if not values.get("DAM") else min(abs(values["DAM"]), values["RFP"] - first)
         block.refuse_if(values.get("DAM", 0.0) < 0.0, "DAM", "is a factor of the pecks", "0 or more")
+        least = min(values.get("MDEP") or values.get("DAM") or math.inf, values["RFP"] - first)
         block.refuse_if((first - bottom) / least > MOST_STROKES, None, "CYCLE83 with too many strokes", "a larger FDPR")
-        other = next((name for name in ("MDEP", "DTD", "DIS1") if values.get(name)), None)
-        block.refuse_if(other or values.get("AXN", 3.0) not in (0.0, 3.0), other, "is not supported in CYCLE83", "none")
-        values["FIRST"] = first
+        other = values.get("AXN", 3.0) not in (0.0, 3.0)
+        block.refuse_if(other, "AXN", "is another axis than that of the tool", "none")
+        values |= {"FIRST": first, "LEAST": least}
     if code in TAPS:
         values["PIT"] = abs(values.get("PIT", 0.0)) or COARSE.get(round(abs(values.get("MPIT", 0.0))), 0.0)
+        block.refuse_if(values.get("PITA", 0.0) > 1.0, "PITA", "is a pitch in other units than mm", "0, 1")
         block.refuse_if(not values["PIT"], None, f"{code} without a pitch", "PIT, or MPIT of 3 to 48")
         block.refuse_if(values.get("VARI"), "VARI", "taps in pecks", "0")
     for name in ("RPA", "RPO", "RPAP"):
         if values.get(name):
             state.note(block.line, block.values[name], SHIFT)
     if "MCALL" in block.codes:
-        state.plain.modal, state.plain.cycle = True, (int(values["number"]), values, block.line)
+        state.plain.modal, state.plain.cycle = True, (int(values["number"]), values)
     else:
         drill(state, block, values)
 
@@ -125,7 +130,7 @@ def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
     """CYCLE83: strokes that get shorter by DAM, of DAM at least, the last two alike; between them out, or 1 mm back."""
     depth, bottom, less = values["FIRST"], values["DP"], values.get("DAM", 0.0)
     stroke, rate = values["RFP"] - depth, feed * (values.get("FRF") or 1.0)
-    ahead = min(max(AHEAD_MM, AHEAD_SHARE * (values["RFP"] - bottom)), MOST_AHEAD_MM)
+    ahead = values.get("DIS1") or min(max(AHEAD_MM, AHEAD_SHARE * (values["RFP"] - bottom)), MOST_AHEAD_MM)
     yield depth, rate, values.get("DTB", 0.0)
     while depth > bottom + SAME_HEIGHT_MM:
         if values.get("VARI"):
@@ -135,7 +140,7 @@ def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
             yield depth + (values.get("VRT") or CHIP_BREAK_MM), feed, 0.0
         left = depth - bottom
         if less:
-            stroke = max(stroke - less, min(less, stroke))
+            stroke = max(stroke - less, values["LEAST"])
             stroke = left / 2.0 if stroke < left < 2.0 * stroke and stroke <= less else stroke
         depth -= min(stroke, left)
         yield depth, feed, values.get("DTB", 0.0)

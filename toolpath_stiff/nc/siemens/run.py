@@ -166,7 +166,9 @@ class SiemensRun(ParametricRun):
         elif isinstance(local.get(name), bool):
             scope[name] = bool(value)
         else:
-            scope[name] = float(math.floor(value + 0.5)) if {name, array} & self._whole and value == value else value
+            scope[name] = (
+                float(math.floor(value + 0.5)) if {name, array} & self._whole and math.isfinite(value) else value
+            )
 
     # Blocks
 
@@ -238,6 +240,9 @@ class SiemensRun(ParametricRun):
         return current
 
     # Flow
+
+    def _ends_before(self, row: int) -> bool:
+        return False  # each file ends with a line of its own
 
     def _step(self, kind: str) -> Step | None:
         return SIEMENS_STEPS.get(kind) or super()._step(kind)
