@@ -31,6 +31,7 @@ from toolpath_stiff.planning.menu import COSTS, Menu
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.result import plan as plan_visits
 from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.readings.pulls import pull_tables
 from toolpath_stiff.results import Progress, one_of, teller
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.units import m_from_mm, rad_from_deg
@@ -92,6 +93,19 @@ class Question:
         """The machine as its file has it. Raises `InputError` where it is of another kind, which `asking` cannot do."""
         return as_hexapod(self.model, asking)
 
+    @property
+    def has_pulls(self) -> bool:
+        """Whether the measurements are forces and displacements as vectors, on a machine of elements."""
+        if self.data is None or isinstance(self.model, Hexapod):
+            return False
+        return bool(pull_tables(self.data.files, self.model, self.data.columns))
+
+    def of_elements(self) -> ElementDiagnosis:
+        """A diagnosis of pulls, or stiffnesses, on a machine of elements."""
+        assert self.data is not None
+        noise = None if self.request.noise is None else float(np.hypot.reduce(np.atleast_1d(self.request.noise)))
+        return diagnose_elements(self.model, self.data.files, self.data.columns, noise)
+
     def diagnosed(self, tell: Callable[[str], None], *words: str, inputs: Iterable[str] = ()) -> Diagnosis:
         """A diagnosis of the readings; `words` are further ones of the command that gives it."""
         return replace(
@@ -123,7 +137,7 @@ def compare(
     strut_spread_percent: StrutSpread = 1.0,
     seed: Seed = 0,
     progress: Progress | None = None,
-) -> Comparison:
+) -> Comparison | ElementDiagnosis:
     """See where the model fails: the machine as its file has it, against measurements.
 
     Parameters
@@ -155,6 +169,8 @@ def compare(
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     teller(progress)("comparing")
+    if question.has_pulls:
+        return question.of_elements()
     comparison = compare_readings(question.model, question.readings, **question.common)
     following = hint("which effect would explain it", question.request.command("diagnose"))
     onwards = (following,) if isinstance(question.model, Hexapod) else ()
@@ -207,9 +223,7 @@ def diagnose(
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     if not isinstance(question.model, Hexapod):
-        assert question.data is not None
-        noise = None if noise_percent is None else float(np.hypot.reduce(np.atleast_1d(noise_percent))) / 100.0
-        return diagnose_elements(question.model, question.data.files, question.data.columns, noise)
+        return question.of_elements()
     on, part, origin = question.on, None if program is None else program_from(program), origin_si(origin_mm_deg)
     words = [
         *words_of(diagnose, {"program": part.file if part else None, "origin_mm_deg": origin_mm_deg, "seed": seed}),

@@ -20,7 +20,7 @@ from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.readings.rows import ANGLES, COLUMNS, POSITION, number, optional_number, parsed_rows
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.tables import Columns
+from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, mm_from_m, rad_from_deg
 
 FORCE, MOVED, DIAL = ("fx_N", "fy_N", "fz_N"), ("ux_um", "uy_um", "uz_um"), ("dial_x", "dial_y", "dial_z")
@@ -65,25 +65,28 @@ class Pulls(ArrayColumns):
 
 def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> Pulls:
     """Pulls on a machine of elements, or its stiffnesses as pulls. Raises `InputError`, `InputErrors`."""
-    joints = _joint_columns(machine)
-    known = Columns((*COLUMNS.numbers, *FORCE, *MOVED, *DIAL, TENSION, *CABLE, *PULL, *TARGET, *joints), COLUMNS.texts)
-    parts, rows, scalar = [], [], []
-    for name in files:
-        table = mapped_table(name, "measurements", known, mapping)
-        if FORCE[0] not in table.heading and TENSION not in table.heading:
-            scalar.append(name)
-            continue
-        of_file, errors = parsed_rows(table, partial(_Pull.of, name, joints))
+    joints, rows = _joint_columns(machine), []
+    tables = pull_tables(files, machine, mapping)
+    if not tables:
+        return _of_stiffnesses(files, machine, mapping)
+    if len(tables) < len(files):
+        raise MeasurementError("pulls beside stiffnesses", hint="give one kind of files at a time")
+    for table in tables:
+        of_file, errors = parsed_rows(table, partial(_Pull.of, table.file, joints))
         if errors:
             raise InputErrors(errors)
         rows += of_file
-    if scalar:
-        parts.append(_of_stiffnesses(scalar, machine, mapping))
-    if rows:
-        parts.append(_of_rows(rows, machine))
-    if len(parts) > 1:
-        raise MeasurementError("pulls beside stiffnesses", hint="give one kind of files at a time")
-    return parts[0]
+    if not rows:
+        raise MeasurementError("no rows below the heading", file=tables[0].file)
+    return _of_rows(rows, machine)
+
+
+def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> list[Table]:
+    """The files that give forces as vectors or by cables, as tables; the others give stiffnesses along directions."""
+    further = (*FORCE, *MOVED, *DIAL, TENSION, *CABLE, *PULL, *TARGET, *_joint_columns(machine))
+    known = Columns((*COLUMNS.numbers, *further), COLUMNS.texts)
+    tables = [mapped_table(name, "measurements", known, mapping) for name in files]
+    return [table for table in tables if not {FORCE[0], TENSION}.isdisjoint(table.heading)]
 
 
 @dataclass(frozen=True)
