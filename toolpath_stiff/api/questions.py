@@ -5,6 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
+
 from toolpath_stiff.api.effects import effect_name
 from toolpath_stiff.api.inputs import Origin, origin_si
 from toolpath_stiff.api.machines import Machine, machine_from
@@ -18,6 +20,7 @@ from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
+from toolpath_stiff.diagnosis.on_elements import ElementDiagnosis, diagnose_elements
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
@@ -170,7 +173,7 @@ def diagnose(
     program: Annotated[Program | str | Path | None, Option("--program", "PROGRAM")] = None,
     origin_mm_deg: Origin = None,
     progress: Progress | None = None,
-) -> Diagnosis:
+) -> Diagnosis | ElementDiagnosis:
     """Find out which physical effect the model lacks, if any.
 
     Parameters
@@ -203,6 +206,10 @@ def diagnose(
     (['diagnose.json', 'residuals.csv'], 7)
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
+    if not isinstance(question.model, Hexapod):
+        assert question.data is not None
+        noise = None if noise_percent is None else float(np.hypot.reduce(np.atleast_1d(noise_percent))) / 100.0
+        return diagnose_elements(question.model, question.data.files, question.data.columns, noise)
     on, part, origin = question.on, None if program is None else program_from(program), origin_si(origin_mm_deg)
     words = [
         *words_of(diagnose, {"program": part.file if part else None, "origin_mm_deg": origin_mm_deg, "seed": seed}),
