@@ -84,7 +84,7 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
     begin = _BEGIN.match(text)
     assert begin is not None
     head = _HEAD.match(text, begin.end())
-    if begin.end() == len(text) or text[begin.end()] in "*(":
+    if begin.end() == len(text) or text[begin.end()] in "*(%":
         return PlainStatement(row + 1, "", 1, (), {}, "", False, after)
     if head is None:
         raise place.fail(
