@@ -45,8 +45,8 @@ def pole(state: State, block: CurrentBlock, code: str) -> None:
     if plane is None:
         raise block.fail(code, "with other coordinates than two of a plane", "two of X, Y, Z, or none")
     first, second, _ = PLANES[plane]
-    here = present(state)
-    state.plain.pole = plane, complex(point.get(first, here[first]), point.get(second, here[second]))
+    point = point or dict(enumerate(present(state)))
+    state.plain.pole = plane, complex(point[first], point[second])
 
 
 def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:

@@ -8,6 +8,7 @@ the TNC 640, "Programming fundamentals", "Structuring programs", "Fixed cycles")
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up
@@ -79,6 +80,16 @@ def labels(lines: Sequence[str], first: int, stop: int) -> dict[str, list[int]]:
     return places
 
 
+@lru_cache(256)
+def _form(head: str) -> tuple[str, re.Pattern[str] | None, bool]:
+    """A head as messages have it, what is looked for behind it alone, and whether words follow it."""
+    shown = " ".join(head.split()).replace(",", ".").replace("FN ", "FN").rstrip(": ")
+    if shown.startswith("CYCL DEF"):
+        shown = "CYCL DEF " + shown.removeprefix("CYCL DEF").replace(" ", "")
+    special = _INCH if shown == "BEGIN PGM" else _NUMBER_BEHIND if _OLD.match(shown) else None
+    return shown, special, special is None and look_up(shown) is not None and not _OTHERWISE.match(shown)
+
+
 def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
     """The statement that begins in a line (from 0), with what continues it. Raises `InputError`."""
     text, after, place = code_text(lines[row]), row + 1, Place(name, row + 1)
@@ -91,15 +102,11 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
         raise place.fail(
             f"{text[begin.end() :][:20]!r} is no statement", "Heidenhain's plain language", "", begin.end() + 1
         )
-    shown = " ".join(head[0].split()).replace(",", ".").replace("FN ", "FN").rstrip(": ")
-    if shown.startswith("CYCL DEF"):
-        shown = "CYCL DEF " + shown.removeprefix("CYCL DEF").replace(" ", "")
+    shown, special, has_words = _form(head[0])
     if len(text) > LONGEST_BLOCK:
         raise place.fail(f"a statement of {len(text)} characters", f"at most {LONGEST_BLOCK}")
     end, cycle = head.start() if shown == "M" else head.end(), shown.startswith("CYCL DEF") and "." not in shown
     rest, words, computed = text[end:], list[Word](), dict[int, str]()
-    special = _INCH if shown == "BEGIN PGM" else _NUMBER_BEHIND if _OLD.match(shown) else None
-    has_words = special is None and look_up(shown) is not None and not _OTHERWISE.match(shown)
     if special is not None and (number := special.search(text, end)):
         _add(words, computed, number[1] or "#", number[2].replace(",", "."), number.start() + 1, number[0].strip())
     if has_words:
