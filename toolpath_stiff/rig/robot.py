@@ -224,7 +224,7 @@ def robot_case(seed: int, hidden: str | None, noise: float) -> tuple[str, Table,
         right, count, change = FAULTS[name]
         part, share = int(streams[1].integers(count)), float(np.exp(streams[1].uniform(*np.log(SHARES))))
         low, high = 1e-4, 1e4
-        for _ in range(18):  # halvings of its logarithm; the size that moves the readings by that share, root mean square
+        for _ in range(18):  # the size that moves the readings by that share, root mean square
             size = float(np.sqrt(low * high))
             true = replace(robot, **change(robot, part, size))
             moved = np.linalg.norm(pulled(true, joints, force) - sound) / np.linalg.norm(sound)
