@@ -206,7 +206,7 @@ def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
     convention = values[""].get("convention")
     if convention not in (None, XYZAC, XYZBC):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{XYZAC!r}, {XYZBC!r}, or [[axis]] rows")
-    turning = {XYZAC: "AC", XYZBC: "BC"}.get(convention, "")
+    turning = {XYZAC: "AC", XYZBC: "BC"}.get(str(convention), "")
     if foreign := [key for key in values.get("limits", {}) if key[0] not in f"XYZ{turning}"]:
         expected = f"limits of {', '.join(f'XYZ{turning}')}"
         raise toml.fault("limits", foreign[0], ": there is no such axis", expected=expected)

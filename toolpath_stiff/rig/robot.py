@@ -135,10 +135,10 @@ def machine_text(robot: Robot, name: str) -> str:
     ends = mm_from_m(np.array([[robot.rows[2, 1], 0.0, 0.0], [robot.rows[3, 1], robot.rows[3, 3], 0.0]]))
     arms = zip(("upper arm", "forearm"), ("J2", "J3"), ends, 1e-6 * robot.arms, strict=True)
     for arm, frame, end, (ea, ei, gj) in arms:
-        place = {"from_mm": [0.0, 0.0, 0.0], "to_mm": np.round(end, 9), "z_axis": [0.0, 0.0, 1.0]}
+        place: Table = {"from_mm": [0.0, 0.0, 0.0], "to_mm": np.round(end, 9), "z_axis": [0.0, 0.0, 1.0]}
         stiff = {"EA_MN": float(ea), "EIy_MNm2": float(ei), "EIz_MNm2": float(ei), "GJ_MNm2": float(gj)}
         parts.append(row("[[element]]", name=arm, type="beam", frame=frame, **place, **stiff))
-    give = {"translation_nm_per_N": spindle, "rotation_nrad_per_Nm": [0.0, 0.0, 0.0]}
+    give = {"translation_nm_per_N": spindle, "rotation_nrad_per_Nm": np.zeros(3)}
     parts.append(row("[[element]]", name="spindle", type="spring", at="tip", **give))
     return "\n\n".join(parts) + "\n"
 
@@ -148,9 +148,9 @@ def frames(robot: Robot, joints: FloatArray) -> tuple[FloatArray, FloatArray]:
     total, axes, origins = np.broadcast_to(np.eye(4), (len(joints), 4, 4)), [], []
     for (alpha, a, offset, d), value in zip(robot.rows, joints.T, strict=True):
         ca, sa, c, s = np.cos(alpha), np.sin(alpha), np.cos(value + offset), np.sin(value + offset)
-        zero, one = np.zeros_like(c), np.ones_like(c)
-        rows = [[c, -s, zero, a * one], [s * ca, c * ca, -sa * one, -d * sa * one]]
-        rows += [[s * sa, c * sa, ca * one, d * ca * one], [zero, zero, zero, one]]
+        zero, unit = np.zeros_like(c), np.ones_like(c)
+        rows = [[c, -s, zero, a * unit], [s * ca, c * ca, -sa * unit, -d * sa * unit]]
+        rows += [[s * sa, c * sa, ca * unit, d * ca * unit], [zero, zero, zero, unit]]
         total = total @ np.moveaxis(np.array(rows), -1, 0)
         axes.append(total[:, :3, :3])
         origins.append(total[:, :3, 3])
@@ -162,8 +162,8 @@ def frames(robot: Robot, joints: FloatArray) -> tuple[FloatArray, FloatArray]:
 def pulled(robot: Robot, joints: FloatArray, force: FloatArray) -> FloatArray:
     """(n, 3) m that the tool moves under forces (n, 3) N at joint values (n, 6) rad."""
     axes, origins = frames(robot, joints)
-    _, first, number = np.unique(joints, axis=0, return_index=True, return_inverse=True)
-    compliance = np.array([_compliance(robot, axes[i], origins[i]) for i in first])[number.ravel()]
+    _, places, number = np.unique(joints, axis=0, return_index=True, return_inverse=True)
+    compliance = np.array([_compliance(robot, axes[i], origins[i]) for i in places])[number.ravel()]
     moved = np.einsum("nij,nj->ni", compliance, force)
     z, arms = axes[:, :6, :, 2], origins[:, 6:7] - origins[:, :6]
     torque = (z * np.cross(arms, force[:, None])).sum(axis=-1)
@@ -195,7 +195,7 @@ def _compliance(robot: Robot, axes: FloatArray, origins: FloatArray) -> FloatArr
     for k, (first, last) in enumerate(((1, 2), (2, 3))):
         vector, (ea, ei, gj) = origins[last] - origins[first], robot.arms[k]
         length = np.linalg.norm(vector)
-        bent = bending(np.array(ei), length, np.array(0.0))
+        bent = bending(np.array(ei), np.array(length), np.array(0.0))
         add(total, [first + 1, 7 + k], spread(vector / length, np.array(ea / length), np.array(gj / length), bent))
     tool = np.zeros((6, 6))
     tool[:3, :3] = axes[6] @ np.diag(1.0 / robot.spindle) @ axes[6].T
