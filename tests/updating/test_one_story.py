@@ -229,6 +229,7 @@ def ambiguous(**chances: float) -> SimpleNamespace:
     return SimpleNamespace(
         verdict="ambiguous",
         explanations=names,
+        entries=[(name,) for name in names],
         plausible=names,
         fits=fits,
         main=main,

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from toolpath_stiff import defaults
+from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Examination
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
@@ -55,8 +56,7 @@ def _verdict_text(diagnosis: Examination) -> str:
     if diagnosis.verdict == "adequate":
         names = [name for name in diagnosis.explanations if name != NONE]
         chance = f" Not ruled out either, but no more than chance would show: {joined(names)}." if names else ""
-        guess = f" But that is a guess: {diagnosis.noise.origin}." if diagnosis.noise.guess else ""
-        return f"Nothing is missing that these data could show: what is left is scatter.{guess}{chance}"
+        return f"Nothing is missing that these data could show: what is left is scatter.{_hidden(diagnosis)}{chance}"
     if diagnosis.verdict in NAMING:
         best, drawn = diagnosis.explanations[0], diagnosis.unconfirmed
         only = "" if drawn is None else f"This describes the readings, and does not explain them yet: {drawn.reason}. "
@@ -141,6 +141,20 @@ def _rivals(diagnosis: Examination) -> str:
     if first < POSITIVE * second or len(causes) < 2:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
     return f"Most likely {causes[0]}; not ruled out: {'; '.join(causes[1:])}."
+
+
+def _hidden(diagnosis: Examination) -> str:
+    """Of an adequate model whose noise is a guess: what such a noise would hide."""
+    if not diagnosis.noise.guess:
+        return ""
+    shown = [smallest.rms for smallest in diagnosis.detectable if smallest.seen]
+    law = NORMAL_95 * np.sqrt(np.diag(diagnosis.base.covariance)[: len(diagnosis.machine.strut_law.parameters)].max())
+    change = f"a missing effect that changes the stiffness by less than {100.0 * min(shown, default=0.0):.2g} % (rms)"
+    change = change if shown else "every effect"
+    return (
+        f" But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading would "
+        f"hide {change} and struts that are off by up to {100.0 * law:.2g} %."
+    )
 
 
 def _errors(diagnosis: Examination, name: str = "") -> str:
