@@ -1,16 +1,13 @@
 """A diagnosis in sentences."""
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Examination
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
-from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
@@ -58,7 +55,8 @@ def _verdict_text(diagnosis: Examination) -> str:
     if diagnosis.verdict == "adequate":
         names = [name for name in diagnosis.explanations if name != NONE]
         chance = f" Not ruled out either, but no more than chance would show: {joined(names)}." if names else ""
-        return f"Nothing is missing that these data could show: what is left is scatter.{_hidden(diagnosis)}{chance}"
+        guess = f" But that is a guess: {diagnosis.noise.origin}." if diagnosis.noise.guess else ""
+        return f"Nothing is missing that these data could show: what is left is scatter.{guess}{chance}"
     if diagnosis.verdict in NAMING:
         best, drawn = diagnosis.explanations[0], diagnosis.unconfirmed
         only = "" if drawn is None else f"This describes the readings, and does not explain them yet: {drawn.reason}. "
@@ -98,11 +96,11 @@ def _cause(diagnosis: Examination, name: str) -> str:
     if name not in diagnosis.fits:
         return f"({name}, probability {chance})"
     fit = diagnosis.fits[name]
-    if diagnosis.main.probability.get(name, 0.0) < SHOWN and name in diagnosis.main.votes:
-        titles = joined([candidate.effect.title for candidate in fit.candidates])
-        return f"{titles} ({name}: less likely than {100 * SHOWN:g} %, but foretells pose after pose as well)"
     unusual = f", more than is usual ({joined(sizes)}) " if (sizes := _unusual(fit)) else " "
-    return f"{joined(fit.findings)}{unusual}({name}, probability {chance})"
+    words = f"probability {chance}"
+    if diagnosis.main.probability.get(name, 0.0) < SHOWN and name in diagnosis.main.votes:
+        words = f"less likely than {100 * SHOWN:g} %, but foretells pose after pose as well"
+    return f"{joined(fit.findings)}{unusual}({name}, {words})"
 
 
 def _unusual(fit: Fit) -> list[str]:
@@ -143,20 +141,6 @@ def _rivals(diagnosis: Examination) -> str:
     if first < POSITIVE * second or len(causes) < 2:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
     return f"Most likely {causes[0]}; not ruled out: {'; '.join(causes[1:])}."
-
-
-def _hidden(diagnosis: Examination) -> str:
-    """Of an adequate model whose noise is a guess: what such a noise would hide."""
-    if not diagnosis.noise.guess:
-        return ""
-    shown = [smallest.rms for smallest in diagnosis.detectable if smallest.seen]
-    law = NORMAL_95 * np.sqrt(np.diag(diagnosis.base.covariance)[: len(diagnosis.machine.strut_law.parameters)].max())
-    change = f"a missing effect that changes the stiffness by less than {100.0 * min(shown, default=0.0):.2g} % (rms)"
-    change = change if shown else "every effect"
-    return (
-        f" But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading would "
-        f"hide {change} and struts that are off by up to {100.0 * law:.2g} %."
-    )
 
 
 def _errors(diagnosis: Examination, name: str = "") -> str:
@@ -206,27 +190,17 @@ def _base_text(judgement: Judgement, several: bool) -> str:
 
 def _not_told_apart(diagnosis: Examination) -> list[str]:
     """Why the plausible effects cannot be told apart."""
-    data, names, matrix = diagnosis.data, diagnosis.confounding.names, diagnosis.confounding.matrix
-    pairs = combinations([names.index(name) for name in diagnosis.plausible if name in names], 2)
-    same = "have the same signature on these poses, loads and directions: correlation"
-    reasons = [f"{names[i]} and {names[j]} {same} {matrix[i, j]:.3f}" for i, j in pairs if matrix[i, j] > CONFOUNDED]
-    rivals = [name for name, votes in diagnosis.main.votes.items() if not outvoted(votes) and name != NONE]
-    for name in rivals[:MOST_BESIDE]:
-        reasons.append(f"{vote_words(name, diagnosis.main.votes[name])} (log probability): not beyond chance")
-    reasons += [f"{tells} would tell {name}" for name, tells in _telling(diagnosis).items()]
+    rivals = [(name, votes) for name, votes in diagnosis.main.votes.items() if not outvoted(votes) and name != NONE]
+    reasons = [f"{vote_words(*rival)} (log probability): not beyond chance" for rival in rivals[:MOST_BESIDE]]
+    effects = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
+    reasons += [f"{would_tell(effect)} would tell {effect.name}" for effect in effects]
     if NONE in diagnosis.plausible:
         reasons.append("chance alone is not excluded either")
-    for effect in (family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible):
-        if count := int(seen_readings([effect], data).sum()):
-            seen = f"was read off {count} of these {len(data)} readings: its probability is too high"
+    for effect in effects:
+        if count := int(seen_readings([effect], diagnosis.data).sum()):
+            seen = f"was read off {count} of these {len(diagnosis.data)} readings: its probability is too high"
             reasons.append(f"the form of {effect.name} {seen}")
     return reasons
-
-
-def _telling(diagnosis: Examination) -> dict[str, str]:
-    """Plausible effect -> the reading that tells it from what looks the same at the tip."""
-    effects = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
-    return {effect.name: would_tell(effect) for effect in effects}
 
 
 def next_steps(diagnosis: Examination, request: Asked | None = None) -> list[str]:
