@@ -335,7 +335,7 @@ class Update(FolderResult):
             return f"Strut law refitted; no effect added. {errors}"
         cause = joined(last.fit.findings)
         word = "added" if self.described is None else "added as described, not as identified"
-        law = f"The strut law stays: {'; '.join(self.kept_law.reasons)}. " if self.kept_law else ""
+        law = f"The strut law stays as given: {'; '.join(self.kept_law.reasons)}. " if self.kept_law else ""
         return f"{cause[:1].upper()}{cause[1:]} ({joined(last.fit.names)} {word}). {law}{unconfirmed}{errors}"
 
     @property

@@ -46,7 +46,7 @@ from toolpath_stiff.inference.hypotheses import Family, score_families, signatur
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.rivals import rivals_of_law
-from toolpath_stiff.inference.votes import outvoted, vote_words, votes
+from toolpath_stiff.inference.votes import outvoted, standard_error, votes
 from toolpath_stiff.planning.plan import reading_words, telling
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.stiffness.sizes import joined
@@ -293,7 +293,8 @@ def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Suppo
         instruments = _as_well(problem, fit, rivals_of_law(problem, given.fit))
         reasons = _mistakable(task, instruments, MACHINE)
     else:
-        reasons.append(f"{vote_words('as given it', differences)} than refitted, no more than chance")
+        gain = f"{differences.sum():+.1f} +- {standard_error(differences):.1f} in log probability"
+        reasons.append(f"the refitted one gains {gain}, no more than chance")
     gained = 2.0 * (fit.log_posterior - given.fit.log_posterior) / dispersion(fit)
     return given, Support(
         LAW_REFITTED, not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
