@@ -238,6 +238,7 @@ def ambiguous(**chances: float) -> SimpleNamespace:
         best=names[0],
         nuisances=[],
         unexcluded=(),
+        entries=tuple((name,) for name in names),
     )
 
 
