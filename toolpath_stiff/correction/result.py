@@ -30,6 +30,7 @@ from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.portrait.portrait import LACKING
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
@@ -158,7 +159,7 @@ class Update(FolderResult):
 
     @cached_property
     def rises(self) -> list[str]:
-        """Conditions under which left-out points are foretold worse than as given, beyond chance: clauses.
+        """Conditions under which left-out points are foretold worse than as given, beyond chance; a draft that lacks.
 
         Load, set-up and tool: a path is under one of each as a whole, and what falls on average may rise there.
         """
@@ -176,6 +177,11 @@ class Update(FolderResult):
                 if gain_in_standard_errors(before, after) < -RISEN:
                     change = f"{100 * before.mean_error:.2f} to {100 * after.mean_error:.2f} %"
                     clauses.append(f"{words.format(value)} the error at left-out points rises, {change}")
+        left, floor = 100 * last.mean_error, self.noise.floor_percent
+        if self.described and left > LACKING * floor:  # it stands for something else, which elsewhere does otherwise
+            clauses.append(
+                f"what was read off these readings leaves {left:.2f} % at left-out points, scatter {floor:.2f} %"
+            )
         return clauses
 
     @property
@@ -335,7 +341,7 @@ class Update(FolderResult):
             return f"Strut law refitted; no effect added. {errors}"
         cause = joined(last.fit.findings)
         word = "added" if self.described is None else "added as described, not as identified"
-        law = f"The strut law stays: {'; '.join(self.kept_law.reasons)}. " if self.kept_law else ""
+        law = f"The strut law stays as given: {'; '.join(self.kept_law.reasons)}. " if self.kept_law else ""
         return f"{cause[:1].upper()}{cause[1:]} ({joined(last.fit.names)} {word}). {law}{unconfirmed}{errors}"
 
     @property

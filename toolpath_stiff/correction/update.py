@@ -20,7 +20,8 @@ The paper's own estimation (`--objective mean-error`) is a ladder of one step, t
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -41,11 +42,11 @@ from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect, base_fit, baseline, with_given_law
 from toolpath_stiff.inference.gates import gain_threshold, simulate
-from toolpath_stiff.inference.hypotheses import score_families, signatures, tables_of
+from toolpath_stiff.inference.hypotheses import Family, score_families, signatures, tables_of
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.rivals import rivals_of_law
-from toolpath_stiff.inference.votes import outvoted, vote_words, votes
+from toolpath_stiff.inference.votes import outvoted, standard_error, votes
 from toolpath_stiff.planning.plan import reading_words, telling
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.stiffness.sizes import joined
@@ -201,12 +202,34 @@ def _drawn(task: UpdateTask, full: Fit) -> Drawn | None:
     return drawn(full, {" + ".join(fit.names) or "none": fit}, task.data)
 
 
-@dataclass(frozen=True)
 class Field:
-    """All candidates on a machine that carries other effects: model and scatter, the gain that chance alone reaches."""
+    """All candidates on a machine that carries other effects.
 
-    problem: Problem
-    threshold: float
+    Attributes
+    ----------
+    problem, none
+        Model and scatter; the fit of the machine as it is there, its law refitted.
+    threshold
+        The gain that chance alone reaches.
+    """
+
+    def __init__(self, problem: Problem, threshold: float) -> None:
+        self.problem, self.threshold, self.none = problem, threshold, base_fit(problem, law_free=True)
+
+    @cached_property
+    def of_instrument(self) -> tuple[Family, ...]:
+        """Effects of the instrument, the likeliest first."""
+        return self._families(of_instrument=True)
+
+    @cached_property
+    def of_machine(self) -> tuple[Family, ...]:
+        """Effects of the machine, the likeliest first."""
+        return self._families(of_instrument=False)
+
+    def _families(self, *, of_instrument: bool) -> tuple[Family, ...]:
+        every = testable_effects(self.problem.predictor)[0]
+        effects = [effect for effect in every if effect.is_instrument == of_instrument]
+        return tuple(f for f in score_families(self.problem, effects, self.none) if f.best is not None)
 
 
 def _field_of(task: UpdateTask, others: Fit) -> Field:
@@ -226,9 +249,8 @@ def _support(
     """Judge effect j of a fit against the model with the other effects."""
     after = LadderStep.of("", fit, task.data)
     in_se = gain_in_standard_errors(before.held, after.held)
-    none = base_fit(others.problem, law_free=True)
-    alone = add_effect(others.problem, none, candidates, law_free=True)
-    gained = 2.0 * (alone.log_posterior - none.log_posterior) / dispersion(alone)
+    alone = add_effect(others.problem, others.none, candidates, law_free=True)
+    gained = 2.0 * (alone.log_posterior - others.none.log_posterior) / dispersion(alone)
     reasons = []
     if not fit.sizes[j].any():
         reasons.append("it fits best when it is absent")
@@ -248,9 +270,12 @@ def _support(
             f"twice the log likelihood rises by {gained:.1f}: the best of all candidates gains {others.threshold:.1f} "
             "by chance once in twenty campaigns"
         )
-    believed = INSTRUMENT if fit.candidates[j].effect.is_instrument else MACHINE
-    instruments = _as_well(others.problem, alone, _other_side(others.problem, none, believed))
-    reasons += _mistakable(task, instruments, believed)
+    instruments = dict[str, str]()
+    if not reasons:  # what is refused anyway needs no vote
+        believed = INSTRUMENT if fit.candidates[j].effect.is_instrument else MACHINE
+        rivals = others.of_instrument if believed == MACHINE else others.of_machine
+        instruments = _as_well(others.problem, alone, {family.name: family.best for family in rivals if family.best})
+        reasons += _mistakable(task, instruments, believed)
     return Support(
         fit.names[j], not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
         json_number(in_se, 3), json_number(gained), json_number(others.threshold), tuple(instruments),
@@ -268,19 +293,13 @@ def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Suppo
         instruments = _as_well(problem, fit, rivals_of_law(problem, given.fit))
         reasons = _mistakable(task, instruments, MACHINE)
     else:
-        reasons.append(f"{vote_words('as given it', differences)} than refitted, no more than chance")
+        gain = f"{differences.sum():+.1f} +- {standard_error(differences):.1f} in log probability"
+        reasons.append(f"the refitted one gains {gain}, no more than chance")
     gained = 2.0 * (fit.log_posterior - given.fit.log_posterior) / dispersion(fit)
     return given, Support(
         LAW_REFITTED, not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
         json_number(gain_in_standard_errors(given.held, after.held), 3), json_number(gained), None, tuple(instruments),
     )  # fmt: skip
-
-
-def _other_side(problem: Problem, none: Fit, believed: str) -> dict[str, Fit]:
-    """Effects of the instrument, where the machine is believed, or of the machine, each on top of a fit, by name."""
-    wanted = believed == MACHINE
-    effects = [effect for effect in testable_effects(problem.predictor)[0] if effect.is_instrument == wanted]
-    return {family.name: family.best for family in score_families(problem, effects, none) if family.best is not None}
 
 
 def _as_well(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, str]:
@@ -308,11 +327,10 @@ def _mistakable(task: UpdateTask, rivals: Mapping[str, str], believed: str) -> l
 def _next_effect(task: UpdateTask, before: LadderStep) -> tuple[LadderStep | None, list[Support]]:
     """The most likely effect that the data support on top of a step, and the supports of all that were tried."""
     others, tried = _field_of(task, before.fit), list[Support]()
-    effects = testable_effects(others.problem.predictor)[0]
-    families = score_families(others.problem, effects, others.problem.score_base())
-    for family in [f for f in families if f.best is not None][:TRIED]:
+    families = sorted((*others.of_instrument, *others.of_machine), key=lambda f: (-f.log_evidence, f.name))
+    for family in families[:TRIED]:
         task.progress(f"fitting {family.name}")
-        candidates = [table.candidate for table in family.tables]
+        candidates = family.best.candidates if family.best else ()  # the choice that its tables make the likeliest
         step = step_up(task, before, [candidates])
         tried.append(_support(task, others, before, step.fit, len(step.fit.candidates) - 1, candidates))
         if tried[-1].supported:
