@@ -178,8 +178,6 @@ class Conversational:
         Axes of the plane whose position is not known until they are named.
     tool_feed, radius, held_tip, shorter
         F of TOOL CALL (mm/min), the tool's radius with its DR, M128 and M126 in force.
-    kept
-        Position, shift and linear part of the frames for which the present point was worked out last, and that point.
     preset, names, stock, parameters
         The datum of cycle 247; numbers given to tools of a name; the corners of the blank; Q parameters.
     inner
@@ -227,10 +225,6 @@ class Conversational:
     offsets_named: bool = False
     changes_by_t: bool = False
     orientation: str = ""
-    kept: tuple[tuple[object, object, object], list[float]] = (
-        (None, None, None),
-        [],
-    )  # the present point, and what it was of
 
 
 @dataclass
