@@ -144,8 +144,9 @@ class CurrentBlock:
     def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
         """An error at a word of the block (or that of a code or letter), or at the block."""
         word = self.codes.get(culprit) or self.values.get(culprit) if isinstance(culprit, str) else culprit
-        text = f"{word.text} {problem}" if word else problem
-        column = word.column if word else self.block.words[0].column
+        head = self.block.words[0]  # of a statement in plain language its name
+        text = f"{word.text} {problem}" if word else problem if head.letter else f"{head.text}: {problem}"
+        column = word.column if word else head.column
         return ProgramError(text, expected=expected, hint=hint, file=self.name, line=self.line, column=column)
 
 
