@@ -189,8 +189,8 @@ class Conversational:
         G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450.
     base
         G500 in force: "machine", or "zero" where the program takes no other offset; "": it is not.
-    offsets_named, changes_by_t, orientation
-        Whether the program takes settable offsets, and changes tools by T alone; ORIVECT, ORIAXES.
+    offsets_named, changes_by_t, transformed
+        Whether the program takes settable offsets, and changes tools by T alone; TRAORI in force.
     """
 
     pole: tuple[str, complex] | None = None
@@ -225,7 +225,7 @@ class Conversational:
     base: str = ""
     offsets_named: bool = False
     changes_by_t: bool = False
-    orientation: str = ""
+    transformed: bool = False
 
 
 @dataclass

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from toolpath_stiff.nc.codes.motion import record
+from toolpath_stiff.nc.codes.tools import HOLDS_HINT
 from toolpath_stiff.nc.geometry import PLANES, ArcError
 from toolpath_stiff.nc.heidenhain import contour, functions
 from toolpath_stiff.nc.heidenhain.points import in_plane, named, plane_of_pole, polar, present
@@ -27,7 +28,7 @@ VECTOR = ("A3", "B3", "C3")
 CORNERS = ("RND", "CHF", "CHR")
 SIDES = {"G40": "R0", "G41": "RL", "G42": "RR"}
 MACHINE = ("SUPA", "G53", "G153")
-ENDS = "the tool goes on the great circle from axis to axis (ORIVECT); between these ORIAXES would lead it otherwise"
+ENDS = "from tool axis to tool axis the tool goes on a great circle (ORIVECT), whatever leads it on the control"
 UNKNOWN_HOME = "goes to a machine position in a variable of the machine builder's: left out of the path"
 CHORDS = "a spline is taken as straight lines through its points"
 
@@ -94,6 +95,9 @@ def _name_steps(state: State, block: CurrentBlock) -> None:
         plain.renumbered -= {axis} if letter in block.free else set()
     turned = plain.tilt is not None and any(block.has(step + letter) for letter in "ABC" for step in ("", "I"))
     block.refuse_if(turned, None, "turns rotary axes in a tilted plane (CYCLE800)", "CYCLE800() before it")
+    rotary = any(word.value for letter, word in block.values.items() if letter in block.free and letter[-1] in "ABC")
+    unknown = plain.transformed and state.frames.posted is None and rotary
+    block.refuse_if(unknown, None, "turns rotary axes under TRAORI", "A3, B3, C3", HOLDS_HINT)
     lost = bool(block.free & POLAR) and plain.pole is None
     block.refuse_if(lost, None, "polar words without a pole, or after a change of the coordinates", "G111 before it")
 
@@ -119,14 +123,13 @@ def _lean(state: State, block: CurrentBlock) -> None:
     """A move with the tool's axis as a vector of the workpiece, turned with the frames in force."""
     plain, vector = state.plain, [block.take(letter) or 0.0 for letter in VECTOR]
     length = math.hypot(*vector)
-    block.refuse_if(not plain.held_tip, "A3", "is the tool's axis without TRAORI", "TRAORI before it")
+    block.refuse_if(not plain.transformed, "A3", "is the tool's axis without TRAORI", "TRAORI before it")
     block.refuse_if(length < 1e-6, "A3", "is no direction", "A3, B3, C3")
     block.refuse_if(plain.mirrored or plain.side, "A3", "under MIRROR, or with G41 or G42", "G40, no mirror image")
     turned = state.frames.turn_direction((vector[0] / length, vector[1] / length, vector[2] / length))
     for letter, value in zip(("TX", "TY", "TZ"), turned, strict=True):
         mark(block, letter, "A3", value)
-    if plain.orientation != "ORIVECT":
-        state.assume(ENDS)
+    state.assume(ENDS)
     functions.vectors(state, block, "LN")
 
 
@@ -215,13 +218,15 @@ def _machine(state: State, block: CurrentBlock, code: str, mode: str) -> None:
     plain, frames, moved = state.plain, state.frames, {axis for axis, letter in enumerate(AXES) if block.has(letter)}
     waits = state.cutter or plain.held or plain.to_corner or plain.side
     block.refuse_if(waits, None, f"{code} beside a contour with compensation or a corner", "G40 before it")
-    block.refuse_if(mode != "G0", None, f"{code} in a cut: where the work sits on the machine is not known", "G0")
+    cut = mode != "G0" and (code == "G500" or mode != "G1")
+    block.refuse_if(cut, None, f"{code} in a cut: where the work sits on the machine is not known", "G0")
     lost = {axis for axis in moved if math.isnan(block.values[AXES[axis]].value)}
     if lost:
         state.warnings.append(Remark(UNKNOWN_HOME, block.line))
         block.free -= {AXES[axis] for axis in lost}
     mark(block, "M91", code)
-    mark(block, "FMAX")
+    if mode == "G0":
+        mark(block, "FMAX")
     length, frames.tool = frames.tool, 0.0
     if moved > lost:
         contour.line(state, block, "L")

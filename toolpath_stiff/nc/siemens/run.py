@@ -98,7 +98,7 @@ class SiemensRun(ParametricRun):
             self.state.plain.renumbered -= {axis for axis, letter in enumerate(AXES) if letter in words.values}
 
     def _scanner(self, row: int, begin: int) -> SiemensScanner:
-        text = code_text(self.lines[row])
+        text = self._begins[row].string
         columns, place = range(1, len(text) + 2), self._place(row)
         return SiemensScanner(text, columns, place, "Siemens' language", False, begin, self._variable)
 
@@ -176,7 +176,7 @@ class SiemensRun(ParametricRun):
         except InputError as error:
             error.file, error.line, _ = self._place(self._at)
             raise
-        slow = plain.modal or plain.held or plain.side or plain.unknown or plain.held_tip or plain.base == "machine"
+        slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
         self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
         called = any(level.stop < 0 for level in self._levels)
         return Flow.RETURN if current.flow is Flow.END and called else current.flow

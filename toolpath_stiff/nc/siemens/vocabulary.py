@@ -105,9 +105,6 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
     ("rotation", f"{PLANNING}, Transformations", (
         ("TRAORI TRAFOOF", coordinates.transformation, "tool centre point control, on and off"),
     )),
-    ("path control", f"{PLANNING}, Orientation", (
-        ("ORIVECT ORIPLANE ORIAXES", coordinates.orientation, "how the tool turns from axis to axis"),
-    )),
     ("M subprogram", f"{PLANNING}, Subprogram technique", (("M17", back, "subprogram end"),)),
     ("cycle return", f"{CYCLES}, Drilling patterns", (("MCALL", cycles.modal, "the cycle behind each move"),)),
     ("corner", f"{CYCLES}, Drilling cycles", (
@@ -115,7 +112,9 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("CYCLE84 CYCLE840", cycles.cycle, "tapping"), ("CYCLE85", cycles.cycle, "reaming"),
         ("CYCLE86 CYCLE87 CYCLE88 CYCLE89", cycles.cycle, "boring"),
     )),
-    ("corner", f"{CYCLES}, Drilling patterns", (("HOLES1 HOLES2", cycles.pattern, "holes on a line, on a circle"),)),
+    ("corner", f"{CYCLES}, Drilling patterns", (
+        ("HOLES1 HOLES2 CYCLE802", cycles.pattern, "holes on a line, on a circle, at points"),
+    )),
     ("corner", f"{MANUAL}, Operating, Blank input", (("WORKPIECE", tools.blank, "blank"),)),
 )  # fmt: skip
 LISTED = {
@@ -125,7 +124,8 @@ LISTED = {
             "G9 G60 G64 G601 G602 G603 G641 G642 G643 G644 G645 G62 G621 BRISK BRISKA SOFT SOFTA DRIVE FFWON FFWOF "
             "COMPON COMPCURV COMPCAD COMPSURF COMPOF CYCLE832 DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC "
             "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CFC CFCIN CFTCP FGROUP ORISON "
-            "ORISOF ORIWKS ORIMKS ORIRESET CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 HIGH_SPEED",
+            "ORISOF ORIWKS ORIMKS ORIRESET CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 HIGH_SPEED "
+            "ORIVECT ORIPLANE ORIAXES",
         "message, stop of the look-ahead, display":
             "MSG STOPRE GROUP_BEGIN GROUP_END GROUP_ADDEND DISPLOF DISPLON NEWCONF WRITE SETAL PARAM_END EXTERN WAITM "
             "SETMS STOPREOF SAVE SBLOF SBLON ENDLABEL",
@@ -145,7 +145,7 @@ REFUSED: dict[str, Refused] = {
     name: Refused(name, what, hint, source)
     for names, what, hint, source in (
         ("POCKET1 POCKET2 POCKET3 POCKET4 SLOT1 SLOT2 LONGHOLE CYCLE71 CYCLE72 CYCLE73 CYCLE74 CYCLE75 CYCLE76 CYCLE77 "
-         "CYCLE61 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 CYCLE90 CYCLE60 CYCLE899 CYCLE801 CYCLE802",
+         "CYCLE61 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 CYCLE90 CYCLE60 CYCLE899 CYCLE801",
          "a cycle whose path the manual draws without numbers", _BY_MOVES, f"{CYCLES}, Milling cycles"),
         ("CYCLE92 CYCLE93 CYCLE94 CYCLE95 CYCLE96 CYCLE97 CYCLE98 CYCLE99 CYCLE930 CYCLE940 CYCLE951 CYCLE952 DIAMON "
          "DIAM90 G33 G34 G35", "a code of lathes", "post it for a mill", f"{CYCLES}, Turning cycles"),

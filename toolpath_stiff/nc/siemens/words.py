@@ -16,15 +16,15 @@ from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS
 from toolpath_stiff.nc.words import AXES, Word
 
 PLAIN = re.compile(r"([A-Z]) ?([+-]?(?:\d++\.?+\d*+|\.\d++)(?:EX[+-]?\d++)?)(?!\s*=(?!=)|\[|_)", re.ASCII)
-EQUALS = re.compile(r"=(?!=)")
+LITERAL = re.compile(r"([A-Z]\w*)=([+-]?(?:\d++\.?+\d*+|\.\d++))(?=\s|$)", re.ASCII)
 DIMENSION = re.compile(r"(IC|ACP|ACN|AC|DC)(?=\s*\()")
 PREFIX = {"IC": "I", "AC": "@", "DC": "DC", "ACP": "ACP", "ACN": "ACN", "": ""}
 JUMP = re.compile(r"(GOTO[FBC]?)\s+([A-Z_]\w*|:?\d+)\s*$", re.ASCII)
 SECTION = re.compile(r"REPEATB?\s+(?!P\s*=)[A-Z_:]\w*", re.ASCII)
 TYPES: dict[str, Value] = {"REAL": 0.0, "INT": 0.0, "BOOL": False, "CHAR": "", "STRING": ""}
 ADDRESSES = {
-    *AXES, *VECTOR, *CORNERS, *WORDS, *"IJKFSTDMGH", "RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL", "FP", "X1",
-    "Y1", "Z1",
+    *AXES, *VECTOR, *CORNERS, *WORDS, *"IJKFSTDMGH", "RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL", "FP",
+    "X1", "Y1", "Z1",
 }  # fmt: skip
 STEERING = ("ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "FOR", "IF", "WHILE", "UNTIL")
 OTHERWISE = {"T": "#", "RP": "PR", "AP": "PA", "CR": "R"}  # names that words then have
@@ -64,6 +64,11 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
             scanner.position = plain.end()
             letter = "#" if plain[1] == "T" else plain[1]
             words.append(Word(letter, float(plain[2].replace("EX", "E")), column, plain[0]))
+            continue
+        literal = LITERAL.match(scanner.text, scanner.position)
+        if literal is not None and literal[1] in ADDRESSES:  # most of a program with tool vectors
+            scanner.position = literal.end()
+            words.append(Word(OTHERWISE.get(literal[1], literal[1]), float(literal[2]), column, literal[0]))
             continue
         name = scanner.take(NAME)
         scanner.refuse_if(not name, f"{scanner.rest()} is no word", "words such as X10, X=R1, CR=5", column=column)
