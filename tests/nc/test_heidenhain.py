@@ -196,6 +196,8 @@ REFUSALS = {
     "M99": ("calls a cycle, and none is defined", 3),
     "CYCL DEF 200 D Q200=2 Q201=-5\nM99": ("without Q206", 3),
     "CYCL DEF 200 D Q200=2 Q201=5 Q206=9 Q202=5 Q203=0": ("above the surface", 3),
+    "CYCL DEF 1.1 SET UP 2": ("without its heading", 3),
+    "CYCL DEF 1.0 PECKING\nCYCL DEF 1.1 SET UP 2\nM99": ("cycle that is not whole", 5),
     "CALL LBL 7": ("LBL 7: the program has none", 3),
     "LBL 1\nLBL 1\nCALL LBL 1": ("has several", 5),
     "LBL 1\nCALL LBL 1": ("subprograms within each other", 4),

@@ -144,8 +144,9 @@ class CurrentBlock:
     def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
         """An error at a word of the block (or that of a code or letter), or at the block."""
         word = self.codes.get(culprit) or self.values.get(culprit) if isinstance(culprit, str) else culprit
-        text = f"{word.text} {problem}" if word else problem
-        column = word.column if word else self.block.words[0].column
+        head = self.block.words[0]  # of a statement in plain language its name
+        text = f"{word.text} {problem}" if word else problem if head.letter else f"{head.text}: {problem}"
+        column = word.column if word else head.column
         return ProgramError(text, expected=expected, hint=hint, file=self.name, line=self.line, column=column)
 
 
@@ -178,8 +179,6 @@ class Conversational:
         Axes of the plane whose position is not known until they are named.
     tool_feed, radius, held_tip, shorter
         F of TOOL CALL (mm/min), the tool's radius with its DR, M128 and M126 in force.
-    kept
-        Position, shift and linear part of the frames for which the present point was worked out last, and that point.
     preset, names, stock, parameters
         The datum of cycle 247; numbers given to tools of a name; the corners of the blank; Q parameters.
     inner
@@ -227,10 +226,6 @@ class Conversational:
     offsets_named: bool = False
     changes_by_t: bool = False
     transformed: bool = False
-    kept: tuple[tuple[object, object, object], list[float]] = (
-        (None, None, None),
-        [],
-    )  # the present point, and what it was of
 
 
 @dataclass

@@ -30,7 +30,7 @@ NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
 # Longer is no block.
 LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
 MOST_DIGITS = 9  # of a program number, its O included
-NAMED_TAPE = re.compile(r"%[^,%();]{1,24},[-MX]*,?", re.ASCII)  # `%name,MX--,` begins a program (Fagor 8055)
+NAMED_TAPE = re.compile(r"%[^,%();]{1,24},[-MX]+,?", re.ASCII)  # `%name,MX--,` begins a program (Fagor 8055)
 # Marlin's texts to the operator: M117 Milling, M0 Attach the probe.
 MESSAGE = re.compile(r"(\s*(?:N\d+\s*)?M0*(?:117|118|0|1))\s+[A-Z\"']{2}", re.IGNORECASE)
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E

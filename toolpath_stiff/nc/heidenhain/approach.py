@@ -51,7 +51,7 @@ def begin_contour(
     rapid = state.plain.fast and code != "APPR LCT"
     state.feed = rate if code == "APPR LCT" else modal
     side = next((word for word in ("R0", "RL", "RR") if block.take(word) is not None), "R0")
-    block.refuse_if(side == "R0" and code != "APPR LT", None, f"{code} without a side", "RL or RR")
+    block.refuse_if(side == "R0" and code != "APPR LT", None, "without a side", "RL or RR")
     if side != "R0":
         begin_compensation(state, block, side)
     cutter = state.cutter

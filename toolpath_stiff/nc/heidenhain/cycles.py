@@ -64,7 +64,8 @@ def define_older(state: State, block: CurrentBlock, code: str) -> None:
     """CYCL DEF 1, 2 and 17: a parameter a statement; holes begin where the tool stands, the set-up clearance above."""
     cycle, part = code.removeprefix("CYCL DEF ").split(".")
     number, names = OLDER[cycle]
-    value, values = block.take("#"), dict(state.plain.cycle[1]) if state.plain.cycle else {}
+    value, values = block.take("#"), dict(state.plain.cycle[1]) if state.plain.cycle else {"Q203": 0.0}
+    block.refuse_if(part != "0" and "Q203" in values, None, "without its heading", f"CYCL DEF {cycle}.0 before it")
     if part == "0":
         state.plain.cycle, state.plain.modal = (number, {}), False
     elif value is not None:

@@ -21,11 +21,7 @@ ON_CIRCLE_MM = 0.016  # how far an end may lie off its circle (user's manual, "C
 
 def present(state: State) -> list[float]:
     """The programmed point in program axes: of an element that waits the end, of an APPR the contour point."""
-    frames, plain = state.frames, state.plain
-    position, shift, linear = plain.kept[0]
-    if position is not frames.position or shift is not frames.g92 or linear is not frames.linear:
-        plain.kept = (frames.position, frames.g92, frames.linear), frames.to_program(frames.position)
-    here = list(plain.kept[1])
+    plain, here = state.plain, state.frames.to_program(state.frames.position)
     if plain.held is not None:
         first, second, _ = PLANES[state.plane]
         here[first], here[second] = plain.held[1][1].real, plain.held[1][1].imag

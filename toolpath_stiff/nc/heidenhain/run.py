@@ -18,7 +18,6 @@ from toolpath_stiff.nc.heidenhain.points import WORDS_OF_AXES
 from toolpath_stiff.nc.heidenhain.statements import PlainStatement, labels, read_statement
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up, meaning_of, refusal_of
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.program_run import ProgramRun
@@ -111,13 +110,7 @@ class HeidenhainRun(ProgramRun):
             retract(self.state, block)
         once, modal = block.take("M99"), block.take("M89")
         before = len(self.state.recorder)
-        try:
-            code.act(self.state, block, head)
-        except InputError as error:
-            if error.column != statement.column or str(error.found).startswith(head):
-                raise
-            place = Place(error.file or self.name, error.line or 0, error.column)
-            raise place.fail(f"{head}: {error.found}", error.expected or "", error.hint or "") from None
+        code.act(self.state, block, head)
         unused = next((letter for letter in block.values if letter in block.free), None)
         if unused is not None and not head.startswith("APPR"):
             raise block.fail(unused, f"is no word of {head}", "its own words")
