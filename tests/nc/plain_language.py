@@ -149,7 +149,9 @@ class Reader:
             radius += self.number(words["IPR"]) if "IPR" in words else 0.0
             heading = self.number(words["PA"]) if "PA" in words else math.degrees(math.atan2(away[1], away[0]))
             heading += self.number(words["IPA"]) if "IPA" in words else 0.0
-            end[axes] = self.pole + radius * np.array([math.cos(math.radians(heading)), math.sin(math.radians(heading))])
+            end[axes] = self.pole + radius * np.array(
+                [math.cos(math.radians(heading)), math.sin(math.radians(heading))]
+            )
         left = "DR+" in line
         if head in ("C", "CP"):
             middle = self.pole

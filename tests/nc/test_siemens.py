@@ -85,6 +85,8 @@ REFUSALS = {
     "LENGTH=5": "no variable that is declared",
     "X=1/0": "cannot be worked out",
     "X=(1+2": "bracket that is not closed",
+    "X=" + "(" * 99: "too many brackets",
+    "X=" + "-" * 400 + "1": "a sign after a sign",
     "X=FOO(1)": "no function that is known",
     'X="A"': "is no number",
     "IF 1==1 AND 2==2\nENDIF": "binds tighter than comparisons",

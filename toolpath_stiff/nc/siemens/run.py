@@ -36,6 +36,7 @@ TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)(?:\s*=\s*([^,)]+))?", re.ASCII)
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
+LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (Fundamentals, "Blocks and block format")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
 RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
 
@@ -105,6 +106,9 @@ class SiemensRun(ParametricRun):
     def _statement(self, row: int) -> Statement:
         if row not in self._statements:
             begin = self._begins[row]
+            if len(begin.string) > LONGEST_BLOCK or begin.string.count("(") > MOST_BRACKETS:
+                problem = f"a block of {len(begin.string)} characters, or with too many brackets"
+                raise self._fail(row, problem, f"at most {LONGEST_BLOCK}, {MOST_BRACKETS} of them")
             slash = begin[1] or begin[4] or ""
             block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
             steering = None
