@@ -159,7 +159,7 @@ def test_compare_names_the_element_that_is_softer(tmp_path: Path) -> None:
     assert any("joint_3" in name for row in findings for name in (row["pattern"], *row["indistinguishable_from"]))
 
 
-REFUSED = (["diagnose"], ["update", "--add", "weak_strut"], ["plan"])
+REFUSED = (["update", "--add", "weak_strut"], ["plan"])
 
 
 @pytest.mark.parametrize("words", REFUSED, ids=lambda words: words[0])

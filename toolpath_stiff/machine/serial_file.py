@@ -17,6 +17,7 @@ from toolpath_stiff.machine.chain import (
 )
 from toolpath_stiff.machine.common_sections import common_fields
 from toolpath_stiff.machine.elements import beam_axes
+from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections, read_rows, read_sections
 from toolpath_stiff.machine.serial import Serial
 from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
@@ -80,8 +81,9 @@ def read(toml: MachineToml) -> Serial:
     bodies = read_bodies(toml, (tool, work), (tip, table))
     if not any(bodies):
         raise InputError("no [[element]]: nothing gives way", expected="springs, joints or beams", file=toml.file)
+    common = common_fields(toml, values)
     machine = Serial(
-        **common_fields(toml, values),
+        **{"limits": Limits(neutral_pose=common["default_origin"]), **common},
         reference_tool_length=m_from_mm(values.get("reference_tool", {}).get("length_mm", np.nan)),
         tool_joints=tool,
         work_joints=work,
