@@ -114,6 +114,7 @@ REFUSALS = {
     "KONT G41 X1": "under KONT",
     "G2 SUPA X1 I1": "in a cut",
     "G54\nG500\nX1": "in a cut",
+    "G54\nTRANS X5\nG500 G0 X1": "a frame under G500",
     "TRAORI\nG1 X1 A5": "turns rotary axes under TRAORI",
     "G1 A3=0 B3=0 C3=1": "without TRAORI",
     'CYCLE800(1,"T",0,192,0,0,0,10,0,0,0,0,0,-1)': "no angles about axes",

@@ -220,6 +220,8 @@ def _machine(state: State, block: CurrentBlock, code: str, mode: str) -> None:
     block.refuse_if(waits, None, f"{code} beside a contour with compensation or a corner", "G40 before it")
     cut = mode != "G0" and (code == "G500" or mode != "G1")
     block.refuse_if(cut, None, f"{code} in a cut: where the work sits on the machine is not known", "G0")
+    framed = code == "G500" and (frames.linear is not None or any(frames.g92))
+    block.refuse_if(framed, None, "a frame under G500 (no settable offset)", "TRANS, or G54 before it")
     lost = {axis for axis in moved if math.isnan(block.values[AXES[axis]].value)}
     if lost:
         state.warnings.append(Remark(UNKNOWN_HOME, block.line))
