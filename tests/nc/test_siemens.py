@@ -99,7 +99,7 @@ REFUSALS = {
     "DRILL_ALL(1)": "no subprogram of the file.*--subprograms",
     "DEF FRAME F": "DEF FRAME is not supported",
     "G2 X10": "an arc without a centre",
-    "G2 X10 Y0 CR=2": "of radius 2 mm to a point 10.0000 mm away",
+    "G2 X10 Y0 CR=2": "whose radius 2 mm cannot reach its end 10.0000 mm away",
     "G2 X10 Y0 I5 CR=5": "a centre are both given",
     "G2 X10 I4": "off its circle",
     "CIP X10 I1=5": "points of CIP on a line",
