@@ -99,6 +99,8 @@ def _name_steps(state: State, block: CurrentBlock) -> None:
     unknown = plain.transformed and state.frames.posted is None and rotary
     block.refuse_if(unknown, None, "turns rotary axes under TRAORI", "A3, B3, C3", HOLDS_HINT)
     lost = bool(block.free & POLAR) and plain.pole is None
+    steps = not state.absolute and bool(block.free & {"PR", "PA"})
+    block.refuse_if(steps, None, "polar words (RP, AP) in G91", "G90, or =IC()")
     block.refuse_if(lost, None, "polar words without a pole, or after a change of the coordinates", "G111 before it")
 
 

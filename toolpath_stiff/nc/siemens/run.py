@@ -23,14 +23,16 @@ from toolpath_stiff.nc.siemens.blocks import carry_out, sort_words
 from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner, Value
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
 from toolpath_stiff.nc.siemens.words import read_words, steering_of
-from toolpath_stiff.nc.state import Flow, GoTo, Then
+from toolpath_stiff.nc.state import LATHE_HINT, Flow, GoTo, Then
 from toolpath_stiff.nc.words import AXES, Block
 
 HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
 PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
 PLAIN = re.compile(r"\s*(?:N\d+\s*)?((?:[GXYZABCIJKFS][-+]?[\d.]+\s*)*)(?:;.*)?", re.ASCII | re.IGNORECASE)
 OFFSET = re.compile(r"\bG(?:5[4-7]|5(?:0[5-9]|[1-9]\d))(?!\d)")
-CHANGE = re.compile(r"(?<![A-Z\d])M0*6(?!\d)")
+CHANGE = re.compile(r"(?<![A-Z])M0*6(?!\d)")
+OF_LATHES = re.compile(r"\bG(?:18|96)(?!\d)|\bLIMS\b|\bDIAM(?:ON|90)\b")
+ALONG_Y = re.compile(r"(?<![A-Z_$])Y\s*[-+=\d.]")
 IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)(?:\s*=\s*([^,)]+))?", re.ASCII)
@@ -60,6 +62,7 @@ class SiemensRun(ParametricRun):
         self._homes = False
         self._lex()
         plain, text = self.state.plain, "\n".join(map(code_text, self.lines))
+        self._of_lathe = None if ALONG_Y.search(text) else OF_LATHES.search(text)
         plain.offsets_named, plain.changes_by_t = OFFSET.search(text) is not None, CHANGE.search(text) is None
         self.state.motion = "G1"  # as a control starts
 
@@ -86,6 +89,13 @@ class SiemensRun(ParametricRun):
             texts.append(plain[1] if plain is not None and begin[3] is None else "?")
         self._ends = {row for row in self._subs.values() if any(code_text(text).strip() for text in self.lines[:row])}
         self._plain = self._lexer = PlainRun(self.state, texts, self.name)
+
+    def run(self) -> list[Remark]:
+        """Run to the program's end; a lathe's program is refused. Returns warnings."""
+        if self._of_lathe is not None:
+            row = self._of_lathe.string.count("\n", 0, self._of_lathe.start())
+            raise self._fail(row, f"a lathe's program: {self._of_lathe[0]} and never Y", "a mill's", LATHE_HINT)
+        return super().run()
 
     @staticmethod
     def meaning(code: str) -> str:
