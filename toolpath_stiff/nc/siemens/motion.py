@@ -229,7 +229,7 @@ def _machine(state: State, block: CurrentBlock, code: str, mode: str) -> None:
         state.warnings.append(Remark(UNKNOWN_HOME, block.line))
         block.free -= {AXES[axis] for axis in lost}
     mark(block, "M91", code)
-    if mode == "G0":
+    if mode == "G0" or state.feed is None:  # a control starts in G1
         mark(block, "FMAX")
     length, frames.tool = frames.tool, 0.0
     if moved > lost:
