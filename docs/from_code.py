@@ -105,13 +105,15 @@ HUNTED_SIEMENS = (
     "G0", "G1", "G2", "G3", "CIP", "CT", "G90", "G91", "G111", "TRANS", "ATRANS", "ROT", "AROT", "MIRROR", "AMIRROR",
     "ASCALE", "CYCLE800", "CYCLE81", "CYCLE82", "CYCLE83", "CYCLE85", "CYCLE89", "MCALL", "HOLES2", "M17", "M30",
 )  # fmt: skip
+UNHELD_SIEMENS = ("G53", "G153", "KONT", "NORM", "G450", "G451", "CSPLINE", "G74")
 
 
 def siemens_table() -> str:
     """Siemens' words, with what holds each of them; and those that are refused."""
     cells = []
     for code in siemens.TABLE.values():
-        held = "" if code.listed or code.controls == EVERYWHERE else "geometry by hand"
+        unheld = code.listed or code.controls == EVERYWHERE or code.name in UNHELD_SIEMENS
+        held = "" if unheld else "geometry by hand"
         held = "geometry by hand; independent reader" if code.name in HUNTED_SIEMENS else held
         meaning = f"{code.meaning} (listed)" if code.listed else code.meaning
         if not re.fullmatch(r"G5(0[6-9]|[1-8]\d|9[0-8])", code.name):  # G505 to G599 are one

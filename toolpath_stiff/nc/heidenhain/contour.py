@@ -33,7 +33,7 @@ from toolpath_stiff.nc.words import AXES, Word
 MANUAL = "HEIDENHAIN, user's manual of the iTNC 530"
 PATHS, POLAR = f"{MANUAL}, Path contours: Cartesian coordinates", f"{MANUAL}, Path contours: Polar coordinates"
 COMPENSATED = (
-    "RL and RR begin and end perpendicular to the first and the last contour element, and round outside corners"
+    "RL, RR (G41, G42) begin and end perpendicular to the first and the last contour element and round outside corners"
 )
 SIDES = {"RL": LEFT, "RR": RIGHT}
 

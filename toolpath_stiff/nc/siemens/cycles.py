@@ -95,11 +95,14 @@ def drill(state: State, block: CurrentBlock, values: Values) -> None:
     block.refuse_if(waits, None, "a cycle inside a contour with compensation or a corner", "G40 before it")
     check_known(state, block, {PLANES[state.plane][2]: 0.0}, rapid=True)
     block.refuse_if(plain.unknown, None, "a cycle where X or Y is not known", "X and Y before it")
-    plunge(state, block, strokes(values, state.feed, state.speed))
+    turns = state.speed if state.feed_mode == "G95" and state.speed else 1.0  # feeds of taps are then a turn's
+    plunge(state, block, strokes(values, state.feed, state.speed, turns))
 
 
-def strokes(values: Values, feed: float | None, speed: float) -> Iterator[Stroke]:
+def strokes(values: Values, feed: float | None, speed: float, turns: float = 1.0) -> Iterator[Stroke]:
     """Heights of a hole one after another, each with its feed (0: there is none) and the dwell there.
+
+    `turns`: 1/min that feeds are counted by, 1 where they are mm/min.
 
     Examples
     --------
@@ -112,7 +115,7 @@ def strokes(values: Values, feed: float | None, speed: float) -> Iterator[Stroke
     out: float | None = None
     if number in (84, 840):
         speed = values.get("SST") or speed
-        down, out = values["PIT"] * speed, values["PIT"] * (values.get("SST1") or speed)
+        down, out = (values["PIT"] * rate / turns for rate in (speed, values.get("SST1") or speed))
     elif number == 85:
         down = values.get("FFR") or down
         out = values.get("RFF") or down

@@ -1,8 +1,8 @@
 """Expressions of Siemens' language, worked out where they stand.
 
 SIEMENS, SINUMERIK 840D sl, Programming Manual Job Planning, "Flexible NC programming" ("Arithmetic operations",
-"Comparison and logic operations", "Priority of the operations"): NOT binds tightest, then * / DIV MOD, + -, B_AND,
-B_XOR, B_OR, AND, XOR, OR, the concatenation <<, and comparisons last. Angles are in degrees.
+"Comparison and logic operations", "Priority of the operations"): NOT binds tightest, then * / DIV MOD, + -, AND,
+XOR, OR (those of bits are not read), the concatenation <<, and comparisons last. Angles are in degrees.
 """
 
 import math
@@ -21,19 +21,17 @@ BLANK = re.compile(r"\s*")
 NUMBER = re.compile(r"(?:\d++\.?\d*|\.\d+)(?:EX[+-]?\d+)?", re.ASCII)
 STRING = re.compile(r'"[^"]*"')
 NAME = re.compile(r"\$?[A-Z_]\w*", re.ASCII)
-OPERATOR = re.compile(r"<<|<>|<=|>=|==|[-+*/<>]|(?:DIV|MOD|AND|XOR|OR|B_AND|B_OR|B_XOR)\b")
+OPERATOR = re.compile(r"<<|<>|<=|>=|==|[-+*/<>]|(?:DIV|MOD|AND|XOR|OR)\b")
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {"<": lt, ">": gt, "<=": le, ">=": ge}
 LOGIC: dict[str, Callable[[bool, bool], bool]] = {
     "AND": lambda a, b: a and b, "OR": lambda a, b: a or b, "XOR": lambda a, b: a != b,
 }  # fmt: skip
 ARITHMETIC: dict[str, Callable[[float, float], float]] = {
     "+": add, "-": sub, "*": mul, "/": truediv, "DIV": lambda a, b: float(math.trunc(a / b)), "MOD": math.fmod,
-    "B_AND": lambda a, b: float(int(a) & int(b)), "B_OR": lambda a, b: float(int(a) | int(b)),
-    "B_XOR": lambda a, b: float(int(a) ^ int(b)),
 }  # fmt: skip
 RANKS = {
-    **dict.fromkeys((*COMPARISONS, "==", "<>"), 1), "<<": 2, "OR": 3, "XOR": 4, "AND": 5, "B_OR": 6, "B_XOR": 7,
-    "B_AND": 8, "+": 9, "-": 9, **dict.fromkeys(("*", "/", "DIV", "MOD"), 10),
+    **dict.fromkeys((*COMPARISONS, "==", "<>"), 1), "<<": 2, "OR": 3, "XOR": 4, "AND": 5, "+": 6, "-": 6,
+    **dict.fromkeys(("*", "/", "DIV", "MOD"), 7),
 }  # fmt: skip
 EQUAL = 1e-12  # relative, of two numbers that are the same (Job Planning, "Precision correction on comparison errors")
 FUNCTIONS: dict[str, Callable[..., float]] = {
@@ -88,12 +86,13 @@ class SiemensScanner(Scanner):
     def _operand(self) -> Value:
         self.take(BLANK)
         column = self.column
-        if self.next("(") or self.next("+"):
-            opened = self.text[self.position - 1] == "("
-            value = self.result() if opened else self._operand()
-            self.refuse_if(opened and not self.sign(")"), "a bracket that is not closed", ")", column=column)
+        self.next("+")
+        if self.next("("):
+            value = self.result()
+            self.refuse_if(not self.sign(")"), "a bracket that is not closed", ")", column=column)
             return value
         if self.next("-"):
+            self.refuse_if(self.begins("-"), "a sign after a sign", "brackets")
             return -self._number(self._operand(), column)
         literal = self.take(NUMBER)
         if literal:

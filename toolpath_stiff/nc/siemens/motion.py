@@ -99,6 +99,8 @@ def _name_steps(state: State, block: CurrentBlock) -> None:
     unknown = plain.transformed and state.frames.posted is None and rotary
     block.refuse_if(unknown, None, "turns rotary axes under TRAORI", "A3, B3, C3", HOLDS_HINT)
     lost = bool(block.free & POLAR) and plain.pole is None
+    steps = not state.absolute and bool(block.free & {"PR", "PA"})
+    block.refuse_if(steps, None, "polar words (RP, AP) in G91", "G90, or =IC()")
     block.refuse_if(lost, None, "polar words without a pole, or after a change of the coordinates", "G111 before it")
 
 
@@ -220,12 +222,14 @@ def _machine(state: State, block: CurrentBlock, code: str, mode: str) -> None:
     block.refuse_if(waits, None, f"{code} beside a contour with compensation or a corner", "G40 before it")
     cut = mode != "G0" and (code == "G500" or mode != "G1")
     block.refuse_if(cut, None, f"{code} in a cut: where the work sits on the machine is not known", "G0")
+    framed = code == "G500" and (frames.linear is not None or any(frames.g92))
+    block.refuse_if(framed, None, "a frame under G500 (no settable offset)", "TRANS, or G54 before it")
     lost = {axis for axis in moved if math.isnan(block.values[AXES[axis]].value)}
     if lost:
         state.warnings.append(Remark(UNKNOWN_HOME, block.line))
         block.free -= {AXES[axis] for axis in lost}
     mark(block, "M91", code)
-    if mode == "G0":
+    if mode == "G0" or state.feed is None:  # a control starts in G1
         mark(block, "FMAX")
     length, frames.tool = frames.tool, 0.0
     if moved > lost:

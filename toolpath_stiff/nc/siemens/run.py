@@ -23,19 +23,22 @@ from toolpath_stiff.nc.siemens.blocks import carry_out, sort_words
 from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner, Value
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
 from toolpath_stiff.nc.siemens.words import read_words, steering_of
-from toolpath_stiff.nc.state import Flow, GoTo, Then
+from toolpath_stiff.nc.state import LATHE_HINT, Flow, GoTo, Then
 from toolpath_stiff.nc.words import AXES, Block
 
 HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
 PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
 PLAIN = re.compile(r"\s*(?:N\d+\s*)?((?:[GXYZABCIJKFS][-+]?[\d.]+\s*)*)(?:;.*)?", re.ASCII | re.IGNORECASE)
 OFFSET = re.compile(r"\bG(?:5[4-7]|5(?:0[5-9]|[1-9]\d))(?!\d)")
-CHANGE = re.compile(r"(?<![A-Z\d])M0*6(?!\d)")
+CHANGE = re.compile(r"(?<![A-Z])M0*6(?!\d)")
+OF_LATHES = re.compile(r"\bG(?:18|96)(?!\d)|\bLIMS\b|\bDIAM(?:ON|90)\b")
+ALONG_Y = re.compile(r"(?<![A-Z_$])Y\s*[-+=\d.]")
 IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)(?:\s*=\s*([^,)]+))?", re.ASCII)
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
+LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (Fundamentals, "Blocks and block format")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
 RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
 
@@ -59,6 +62,7 @@ class SiemensRun(ParametricRun):
         self._homes = False
         self._lex()
         plain, text = self.state.plain, "\n".join(map(code_text, self.lines))
+        self._of_lathe = None if ALONG_Y.search(text) else OF_LATHES.search(text)
         plain.offsets_named, plain.changes_by_t = OFFSET.search(text) is not None, CHANGE.search(text) is None
         self.state.motion = "G1"  # as a control starts
 
@@ -86,6 +90,13 @@ class SiemensRun(ParametricRun):
         self._ends = {row for row in self._subs.values() if any(code_text(text).strip() for text in self.lines[:row])}
         self._plain = self._lexer = PlainRun(self.state, texts, self.name)
 
+    def run(self) -> list[Remark]:
+        """Run to the program's end; a lathe's program is refused. Returns warnings."""
+        if self._of_lathe is not None:
+            row = self._of_lathe.string.count("\n", 0, self._of_lathe.start())
+            raise self._fail(row, f"a lathe's program: {self._of_lathe[0]} and never Y", "a mill's", LATHE_HINT)
+        return super().run()
+
     @staticmethod
     def meaning(code: str) -> str:
         """What a code, or a word, is taken for."""
@@ -105,13 +116,21 @@ class SiemensRun(ParametricRun):
     def _statement(self, row: int) -> Statement:
         if row not in self._statements:
             begin = self._begins[row]
+            if len(begin.string) > LONGEST_BLOCK or begin.string.count("(") > MOST_BRACKETS:
+                problem = f"a block of {len(begin.string)} characters, or with too many brackets"
+                raise self._fail(row, problem, f"at most {LONGEST_BLOCK}, {MOST_BRACKETS} of them")
             slash = begin[1] or begin[4] or ""
             block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
             steering = None
-            if PROGRAM.match(begin.string) is None and begin.string.lstrip()[:1] != "%":
+            if not self._is_head(row):
                 steering = steering_of(self._scanner(row, begin.end()), lambda place: self._at_place(row, place))
             self._statements[row] = Statement(block, steering=steering)
         return self._statements[row]
+
+    def _is_head(self, row: int) -> bool:
+        """Whether a line says of which program it is, and nothing else."""
+        code = self._begins[row].string
+        return PROGRAM.match(code) is not None or code.lstrip()[:1] == "%"
 
     def _at_place(self, row: int, place: int) -> Number:
         """The number of an expression in a line."""
@@ -120,7 +139,7 @@ class SiemensRun(ParametricRun):
     def _read(self, row: int) -> Block:
         statement, code = self._statement(row), self._begins[row].string
         line = row + 1 if row < self._main_lines else self._line_of_call()
-        if PROGRAM.match(code) is not None or code.lstrip()[:1] == "%":
+        if self._is_head(row):
             return Block(line, ())
         self._homes = IN_MACHINE.search(code) is not None
         words = read_words(self._scanner(row, self._begins[row].end()), self._define)
@@ -142,13 +161,14 @@ class SiemensRun(ParametricRun):
         if name in SEARCHED:
             self.state.assume(RUNS)
             return False
-        if value is None or math.isnan(value):
-            reason = "a control keeps it from earlier programs, or its builder defines it"
-            if not self._homes or scope is self.variables.common:
-                problem = f"{name} is read before it is set: {reason}"
-                raise self._fail(self._at, problem, f"{name}=... before", column=column)
+        if value is not None and not math.isnan(value):
+            return value
+        if self._homes and scope is not self.variables.common:
             return math.nan
-        return value
+        problem = (
+            f"{name} is read before it is set: a control keeps it from earlier programs, or its builder defines it"
+        )
+        raise self._fail(self._at, problem, f"{name}=... before", column=column)
 
     def _define(self, name: str, value: Value, column: int, kind: str) -> None:
         """Set a variable; `kind`: its type where it is declared."""
@@ -203,12 +223,12 @@ class SiemensRun(ParametricRun):
         return self._leave(row) if self._levels else len(self.lines)
 
     def _to_label(self, row: int, way: str, label: str) -> int:
-        """The line of a label: ahead (GOTOF), behind (GOTOB), or first ahead (GOTO)."""
+        """The line of a label: ahead (GOTOF), behind (GOTOB), first behind (REPEAT), or first ahead (GOTO)."""
         first = self._program_of(row)
         stop = min((end for end in self._ends if end > first), default=len(self.lines))
         rows = [place for place in self._labels.get(label, []) if first <= place < stop]
-        ahead, behind = [place for place in rows if place > row], [place for place in rows if place <= row][::-1]
-        places = ahead if way == "GOTOF" else behind if way == "GOTOB" else ahead + behind
+        ahead, behind = [place for place in rows if place > row], [place for place in rows[::-1] if place <= row]
+        places = {"GOTOF": ahead, "GOTOB": behind, "REPEAT": behind + ahead}.get(way, ahead + behind)
         if not places:
             raise self._fail(row, f"{way} {label}: the program has no such label there", "LABEL: before a block")
         to = places[0]
@@ -221,11 +241,8 @@ class SiemensRun(ParametricRun):
 
     def _jump_to(self, row: int, steering: Steering) -> int | None:
         way, label = steering.label.split()
-        if steering.values and not self._value(steering):
-            return None
-        if way == "GOTOC" and label not in self._labels:
-            return None
-        return self._to_label(row, way, label)
+        stays = (steering.values and not self._value(steering)) or (way == "GOTOC" and label not in self._labels)
+        return None if stays else self._to_label(row, way, label)
 
     def _scanner_of(self, row: int, text: str) -> SiemensScanner:
         """An expression that does not stand at its place."""
@@ -277,16 +294,13 @@ class SiemensRun(ParametricRun):
         scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind {steering.shown}", "REPEAT LABEL P=2")
         if not times:
             return None
-        first = self._to_label(
-            row, "GOTOB" if section[2] in self._labels and self._labels[section[2]][0] < row else "GOTOF", section[2]
-        )
-        stop = row if first < row else len(self.lines)
-        if section[3]:
-            stop = self._to_label(first, "GOTO", section[3]) + 1
-        elif section[1] == "REPEATB":
-            stop = first + 1
+        first = self._to_label(row, "REPEAT", section[2])
+        if section[3] or section[1] == "REPEATB":
+            stop = (self._to_label(first, "GOTO", section[3]) if section[3] else first) + 1
+        elif first < row:
+            stop = next((end for end in self._labels.get("ENDLABEL", []) if first < end < row), row)
         else:
-            stop = next((end for end in self._labels.get("ENDLABEL", []) if first < end < stop or first > row), stop)
+            stop = self._to_label(first, "GOTOF", "ENDLABEL")
         self._begin(Subprogram(section[2], first, row + 1, times - 1, stop=stop), row, steering.column)
         return first
 
@@ -301,12 +315,11 @@ class SiemensRun(ParametricRun):
         if name not in self._subs:
             problem = f"{name} is no word that is known, and no subprogram of the file or of a folder"
             raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=steering.column)
-        first = self._subs[name]
-        level = Subprogram(name, first + 1, row + 1, times - 1, self._bound(row, first, values))
-        if not times:
-            return None
-        self._begin(level, row, steering.column)
-        return first + 1
+        first = self._subs[name] + 1
+        level = Subprogram(name, first, row + 1, times - 1, self._bound(row, first - 1, values))
+        if times:
+            self._begin(level, row, steering.column)
+        return first if times else None
 
     def _bound(self, row: int, first: int, values: list[Value | None]) -> dict[str, float | None]:
         """The parameters of PROC with the values of a call."""

@@ -17,6 +17,7 @@ from toolpath_stiff.nc.words import AXES, Word
 
 PLAIN = re.compile(r"([A-Z]) ?([+-]?(?:\d++\.?+\d*+|\.\d++)(?:EX[+-]?\d++)?)(?!\s*=(?!=)|\[|_)", re.ASCII)
 LITERAL = re.compile(r"([A-Z]\w*)=([+-]?(?:\d++\.?+\d*+|\.\d++))(?=\s|$)", re.ASCII)
+IN_BRACKETS = re.compile(r'\((?:[^()"]|"[^"]*"|\((?:[^()"]|"[^"]*")*\))*\)?')
 DIMENSION = re.compile(r"(IC|ACP|ACN|AC|DC)(?=\s*\()")
 PREFIX = {"IC": "I", "AC": "@", "DC": "DC", "ACP": "ACP", "ACN": "ACN", "": ""}
 JUMP = re.compile(r"(GOTO[FBC]?)\s+([A-Z_]\w*|:?\d+)\s*$", re.ASCII)
@@ -107,7 +108,7 @@ def _addressed(scanner: SiemensScanner, name: str, column: int, begin: int) -> W
 def _named(scanner: SiemensScanner, name: str, column: int) -> list[Word]:
     """A word without a number, and the parameters in its brackets where these are known by name."""
     scanner.take(BLANK)
-    words, begin = [Word(name, 0.0, column, name)], scanner.position
+    words = [Word(name, 0.0, column, name)]
     if name in SIGNATURES and scanner.begins("("):
         names, values = SIGNATURES[name].split(), scanner.arguments()
         for key, value in zip(names, values, strict=False):
@@ -115,12 +116,8 @@ def _named(scanner: SiemensScanner, name: str, column: int) -> list[Word]:
                 text = value if isinstance(value, str) else f"{key}={value:g}"
                 words.append(Word(key, 0.0 if isinstance(value, str) else float(value), column, text))
         scanner.refuse_if(any(values[len(names) :]), f"{name} with {len(values)} parameters", f"{len(names)} of them")
-    elif scanner.begins("("):
-        depth = 0
-        while not scanner.done and (depth or scanner.position == begin):
-            quoted = scanner.text.find('"', scanner.position + 1) if scanner.begins('"') else -1
-            depth += scanner.begins("(") - scanner.begins(")")
-            scanner.position = max(quoted, scanner.position) + 1
+    else:
+        scanner.take(IN_BRACKETS)
     return words
 
 
