@@ -81,7 +81,7 @@ class PullModel:
 
     def candidates(self) -> list[tuple[str, str, list[str], FloatArray]]:
         """Effect, element, parameters and (m, k) columns per SI unit of each, of what changes anything."""
-        found = []
+        rows = []
         for name, effect in effects_of_elements().items():
             real = [p for p in effect.parameters if not p.discrete]
             if effect.is_instrument or effect.load_dependent or any(p.name == "setup" for p in effect.parameters):
@@ -94,8 +94,8 @@ class PullModel:
                 none = {p.name: p.neutral * p.si for p in real}
                 units = [none | {p.name: 0.5 if p.name == "factor" else 1.0} for p in real]
                 columns = [self.column_of(ActiveEffect(effect, on | values)) for values in units]
-                found.append((name, element, [p.name for p in real], np.stack(columns, axis=1)))
-        return [row for row in found if (np.abs(row[3]).max(axis=0) > 0.0).any()]
+                rows.append((name, element, [p.name for p in real], np.stack(columns, axis=1)))
+        return [row for row in rows if (np.abs(row[3]).max(axis=0) > 0.0).any()]
 
     def _turns(self, name: str) -> bool:
         return any(e.name == name and e.link == "joints" and e.directions == SIX for e in self.machine.elements)
@@ -129,12 +129,12 @@ def non_negative(columns: FloatArray, values: FloatArray) -> tuple[FloatArray, f
 
 def left_out(columns: FloatArray, values: FloatArray, fixed: FloatArray, sd: FloatArray, pose: IntArray) -> FloatArray:
     """(m,) what a fit of columns beside the fixed part says of the readings of each pose without these."""
-    said = np.empty_like(values)
+    predicted = np.empty_like(values)
     for number in np.unique(pose):
         here = pose == number
         size, _ = non_negative(columns[~here] / sd[~here, None], (values - fixed)[~here] / sd[~here])
-        said[here] = fixed[here] + columns[here] @ size
-    return said
+        predicted[here] = fixed[here] + columns[here] @ size
+    return predicted
 
 
 def verdict_of(chi_square: float, rows: Sequence[Explanation], count: int) -> tuple[str, list[Explanation]]:
