@@ -140,8 +140,7 @@ def place(
     model, origin, turns = on.running(part), origin_si(origin_mm_deg), (tilt_a_deg, tilt_b_deg, rotate_deg)
     default, setup = model.machine.default_origin, cut_setup(cut, material, stock_mm)
     if (objective == ERROR) != (setup is not None):
-        problem = "--objective error and a cut need each other"
-        raise InputError(problem, hint="say --cut FILE, or --material and --stock")
+        raise InputError("--objective error and a cut need each other", hint="say --cut, or --material and --stock")
     read = part.moves(origin, default)
     present, step = origin or (read.origin if read.origin_source == "program" else default), m_from_mm(step_mm)
     now = None if setup is None else evaluate_cut(model, read, present, setup, step, progress)
