@@ -21,7 +21,7 @@ from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
 from toolpath_stiff.cutting.workpiece import Workpiece, stages_of
-from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.poses import Pose
@@ -143,8 +143,11 @@ def evaluate_cut(
     Raises
     ------
     InputError
-        Something is missing (which, and where to write it), or a tool is tilted.
+        Something is missing (which, and where to write it), a tool is tilted, or the joints could stand otherwise.
     """
+    if len(model.machine.configurations) > 1:
+        mistake = f"the error of a surface on machine {model.machine.name}, whose joints may stand in several ways"
+        raise InputError(mistake, expected="a machine of one configuration; others are analyzed without a cut")
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
     spindle = spindle_of(setup, program, samples)
     stock = stock_of(setup, program.moves, cutters)
