@@ -186,7 +186,7 @@ def test_what_is_removed_is_what_is_missing(points, corner):
 @pytest.mark.parametrize(
     "text, line, message",
     [
-        (HEAD + "G0 Z5\nG1 X10 B5\nM30\n", 3, "tilted tools are not supported"),
+        (HEAD + "G0 Z5\nG1 X10 B5\nM30\n", 3, "tilted tools: no cut of the program has the tool along Z"),
         (HEAD + "T3 M6\nG1 X10\nM30\n", 3, "tool 3 cuts and its geometry is not known"),
     ],
 )

@@ -19,10 +19,13 @@ from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock
 from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
+from toolpath_stiff.cutting.sweeps import tilted_moves
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
 from toolpath_stiff.cutting.workpiece import Workpiece, stages_of
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.moves import ReadProgram
+from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.nc.courses import move_lengths
+from toolpath_stiff.nc.moves import Moves, ReadProgram
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Progress
@@ -136,26 +139,30 @@ def evaluate_cut(
     model
         The machine with its effects, under its conditions; those that depend on the load take the force that acts.
     program
-        As it was read; the tool has to stand upright in the set-up frame.
+        As it was read; cuts with a tilted tool are left out, with a warning.
     progress
         Called with what is being done, samples done, samples in all.
 
     Raises
     ------
     InputError
-        Something is missing (which, and where to write it), a tool is tilted, or the joints could stand otherwise.
+        Something is missing (which, and where to write it), every cut has a tilted tool, or the machine leaves a choice.
     """
-    if len(model.machine.configurations) > 1:
-        mistake = f"the error of a surface on machine {model.machine.name}, whose joints may stand in several ways"
-        raise InputError(mistake, expected="a machine of one configuration; others are analyzed without a cut")
+    machine, turned = model.machine, bool(program.moves.end[:, 3:].any())
+    if not isinstance(machine, Hexapod) and (turned or len(machine.configurations) > 1):
+        mistake = (
+            f"the error of a surface on machine {machine.name}, whose joints stand in several ways or turn the work"
+        )
+        raise InputError(mistake, expected="an upright tool on a machine of one configuration, or no cut")
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
     spindle = spindle_of(setup, program, samples)
+    feed_per_tooth = _feed_per_tooth(samples, cutters, spindle)
+    samples = _along_teeth(samples, program.moves, feed_per_tooth)
     stock = stock_of(setup, program.moves, cutters)
     try:
         engaged = engage(stages_of(stock, program.moves, cutters), program.moves, samples, cutters, progress)
     except ProgramError as error:  # which knows no file
         raise error.in_line(program.name, error.line or 0) from None
-    cut = replace(_nothing_cut(samples, cutters, engaged.work, setup.coefficients, spindle), removed=engaged.removed)
     walls, own = walls_of_passes(engaged.work, samples, cutters)
     # Samples that share a contact are computed once, but where their walls differ.
     source = engaged.source.copy()
@@ -166,7 +173,8 @@ def evaluate_cut(
     strips[rows] = final_strip(engaged.work, samples.take(rows), cutters)
     patches = of_stations(engaged.patches, engaged.source[rows])
     patches = replace(patches, station=rows[patches.station])
-    cut = replace(cut, wall_heights=walls)
+    cut = _nothing_cut(samples, cutters, engaged.work, setup.coefficients, feed_per_tooth)
+    cut = replace(cut, removed=engaged.removed, wall_heights=walls)
     made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
         values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
@@ -182,25 +190,42 @@ def evaluate_cut(
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation, cut.wall_profiles):
         values[:] = values[source]
     cut = _with_walls_of_all_passes(cut, own, step)
-    return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=_warnings(cut))
+    tilted = samples.cutting & tilted_moves(program.moves)[samples.move]
+    warnings = _warnings(cut, engaged.struck, tilted)
+    return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=warnings)
+
+
+def _feed_per_tooth(samples: Samples, cutters: Mapping[int, Cutter], spindle: FloatArray) -> FloatArray:
+    """(n,) m; nan where nothing turns or cuts."""
+    teeth = np.ones(len(samples))
+    for number, cutter in cutters.items():
+        teeth[samples.tool == number] = cutter.flutes
+    per_second = np.where(samples.cutting & (np.abs(spindle) > 0.0), teeth * np.abs(spindle) / (2.0 * np.pi), np.nan)
+    return np.asarray(samples.feed / per_second)
+
+
+def _along_teeth(samples: Samples, moves: Moves, feed: FloatArray) -> Samples:
+    """Samples with the direction of feed over a tooth's feed, where moves are shorter: rounding turns short chords."""
+    rows = np.flatnonzero(samples.cutting & (move_lengths(moves)[samples.move] < feed))
+    ends = (samples.s[rows] + side * feed[rows] for side in (0.5, -0.5))
+    after, before = ([np.interp(path, samples.s, axis) for axis in samples.position.T] for path in ends)
+    along = np.subtract(after, before).T
+    length, tangent = np.linalg.norm(along, axis=1, keepdims=True), samples.tangent.copy()
+    tangent[rows] = np.divide(along, length, out=tangent[rows], where=length > 0.0)
+    return replace(samples, tangent=tangent)
 
 
 def _nothing_cut(
-    samples: Samples, cutters: Mapping[int, Cutter], work: Workpiece, coefficients: Coefficients, spindle: FloatArray
+    samples: Samples, cutters: Mapping[int, Cutter], work: Workpiece, coefficients: Coefficients, feed: FloatArray
 ) -> Cut:
     """A cut to be filled in."""
     n = len(samples)
-    teeth = np.ones(n)
-    for number, cutter in cutters.items():
-        teeth[samples.tool == number] = cutter.flutes
-    turning = samples.cutting & (np.abs(spindle) > 0.0)
-    per_second = np.where(turning, teeth * np.abs(spindle) / (2.0 * np.pi), 1.0)
     return Cut(
         samples=samples,
         cutters=cutters,
         work=work,
         coefficients=coefficients,
-        feed_per_tooth=np.where(turning, samples.feed / per_second, np.nan),
+        feed_per_tooth=feed,
         **{name: np.zeros(n) for name in ("ap", "ae", "entry", "exit", "removed")},
         **{name: np.zeros((n, 3)) for name in ("mean_force", "peak_force", "deflection")},
         wall_heights=np.full((n, 2, 2), np.nan),
@@ -307,7 +332,7 @@ def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str,
     return tuple(sentences)
 
 
-def _warnings(cut: Cut) -> tuple[str, ...]:
+def _warnings(cut: Cut, struck: BoolArray, tilted: BoolArray) -> tuple[str, ...]:
     """What deserves a look, a sentence each."""
     samples, warnings = cut.samples, []
     if cut.machine_only:
@@ -318,9 +343,13 @@ def _warnings(cut: Cut) -> tuple[str, ...]:
         )
     engaged = cut.ap > 0.0
     plunges = (cut.removed > 0.0) & (np.abs(samples.tangent[:, 2]) >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
-    warnings += _lines_warning(
-        samples, plunges, "plunges: cutting with the end is not modelled, no force is known there"
-    )
+    for rows, words in (
+        (struck, "rapids run into material, which counts as still there afterwards"),
+        (plunges, "plunges: cutting with the end is not modelled, no force is known there"),
+        (tilted, "the tool is tilted: no force is known there, and what these cuts take off counts as still there, so "
+         "that later cuts are foretold too heavy, never too light"),
+    ):  # fmt: skip
+        warnings += _lines_warning(samples, rows, words)
     chip = np.where(engaged, cut.feed_per_tooth, np.nan)
     thin, thick = cut.coefficients.thinnest, cut.coefficients.thickest
     for beyond, words in ((chip < thin, "thinner"), (chip > thick, "thicker")):

@@ -25,7 +25,7 @@ from toolpath_stiff.cutting.stations import (
     stations_between,
 )
 from toolpath_stiff.cutting.workpiece import Workpiece
-from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.results import Progress, counter
 
@@ -36,7 +36,7 @@ END_POINTS = 200  # of the end of a cutter that descends
 HALVINGS = 14, 9  # of up to 9 degrees: 1e-5 rad; of up to 18 degrees round a corner or a ball: 6e-4 rad
 # Stations that share a contact: turn, rad, and tilt of the feed from one to the next; relative difference of rate and
 # size of the contacts at the ends of a stretch, which has so many radii at most; stations that it may have.
-SAME, ALIKE, SPAN, STRIDES = 0.05, 0.03, 0.6, (16, 8, 4, 2, 1)
+SAME, ALIKE, SPAN, STRIDES = 0.05, 0.05, 0.8, (16, 8, 4, 2, 1)
 NARROW = 1e-4  # rad, arcs below are rounding
 PLATEAU = 1e-6  # m: heights closer than this are a level
 # Relative change of the rate of removal between two stations that is looked into, and the steps for it in radii: the
@@ -93,9 +93,10 @@ def engage(
     regime, begin = np.cumsum(regime), 0
     last, last_rate = np.zeros(1, dtype=STATION), np.zeros(1)
     last["move"] = -1
+    piece: IntArray | None = None
     for work in stages:
-        piece = pieces_at(work, samples.move[moving[begin:]], samples.s[moving[begin:]])
-        end = begin + int(np.searchsorted(piece, work.until)) if work.until < len(work.pieces) else len(moving)
+        piece = pieces_at(work, samples.move[moving], samples.s[moving]) if piece is None else piece
+        end = int(np.searchsorted(piece, work.until)) if work.until < len(work.pieces) else len(moving)
         for rows, stations in blocks_of_stations(work, samples, cutters, moving[begin:end]):
             patches, own, rate = _contact_along(work, stations, regime[rows])
             rapid = stations["recent"] == len(work.pieces)
@@ -110,7 +111,14 @@ def engage(
             if tell:
                 tell(int(rows[-1]) + 1, count)
         begin = end
+    struck &= (samples.motion == RAPID) & (samples.s >= _placed(moves, samples))
     return Engagement(work, Patches.joined(parts), source, removed, struck)
+
+
+def _placed(moves: Moves, samples: Samples) -> float:
+    """M of path from where on the program has said where the tool is, in all three axes."""
+    named = moves.end[:, :3] != moves.start[:, :3]
+    return float(samples.s[samples.move <= named.argmax(axis=0).max()].max(initial=0.0))
 
 
 def _volumes(

@@ -45,7 +45,8 @@ def within(along: FloatArray, extent: FloatArray) -> FloatArray:
 def distance(beside: FloatArray, away: FloatArray, spoke: FloatArray, arc: bool) -> FloatArray:
     """M from a point to the axis at a place so far `away` from the point's foot."""
     across = 4.0 * spoke * np.sin(0.5 * away) ** 2 if arc else away**2
-    return np.sqrt(beside**2 + across)
+    whole: FloatArray = np.sqrt(beside**2 + across)
+    return whole
 
 
 def rise(reach: FloatArray, flat: FloatArray, beside: FloatArray) -> FloatArray:
@@ -142,7 +143,7 @@ def lower(
             low = first_from(piece, low, high, window[0][i])
         elif high > low:
             low = max(low, counts_from[high - 1])
-        best, last = math.inf, -1
+        best, last = float(math.inf), -1
         for entry in range(high - 1, low - 1, -1):
             if below[entry] >= best:
                 continue
@@ -150,11 +151,11 @@ def lower(
             arc, smaller = part["turn"] != 0.0, slack if piece[entry] >= slack_from[i] else 0.0
             along, beside, spoke = foot(part, x[i], y[i], arc)
             near = distance(beside, within(along, part["extent"]) - along, spoke, arc)
-            lowest = part["z"] + min(part["slope"] * part["extent"], 0.0) + smaller
-            if near > part["reach"] - smaller or lowest + rise(part["reach"], part["flat"], near) >= best:
+            least: float = part["z"] + min(part["slope"] * part["extent"], 0.0) + smaller
+            if near > part["reach"] - smaller or least + rise(part["reach"], part["flat"], near) >= best:
                 continue
             sloped, bull = part["slope"] != 0.0, 0.0 < part["flat"] < part["reach"]
-            height = height_above(part, along, beside, spoke, arc, sloped, bull) + smaller
+            height = float(height_above(part, along, beside, spoke, arc, sloped, bull)) + smaller
             if height < best:
                 last = piece[entry] if height < best - CLEAR else last
                 best = height

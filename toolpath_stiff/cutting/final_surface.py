@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import down_slope, foot, rise, within
 from toolpath_stiff.cutting.stations import blocks_of_stations, points_around
@@ -67,7 +67,9 @@ def final_strip(work: Workpiece, samples: Samples, cutters: Mapping[int, Cutter]
         x, y = points_around(stations, away, np.arctan2(-back, offset))
         every = np.full(len(surface), len(work.pieces))
         ball = np.repeat(np.where(stations["flat"] == 0.0, SCALLOP * stations["reach"], 0.0), ACROSS)
-        stays = np.abs(work.tops(x, y, (np.zeros_like(every), every))[0] - surface) < BESIDE + ball
+        stays: BoolArray = np.asarray(
+            np.abs(work.tops(x, y, (np.zeros_like(every), every))[0] - surface) < BESIDE + ball
+        )
         stays &= (work.stock.bottoms(x, y) < surface) & ~np.repeat(stations["end_alone"], ACROSS)
         # A flat end passes a point of the floor twice, with its front and with its back.
         other = stations["path"] + LATER * stations["reach"] + 2.0 * stations["flat"]

@@ -36,13 +36,14 @@ PIECE = np.dtype([(name, np.float64) for name in FIELDS])
 
 
 def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, IntArray]:
-    """The pieces of all cutting moves, and (moves + 1,) the first piece of each move.
+    """The pieces of all cutting moves with an upright tool, and (moves + 1,) the first piece of each move.
 
-    Raises `ProgramError` where the tool is not upright or not known.
+    Raises `ProgramError` where none is upright, or a tool is not known.
     """
     length = move_lengths(moves)
-    cuts = (moves.motion != RAPID) & (length > 0.0)
-    _refuse(moves, cuts, cutters)
+    every = (moves.motion != RAPID) & (length > 0.0)
+    cuts = every & ~tilted_moves(moves)
+    _refuse(moves, every, cuts, cutters)
     radius, flat = np.zeros(len(moves)), np.zeros(len(moves))
     for tool in np.unique(moves.tool[cuts]).tolist():
         radius[cuts & (moves.tool == tool)] = cutters[tool].radius
@@ -87,13 +88,17 @@ def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, In
     return pieces, first
 
 
-def _refuse(moves: Moves, cuts: BoolArray, cutters: Mapping[int, Cutter]) -> None:
-    tilted = cuts & ((moves.start[:, 3:5] != 0.0).any(axis=1) | (moves.end[:, 3:5] != 0.0).any(axis=1))
-    unknown = cuts & ~np.isin(moves.tool, list(cutters))
+def tilted_moves(moves: Moves) -> BoolArray:
+    """(n,) moves with a tool that is not along Z at either end."""
+    return np.asarray((moves.start[:, 3:5] != 0.0).any(axis=1) | (moves.end[:, 3:5] != 0.0).any(axis=1))
+
+
+def _refuse(moves: Moves, cuts: BoolArray, upright: BoolArray, cutters: Mapping[int, Cutter]) -> None:
     for rows, text, hint in (
-        (tilted, "tilted tools are not supported with --cut yet", "leave --cut out"),
-        (unknown, "tool {tool} cuts and its geometry is not known", "give it a [[tool]] in the file of --cut"),
-    ):
+        (cuts & ~upright.any(), "tilted tools: no cut of the program has the tool along Z", "leave --cut out"),
+        (cuts & ~np.isin(moves.tool, list(cutters)), "tool {tool} cuts and its geometry is not known",
+         "give it a [[tool]] in the file of --cut"),
+    ):  # fmt: skip
         if rows.any():
             row = int(np.flatnonzero(rows)[0])
             raise ProgramError(text.format(tool=moves.tool[row]), hint=hint, line=int(moves.line[row]))

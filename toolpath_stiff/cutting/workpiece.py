@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cells import cells_of_boxes, portions
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import (
@@ -31,7 +31,7 @@ from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.sweeps import PIECE, sweeps_of
 from toolpath_stiff.nc.moves import Moves
 
-CELL = 0.2  # radii of the smallest cutter, size of a cell of the index
+CELL = 0.25  # radii of the smallest cutter, size of a cell of the index
 MANY = 500  # pieces from where on it pays to import numba: half a second
 STAGE = 16_384  # pieces
 BEFORE = 1024  # pieces: between a station of the stage before and the first of a stage are fewer
@@ -152,14 +152,14 @@ def stages_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> Iter
         cell, piece, below, above = (np.concatenate([part[k] for part in parts]) for k in range(4))
         order = np.argsort(cell, kind="stable")
         cell, piece, below, above = (values[order] for values in (cell, piece, below, above))
-        outdone, ends = _outdone(cell, below, above), np.searchsorted(cell, cell, side="right")
+        starts = np.searchsorted(cell, np.arange(rows * columns + 1))
+        outdone = np.minimum(_outdone(cell, below, above), starts[cell + 1])
         kept = outdone > np.arange(len(cell))
         before = np.append(0, np.cumsum(kept))
         counts_from = np.searchsorted(np.maximum.accumulate(before[outdone[kept]]), np.arange(before[-1]), side="right")
-        starts = before[np.searchsorted(cell, np.arange(rows * columns + 1))]
-        index = starts, piece[kept], counts_from, below[kept]
+        index = before[starts], piece[kept], counts_from, below[kept]
         yield Workpiece(stock, pieces, first, until, corner, size, columns, index, quick)
-        kept &= (outdone == ends) | (np.append(piece, until)[outdone] >= until - BEFORE)
+        kept &= ~_redone(cell, below, np.where(piece < until - BEFORE, above, np.inf))
         cell, piece, below, above = cell[kept], piece[kept], below[kept], above[kept]
 
 
@@ -215,12 +215,19 @@ def _along(pieces: AnyArray, share: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _outdone(cell: IntArray, below: FloatArray, above: FloatArray) -> IntArray:
-    """(e,) the first entry of the cell that leaves less than each all over it; the cell's end: none.
+    """(e,) the first entry of the cell that leaves less than each all over it; beyond the cell: none.
 
     By the least bound so far in each cell: a running minimum over all entries, the cells set apart by a large step.
     """
     highest = float(below.max(initial=0.0)) + 1e-4
     apart = (highest - float(below.min(initial=0.0)) + 1e-3) * cell
     bound = np.minimum.accumulate(np.minimum(above, highest) - apart)
-    outdone = np.searchsorted(-bound, CLEAR + apart - below, side="right")
-    return np.minimum(outdone, np.searchsorted(cell, cell, side="right"))
+    return np.searchsorted(-bound, CLEAR + apart - below, side="right")
+
+
+def _redone(cell: IntArray, below: FloatArray, above: FloatArray) -> BoolArray:
+    """(e,) whether a later entry of the cell leaves no more than each all over it."""
+    highest = float(below.max(initial=0.0)) + 1e-4
+    apart = (highest - float(below.min(initial=0.0)) + 1e-3) * (cell.max(initial=0) - cell)
+    bound = np.minimum.accumulate((np.minimum(above, highest) - apart)[::-1])[::-1]
+    return np.asarray(np.append(bound[1:], np.inf)[: len(cell)] + apart <= below + CLEAR)
