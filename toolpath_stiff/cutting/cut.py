@@ -146,13 +146,11 @@ def evaluate_cut(
     Raises
     ------
     InputError
-        Something is missing (which, and where to write it), every cut has a tilted tool, or the machine leaves a choice.
+        Something is missing (which, and where to write it), every cut has a tilted tool, or joints leave a choice.
     """
-    machine, turned = model.machine, bool(program.moves.end[:, 3:].any())
-    if not isinstance(machine, Hexapod) and (turned or len(machine.configurations) > 1):
-        mistake = (
-            f"the error of a surface on machine {machine.name}, whose joints stand in several ways or turn the work"
-        )
+    turned, many = bool(program.moves.end[:, 3:].any()), len(model.machine.configurations) > 1
+    if not isinstance(model.machine, Hexapod) and (turned or many):
+        mistake = f"a cut on machine {model.machine.name}, whose joints stand in several ways or turn the work"
         raise InputError(mistake, expected="an upright tool on a machine of one configuration, or no cut")
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
     spindle = spindle_of(setup, program, samples)

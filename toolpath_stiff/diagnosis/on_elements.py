@@ -50,8 +50,8 @@ class ElementDiagnosis(FolderResult):
         As of a hexapod: "adequate", "identified", "ambiguous", "unexplained"; the explanations that it leaves.
     ranked
         All explanations, each fitted alone, the likeliest first.
-    joints, torsion
-        Names of the joints that turn, (j,) rad/(N m) fitted in place of the file's; none where nothing turns.
+    joints, torsion, chi_square_fitted
+        Names of the joints that turn, (j,) rad/(N m) fitted in place of the file's, and the misfit that these leave.
     left_out
         (m,) m, by joints fitted without the readings of the same pose.
     """
@@ -68,6 +68,7 @@ class ElementDiagnosis(FolderResult):
     ranked: list[Explanation]
     joints: list[str]
     torsion: FloatArray
+    chi_square_fitted: float
     left_out: FloatArray
     inputs: tuple[str, ...] = ()
 
@@ -115,6 +116,7 @@ class ElementDiagnosis(FolderResult):
                 for row in self.ranked[:SHOWN]
             ],
             "joints_fitted_nrad_per_Nm": dict(ends),
+            "chi_square_of_joints_fitted": self.chi_square_fitted if self.joints else None,
             "error_of_joints_fitted_at_left_out_poses_percent": error,
         }
 
@@ -162,14 +164,14 @@ def diagnose_elements(
     if not known and verdict == "unexplained":
         verdict, plausible = "ambiguous", [row for row in ranked if row.chi_square < chi_square]
     joints, columns = model.torsions()
-    value, torsion, without = model.pulls.value, np.zeros(0), model.predicted
+    value, torsion, without, left = model.pulls.value, np.zeros(0), model.predicted, chi_square
     if joints:
         stated = np.array(_file_torsions(model, joints))
         fixed = model.predicted - columns @ stated
-        torsion = non_negative(columns / sd[:, None], (value - fixed) / sd)[0]
+        torsion, left = non_negative(white @ columns, white @ (value - fixed))
         without = left_out(columns, value, fixed, sd, model.pulls.pose)
     return ElementDiagnosis(
-        model, sd, source_of_noise, chi_square, verdict, plausible, ranked, joints, torsion, without, tuple(files)
+        model, sd, source_of_noise, chi_square, verdict, plausible, ranked, joints, torsion, left, without, tuple(files)
     )
 
 
@@ -186,7 +188,7 @@ def _noise(model: PullModel, relative: float | None) -> tuple[FloatArray, str, b
     """
     pulls = model.pulls
     key = np.unique(np.char.add(pulls.file, pulls.line.astype(str)), return_inverse=True)[1]
-    size = np.sqrt(np.bincount(key, model.predicted**2))[key]
+    size = np.sqrt(np.bincount(key, pulls.value**2))[key]
     stated = ~np.isnan(pulls.sd)
     if relative is None and stated.all():
         return pulls.sd, "sd_um of each row", True
