@@ -20,8 +20,8 @@ from toolpath_stiff.machine.bodies import Body, SpanningBeam
 from toolpath_stiff.machine.chain import (
     STILL,
     ChainJoint,
+    FixedFrame,
     Frame,
-    Placement,
     chain_frames,
     columns_of,
     rows_of,
@@ -68,8 +68,8 @@ class Serial(MachineTool):
     tool_joints: tuple[ChainJoint, ...]
     work_joints: tuple[ChainJoint, ...] = ()
     order: tuple[int, ...] = ()
-    tip: Placement = STILL
-    work: Placement = STILL
+    tip: FixedFrame = STILL
+    work: FixedFrame = STILL
     tool_bodies: tuple[Body | SpanningBeam, ...] = ()
     work_bodies: tuple[Body | SpanningBeam, ...] = ()
     least: dict[str, float] = field(default_factory=dict)

@@ -9,7 +9,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.chain import (
     STILL,
     ChainJoint,
-    Placement,
+    FixedFrame,
     aligned,
     modified_dh,
     placement,
@@ -100,7 +100,7 @@ def read(toml: MachineToml) -> Serial:
 
 def _of_rows(
     toml: MachineToml, rows: Sequence[Document], values: Sections, convention: str
-) -> tuple[tuple[ChainJoint, ...], tuple[ChainJoint, ...], Placement, Placement]:
+) -> tuple[tuple[ChainJoint, ...], tuple[ChainJoint, ...], FixedFrame, FixedFrame]:
     """Joints of tool and work, the tip in the last frame of the one, the work in that of the other."""
     if convention not in (MODIFIED, STANDARD):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{MODIFIED!r} or {STANDARD!r}")
@@ -137,7 +137,7 @@ def _is_linear(toml: MachineToml, section: str, row: Document) -> bool:
     return kinds[row["type"].lower()]
 
 
-def _placements(toml: MachineToml, section: str, row: Document, convention: str) -> tuple[Placement, Placement]:
+def _placements(toml: MachineToml, section: str, row: Document, convention: str) -> tuple[FixedFrame, FixedFrame]:
     """What stands between the joint before and this one, and what follows this one."""
     dh, free = [key for key in DH if key in row], [key for key in ("xyz_mm", "rpy_deg", "axis") if key in row]
     if dh and free:
@@ -185,11 +185,11 @@ def _check_units(toml: MachineToml, joints: Sequence[ChainJoint]) -> None:
         raise toml.fault("axis[1]", "max_deg", mistake, expected="degrees")
 
 
-def _tip(toml: MachineToml, tool: Document) -> Placement:
+def _tip(toml: MachineToml, tool: Document) -> FixedFrame:
     """The tip in the flange; its axes by two columns, the third checked if it is there."""
     given = {name: tool[name] for name in ("x_axis", "y_axis", "z_axis") if name in tool}
     if not given:
-        return Placement(np.eye(3), m_from_mm(tool["tip_mm"]))
+        return FixedFrame(np.eye(3), m_from_mm(tool["tip_mm"]))
     if "x_axis" not in given or "z_axis" not in given:
         raise toml.fault("tool", next(iter(given)), " is given alone", expected="x_axis and z_axis")
     y = given.get("y_axis", np.cross(given["z_axis"], given["x_axis"]))
@@ -198,7 +198,7 @@ def _tip(toml: MachineToml, tool: Document) -> Placement:
         raise toml.fault("tool", "x_axis", ": the axes are not square, or no unit vectors", expected="a frame")
     if np.linalg.det(axes) < 0.0:
         raise toml.fault("tool", "y_axis", ": the frame is mirrored", expected="a right-handed frame, y = z cross x")
-    return Placement(beam_axes(axes[:, 0], axes[:, 2]), m_from_mm(tool["tip_mm"]))
+    return FixedFrame(beam_axes(axes[:, 0], axes[:, 2]), m_from_mm(tool["tip_mm"]))
 
 
 def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
