@@ -57,11 +57,13 @@ class ControlFiles:
 
     def limits_of(self, axes: str, letters: str) -> Document:
         """Keys of [limits] by letter, None where nobody says; `letters` are the joints' unless the files name them."""
-        letters, keys = self.coordinates or letters, {}
+        letters = self.coordinates or letters
+        keys: dict[str, FloatArray | None] = {}
         for axis in axes:
-            linear, unit, shop = axis in "XYZ", *(("mm", mm_from_m) if axis in "XYZ" else ("deg", deg_from_rad))
+            linear = axis in "XYZ"
             bounds = self.bounds(letters.index(axis), linear) if axis in letters else None
-            keys[f"{axis}_{unit}"] = None if bounds is None else shop(bounds)
+            shop = mm_from_m if linear else deg_from_rad
+            keys[f"{axis}_{'mm' if linear else 'deg'}"] = None if bounds is None else shop(bounds)
         return keys
 
 
@@ -167,11 +169,10 @@ def _penta(files: ControlFiles) -> tuple[str, list[str]]:
         "ring_radius_mm": [files.length(f"effector.{i}.r") for i in range(5)],
         "ring_height_mm": [files.length(f"effector.{i}.z") for i in range(5)],
     }
-    ends = [files.bounds(i, linear=True) for i in range(5) if i in files.limits]
-    shared = (
-        [mm_from_m(float(max(low for low, _ in ends))), mm_from_m(float(min(high for _, high in ends)))] if ends else []
-    )
-    travel = dict(zip(("min_mm", "max_mm"), shared or (None, None), strict=True))
+    travel: Document = dict.fromkeys(("min_mm", "max_mm"))
+    if files.limits:
+        low, high = np.array(list(files.limits.values())).T * files.scale
+        travel = {"min_mm": float(low.max()), "max_mm": float(high.min())}
     strut = {"length_mm": None, "compliance_nm_per_N": None, "slope_nm_per_N_per_m": None, **travel}
     torsion = dict.fromkeys(("strut", "EI_MNm2", "hinge_nrad_per_Nm"))
     return "pentapod", [section("", top), STRUT + section("[strut]", strut), section("[torsion]", torsion), SPINDLE]
@@ -184,11 +185,8 @@ def _delta(files: ControlFiles) -> tuple[str, list[str]]:
     bounds = files.bounds(0, linear=True)
     limits = {"carriage_mm": None if bounds is None else mm_from_m(bounds)}
     carriage = {"rail_radius_mm": None, "centre_height_mm": None, **GIVE}
-    parts = [
-        section("[limits]", limits),
-        section("[rod]", {"compliance_nm_per_N": None}),
-        section("[carriage]", carriage),
-    ]
+    rod = section("[rod]", {"compliance_nm_per_N": None})
+    parts = [section("[limits]", limits), rod, section("[carriage]", carriage)]
     return "delta", [note + section("", {"rod_length_mm": files.length("L"), **joints, **rest}), *parts, SPINDLE]
 
 
