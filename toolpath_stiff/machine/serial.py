@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -271,7 +272,7 @@ class Serial(MachineTool):
         reference = tool[-1]
         tool[-1] = Frame(reference.axes, reference.origin - reference.axes[:, 2] * extension)
         n = joints.shape[1]
-        turns = any(not joint.linear for joint in self.work_joints)
+        turns = not np.array_equal(work[-1].axes, np.eye(3)[..., None])
         loads = [body.spring(tool) for body in self.tool_bodies] + [body.spring(work) for body in self.work_bodies]
         return Stance(
             joints=joints.T,
@@ -300,13 +301,24 @@ class Serial(MachineTool):
         return self.wrist.singularities(stance.joints.T[self.chain[first : first + 6]]).T
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
-        """What a picture draws: names and polylines (n, p, 3) m, base axes."""
+        """What a picture draws: names and polylines (n, p, 3) m, base axes.
+
+        From joint to joint where joints turn on the tool's side, else from body to body; to the tip, to the work.
+        """
         tool, work = self.frames(stance.joints.T)
-        n = len(stance)
+        tip = Frame(tool[-1].axes, stance.position.T)
+        turning = any(not joint.linear for joint in self.tool_joints)
+        stops = [(joint.name, frame.origin) for joint, frame in zip(self.tool_joints, tool[1:-1], strict=True)]
+        if not turning:
+            stops = [(body.element.name, body.spring(tool).place.T) for body in self.tool_bodies]
+        sides = [[("base", tool[0].origin), *stops, ("tool", tip.origin)]]
+        stops = [(body.element.name, body.spring(work).place.T) for body in self.work_bodies]
+        sides.append([("base", work[0].origin), *stops, ("work", work[-1].origin)] if stops else [])
         drawn = []
-        for side, frames in (("tool", [*tool[:-1], Frame(tool[-1].axes, stance.position.T)]), ("work", work)):
-            points = [np.broadcast_to(frame.origin, (3, n)).T for frame in frames]
-            drawn.append((side, np.stack(points, axis=1)))
+        for side in sides:
+            for (_, start), (name, end) in pairwise(side):
+                points = [np.broadcast_to(point.reshape(3, -1), (3, len(stance))).T for point in (start, end)]
+                drawn.append((name, np.stack(points, axis=1)))
         return drawn
 
 
