@@ -51,6 +51,9 @@ def campaign(path: Path, seed: int, fault: str, joint: int = 2, count: int = 30)
     for axis, size in {"torsion": (("z", 800e-9),), "bending": (("x", 700e-9), ("y", 700e-9))}.get(fault, ()):
         rows = screws(q, axis)[:, joint]
         moved += size * rows * (rows * force).sum(axis=1, keepdims=True)
+    if fault == "backlash":  # taken up by any load
+        rows = screws(q, "z")[:, joint]
+        moved += 4e-4 * np.sign((rows * force).sum(axis=1, keepdims=True)) * rows
     if fault == "unknown":  # a guide that binds: softer the further out, along one direction of the floor alone
         moved[:, 0] += 2e-6 * np.sin(3.0 * position[:, 0]) ** 2 * force[:, 0]
     moved = 1e6 * moved + SD_UM * rng.normal(size=moved.shape)
@@ -71,7 +74,8 @@ def test_blind_cases_of_a_robot(tmp_path: Path) -> None:
     right = wrong = 0
     for seed, (fault, joint) in enumerate(CASES):
         found = tps.diagnose(campaign(tmp_path / f"{seed}.csv", seed, fault, joint), ROBOT)
-        truth = {"none": "adequate", "unknown": "unexplained"}.get(fault, f"joint_{fault}, joint {joint + 1}")
+        named = "gear_backlash" if fault == "backlash" else f"joint_{fault}"
+        truth = {"none": "adequate", "unknown": "unexplained"}.get(fault, f"{named}, joint {joint + 1}")
         names = [row.label for row in found.plausible]
         right += truth == found.verdict or truth in names
         wrong += found.verdict == "identified" and truth not in names

@@ -136,17 +136,11 @@ def place(
     """
     if write is None and not (decimals is None and linearise_mm is None):
         raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
-    base = [inputs.finite("--base", value) for value in base_mm]
-    if len(base) != 3:
-        raise InputError(f"--base of {len(base)} numbers", expected="X,Y,Z in mm")
-    box = [_moved(side, offset) for side, offset in zip((x_mm, y_mm, z_mm), base, strict=True)]
-    heights = [z + base[2] for z in z_values_mm]
     on, part = machine_from(machine), program_from(program)
-    model, origin = on.running(part), origin_si(origin_mm_deg)
+    model, origin, turns = on.running(part), origin_si(origin_mm_deg), (tilt_a_deg, tilt_b_deg, rotate_deg)
     default, setup = model.machine.default_origin, cut_setup(cut, material, stock_mm)
     if (objective == ERROR) != (setup is not None):
-        problem = "--objective error and a cut need each other"
-        raise InputError(problem, hint="say --cut FILE, or --material and --stock")
+        raise InputError("--objective error and a cut need each other", hint="say --cut, or --material and --stock")
     read = part.moves(origin, default)
     present, step = origin or (read.origin if read.origin_source == "program" else default), m_from_mm(step_mm)
     now = None if setup is None else evaluate_cut(model, read, present, setup, step, progress)
@@ -155,7 +149,7 @@ def place(
         program=read,
         present=present,
         read=lambda other: part.moves(other, default),
-        bounds=_bounds(model.machine, box, heights, (tilt_a_deg, tilt_b_deg, rotate_deg)),
+        bounds=_bounds(model.machine, *_from_base(base_mm, (x_mm, y_mm, z_mm), z_values_mm), turns),
         rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
         load=parse_load(load),
         step=step,
@@ -197,11 +191,18 @@ def _bounds(
     return Bounds(low, high, tuple(m_from_mm(z) for z in heights))
 
 
-def _moved(side: Range | None, offset: float) -> Range | None:
-    """A bound, or both, counted from elsewhere."""
-    if side is None or not offset:
-        return side
-    return side + offset if isinstance(side, int | float) else (side[0] + offset, side[1] + offset)
+def _from_base(
+    base_mm: Sequence[float], box: Sequence[Range | None], heights_mm: Sequence[float]
+) -> tuple[list[Range | None], list[float]]:
+    """Bounds and heights that are given, counted from the machine's base. Raises `InputError`."""
+    base = [inputs.finite("--base", value) for value in base_mm]
+    if len(base) != 3:
+        raise InputError(f"--base of {len(base)} numbers", expected="X,Y,Z in mm")
+    moved: list[Range | None] = []
+    for side, offset in zip(box, base, strict=True):
+        ends = side if side is None else np.add(side, offset).tolist()
+        moved.append(tuple(ends) if isinstance(ends, list) else ends)
+    return moved, [z + base[2] for z in heights_mm]
 
 
 def _pair(given: Range) -> tuple[float, float]:

@@ -22,7 +22,8 @@ from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, w
 from toolpath_stiff.cutting.sweeps import tilted_moves
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
 from toolpath_stiff.cutting.workpiece import Workpiece, stages_of
-from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import Moves, ReadProgram
 from toolpath_stiff.path.sampling import Samples, sample_moves
@@ -145,8 +146,12 @@ def evaluate_cut(
     Raises
     ------
     InputError
-        Something is missing (which, and where to write it), or every cut has a tilted tool.
+        Something is missing (which, and where to write it), every cut has a tilted tool, or joints leave a choice.
     """
+    turned, many = bool(program.moves.end[:, 3:].any()), len(model.machine.configurations) > 1
+    if not isinstance(model.machine, Hexapod) and (turned or many):
+        mistake = f"a cut on machine {model.machine.name}, whose joints stand in several ways or turn the work"
+        raise InputError(mistake, expected="an upright tool on a machine of one configuration, or no cut")
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
     spindle = spindle_of(setup, program, samples)
     feed_per_tooth = _feed_per_tooth(samples, cutters, spindle)

@@ -50,9 +50,9 @@ class ElementDiagnosis(FolderResult):
         As of a hexapod: "adequate", "identified", "ambiguous", "unexplained"; the explanations that it leaves.
     ranked
         All explanations, each fitted alone, the likeliest first.
-    joints, torsion
-        Names of the joints that turn, (j,) rad/(N m) fitted in place of the file's; none where nothing turns.
-    said
+    joints, torsion, chi_square_fitted
+        Names of the joints that turn, (j,) rad/(N m) fitted in place of the file's, and the misfit that these leave.
+    left_out
         (m,) m, by joints fitted without the readings of the same pose.
     """
 
@@ -68,7 +68,8 @@ class ElementDiagnosis(FolderResult):
     ranked: list[Explanation]
     joints: list[str]
     torsion: FloatArray
-    said: FloatArray
+    chi_square_fitted: float
+    left_out: FloatArray
     inputs: tuple[str, ...] = ()
 
     @property
@@ -76,15 +77,15 @@ class ElementDiagnosis(FolderResult):
         """The readings."""
         return self.model.pulls
 
-    def error_percent(self, said: FloatArray) -> float:
-        """Root mean square of what is read less what is said, of that of what is read, all components together."""
+    def error_percent(self, modelled: FloatArray) -> float:
+        """Root mean square of what is read less what is modelled, of that of what is read, all components together."""
         value = self.pulls.value
-        return float(100.0 * np.sqrt(((value - said) ** 2).sum() / (value**2).sum()))
+        return float(100.0 * np.sqrt(((value - modelled) ** 2).sum() / (value**2).sum()))
 
     @property
     def fitted_text(self) -> str:
         """The machine file with the fitted torsions; "" where the file does not list them or they predict no better."""
-        better = self.error_percent(self.said) < self.error_percent(self.model.predicted)
+        better = self.error_percent(self.left_out) < self.error_percent(self.model.predicted)
         text = self.model.machine.text
         if not better or len(TORSION.findall(text)) != 1 or not len(self.torsion):
             return ""
@@ -93,6 +94,7 @@ class ElementDiagnosis(FolderResult):
     def to_dict(self) -> Document:
         """The content of diagnose.json."""
         ends = zip(self.joints, (NRAD * self.torsion).tolist(), strict=True)
+        error = self.error_percent(self.left_out) if self.joints else None
         return {
             "machine": self.model.machine.name,
             **effects_stated(self.model.model),
@@ -114,7 +116,8 @@ class ElementDiagnosis(FolderResult):
                 for row in self.ranked[:SHOWN]
             ],
             "joints_fitted_nrad_per_Nm": dict(ends),
-            "error_of_joints_fitted_at_left_out_poses_percent": self.error_percent(self.said) if self.joints else None,
+            "chi_square_of_joints_fitted": self.chi_square_fitted if self.joints else None,
+            "error_of_joints_fitted_at_left_out_poses_percent": error,
         }
 
     def to_frame(self) -> pd.DataFrame:
@@ -127,7 +130,7 @@ class ElementDiagnosis(FolderResult):
         return {
             "file": pulls.file, "line": pulls.line, "component": pulls.component, "pose": pulls.pose + 1,
             "measured_um": um_from_m(pulls.value), "modelled_um": um_from_m(self.model.predicted),
-            "joints_fitted_left_out_um": um_from_m(self.said), "sd_um": um_from_m(self.sd),
+            "joints_fitted_left_out_um": um_from_m(self.left_out), "sd_um": um_from_m(self.sd),
         }  # fmt: skip
 
     def words(self, row: Explanation) -> str:
@@ -154,21 +157,21 @@ def diagnose_elements(
         A file cannot be read, a row is no pull, or the machine cannot stand there.
     """
     model = PullModel(build_model(machine), read_pulls(files, machine, mapping))
-    sd, said_of_noise, known = _noise(model, noise)
+    sd, source_of_noise, known = _noise(model, noise)
     white = whitening(model, sd)
     chi_square, ranked = explanations(model, white)
     verdict, plausible = verdict_of(chi_square, ranked, len(sd))
     if not known and verdict == "unexplained":
         verdict, plausible = "ambiguous", [row for row in ranked if row.chi_square < chi_square]
     joints, columns = model.torsions()
-    value, torsion, said = model.pulls.value, np.zeros(0), model.predicted
+    value, torsion, without, left = model.pulls.value, np.zeros(0), model.predicted, chi_square
     if joints:
-        own = np.array(_file_torsions(model, joints))
-        fixed = model.predicted - columns @ own
-        torsion = non_negative(columns / sd[:, None], (value - fixed) / sd)[0]
-        said = left_out(columns, value, fixed, sd, model.pulls.pose)
+        stated = np.array(_file_torsions(model, joints))
+        fixed = model.predicted - columns @ stated
+        torsion, left = non_negative(white @ columns, white @ (value - fixed))
+        without = left_out(columns, value, fixed, sd, model.pulls.pose)
     return ElementDiagnosis(
-        model, sd, said_of_noise, chi_square, verdict, plausible, ranked, joints, torsion, said, tuple(files)
+        model, sd, source_of_noise, chi_square, verdict, plausible, ranked, joints, torsion, left, without, tuple(files)
     )
 
 
@@ -185,7 +188,7 @@ def _noise(model: PullModel, relative: float | None) -> tuple[FloatArray, str, b
     """
     pulls = model.pulls
     key = np.unique(np.char.add(pulls.file, pulls.line.astype(str)), return_inverse=True)[1]
-    size = np.sqrt(np.bincount(key, model.predicted**2))[key]
+    size = np.sqrt(np.bincount(key, pulls.value**2))[key]
     stated = ~np.isnan(pulls.sd)
     if relative is None and stated.all():
         return pulls.sd, "sd_um of each row", True

@@ -7,7 +7,7 @@ where nothing is missing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from toolpath_stiff.machine.elements import SIX
 from toolpath_stiff.readings.pulls import Pulls
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import effects_of_elements
-from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
 
 ALIKE = 10.0  # chi-square: an explanation that leaves no more than this beside the best cannot be told from it
@@ -49,10 +48,12 @@ class PullModel:
 
     def __init__(self, model: StiffnessModel, pulls: Pulls) -> None:
         self.model, self.pulls, self.machine = model, pulls, model.machine
-        self.path: LoadPath = path_of_stance(model, pulls.stance, force=np.linalg.norm(pulls.wrench[:, :3], axis=1))
+        path = path_of_stance(model, pulls.stance, force=np.linalg.norm(pulls.wrench[:, :3], axis=1))
         rows = [load.rows(pulls.stance.position) for load in pulls.stance.loads]
+        loads = [np.einsum("nri,ni->nr", part, pulls.wrench) for part in rows]
+        self.path = replace(path, element_loads=np.concatenate(loads, axis=1))
         self._by_load = [
-            np.einsum("nri,ni->nr", part, pulls.wrench) * np.einsum("nri,ni->nr", part, pulls.along) for part in rows
+            load * np.einsum("nri,ni->nr", part, pulls.along) for load, part in zip(loads, rows, strict=True)
         ]
         compliances = [load.compliance for load in pulls.stance.loads]
         self.by_element = np.stack(
@@ -81,21 +82,21 @@ class PullModel:
 
     def candidates(self) -> list[tuple[str, str, list[str], FloatArray]]:
         """Effect, element, parameters and (m, k) columns per SI unit of each, of what changes anything."""
-        found = []
+        rows = []
         for name, effect in effects_of_elements().items():
             real = [p for p in effect.parameters if not p.discrete]
-            if effect.is_instrument or effect.load_dependent or any(p.name == "setup" for p in effect.parameters):
+            if effect.is_instrument or any(p.name == "setup" for p in effect.parameters):
                 continue
             by_element = len(real) < len(effect.parameters)
             for element in [e.name for e in self.machine.elements] if by_element else [""]:
                 on = {"element": element} if element else {}
-                if by_element and name.startswith("joint_") != self._turns(element):
-                    continue  # of a joint that turns, torsion and bending; of others all that they give
+                if by_element and (effect.link == "joints") != self._turns(element):
+                    continue  # of a joint that turns, what joints do; of others all that they give
                 none = {p.name: p.neutral * p.si for p in real}
                 units = [none | {p.name: 0.5 if p.name == "factor" else 1.0} for p in real]
                 columns = [self.column_of(ActiveEffect(effect, on | values)) for values in units]
-                found.append((name, element, [p.name for p in real], np.stack(columns, axis=1)))
-        return [row for row in found if (np.abs(row[3]).max(axis=0) > 0.0).any()]
+                rows.append((name, element, [p.name for p in real], np.stack(columns, axis=1)))
+        return [row for row in rows if (np.abs(row[3]).max(axis=0) > 0.0).any()]
 
     def _turns(self, name: str) -> bool:
         return any(e.name == name and e.link == "joints" and e.directions == SIX for e in self.machine.elements)
@@ -129,12 +130,12 @@ def non_negative(columns: FloatArray, values: FloatArray) -> tuple[FloatArray, f
 
 def left_out(columns: FloatArray, values: FloatArray, fixed: FloatArray, sd: FloatArray, pose: IntArray) -> FloatArray:
     """(m,) what a fit of columns beside the fixed part says of the readings of each pose without these."""
-    said = np.empty_like(values)
+    predicted = np.empty_like(values)
     for number in np.unique(pose):
         here = pose == number
         size, _ = non_negative(columns[~here] / sd[~here, None], (values - fixed)[~here] / sd[~here])
-        said[here] = fixed[here] + columns[here] @ size
-    return said
+        predicted[here] = fixed[here] + columns[here] @ size
+    return predicted
 
 
 def verdict_of(chi_square: float, rows: Sequence[Explanation], count: int) -> tuple[str, list[Explanation]]:

@@ -22,7 +22,10 @@ def text(result: ElementDiagnosis) -> str:
     if result.joints:
         values = ", ".join(f"{name} {NRAD * c:.0f}" for name, c in zip(result.joints, result.torsion, strict=True))
         lines += ["", f"torsion of the joints fitted in place of the file's, nrad/(N m): {values}"]
-        lines.append(f"error of these at poses left out of the fit {result.error_percent(result.said):.1f} %")
+        lines.append(
+            f"error of these at poses left out of the fit {result.error_percent(result.left_out):.1f} %; they leave "
+            f"chi-square {result.chi_square_fitted:.0f} of {count} readings"
+        )
     return "\n".join(lines)
 
 
