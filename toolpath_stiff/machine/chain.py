@@ -31,7 +31,7 @@ class Frame:
 
     def point(self, place: FloatArray) -> FloatArray:
         """(n, 3) in base axes of a point (3,) of this frame; (3,) where the frame is the same at all poses."""
-        return rows_of(self.origin + applied(self.axes, place))
+        return rows_of(self.origin + applied(self.axes, place) if place.any() else self.origin)
 
     @property
     def placement(self) -> FixedFrame:
