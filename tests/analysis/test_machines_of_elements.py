@@ -241,3 +241,9 @@ def test_bounds_of_a_placement_count_from_where_the_work_stands() -> None:
     said = tps.place(POCKET, file("mill3"), x_mm=60, y_mm=(-60, 40), z_mm=200, **fixed)
     assert here.origin_mm_deg == said.origin_mm_deg
     assert here.origin_mm_deg[0] == 60 and here.origin_mm_deg[2] == 200 and -60 <= here.origin_mm_deg[1] <= 40
+
+
+def test_a_program_that_turns_the_work_is_not_turned_by_a_search() -> None:
+    program = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z0\nG1 X10 A-20 F500\nM2", name="tilted.nc")
+    with pytest.raises(tps.InputError, match="turns axes of machine mill5.*--rotate 0"):
+        tps.place(program, file("mill5"))

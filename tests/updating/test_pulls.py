@@ -66,7 +66,7 @@ def campaign(path: Path, seed: int, fault: str, joint: int = 2, count: int = 30)
 CASES = (
     [("none", 0)] * 12 + [("torsion", j) for j in (0, 1, 2, 3, 4, 5)] * 2 + [("bending", j) for j in (0, 1, 2, 3)] * 2
 )
-CASES += [("unknown", 0)] * 6
+CASES += [("unknown", 0)] * 6 + [("backlash", 0), ("backlash", 2)]
 
 
 def test_blind_cases_of_a_robot(tmp_path: Path) -> None:

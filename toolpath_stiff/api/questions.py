@@ -104,7 +104,8 @@ class Question:
         """A diagnosis of pulls, or stiffnesses, on a machine of elements."""
         assert self.data is not None
         noise = None if self.request.noise is None else float(np.hypot.reduce(np.atleast_1d(self.request.noise)))
-        return diagnose_elements(self.model, self.data.files, self.data.columns, noise)
+        spread = float(self.common["strut_spread"])
+        return diagnose_elements(self.on.running(), self.data.files, self.data.columns, noise, spread)
 
     def diagnosed(self, tell: Callable[[str], None], *words: str, inputs: Iterable[str] = ()) -> Diagnosis:
         """A diagnosis of the readings; `words` are further ones of the command that gives it."""
@@ -223,6 +224,8 @@ def diagnose(
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     if not isinstance(question.model, Hexapod):
+        if program is not None:
+            raise InputError("--program, on which explanations are weighed, knows hexapods only", hint="leave it out")
         return question.of_elements()
     on, part, origin = question.on, None if program is None else program_from(program), origin_si(origin_mm_deg)
     words = [

@@ -21,11 +21,10 @@ from toolpath_stiff.inference.element_fits import (
     verdict_of,
     whitening,
 )
-from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.readings.pulls import Pulls, read_pulls
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.catalogue import effects_of_elements
-from toolpath_stiff.stiffness.model import build_model, effects_stated
+from toolpath_stiff.stiffness.model import StiffnessModel, effects_stated
 from toolpath_stiff.units import um_from_m
 
 if TYPE_CHECKING:
@@ -147,18 +146,21 @@ class ElementDiagnosis(FolderResult):
 
 
 def diagnose_elements(
-    machine: MachineTool, files: Sequence[str], mapping: Mapped = None, noise: float | None = None
+    machine: StiffnessModel, files: Sequence[str], mapping: Mapped, noise: float | None, spread: float
 ) -> ElementDiagnosis:
-    """The verdict; `noise` is the standard deviation of a displacement relative to the size of its pull's.
+    """The verdict.
+
+    `noise` is the standard deviation of a displacement relative to the size of its pull's, `spread` that of the
+    elements' compliances, relative.
 
     Raises
     ------
     InputError, InputErrors
         A file cannot be read, a row is no pull, or the machine cannot stand there.
     """
-    model = PullModel(build_model(machine), read_pulls(files, machine, mapping))
+    model = PullModel(machine, read_pulls(files, machine.machine, mapping))
     sd, source_of_noise, known = _noise(model, noise)
-    white = whitening(model, sd)
+    white = whitening(model, sd, spread)
     chi_square, ranked = explanations(model, white)
     verdict, plausible = verdict_of(chi_square, ranked, len(sd))
     if not known and verdict == "unexplained":

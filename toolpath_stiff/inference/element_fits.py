@@ -21,7 +21,6 @@ from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
 ALIKE = 10.0  # chi-square: an explanation that leaves no more than this beside the best cannot be told from it
 GAIN = 16.0  # chi-square that a name must gain over no effect, with some thirty candidates: under 1 in 500 by chance
 WRONG = 1e-3  # probability of so large a misfit, below which something else is missing
-SPREAD = 0.01  # relative standard deviation of each element's compliance from the file's, assumed
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,8 @@ class PullModel:
 
     def __init__(self, model: StiffnessModel, pulls: Pulls) -> None:
         self.model, self.pulls, self.machine = model, pulls, model.machine
-        path = path_of_stance(model, pulls.stance, force=np.linalg.norm(pulls.wrench[:, :3], axis=1))
+        seen = model.conditions.columns(len(pulls))
+        path = path_of_stance(model, pulls.stance, force=np.linalg.norm(pulls.wrench[:, :3], axis=1), **seen)
         rows = [load.rows(pulls.stance.position) for load in pulls.stance.loads]
         loads = [np.einsum("nri,ni->nr", part, pulls.wrench) for part in rows]
         self.path = replace(path, element_loads=np.concatenate(loads, axis=1))
@@ -102,9 +102,9 @@ class PullModel:
         return any(e.name == name and e.link == "joints" and e.directions == SIX for e in self.machine.elements)
 
 
-def whitening(model: PullModel, sd: FloatArray) -> FloatArray:
-    """(m, m) that makes noise of sd (m,) m and elements alike to `SPREAD` independent and of unit size."""
-    covariance = np.diag(sd**2) + SPREAD**2 * model.by_element @ model.by_element.T
+def whitening(model: PullModel, sd: FloatArray, spread: float) -> FloatArray:
+    """(m, m) that makes noise of sd (m,) m and elements alike to a relative `spread` independent and of unit size."""
+    covariance = np.diag(sd**2) + spread**2 * model.by_element @ model.by_element.T
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 

@@ -10,6 +10,7 @@ from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import share, stiffness_figures
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, UnreachableError
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
@@ -88,6 +89,10 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
 
 def _check(task: PlacementTask) -> None:
     """Raise `InputError` for what can be told before a search."""
+    machine, turns = task.model.machine, np.concatenate([task.bounds.low[3:], task.bounds.high[3:]])
+    if not isinstance(machine, Hexapod) and task.program.native and task.program.moves.end[:, 3:].any() and turns.any():
+        mistake = f"the program turns axes of machine {machine.name}, whose words another turn of the work would change"
+        raise InputError(mistake, hint="place it with --rotate 0, untilted")
     if not task.write:
         return
     check_rewritable(task.program)
