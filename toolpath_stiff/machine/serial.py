@@ -136,6 +136,11 @@ class Serial(MachineTool):
         loop = [i for i in (*reversed(range(count, len(z))), *range(count)) if rotary[self.chain[i]]]
         return RotaryAxes([int(self.chain[i]) for i in loop], tuple(z[i] for i in loop), base @ tool[-1].axes[..., 0])
 
+    def motion_at_zero(self, name: str) -> FloatArray:
+        """(3,) base axes: the way an axis moves the tool against the work, or turns it, at joint values of 0."""
+        number = int(np.flatnonzero(self.chain == self.joint_names.index(name))[0])
+        return _directions(*self.frames(np.zeros((len(self.joints), 1))))[number][:, 0]
+
     def frames(self, values: FloatArray) -> tuple[list[Frame], list[Frame]]:
         """Frames of both chains at joint values (j, n): the base, one a joint, then the tip and the work."""
         count, values = len(self.tool_joints), values[self.chain]

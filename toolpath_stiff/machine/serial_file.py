@@ -21,6 +21,7 @@ from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections, read_rows, read_sections
 from toolpath_stiff.machine.serial import Serial
 from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
+from toolpath_stiff.machine.words import LETTERS
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 MODIFIED, STANDARD, XYZAC, XYZBC = "modified DH", "standard DH", "linuxcnc xyzac-trt-kins", "linuxcnc xyzbc-trt-kins"
@@ -64,6 +65,7 @@ SECTIONS_BESIDE = [name for name in SCHEMA if name]
 # Limits of all rotary axes within a turn of 2 pi: such degrees are radians. Angles of a row that are multiples of a
 # right angle in radians, to the digits that people write.
 RADIANS, RIGHT_ANGLE, WRITTEN = 6.29, np.pi / 2.0, 1e-3
+PARALLEL = 1e-3  # sine of the angle, or volume, of directions that are taken for one
 SHORTEST_ARM = 0.05  # m from the first joint to the tip: less is a description in metres
 
 
@@ -250,8 +252,20 @@ def _ends(toml: MachineToml, values: Sections, axis: str) -> Document:
 
 
 def _check_solvable(toml: MachineToml, machine: Serial) -> None:
-    """A pose needs three linear axes and up to two rotary ones, or six joints."""
-    linear = sum(joint.linear for joint in machine.joints)
-    if machine.rotary_axes is None and len(machine.tool_joints) < 6:
-        mistake = f"{linear} linear and {len(machine.joints) - linear} rotary axes"
-        raise toml.fault("", "axis", f": {mistake}", "three linear axes and up to two rotary ones, or six joints")
+    """A pose needs three linear axes that span space and up to two rotary ones, named by words; or six joints."""
+    linear = [joint.name for joint in machine.joints if joint.linear]
+    rotary = [joint.name for joint in machine.joints if not joint.linear]
+    expected = "three linear axes and up to two rotary ones, or six joints"
+    if (axes := machine.rotary_axes) is None:
+        if len(machine.tool_joints) < 6:
+            raise toml.fault("", "axis", f": {len(linear)} linear and {len(rotary)} rotary axes", expected)
+        return
+    if strange := [name for name in rotary if name not in LETTERS]:
+        raise toml.fault("", "axis", f": rotary axis {strange[0]!r}", expected="A, B or C, as programs call it")
+    if len(axes.axes) == 2 and np.linalg.norm(np.cross(*axes.axes)) < PARALLEL:
+        raise toml.fault("", "axis", f": {' and '.join(rotary)} turn about the same direction", expected)
+    volume = float(np.linalg.det([machine.motion_at_zero(name) for name in sorted(linear)]))
+    if abs(volume) < PARALLEL:
+        raise toml.fault("", "axis", f": {', '.join(linear)} do not reach all places", expected)
+    if volume < 0.0 and sorted(linear) == ["X", "Y", "Z"]:
+        raise toml.fault("", "axis", ": X, Y, Z are mirrored (left-handed)", expected="a right-handed frame")
