@@ -416,6 +416,26 @@ BAD = [
 ]  # fmt: skip
 
 
+HEADS = [
+    ('name = "B"', 'name = "B1"', "rotary axis 'B1'; expected A, B or C"),
+    ("axis = [0, -1, 0]", "axis = [0, 0, -1]", "C and B turn about the same direction"),
+    ("axis = [0, 1, 0]", "axis = [0, -1, 0]", "X, Y, Z are mirrored"),
+    ("axis = [0, 1, 0]", "axis = [1, 0, 0]", "do not reach all places"),
+    (
+        'name = "Z"\ntype = "linear"',
+        'name = "A"\ntype = "rotary"',
+        "m(ax|in)_mm: the axis is rotary",
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "words"), HEADS)
+def test_axes_that_cannot_be_are_refused(old, new, words):
+    assert old in HEAD
+    with pytest.raises(InputError, match=words):
+        parse_machine(HEAD.replace(old, new, 1))
+
+
 @pytest.mark.parametrize(("name", "old", "new", "words"), BAD)
 def test_a_bad_description_is_one_line_that_names_it(name, old, new, words):
     text = (DATA / f"{name}.toml").read_text()

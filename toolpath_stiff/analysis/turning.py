@@ -103,7 +103,6 @@ def choose_turn(
     tool_length: FloatArray,
     load: Load,
     mode: str = BEST,
-    turns: int = TURNS,
 ) -> TurnChoice:
     """The turn at n poses of a path under a load.
 
@@ -117,8 +116,6 @@ def choose_turn(
         Whose compliance counts.
     mode
         "fixed" as programmed, "feed" with the tool's x along the feed, "best".
-    turns
-        How many are tried, evenly round the circle.
 
     Raises
     ------
@@ -133,7 +130,7 @@ def choose_turn(
     if mode == FEED:
         return replace(_kept(rotation, feed_turns(rotation, tangent)), mode=FEED)
     nodes = np.unique(np.linspace(0, len(abc) - 1, NODES).round().astype(np.int64))
-    angles = np.asarray(TURN / turns * np.arange(turns), dtype=np.float64)
+    angles = np.asarray(TURN / TURNS * np.arange(TURNS), dtype=np.float64)
     poses = (position[nodes], rotation[nodes], tangent[nodes])
     joints, cost = _candidates(model, poses, tool_length[nodes], load, angles)
     if not np.isfinite(cost).any():

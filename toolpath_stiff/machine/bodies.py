@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.machine.chain import Frame, Placement, applied, rows_of
+from toolpath_stiff.machine.chain import FixedFrame, Frame, applied, rows_of
 from toolpath_stiff.machine.elements import Element, Spring, beam_axes, beam_compliance
 
 
@@ -28,7 +28,7 @@ class Body:
 
     element: Element
     frame: int
-    place: Placement
+    place: FixedFrame
     compliance: FloatArray
 
     def spring(self, frames: Sequence[Frame]) -> Spring:

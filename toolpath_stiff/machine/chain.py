@@ -25,18 +25,18 @@ class Frame:
     axes: FloatArray
     origin: FloatArray
 
-    def moved(self, place: Placement) -> Frame:
+    def moved(self, place: FixedFrame) -> Frame:
         """A frame that stands still in this one."""
         return Frame(turned(self.axes, place.axes), self.origin + applied(self.axes, place.origin))
 
     def point(self, place: FloatArray) -> FloatArray:
         """(n, 3) in base axes of a point (3,) of this frame; (3,) where the frame is the same at all poses."""
-        return rows_of(self.origin + applied(self.axes, place))
+        return rows_of(self.origin + applied(self.axes, place) if place.any() else self.origin)
 
     @property
-    def placement(self) -> Placement:
+    def placement(self) -> FixedFrame:
         """It in the base, where it is the same at all poses."""
-        return Placement(self.axes[..., 0], self.origin[:, 0])
+        return FixedFrame(self.axes[..., 0], self.origin[:, 0])
 
     def turn(self, axes: FloatArray) -> FloatArray:
         """(n, 3, 3) in base axes of axes (3, 3) in this frame; (3, 3) where the frame is the same at all poses."""
@@ -44,25 +44,25 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Placement:
+class FixedFrame:
     """Where one body stands in another: axes (3, 3), its axes as columns; origin (3,) m."""
 
     axes: FloatArray
     origin: FloatArray
 
-    def then(self, other: Placement) -> Placement:
+    def then(self, other: FixedFrame) -> FixedFrame:
         """The placement of what stands so in this one."""
-        return Placement(self.axes @ other.axes, self.axes @ other.origin + self.origin)
+        return FixedFrame(self.axes @ other.axes, self.axes @ other.origin + self.origin)
 
-    def inverse(self) -> Placement:
+    def inverse(self) -> FixedFrame:
         """The placement of the other body in this one."""
-        return Placement(self.axes.T, -self.axes.T @ self.origin)
+        return FixedFrame(self.axes.T, -self.axes.T @ self.origin)
 
 
-def placement(xyz: ArrayLike = (0.0, 0.0, 0.0), rpy: ArrayLike = (0.0, 0.0, 0.0)) -> Placement:
+def placement(xyz: ArrayLike = (0.0, 0.0, 0.0), rpy: ArrayLike = (0.0, 0.0, 0.0)) -> FixedFrame:
     """From m and roll, pitch, yaw in rad, R = Rz(yaw) Ry(pitch) Rx(roll), as URDF has origins; right angles exact."""
     axes = rotation_matrices(np.asarray(rpy, dtype=float))
-    return Placement(np.where(np.abs(axes) < TINY, 0.0, axes), np.asarray(xyz, dtype=float))
+    return FixedFrame(np.where(np.abs(axes) < TINY, 0.0, axes), np.asarray(xyz, dtype=float))
 
 
 STILL = placement()
@@ -88,23 +88,23 @@ class ChainJoint:
 
     name: str
     linear: bool
-    place: Placement
+    place: FixedFrame
     low: float = -np.inf
     high: float = np.inf
-    given: Placement = STILL
+    given: FixedFrame = STILL
 
 
-def modified_dh(alpha: float, a: float, offset: float, d: float) -> Placement:
-    """Placement at joint value 0 by modified DH: Rx(alpha) Tx(a) Rz(offset) Tz(d) (Craig, Robotics, 3.6)."""
+def modified_dh(alpha: float, a: float, offset: float, d: float) -> FixedFrame:
+    """FixedFrame at joint value 0 by modified DH: Rx(alpha) Tx(a) Rz(offset) Tz(d) (Craig, Robotics, 3.6)."""
     return placement((a, 0.0, 0.0), (alpha, 0.0, 0.0)).then(placement((0.0, 0.0, d), (0.0, 0.0, offset)))
 
 
-def standard_dh(alpha: float, a: float, offset: float, d: float) -> Placement:
+def standard_dh(alpha: float, a: float, offset: float, d: float) -> FixedFrame:
     """What follows a joint by standard DH: Rz(offset) Tz(d) Tx(a) Rx(alpha) (Denavit and Hartenberg, 1955)."""
     return placement((0.0, 0.0, d), (0.0, 0.0, offset)).then(placement((a, 0.0, 0.0), (alpha, 0.0, 0.0)))
 
 
-def aligned(axis: ArrayLike) -> Placement:
+def aligned(axis: ArrayLike) -> FixedFrame:
     """A placement whose z is a direction, turned from z by the shortest way."""
     direction = np.asarray(axis, dtype=float)
     x, y, z = direction / np.linalg.norm(direction)
@@ -112,7 +112,7 @@ def aligned(axis: ArrayLike) -> Placement:
         return placement(rpy=(np.pi, 0.0, 0.0))
     share = 1.0 / (1.0 + z)  # Rodrigues' formula about (-y, x, 0)
     axes = np.array([[1.0 - x * x * share, -x * y * share, x], [-x * y * share, 1.0 - y * y * share, y], [-x, -y, z]])
-    return Placement(axes, np.zeros(3))
+    return FixedFrame(axes, np.zeros(3))
 
 
 def chain_frames(joints: Sequence[ChainJoint], values: FloatArray) -> list[Frame]:

@@ -8,7 +8,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.chain import Placement
+from toolpath_stiff.machine.chain import FixedFrame
 from toolpath_stiff.machine.unfilled import SPINDLE, axis_row, carriages, file_text, place_keys
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm, rad_from_deg
 
@@ -53,7 +53,7 @@ def machine_from_fcm(text: str, order: Sequence[str], file: str) -> tuple[str, l
         side, before = {"head": "tool", "table": "work"}[role], np.zeros(3)
         for name in names:
             (origin, axis), sort = joints[name], str(axes[name].get("type"))
-            place = Placement(np.eye(3), m_from_mm(scale * (origin - before)))
+            place = FixedFrame(np.eye(3), m_from_mm(scale * (origin - before)))
             bounds = m_from_mm(scale * ends[name]) if sort == "linear" else rad_from_deg(ends[name])
             towards = -axis if side == "work" else axis  # a table moves against the programmed axis
             parts.append(axis_row(name, sort == "linear", place_keys(place, towards), bounds, side))

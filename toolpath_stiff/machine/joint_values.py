@@ -25,7 +25,8 @@ def wound(values: FloatArray, limits: FloatArray, linear: Sequence[bool], start:
             continue
         finite = np.flatnonzero(np.isfinite(values[i]))
         if len(finite):
-            path = np.unwrap(np.concatenate([start[i : i + 1], values[i, finite]]))[1:]
+            path = np.concatenate([start[i : i + 1], values[i, finite]])
+            path = path[1:] - TURN * np.cumsum(np.round(np.diff(path) / TURN))
             fewest, most = np.ceil((low - path.min()) / TURN), np.floor((high - path.max()) / TURN)
             wound[i, finite] = path + TURN * (np.clip(0.0, fewest, most) if fewest <= most else 0.0)
     return wound

@@ -19,7 +19,8 @@ from toolpath_stiff.machine.unfilled import EXPERIENCE, JOINTS, SPINDLE, axis_ro
 from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
 
 PIN = re.compile(r"(?m)^\s*setp\s+([\w-]+)\.(\S+?)\s*(?:=\s*|\s+)([^\s#]+)")
-RAIL = "# translation_nm_per_N = []  # radial, tangential, vertical (the drive)\n# rotation_nrad_per_Nm = []"
+GIVE = dict.fromkeys(("translation_nm_per_N", "rotation_nrad_per_Nm"))
+STRUT = f"# A strut with both joints has typically 10 to 30 nm/N ({EXPERIENCE}).\n"
 TABLE = '# The files do not say which axes carry the work: an element with moves_with = ["-X"] does, of X'
 RADIANS = 2.0 * np.pi + 0.01
 
@@ -54,11 +55,16 @@ class ControlFiles:
             return None
         return m_from_mm(self.limits[joint] * self.scale) if linear else rad_from_deg(self.limits[joint])
 
-    def key(self, name: str, joint: int, linear: bool) -> str:
-        """A row of [limits]: a comment where nobody says."""
-        bounds = self.bounds(joint, linear)
-        unit, shop = ("mm", mm_from_m) if linear else ("deg", deg_from_rad)
-        return f"# {name}_{unit} = []" if bounds is None else section("", {f"{name}_{unit}": shop(bounds)})
+    def limits_of(self, axes: str, letters: str) -> Document:
+        """Keys of [limits] by letter, None where nobody says; `letters` are the joints' unless the files name them."""
+        letters = self.coordinates or letters
+        keys: dict[str, FloatArray | None] = {}
+        for axis in axes:
+            linear = axis in "XYZ"
+            bounds = self.bounds(letters.index(axis), linear) if axis in letters else None
+            shop = mm_from_m if linear else deg_from_rad
+            keys[f"{axis}_{'mm' if linear else 'deg'}"] = None if bounds is None else shop(bounds)
+        return keys
 
 
 def control_files(hal: str, ini: str, module: str, scale: float, file: str) -> ControlFiles:
@@ -98,18 +104,14 @@ def machine_from_control(files: ControlFiles, name: str) -> tuple[str, list[str]
         raise InputError(f"no machine of {files.module or 'a kinematics module'}", expected=known, file=files.file)
     kind, parts = KINDS[files.module](files)
     notes = [f"Made from {files.file}: {files.module}."]
-    if "# X_mm" in "".join(parts) or "# min_" in "".join(parts):
-        notes.append("Limits that no ini file gives are to be filled in.")
     return file_text(name, kind, f"{files.module} pins of {files.file}", notes, parts), notes
 
 
 def _mill(files: ControlFiles) -> tuple[str, list[str]]:
-    letters = files.coordinates or "XYZ"
-    if left := set(letters) - set("XYZ"):
+    if left := set(files.coordinates) - set("XYZ"):
         expected = "X, Y, Z; where rotary axes stand trivkins does not say"
         raise InputError(f"trivkins with axis {min(left)}", expected=expected, file=files.file)
-    rows = [files.key(letter, letters.index(letter), linear=True) for letter in "XYZ" if letter in letters]
-    return "serial", ["\n".join(["[limits]", *rows]), f"{TABLE}\n{SPINDLE}"]
+    return "serial", [section("[limits]", files.limits_of("XYZ", "XYZ")), f"{TABLE}\n{SPINDLE}"]
 
 
 def _trunnion(files: ControlFiles) -> tuple[str, list[str]]:
@@ -118,14 +120,11 @@ def _trunnion(files: ControlFiles) -> tuple[str, list[str]]:
     trunnion = {f"{key.replace('-', '_')}_mm": files.length(key, 0.0) for key in keys}
     if files.pins.get("tool-offset"):
         raise InputError(f"{files.module}.tool-offset is not 0", expected="joints that place the tip", file=files.file)
-    letters = files.coordinates or f"XYZ{letter}C"
-    rows = [files.key(axis, letters.index(axis), axis in "XYZ") for axis in f"XYZ{letter}C" if axis in letters]
     parts = [section("", {"convention": f"linuxcnc {files.module}"}), section("[trunnion]", trunnion)]
-    parts.append("\n".join(["[limits]", *rows]))
+    parts.append(section("[limits]", files.limits_of(f"XYZ{letter}C", f"XYZ{letter}C")))
     for axis in (letter, "C"):
         keys_of = {"name": f"{axis} axis", "type": "spring", "side": "work", "centre": axis}
-        give = "# translation_nm_per_N = []\n# rotation_nrad_per_Nm = []"
-        parts.append(f"{section('[[element]]', keys_of)}\n{give}")
+        parts.append(section("[[element]]", {**keys_of, **GIVE}))
     return "serial", [*parts, SPINDLE]
 
 
@@ -170,21 +169,25 @@ def _penta(files: ControlFiles) -> tuple[str, list[str]]:
         "ring_radius_mm": [files.length(f"effector.{i}.r") for i in range(5)],
         "ring_height_mm": [files.length(f"effector.{i}.z") for i in range(5)],
     }
-    strut = f"[strut]\n# length_mm =\n# compliance_nm_per_N =  # with both joints, 10 to 30 ({EXPERIENCE})"
-    strut += "\n# slope_nm_per_N_per_m =\n# min_mm =\n# max_mm ="
-    if len(ends := np.array([files.bounds(i, linear=True) for i in range(5) if i in files.limits])):
-        travel = {"min_mm": mm_from_m(float(ends[:, 0].max())), "max_mm": mm_from_m(float(ends[:, 1].min()))}
-        strut = strut.replace("# min_mm =\n# max_mm =", section("", travel))
-    return "pentapod", [section("", top), strut, "[torsion]\n# strut =\n# EI_MNm2 =\n# hinge_nrad_per_Nm =", SPINDLE]
+    travel: Document = dict.fromkeys(("min_mm", "max_mm"))
+    if files.limits:
+        low, high = np.array(list(files.limits.values())).T * files.scale
+        travel = {"min_mm": float(low.max()), "max_mm": float(high.min())}
+    strut = {"length_mm": None, "compliance_nm_per_N": None, "slope_nm_per_N_per_m": None, **travel}
+    torsion = dict.fromkeys(("strut", "EI_MNm2", "hinge_nrad_per_Nm"))
+    return "pentapod", [section("", top), STRUT + section("[strut]", strut), section("[torsion]", torsion), SPINDLE]
 
 
 def _delta(files: ControlFiles) -> tuple[str, list[str]]:
-    top = section("", {"rod_length_mm": files.length("L")})
-    top += f"\n# carriage_joint_radius_mm =  # less effector_joint_radius_mm: {files.length('R'):g}"
-    top += "\n# effector_joint_radius_mm =\n# rod_spacing_mm =\n# effector_joint_height_mm ="
-    limits = "\n".join(["[limits]", files.key("carriage", 0, linear=True)])
-    carriage = f"[carriage]\n# rail_radius_mm =\n# centre_height_mm =\n{RAIL}"
-    return "delta", [top, limits, "[rod]\n# compliance_nm_per_N =", carriage, SPINDLE]
+    joints = dict.fromkeys(("carriage_joint_radius_mm", "effector_joint_radius_mm"))
+    rest = dict.fromkeys(("rod_spacing_mm", "effector_joint_height_mm"))
+    note = f"# carriage_joint_radius_mm is {files.length('R'):g} more than effector_joint_radius_mm.\n"
+    bounds = files.bounds(0, linear=True)
+    limits = {"carriage_mm": None if bounds is None else mm_from_m(bounds)}
+    carriage = {"rail_radius_mm": None, "centre_height_mm": None, **GIVE}
+    rod = section("[rod]", {"compliance_nm_per_N": None})
+    parts = [section("[limits]", limits), rod, section("[carriage]", carriage)]
+    return "delta", [note + section("", {"rod_length_mm": files.length("L"), **joints, **rest}), *parts, SPINDLE]
 
 
 KINDS: dict[str, Callable[[ControlFiles], tuple[str, list[str]]]] = {

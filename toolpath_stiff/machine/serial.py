@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -20,8 +21,8 @@ from toolpath_stiff.machine.bodies import Body, SpanningBeam
 from toolpath_stiff.machine.chain import (
     STILL,
     ChainJoint,
+    FixedFrame,
     Frame,
-    Placement,
     chain_frames,
     columns_of,
     rows_of,
@@ -68,8 +69,8 @@ class Serial(MachineTool):
     tool_joints: tuple[ChainJoint, ...]
     work_joints: tuple[ChainJoint, ...] = ()
     order: tuple[int, ...] = ()
-    tip: Placement = STILL
-    work: Placement = STILL
+    tip: FixedFrame = STILL
+    work: FixedFrame = STILL
     tool_bodies: tuple[Body | SpanningBeam, ...] = ()
     work_bodies: tuple[Body | SpanningBeam, ...] = ()
     least: dict[str, float] = field(default_factory=dict)
@@ -134,6 +135,11 @@ class Serial(MachineTool):
         z = [base @ direction[:, 0] for direction in _directions(tool, work)]
         loop = [i for i in (*reversed(range(count, len(z))), *range(count)) if rotary[self.chain[i]]]
         return RotaryAxes([int(self.chain[i]) for i in loop], tuple(z[i] for i in loop), base @ tool[-1].axes[..., 0])
+
+    def motion_at_zero(self, name: str) -> FloatArray:
+        """(3,) base axes: the way an axis moves the tool against the work, or turns it, at joint values of 0."""
+        number = int(np.flatnonzero(self.chain == self.joint_names.index(name))[0])
+        return _directions(*self.frames(np.zeros((len(self.joints), 1))))[number][:, 0]
 
     def frames(self, values: FloatArray) -> tuple[list[Frame], list[Frame]]:
         """Frames of both chains at joint values (j, n): the base, one a joint, then the tip and the work."""
@@ -271,7 +277,7 @@ class Serial(MachineTool):
         reference = tool[-1]
         tool[-1] = Frame(reference.axes, reference.origin - reference.axes[:, 2] * extension)
         n = joints.shape[1]
-        turns = any(not joint.linear for joint in self.work_joints)
+        turns = not np.array_equal(work[-1].axes, np.eye(3)[..., None])
         loads = [body.spring(tool) for body in self.tool_bodies] + [body.spring(work) for body in self.work_bodies]
         return Stance(
             joints=joints.T,
@@ -300,13 +306,24 @@ class Serial(MachineTool):
         return self.wrist.singularities(stance.joints.T[self.chain[first : first + 6]]).T
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
-        """What a picture draws: names and polylines (n, p, 3) m, base axes."""
+        """What a picture draws: names and polylines (n, p, 3) m, base axes.
+
+        From joint to joint where joints turn on the tool's side, else from body to body; to the tip, to the work.
+        """
         tool, work = self.frames(stance.joints.T)
-        n = len(stance)
+        tip = Frame(tool[-1].axes, stance.position.T)
+        turning = any(not joint.linear for joint in self.tool_joints)
+        stops = [(joint.name, frame.origin) for joint, frame in zip(self.tool_joints, tool[1:-1], strict=True)]
+        if not turning:
+            stops = [(body.element.name, body.spring(tool).place.T) for body in self.tool_bodies]
+        sides = [[("base", tool[0].origin), *stops, ("tool", tip.origin)]]
+        stops = [(body.element.name, body.spring(work).place.T) for body in self.work_bodies]
+        sides.append([("base", work[0].origin), *stops, ("work", work[-1].origin)] if stops else [])
         drawn = []
-        for side, frames in (("tool", [*tool[:-1], Frame(tool[-1].axes, stance.position.T)]), ("work", work)):
-            points = [np.broadcast_to(frame.origin, (3, n)).T for frame in frames]
-            drawn.append((side, np.stack(points, axis=1)))
+        for side in sides:
+            for (_, start), (name, end) in pairwise(side):
+                points = [np.broadcast_to(point.reshape(3, -1), (3, len(stance))).T for point in (start, end)]
+                drawn.append((name, np.stack(points, axis=1)))
         return drawn
 
 

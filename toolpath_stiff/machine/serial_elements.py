@@ -8,7 +8,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.bodies import Body, SpanningBeam
-from toolpath_stiff.machine.chain import STILL, ChainJoint, Placement
+from toolpath_stiff.machine.chain import STILL, ChainJoint, FixedFrame
 from toolpath_stiff.machine.elements import Element, beam_axes, beam_compliance
 from toolpath_stiff.machine.schema import Key, MachineToml, read_rows
 from toolpath_stiff.units import m_from_mm, m_from_nm
@@ -44,7 +44,7 @@ Part = Body | SpanningBeam
 class ElementReader:
     """Reads one element after the other; frames of each side are numbered from the base, the last one tip or work."""
 
-    def __init__(self, toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[Placement]) -> None:
+    def __init__(self, toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[FixedFrame]) -> None:
         self.toml, self.chains, self.section = toml, chains, ""
         self.row: Document = {}
         self.homes = []
@@ -122,22 +122,22 @@ class ElementReader:
         else:
             frame, place = self._placed("centre_mm", "moves_with", work)
         if "x_axis" in self.row or "z_axis" in self.row:
-            place = Placement(beam_axes(self.needed("x_axis"), self.needed("z_axis")), place.origin)
+            place = FixedFrame(beam_axes(self.needed("x_axis"), self.needed("z_axis")), place.origin)
         tip = frame == len(homes) - 1 and not work
         return Body(self.element("tool" if tip else "table" if work else "frame"), frame, place, compliance)
 
-    def _centre(self, work: bool) -> tuple[int, Placement]:
+    def _centre(self, work: bool) -> tuple[int, FixedFrame]:
         """On the axis of a rotary joint, in the frame that carries it: machine axes with all joints at 0."""
         names = [joint.name for joint in self.chains[work]]
         if self.row["centre"] not in names:
             raise self.fault("centre", f" = {self.row['centre']!r}", f"one of {', '.join(names)}")
         carrier = names.index(self.row["centre"])
         homes = self.homes[work]
-        return carrier, homes[carrier].inverse().then(Placement(np.eye(3), homes[carrier + 1].origin))
+        return carrier, homes[carrier].inverse().then(FixedFrame(np.eye(3), homes[carrier + 1].origin))
 
-    def _placed(self, key: str, moving: str, work: bool) -> tuple[int, Placement]:
+    def _placed(self, key: str, moving: str, work: bool) -> tuple[int, FixedFrame]:
         """A point in a joint's frame, or in machine axes with all joints at 0 and moving with some of the axes."""
-        point = Placement(np.eye(3), m_from_mm(self.needed(key)))
+        point = FixedFrame(np.eye(3), m_from_mm(self.needed(key)))
         joints = self.chains[work]
         if "frame" in self.row:
             names = [joint.name for joint in joints]
@@ -168,12 +168,12 @@ class ElementReader:
         along = end.origin - start.origin
         if np.linalg.norm(np.cross(along, z_axis)) < 1e-6 * np.linalg.norm(along) or not along.any():
             raise self.fault("z_axis", " lies along the beam", "a direction across it")
-        place = Placement(beam_axes(along, z_axis), 0.5 * (start.origin + end.origin))
+        place = FixedFrame(beam_axes(along, z_axis), 0.5 * (start.origin + end.origin))
         return Body(element, first, place, beam_compliance(float(np.linalg.norm(along)), stiffness))
 
 
 def read_bodies(
-    toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[Placement] = (STILL, STILL)
+    toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[FixedFrame] = (STILL, STILL)
 ) -> tuple[tuple[Part, ...], tuple[Part, ...]]:
     """What gives way on the tool's and on the work's side."""
     reader = ElementReader(toml, chains, ends)

@@ -9,7 +9,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.chain import (
     STILL,
     ChainJoint,
-    Placement,
+    FixedFrame,
     aligned,
     modified_dh,
     placement,
@@ -21,6 +21,7 @@ from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections, read_rows, read_sections
 from toolpath_stiff.machine.serial import Serial
 from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
+from toolpath_stiff.machine.words import LETTERS
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 MODIFIED, STANDARD, XYZAC, XYZBC = "modified DH", "standard DH", "linuxcnc xyzac-trt-kins", "linuxcnc xyzbc-trt-kins"
@@ -64,6 +65,7 @@ SECTIONS_BESIDE = [name for name in SCHEMA if name]
 # Limits of all rotary axes within a turn of 2 pi: such degrees are radians. Angles of a row that are multiples of a
 # right angle in radians, to the digits that people write.
 RADIANS, RIGHT_ANGLE, WRITTEN = 6.29, np.pi / 2.0, 1e-3
+PARALLEL = 1e-3  # sine of the angle, or volume, of directions that are taken for one
 SHORTEST_ARM = 0.05  # m from the first joint to the tip: less is a description in metres
 
 
@@ -100,7 +102,7 @@ def read(toml: MachineToml) -> Serial:
 
 def _of_rows(
     toml: MachineToml, rows: Sequence[Document], values: Sections, convention: str
-) -> tuple[tuple[ChainJoint, ...], tuple[ChainJoint, ...], Placement, Placement]:
+) -> tuple[tuple[ChainJoint, ...], tuple[ChainJoint, ...], FixedFrame, FixedFrame]:
     """Joints of tool and work, the tip in the last frame of the one, the work in that of the other."""
     if convention not in (MODIFIED, STANDARD):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{MODIFIED!r} or {STANDARD!r}")
@@ -137,7 +139,7 @@ def _is_linear(toml: MachineToml, section: str, row: Document) -> bool:
     return kinds[row["type"].lower()]
 
 
-def _placements(toml: MachineToml, section: str, row: Document, convention: str) -> tuple[Placement, Placement]:
+def _placements(toml: MachineToml, section: str, row: Document, convention: str) -> tuple[FixedFrame, FixedFrame]:
     """What stands between the joint before and this one, and what follows this one."""
     dh, free = [key for key in DH if key in row], [key for key in ("xyz_mm", "rpy_deg", "axis") if key in row]
     if dh and free:
@@ -185,11 +187,11 @@ def _check_units(toml: MachineToml, joints: Sequence[ChainJoint]) -> None:
         raise toml.fault("axis[1]", "max_deg", mistake, expected="degrees")
 
 
-def _tip(toml: MachineToml, tool: Document) -> Placement:
+def _tip(toml: MachineToml, tool: Document) -> FixedFrame:
     """The tip in the flange; its axes by two columns, the third checked if it is there."""
     given = {name: tool[name] for name in ("x_axis", "y_axis", "z_axis") if name in tool}
     if not given:
-        return Placement(np.eye(3), m_from_mm(tool["tip_mm"]))
+        return FixedFrame(np.eye(3), m_from_mm(tool["tip_mm"]))
     if "x_axis" not in given or "z_axis" not in given:
         raise toml.fault("tool", next(iter(given)), " is given alone", expected="x_axis and z_axis")
     y = given.get("y_axis", np.cross(given["z_axis"], given["x_axis"]))
@@ -198,7 +200,7 @@ def _tip(toml: MachineToml, tool: Document) -> Placement:
         raise toml.fault("tool", "x_axis", ": the axes are not square, or no unit vectors", expected="a frame")
     if np.linalg.det(axes) < 0.0:
         raise toml.fault("tool", "y_axis", ": the frame is mirrored", expected="a right-handed frame, y = z cross x")
-    return Placement(beam_axes(axes[:, 0], axes[:, 2]), m_from_mm(tool["tip_mm"]))
+    return FixedFrame(beam_axes(axes[:, 0], axes[:, 2]), m_from_mm(tool["tip_mm"]))
 
 
 def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
@@ -250,8 +252,20 @@ def _ends(toml: MachineToml, values: Sections, axis: str) -> Document:
 
 
 def _check_solvable(toml: MachineToml, machine: Serial) -> None:
-    """A pose needs three linear axes and up to two rotary ones, or six joints."""
-    linear = sum(joint.linear for joint in machine.joints)
-    if machine.rotary_axes is None and len(machine.tool_joints) < 6:
-        mistake = f"{linear} linear and {len(machine.joints) - linear} rotary axes"
-        raise toml.fault("", "axis", f": {mistake}", "three linear axes and up to two rotary ones, or six joints")
+    """A pose needs three linear axes that span space and up to two rotary ones, named by words; or six joints."""
+    linear = [joint.name for joint in machine.joints if joint.linear]
+    rotary = [joint.name for joint in machine.joints if not joint.linear]
+    expected = "three linear axes and up to two rotary ones, or six joints"
+    if (axes := machine.rotary_axes) is None:
+        if len(machine.tool_joints) < 6:
+            raise toml.fault("", "axis", f": {len(linear)} linear and {len(rotary)} rotary axes", expected)
+        return
+    if strange := [name for name in rotary if name not in LETTERS]:
+        raise toml.fault("", "axis", f": rotary axis {strange[0]!r}", expected="A, B or C, as programs call it")
+    if len(axes.axes) == 2 and np.linalg.norm(np.cross(*axes.axes)) < PARALLEL:
+        raise toml.fault("", "axis", f": {' and '.join(rotary)} turn about the same direction", expected)
+    volume = float(np.linalg.det([machine.motion_at_zero(name) for name in sorted(linear)]))
+    if abs(volume) < PARALLEL:
+        raise toml.fault("", "axis", f": {', '.join(linear)} do not reach all places", expected)
+    if volume < 0.0 and sorted(linear) == ["X", "Y", "Z"]:
+        raise toml.fault("", "axis", ": X, Y, Z are mirrored (left-handed)", expected="a right-handed frame")

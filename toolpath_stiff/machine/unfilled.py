@@ -6,7 +6,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
-from toolpath_stiff.machine.chain import Placement
+from toolpath_stiff.machine.chain import FixedFrame
 from toolpath_stiff.machine.writer import toml_text, value_text
 from toolpath_stiff.rotations import roll_pitch_yaw
 from toolpath_stiff.units import deg_from_rad, mm_from_m
@@ -35,36 +35,37 @@ rotation_nrad_per_Nm = [0.0, 0.0, 0.0]"""
 
 
 def section(heading: str, values: Document) -> str:
-    """A section of a machine file; "[name]", "[[name]]", or "" for the keys above all of them."""
-    rows = [f"{key} = {value_text(value)}" for key, value in values.items()]
+    """A section of a machine file, "[name]" or "[[name]]", "" for the keys above all; None is to be filled in."""
+    rows = [f"# {key} =" if value is None else f"{key} = {value_text(value)}" for key, value in values.items()]
     return "\n".join([heading, *rows] if heading else rows)
 
 
 def file_text(name: str, kind: str, source: str, notes: Sequence[str], parts: Sequence[str]) -> str:
     """The text of a machine file."""
-    top = [*(f"# {note}" for note in notes), "# No stiffness is known: fill in what is commented out below."]
+    top = [
+        *(f"# {note}" for note in notes),
+        "# Fill in what is commented out below: no stiffness is known, nor what is missing.",
+    ]
     top += [f"name = {toml_text(name)}", f'kind = "{kind}"', f"source = {toml_text(source)}"]
     return "\n\n".join(["\n".join(top), *parts]) + "\n"
 
 
 def axis_row(name: str, linear: bool, place: Document, limits: FloatArray | None, side: str = "tool") -> str:
-    """One `[[axis]]`, its limits in m or rad; None: they are to be filled in."""
+    """One `[[axis]]`, its limits in m or rad; None: they are to be filled in, -inf and inf where it has none."""
     unit, kind = ("mm", "linear") if linear else ("deg", "rotary")
-    row = section("[[axis]]", {"name": name, "type": kind, **({"side": side} if side != "tool" else {}), **place})
-    if limits is None:
-        return f"{row}\n# min_{unit} =\n# max_{unit} =  # nobody says: fill in, -inf and inf where it has none"
-    low, high = (mm_from_m if linear else deg_from_rad)(np.asarray(limits, dtype=float)).tolist()
-    return f"{row}\n" + section("", {f"min_{unit}": low, f"max_{unit}": high})
+    ends = (None, None) if limits is None else (mm_from_m if linear else deg_from_rad)(np.asarray(limits)).tolist()
+    keys = {"name": name, "type": kind, **({"side": side} if side != "tool" else {}), **place}
+    return section("[[axis]]", {**keys, f"min_{unit}": ends[0], f"max_{unit}": ends[1]})
 
 
-def place_keys(place: Placement, axis: FloatArray) -> Document:
+def place_keys(place: FixedFrame, axis: FloatArray) -> Document:
     """Keys of an axis that stands so in the frame before."""
     angles = roll_pitch_yaw(place.axes)
     turned = {"rpy_deg": deg_from_rad(angles)} if angles.any() else {}
     return {"xyz_mm": mm_from_m(place.origin), **turned, "axis": axis}
 
 
-def tool_section(tip: Placement) -> str:
+def tool_section(tip: FixedFrame) -> str:
     """`[tool]` of a tip in the last frame."""
     keys = {"tip_mm": mm_from_m(tip.origin), "x_axis": tip.axes[:, 0], "z_axis": tip.axes[:, 2]}
     return "# z_axis runs from the tip to the shank: check it.\n" + section("[tool]", keys)

@@ -9,7 +9,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.chain import STILL, Placement, placement
+from toolpath_stiff.machine.chain import STILL, FixedFrame, placement
 from toolpath_stiff.machine.unfilled import JOINTS, SPINDLE, axis_row, file_text, place_keys, tool_section
 
 Fault = Callable[..., InputError]
@@ -88,7 +88,7 @@ def _numbers(element: ET.Element | None, key: str, default: list[float], fault: 
     return values
 
 
-def _origin(joint: ET.Element, fault: Fault) -> Placement:
+def _origin(joint: ET.Element, fault: Fault) -> FixedFrame:
     place = [_numbers(joint.find("origin"), key, [0.0] * 3, fault) for key in ("xyz", "rpy")]
     if np.abs(place[0]).max() > FARTHEST or np.abs(place[1]).max() > MOST_TURNS:
         mistake = f"joint {joint.get('name')}: origin {place[0].tolist()}, rpy {place[1].tolist()}"

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.machine.chain import STILL, ChainJoint, Placement, applied, turned, turned_from_left
+from toolpath_stiff.machine.chain import STILL, ChainJoint, FixedFrame, applied, turned, turned_from_left
 
 # Of the arm's reach, and of 1: what rounding and the digits of a file leave between axes that meet or are square.
 SQUARE = 1e-6
@@ -53,7 +53,7 @@ class SphericalWrist:
         rad, from axis 4 to axis 6 about axis 5 at joint values of 0.
     """
 
-    base: Placement
+    base: FixedFrame
     shoulder: complex
     upper: complex
     lower: complex
@@ -65,7 +65,7 @@ class SphericalWrist:
     bend: float
 
     @classmethod
-    def of(cls, joints: Sequence[ChainJoint], tip: Placement) -> SphericalWrist | None:
+    def of(cls, joints: Sequence[ChainJoint], tip: FixedFrame) -> SphericalWrist | None:
         """The closed form of six joints and the tip's frame in the last one; None where they have none."""
         if len(joints) != 6 or any(joint.linear for joint in joints):
             return None
@@ -80,9 +80,9 @@ class SphericalWrist:
         square = max(abs(float(z[i] @ z[j])) for i, j in ((0, 1), (3, 4), (4, 5))) < SQUARE
         if centre is None or not square or abs(abs(float(z[1] @ z[2])) - 1.0) > SQUARE:
             return None
-        arm = Placement(np.column_stack([np.cross(z[1], z[0]), z[1], z[0]]), homes[0].origin)
+        arm = FixedFrame(np.column_stack([np.cross(z[1], z[0]), z[1], z[0]]), homes[0].origin)
         a, b, c = (
-            arm.inverse().then(Placement(np.eye(3), p)).origin for p in (homes[1].origin, homes[2].origin, centre)
+            arm.inverse().then(FixedFrame(np.eye(3), p)).origin for p in (homes[1].origin, homes[2].origin, centre)
         )
         plane = [complex(point[2], point[0]) for point in (a, b, c)]
         wrist = np.column_stack([np.cross(z[4], z[3]), z[4], z[3]])
@@ -95,7 +95,7 @@ class SphericalWrist:
             lower=plane[2] - plane[1],
             lateral=float(c[1]),
             sign=float(np.sign(z[1] @ z[2])),
-            centre=home.inverse().then(Placement(np.eye(3), centre)).origin,
+            centre=home.inverse().then(FixedFrame(np.eye(3), centre)).origin,
             before=_cleaned(wrist.T @ arm.axes),
             after=_cleaned(home.axes.T @ wrist @ about_y),
             bend=float(np.arctan2(sine, cosine)),

@@ -118,7 +118,7 @@ def score(hidden: list[str], claim: list[str]) -> str:
     """
     claimed, truth = set(claim) - set(SOUND), set(hidden)
     if claimed & set(OTHER):
-        of_robots = {name for name, fault in ROBOT_FAULTS.items() if not fault[0]}
+        of_robots = {name for name, fault in ROBOT_FAULTS.items() if not fault.names}
         beyond = {*OUTSIDE, *faults(in_catalogue=False), *of_robots}
         claimed = (claimed - set(OTHER)) | ((truth & beyond) or {"outside"})
     if claimed == truth:
@@ -262,7 +262,7 @@ def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
     """What was hidden, and how the claim scores: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
     claims = [name.strip() for name in claim.split(",") if name.strip()]
-    of_robots = (*ROBOT_FAULTS, *(name for fault in ROBOT_FAULTS.values() for name in fault[0]))
+    of_robots = (*ROBOT_FAULTS, *(name for fault in ROBOT_FAULTS.values() for name in fault.names))
     known = tuple(dict.fromkeys((*SOUND, *OTHER, *CATALOGUE, *OUTSIDE, *FAULTS, *of_robots)))
     alone = len(claims) == 1 or (claims and not {*SOUND} & {*claims})
     if not alone or not {*claims} <= {*known}:

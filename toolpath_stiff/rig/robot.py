@@ -74,17 +74,33 @@ def _soft(field: str, count: int) -> Callable[[Robot, int, float], Document]:
     return lambda r, i, size: {field: getattr(r, field) * (1.0 + size * (np.arange(count) == i))}
 
 
-# Fault -> right names of the catalogue, how many parts it may sit in, what it changes by a size.
-FAULTS: dict[str, tuple[tuple[str, ...], int, Callable[[Robot, int, float], Document]]] = {
-    "joint_torsion": (("joint_torsion", "weak_element"), 6, _soft("torsion", 6)),
-    "joint_bending": (("joint_bending", "weak_element"), 3, _soft("bending", 6)),
-    "soft_link": (("weak_element",), 2, lambda r, i, s: {"arms": r.arms / (1.0 + s * (np.arange(2) == i))[:, None]}),
-    "loose_foot": (("weak_element",), 1, lambda r, i, s: {"mount": r.mount * (1.0 + s)}),
-    "soft_spindle": (("spindle_compliance", "weak_element"), 1, lambda r, i, s: {"spindle": r.spindle * (1.0 + s)}),
-    "backlash": (("gear_backlash",), 3, lambda r, i, s: {"gap": r.gap + 1e-4 * s * (np.arange(6) == i)}),
-    "balancer": ((), 1, lambda r, i, s: {"balancer": 1e6 * s}),
-    "crosstalk": ((), 1, lambda r, i, s: {"crosstalk": s}),
-    "creep": ((), 1, lambda r, i, s: {"creep": s}),
+@dataclass(frozen=True)
+class RobotFault:
+    """Right names of the catalogue, parts that it may sit in, what it changes by a size, and the largest size."""
+
+    names: tuple[str, ...]
+    parts: tuple[int, ...]
+    change: Callable[[Robot, int, float], Document]
+    largest: float
+
+
+JOINTS, UPRIGHT = tuple(range(6)), (0, 3, 4, 5)  # the weight holds a gap in joints 2 and 3 closed: nobody sees it
+FAULTS: dict[str, RobotFault] = {
+    "joint_torsion": RobotFault(("joint_torsion", "weak_element"), JOINTS, _soft("torsion", 6), 30.0),
+    "joint_bending": RobotFault(("joint_bending", "weak_element"), JOINTS[:3], _soft("bending", 6), 30.0),
+    "soft_link": RobotFault(
+        ("weak_element",), (0, 1), lambda r, i, s: {"arms": r.arms / (1.0 + s * (np.arange(2) == i))[:, None]}, 30.0
+    ),
+    "loose_foot": RobotFault(("weak_element",), (0,), lambda r, i, s: {"mount": r.mount * (1.0 + s)}, 30.0),
+    "soft_spindle": RobotFault(
+        ("spindle_compliance", "weak_element"), (0,), lambda r, i, s: {"spindle": r.spindle * (1.0 + s)}, 100.0
+    ),
+    "backlash": RobotFault(
+        ("gear_backlash",), UPRIGHT, lambda r, i, s: {"gap": r.gap + 1e-4 * s * (np.arange(6) == i)}, 30.0
+    ),
+    "balancer": RobotFault((), (0,), lambda r, i, s: {"balancer": 1e6 * s}, 30.0),
+    "crosstalk": RobotFault((), (0,), lambda r, i, s: {"crosstalk": s}, 0.5),
+    "creep": RobotFault((), (0,), lambda r, i, s: {"creep": s}, 0.5),
 }
 ELEMENTS = {**dict.fromkeys(("joint_torsion", "joint_bending", "backlash"), "joint {}"), "soft_link": "link {}"}
 
@@ -209,7 +225,7 @@ def robot_case(seed: int, hidden: str | None, noise: float) -> tuple[str, Table,
     """Machine file, pulls in shop units and truth of an exercise; `hidden` as `draw_case` has it, names of `FAULTS`."""
     streams = [np.random.default_rng([seed, 77, i]) for i in range(4)]
     robot = invented(streams[0])
-    inside = [name for name, fault in FAULTS.items() if fault[0]]
+    inside = [name for name, fault in FAULTS.items() if fault.names]
     groups = {"one": inside, "outside": [name for name in FAULTS if name not in inside], "none": []}
     drawn = str(streams[1].choice(["none", "one", "outside"], p=[0.25, 0.55, 0.2])) if hidden is None else hidden
     if drawn not in (*groups, *FAULTS):
@@ -221,17 +237,18 @@ def robot_case(seed: int, hidden: str | None, noise: float) -> tuple[str, Table,
     sound, true, effects = pulled(robot, joints, force), robot, []
     if names:
         name = str(streams[1].choice(names))
-        right, count, change = FAULTS[name]
-        part, share = int(streams[1].integers(count)), float(np.exp(streams[1].uniform(*np.log(SHARES))))
-        low, high = 1e-4, 1e4
-        for _ in range(18):  # the size that moves the readings by that share, root mean square
+        fault = FAULTS[name]
+        part, share = int(streams[1].choice(fault.parts)), float(np.exp(streams[1].uniform(*np.log(SHARES))))
+        low, high = 1e-4, fault.largest
+        for _ in range(18):  # the size that moves the readings by that share, root mean square, or the largest
             size = float(np.sqrt(low * high))
-            true = replace(robot, **change(robot, part, size))
+            true = replace(robot, **fault.change(robot, part, size))
             moved = np.linalg.norm(pulled(true, joints, force) - sound) / np.linalg.norm(sound)
             low, high = (size, high) if moved < share else (low, size)
         where = {"element": ELEMENTS[name].format(part + 1)} if name in ELEMENTS else {}
-        parameters = {**where, "by": size}
-        effects = [{"effect": name, "names": list(right), "parameters": parameters, "size": float(moved)}]
+        effects = [
+            {"effect": name, "names": list(fault.names), "parameters": {**where, "by": size}, "size": float(moved)}
+        ]
     moved_by = pulled(true, joints, force)
     sd = np.maximum(noise * np.linalg.norm(moved_by, axis=1), NOISE_FLOOR)
     read = moved_by + sd[:, None] * streams[3].standard_normal(moved_by.shape)
