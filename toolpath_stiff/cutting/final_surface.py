@@ -78,7 +78,7 @@ def final_strip(work: Workpiece, samples: Samples, cutters: Mapping[int, Cutter]
         stays[some] = (above > TOUCHED) | ((above < -TOUCHED) & (ball[some] > 0.0))
         stays = stays.reshape(offset.shape)
         low, high = np.where(stays, offset, np.inf).min(axis=1), np.where(stays, offset, -np.inf).max(axis=1)
-        strips[rows] = np.where(stays.any(axis=1)[:, None], np.stack([low, high], axis=1), np.nan)
+        strips[rows] = np.where(np.isfinite(low)[:, None], np.stack([low, high], axis=1), np.nan)
     return strips
 
 
