@@ -159,7 +159,7 @@ def test_compare_names_the_element_that_is_softer(tmp_path: Path) -> None:
     assert any("joint_3" in name for row in findings for name in (row["pattern"], *row["indistinguishable_from"]))
 
 
-REFUSED = (["diagnose"], ["update", "--add", "weak_strut"], ["plan"])
+REFUSED = (["update", "--add", "weak_strut"], ["plan"])
 
 
 @pytest.mark.parametrize("words", REFUSED, ids=lambda words: words[0])
@@ -232,3 +232,12 @@ def test_a_path_out_of_the_arms_reach_is_told_by_line() -> None:
         tps.UnreachableError, match=r"far.nc:4: .* out of reach, first .* (no joint values|J\d|elbow|wrist)"
     ):
         tps.analyze(program, file("robot200"), origin_mm_deg=(1500, 0, 700))
+
+
+def test_bounds_of_a_placement_count_from_where_the_work_stands() -> None:
+    """A table beside the machine's zero: the same search as with the sums said."""
+    fixed = {"rotate_deg": 0, "step_mm": 40}
+    here = tps.place(POCKET, file("mill3"), x_mm=0, y_mm=(-50, 50), z_mm=0, base_mm=(60, -10, 200), **fixed)
+    said = tps.place(POCKET, file("mill3"), x_mm=60, y_mm=(-60, 40), z_mm=200, **fixed)
+    assert here.origin_mm_deg == said.origin_mm_deg
+    assert here.origin_mm_deg[0] == 60 and here.origin_mm_deg[2] == 200 and -60 <= here.origin_mm_deg[1] <= 40

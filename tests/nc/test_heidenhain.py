@@ -174,7 +174,7 @@ REFUSALS = {
     "CC X+1\n": ("other coordinates than two of a plane", 3),
     "L X+0 RL\nL X+20\nCC X+10 Z+0\nC X+10 Z+10 DR+": ("in another plane than G17", 6),
     "CC X+0 Y+0\nL X+10\nCP IPA+90 DR-": ("against the direction", 5),
-    "CR X+20 R+5 DR+": ("of radius 5 mm", 3),
+    "CR X+20 R+5 DR+": ("radius 5 mm cannot reach", 3),
     "CT X+10 Y+10": ("without a contour element", 3),
     "L X+10\nRND R20\nL Y+10": ("does not fit", 4),
     "L X+10\nRND R2\nL Z+10": ("out of the plane", 5),

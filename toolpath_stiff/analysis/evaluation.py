@@ -287,7 +287,9 @@ def kept_configuration(machine: MachineTool, position: FloatArray, abc: FloatArr
     return int(np.argmax([reach(machine, position[few], stance).margin.min() for stance in stances]))
 
 
-def evaluate_stance(model: StiffnessModel, stance: Stance, in_work: WorkPoses, load: Load, force: float) -> Evaluation:
+def evaluate_stance(
+    model: StiffnessModel, stance: Stance, in_work: WorkPoses, load: Load, force: float = defaults.FORCE
+) -> Evaluation:
     """A machine of elements where it stands; tip, tool axes and tangent in work axes."""
     position, _, tangent = in_work
     n, stand = len(stance), reach(model.machine, position, stance)

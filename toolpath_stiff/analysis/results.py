@@ -305,10 +305,10 @@ def _warnings(analysis: Analysis) -> list[str]:
             f"{_sample_words(analysis, first)}"
         )
     if swapped.any():
-        lines = np.unique(samples.line[swapped])
-        more = f" and {len(lines) - MOST_NAMED} more" if len(lines) > MOST_NAMED else ""
+        where = np.unique(samples.line[swapped])
+        more = f" and {len(where) - MOST_NAMED} more" if len(where) > MOST_NAMED else ""
         warnings.append(
-            f"lines {', '.join(map(str, lines[:MOST_NAMED]))}{more}: the load direction does not exist there "
+            f"lines {', '.join(map(str, where[:MOST_NAMED]))}{more}: the load direction does not exist there "
             "(rotary axes alone, or a move along the tool axis); the softest direction stands in"
         )
     return warnings

@@ -19,7 +19,6 @@ from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, command
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.options import Option, finite_number, numbers
-from toolpath_stiff.results import TextFile
 
 OUT_OF_REACH = NOT_GOOD = 1  # exit codes
 MOST_NAMED = 10
@@ -144,34 +143,25 @@ def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
 Made = Annotated[str | None, Option("-o --out", "FILE", help="machine file to write (default: standard output)")]
 
 
-def _made(args: Namespace, machine_file: TextFile, out: str | None) -> int:
-    """Write or print a machine file that was made from another description."""
-    run.tell("note", machine_file.notes)
-    if out:
-        return run.write_text(args, out, machine_file.text, "next", "machine", "check", out)
-    sys.stdout.write(machine_file.text)
-    return 0
-
-
 @command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
 def from_linuxcnc(args: Namespace, file: Annotated[str, Option("FILE.hal")], out: Made = None) -> int:
     """Read the kinematics pins of a LinuxCNC HAL file."""
-    return _made(args, tps.machine_from_linuxcnc(file, args.units), out)
+    return run.made(args, tps.machine_from_linuxcnc(file, args.units), out)
 
 
 @command("machine from-urdf", "machine_from_urdf", REPLACE)
 def from_urdf(args: Namespace, file: Annotated[str, Option("FILE.urdf")], out: Made = None) -> int:
     """Read a robot of a URDF file."""
-    return _made(args, tps.machine_from_urdf(file, args.tip), out)
+    return run.made(args, tps.machine_from_urdf(file, args.tip), out)
 
 
 @command("machine from-dh", "machine_from_dh", REPLACE)
 def from_dh(args: Namespace, file: Annotated[str, Option("TABLE")], out: Made = None) -> int:
     """Read a robot of a table of Denavit-Hartenberg rows."""
-    return _made(args, tps.machine_from_dh(file, args.convention), out)
+    return run.made(args, tps.machine_from_dh(file, args.convention), out)
 
 
 @command("machine from-freecad", "machine_from_freecad", REPLACE)
 def from_freecad(args: Namespace, file: Annotated[str, Option("FILE.fcm")], out: Made = None) -> int:
     """Read a mill of FreeCAD."""
-    return _made(args, tps.machine_from_freecad(file, args.order), out)
+    return run.made(args, tps.machine_from_freecad(file, args.order), out)

@@ -76,10 +76,10 @@ def _in_order(axes: dict[str, Document], order: Sequence[str], fault: Fault) -> 
         return list(axes)
     depth = {}
     for name, axis in axes.items():
-        seen, at = [name], axis.get("parent")
-        while at in axes and at not in seen:
-            seen.append(at)
-            at = axes[at].get("parent")
+        seen, parent = [name], axis.get("parent")
+        while parent in axes and parent not in seen:
+            seen.append(parent)
+            parent = axes[parent].get("parent")
         depth[name] = len(seen)
     if sorted(depth.values()) == list(range(1, len(axes) + 1)):
         return sorted(axes, key=depth.__getitem__)

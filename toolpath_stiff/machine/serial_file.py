@@ -17,6 +17,7 @@ from toolpath_stiff.machine.chain import (
 )
 from toolpath_stiff.machine.common_sections import common_fields
 from toolpath_stiff.machine.elements import beam_axes
+from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections, read_rows, read_sections
 from toolpath_stiff.machine.serial import Serial
 from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
@@ -70,18 +71,19 @@ def read(toml: MachineToml) -> Serial:
     """A serial machine of a machine file. Raises `InputError`."""
     values = read_sections(toml, SCHEMA, SECTIONS_BESIDE, stated=False)
     if rows := read_rows(toml, "axis", AXIS):
-        names = [row["name"] for row in rows]
+        names, convention = [row["name"] for row in rows], values[""].get("convention", MODIFIED)
         if "trunnion" in values or "limits" in values:
             section = "trunnion" if "trunnion" in values else "limits"
             raise toml.fault(section, "", ": the file has [[axis]] rows", expected="limits and places of axes there")
     else:
-        rows, names = _rows_of_mill(toml, values), ["X", "Y", "Z", "A", "B", "C"]
-    tool, work, tip, table = _of_rows(toml, rows, values)
+        rows, names, convention = _rows_of_mill(toml, values), ["X", "Y", "Z", "A", "B", "C"], MODIFIED
+    tool, work, tip, table = _of_rows(toml, rows, values, convention)
     bodies = read_bodies(toml, (tool, work), (tip, table))
     if not any(bodies):
         raise InputError("no [[element]]: nothing gives way", expected="springs, joints or beams", file=toml.file)
+    common = common_fields(toml, values)
     machine = Serial(
-        **common_fields(toml, values),
+        **{"limits": Limits(neutral_pose=common["default_origin"]), **common},
         reference_tool_length=m_from_mm(values.get("reference_tool", {}).get("length_mm", np.nan)),
         tool_joints=tool,
         work_joints=work,
@@ -97,10 +99,9 @@ def read(toml: MachineToml) -> Serial:
 
 
 def _of_rows(
-    toml: MachineToml, rows: Sequence[Document], values: Sections
+    toml: MachineToml, rows: Sequence[Document], values: Sections, convention: str
 ) -> tuple[tuple[ChainJoint, ...], tuple[ChainJoint, ...], Placement, Placement]:
     """Joints of tool and work, the tip in the last frame of the one, the work in that of the other."""
-    convention = values[""].get("convention", MODIFIED)
     if convention not in (MODIFIED, STANDARD):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{MODIFIED!r} or {STANDARD!r}")
     sides: dict[str, list[ChainJoint]] = {"tool": [], "work": []}
@@ -202,16 +203,16 @@ def _tip(toml: MachineToml, tool: Document) -> Placement:
 
 def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
     """`[[axis]]` rows of X, Y, Z by limits: the work's side where an element moves against one; and of a trunnion."""
-    convention = values[""].pop("convention", None)
+    convention = values[""].get("convention")
     if convention not in (None, XYZAC, XYZBC):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{XYZAC!r}, {XYZBC!r}, or [[axis]] rows")
-    turning = {XYZAC: "AC", XYZBC: "BC"}.get(convention, "")
+    turning = {XYZAC: "AC", XYZBC: "BC"}.get(str(convention), "")
     if foreign := [key for key in values.get("limits", {}) if key[0] not in f"XYZ{turning}"]:
         expected = f"limits of {', '.join(f'XYZ{turning}')}"
         raise toml.fault("limits", foreign[0], ": there is no such axis", expected=expected)
     moved = [name for row in read_rows(toml, "element", ELEMENT) for name in row.get("moves_with", ())]
     side = {axis: "work" if f"-{axis}" in moved else "tool" for axis in "XYZ"}
-    rows = []
+    rows: list[Document] = []
     # The axis that most elements move with is nearest the base; rows do not cross sides, so the order serves both.
     for axis in sorted("XYZ", key=lambda axis: -moved.count(axis) - moved.count(f"-{axis}")):
         direction = np.eye(3)["XYZ".index(axis)] * (1.0 if side[axis] == "tool" else -1.0)
@@ -220,7 +221,7 @@ def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
     if convention is None:
         return rows
     letter, idle = turning[0], {"A": "x_offset_mm", "B": "y_offset_mm"}[turning[0]]
-    trunnion = values.pop("trunnion", None)
+    trunnion = values.get("trunnion")
     if trunnion is None:
         raise toml.fault("", "convention", f" = {convention!r}: section [trunnion] is missing", ", ".join(TRUNNION))
     if trunnion.get(idle):

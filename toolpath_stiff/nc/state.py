@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import RadiusCompensation
@@ -16,7 +16,7 @@ from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
-from toolpath_stiff.nc.words import AXES, POLAR, Block, Word
+from toolpath_stiff.nc.words import Block, Word
 from toolpath_stiff.units import MM_PER_INCH
 
 # Modal groups in the order in which the codes and words of a block act: both are LinuxCNC's (manual, "G-Code Overview",
@@ -35,7 +35,6 @@ Group = Literal[
 ]  # fmt: skip
 STEPS: dict[Group, int] = {group: place for place, group in enumerate(get_args(Group))}
 LAST_MODE = STEPS["M rigid tapping"]
-POINT_WORDS = (*AXES, *POLAR)
 LATHE_HINT = "this reads the programs of mills: post it for a mill, with X as a position"
 
 
@@ -89,8 +88,6 @@ class CurrentBlock:
         Modal group -> code; no two codes of a group are in one block.
     values
         Letter -> word, of the other words; `free` are the letters that nothing has taken yet.
-    polar_words
-        Its polar words (@, ^): the first one, radius and angle.
     flow
         What it asks of whoever runs the blocks, once its own moves are made.
     """
@@ -101,7 +98,6 @@ class CurrentBlock:
     groups: dict[Group, str] = field(default_factory=dict)
     values: dict[str, Word] = field(default_factory=dict)
     free: set[str] = field(default_factory=set)
-    polar_words: tuple[Word, float | None, float | None] | None = None
     flow: Then = Flow.NEXT
 
     @property
@@ -194,8 +190,8 @@ class Conversational:
         G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450.
     base
         G500 in force: "machine", or "zero" where the program takes no other offset; "": it is not.
-    offsets_named, changes_by_t, orientation
-        Whether the program takes settable offsets, and changes tools by T alone; ORIVECT, ORIAXES.
+    offsets_named, changes_by_t, transformed
+        Whether the program takes settable offsets, and changes tools by T alone; TRAORI in force.
     """
 
     pole: tuple[str, complex] | None = None
@@ -230,7 +226,7 @@ class Conversational:
     base: str = ""
     offsets_named: bool = False
     changes_by_t: bool = False
-    orientation: str = ""
+    transformed: bool = False
     kept: tuple[tuple[object, object, object], list[float]] = (
         (None, None, None),
         [],
@@ -344,7 +340,7 @@ class State:
     beside: list[float] | None = None
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
-    saved: list[dict[str, Any] | None] = field(default_factory=lambda: [None])
+    saved: list[tuple[str, "State", int, float] | None] = field(default_factory=lambda: [None])
     plain: Conversational = field(default_factory=Conversational)
 
     def __post_init__(self) -> None:

@@ -20,12 +20,10 @@ from toolpath_stiff.nc.place import Place
 
 NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails does not try shorter numbers
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
-WORD = re.compile(rf"([A-Z@^]|,[CR])({NUMBER})(E[+-]?\d++)?", re.ASCII)
+WORD = re.compile(rf"([A-Z]|,[CR])({NUMBER})(E[+-]?\d++)?", re.ASCII)
 AXES = "XYZABC"
-POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
 CORNERS = (",C", ",R")  # chamfer and rounding of the corner to the next block (Fanuc, Haas)
-NOT_PYGCODES = (*POLAR, *CORNERS)
-LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *POLAR, *CORNERS))
+LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *CORNERS))
 COMMENT = re.compile("[();]")
 EXPRESSION = re.compile(r"[#\[]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
@@ -210,6 +208,9 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
     character, follower = compact[position], compact[position + 1 : position + 3].lstrip("+-")[:1]
     if character == "%":
         return place.fail("`%` among other words", "`%` alone on its line", "take the name behind it away", column)
+    if character in "@^":
+        hint = "X and Y, or --interpreter linuxcnc"
+        raise place.fail(f"{compact[position : position + 12]!r} is a polar word of LinuxCNC's", "", hint, column)
     if character in LETTERS and (not follower or follower in LETTERS or follower == "/"):
         return place.fail(f"the word {character!r} has no number", f"a number after {character}", column=column)
     return place.fail(f"{compact[position : position + 12]!r} is not a word", "a letter and a number", column=column)
@@ -217,7 +218,7 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
 
 def through_pygcode(words: Sequence[Word], place: Place) -> None:
     """Let pygcode read the normalised words; what it does not return exactly is an error."""
-    known = [word for word in words if word.letter not in NOT_PYGCODES]
+    known = [word for word in words if word.letter not in CORNERS]
     returned: list[tuple[str, float]] = []
     try:
         for word in text2words(" ".join([_plain(word) for word in known])):

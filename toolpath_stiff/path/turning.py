@@ -91,10 +91,10 @@ def least_costly_way(
     change = 1.0 + 2.0 * n * (np.ptp(finite) if len(finite) else 0.0) + weight * n * count * WHOLE**2
     total, came = cost[0].copy(), np.zeros((n, configurations, turns), dtype=np.int64)
     last = joints[0]
-    own = np.arange(configurations * turns).reshape(configurations, turns)
+    same = np.arange(configurations * turns).reshape(configurations, turns)
     for i in range(1, n):
         if not np.isfinite(cost[i]).any():
-            came[i] = own  # nobody gets there: as if it were not on the path
+            came[i] = same  # nobody gets there: as if it were not on the path
             continue
         step = joints[i][:, :, None] - last[:, near]
         step -= winds * WHOLE * np.round(step / WHOLE)
@@ -102,7 +102,7 @@ def least_costly_way(
         ways[~(np.abs(step) <= largest).all(axis=-1)] = np.inf
         best = ways.argmin(axis=-1)
         least = np.take_along_axis(ways, best[..., None], axis=-1)[..., 0]
-        came[i] = own[:, 0][:, None] + near[np.arange(turns), best]
+        came[i] = same[:, 0][:, None] + near[np.arange(turns), best]
         if np.isfinite(total).any():  # else this is the first pose that is reached
             broken = total.min() + change < least
             least, came[i][broken] = np.minimum(least, total.min() + change), int(total.argmin())

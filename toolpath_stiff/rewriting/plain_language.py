@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.heidenhain.plain_statements import in_inches
@@ -66,7 +66,7 @@ def write_placed(program: ReadProgram, text: str, turn: Turn, decimals: int | No
     return ("\r\n" if "\r\n" in text else "\n").join([*placed, ""])
 
 
-def _differs(moves: Moves, again: Moves, turn: Turn, largest_mm: float) -> FloatArray:
+def _differs(moves: Moves, again: Moves, turn: Turn, largest_mm: float) -> IntArray:
     """Rows of the cuts that end elsewhere than at the placed point, or with another tool axis."""
     if len(again) != len(moves):  # a turned tool axis may take other parts to a move
         again, moves = (m.take(np.append(np.diff(m.line) != 0, True)) for m in (again, moves))

@@ -5,7 +5,8 @@ from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
 from toolpath_stiff.nc.courses import length_of_move
 from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc, Remark
-from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
 LONG_PAUSE = 100.0  # s; a longer one may count milliseconds
@@ -113,7 +114,7 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
         seconds = 0.0
     if state.dialect.name == GENERIC.name and letter in TIMES and seconds is not None:
         word, (control, unit) = block.values[letter], TIMES[letter]
-        doubtful = any(block.has(axis) for axis in POINT_WORDS) or (letter == "X" and "." not in word.text)
+        doubtful = any(block.has(axis) for axis in AXES) or (letter == "X" and "." not in word.text)
         expected = f"{word.text.rstrip('.')}. alone, for seconds"
         block.refuse_if(doubtful, word, "beside G4 may count milliseconds", expected, "name the control with --dialect")
         counts = "hundredths of a second" if letter == "K" else "seconds"

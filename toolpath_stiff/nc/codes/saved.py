@@ -1,5 +1,7 @@
 """M70 to M73: modes saved and restored, as LinuxCNC has them ("M-Codes", "M70 - M73"); motion mode and tool stay."""
 
+from copy import copy
+
 from toolpath_stiff.nc.codes.code import family, m_codes
 from toolpath_stiff.nc.codes.coordinates import take_offset
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -12,9 +14,7 @@ MODES = (
 def save(state: State, block: CurrentBlock, code: str) -> None:
     """M70: the modes are kept for M72 of this call, by M73 for its end too; M71: they are kept no longer."""
     _alone(block, code)
-    values = {name: getattr(state, name) for name in MODES} | {"by": code, "feed": state.feed}
-    values |= {"active": state.frames.active, "length": state.frames.tool}
-    state.saved[-1] = None if code == "M71" else values
+    state.saved[-1] = None if code == "M71" else (code, copy(state), state.frames.active, state.frames.tool)
 
 
 def restore_block(state: State, block: CurrentBlock, code: str) -> None:
@@ -25,23 +25,23 @@ def restore_block(state: State, block: CurrentBlock, code: str) -> None:
 
 def restore(state: State, block: CurrentBlock) -> None:
     """Bring back the modes saved last; F to a tenth, as LinuxCNC does."""
-    saved = state.saved[-1]
+    saved, feed = state.saved[-1], state.feed
     if saved is None:
         raise block.fail(None, "restores modes, and none are saved", "M70 before it")
-    other = state.cutter or state.polar or saved["length"] != state.frames.tool
+    _, modes, active, length = saved
+    other = state.cutter or state.polar or length != state.frames.tool
     block.refuse_if(other, None, "restores modes after G43, G49, G41 or G16", "the same tool length as at M70")
-    feed = state.feed
     for name in MODES:
-        setattr(state, name, saved[name])
-    if saved["feed"] != feed:
-        scale = state.feed_scale
-        state.feed = None if saved["feed"] is None else float(f"{saved['feed'] / scale:.1f}") * scale
-    take_offset(state, block, block.block.words[0], saved["active"])
+        setattr(state, name, getattr(modes, name))
+    if modes.feed != feed:
+        state.feed = None if modes.feed is None else float(f"{modes.feed / state.feed_scale:.1f}") * state.feed_scale
+    take_offset(state, block, block.block.words[0], active)
 
 
 def leave_call(state: State, block: CurrentBlock) -> None:
     """The end of a subprogram: what M73 saved in it comes back."""
-    if state.saved[-1] is not None and state.saved[-1]["by"] == "M73":
+    saved = state.saved[-1]
+    if saved is not None and saved[0] == "M73":
         restore(state, block)
     state.saved.pop()
 

@@ -45,8 +45,8 @@ def pole(state: State, block: CurrentBlock, code: str) -> None:
     if plane is None:
         raise block.fail(code, "with other coordinates than two of a plane", "two of X, Y, Z, or none")
     first, second, _ = PLANES[plane]
-    here = present(state)
-    state.plain.pole = plane, complex(point.get(first, here[first]), point.get(second, here[second]))
+    point = point or dict(enumerate(present(state)))
+    state.plain.pole = plane, complex(point[first], point[second])
 
 
 def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:
@@ -264,13 +264,12 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
         raise block.fail(None, "without its radius", "R")
     start = in_plane(state, present(state))
     end = in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
-    size, chord = abs(radius) * state.length_scale, abs(end - start)
-    block.refuse_if(
-        not 0.0 < chord <= 2.0 * (size + ON_CIRCLE_MM), None, f"of radius {size:g} mm to a point {chord:.4f} mm away"
-    )
-    height = math.sqrt(max(size * size - chord * chord / 4.0, 0.0))
-    side = turn if radius > 0.0 else -turn
-    _round(state, block, there, (start + end) / 2.0 + side * height * 1j * (end - start) / chord, turn)
+    try:
+        places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
+        center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
+    except ArcError as error:
+        raise block.fail(None, error.found, error.expected) from None
+    _round(state, block, there, center, turn)
 
 
 def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:

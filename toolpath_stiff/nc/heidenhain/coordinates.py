@@ -159,5 +159,7 @@ def hold_tip(state: State, block: CurrentBlock, code: str) -> None:
     plain, on = state.plain, code in ("M128", "FUNCTION TCPM")
     if code[0] == "F":
         block.free.clear()
+    elif block.block.words[0].text == "M":  # M128 F1000: the feed of the axes that follow
+        block.take("F"), block.take("FMAX")
     tools.hold_tip(state, block, code, on)
     plain.held_tip = on

@@ -51,9 +51,11 @@ class HeidenhainRun(ProgramRun):
         self._row = 0
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
-        """Count plain statements."""
-        for row in words.count.nonzero()[0] + first if self.tally is not None else ():
-            self._count(self._statement(int(row)))
+        """Count plain statements, which are all L."""
+        rows = words.count.nonzero()[0]
+        if self.tally is not None and len(rows):
+            self._count(self._statement(first + int(rows[0])))
+            self.tally.count["L"] += len(rows) - 1
 
     @staticmethod
     def meaning(code: str) -> str:

@@ -119,12 +119,7 @@ def swivel(state: State, block: CurrentBlock, code: str) -> None:
 def transformation(state: State, block: CurrentBlock, code: str) -> None:
     """TRAORI: X, Y, Z are the tip's while the tool turns; TRAFOOF: no longer."""
     tools.hold_tip(state, block, code, code == "TRAORI")
-    state.plain.held_tip = code == "TRAORI"
-
-
-def orientation(state: State, block: CurrentBlock, code: str) -> None:
-    """ORIVECT, ORIAXES: how the tool turns between two axes."""
-    state.plain.orientation = code
+    state.plain.transformed = code == "TRAORI"
 
 
 def pole(state: State, block: CurrentBlock, code: str) -> None:

@@ -28,6 +28,7 @@ SIGNATURES = {
     "CYCLE87": f"{_HEIGHTS} SDIR", "CYCLE88": f"{_HEIGHTS} DTB SDIR", "CYCLE89": f"{_HEIGHTS} DTB {_MODES}",
     "HOLES1": "SPCA SPCO STA1 FDIS DBH NUM VARI UMODE HIDE NSP DMODE",
     "HOLES2": "CPA CPO RAD STA1 INDA NUM VARI UMODE HIDE NSP DMODE",
+    "CYCLE802": f"XA YA {' '.join(f'X{n} Y{n}' for n in range(9))} VARI UMODE DMODE",
     "CYCLE800": "FR TC ST MODE X0 Y0 Z0 A B C X1 Y1 Z1 DIR FRI DMODE",
     "WORKPIECE": "WP REF HOLD FORM MODE Z0 Z1 ZB X0 Y0 X1 Y1",
 }  # fmt: skip
@@ -147,25 +148,30 @@ def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
 
 
 def pattern(state: State, block: CurrentBlock, code: str) -> None:
-    """HOLES1: holes on a line, from its nearer end; HOLES2: on a circle. Each with the cycle of MCALL."""
+    """HOLES1: holes on a line, from its nearer end; HOLES2: on a circle; CYCLE802: at points. With MCALL's cycle."""
     plain, (first, second, _) = state.plain, PLANES[state.plane]
-    names = SIGNATURES[code].split()
-    values = {name: (block.take(name) or 0.0) * (state.length_scale if name in LENGTHS else 1.0) for name in names}
+    given = {name for name in SIGNATURES[code].split() if block.has(name)}
+    values = {name: (block.take(name) or 0.0) * (state.length_scale if name in LENGTHS else 1.0) for name in given}
     if plain.cycle is None:
         raise block.fail(None, f"{code} without a cycle", "MCALL CYCLE81(...) before it")
-    count, start = round(values["NUM"]), math.radians(values["STA1"])
+    number = values.get
+    count, start = round(number("NUM", 1.0)), math.radians(number("STA1", 0.0))
     block.refuse_if(not 1 <= count <= 10_000, None, f"{code} with {count} holes", "1 or more")
-    if code == "HOLES1":
-        along, base = complex(math.cos(start), math.sin(start)), complex(values["SPCA"], values["SPCO"])
-        points = [base + (values["FDIS"] + index * values["DBH"]) * along for index in range(count)]
+    if code == "CYCLE802":
+        steps = any({*f"{number(name, 0.0):.0f}"} != {"1"} for name in ("XA", "YA"))
+        block.refuse_if(steps, None, f"{code} with steps", "111111111: absolute points")
+        pairs = [(f"X{index}", f"Y{index}") for index in range(9)]
+        points = [complex(values[x], values[y]) * state.length_scale for x, y in pairs if {x, y} <= given]
+    elif code == "HOLES1":
+        along, base = cmath.rect(1.0, start), complex(number("SPCA", 0.0), number("SPCO", 0.0))
+        points = [base + (number("FDIS", 0.0) + index * number("DBH", 0.0)) * along for index in range(count)]
         here = in_plane(state, present(state))
         if abs(here - points[-1]) < abs(here - points[0]):
             points.reverse()
     else:
-        step = math.radians(values["INDA"] or 360.0 / count)
-        turns = (start + index * step for index in range(count))
-        middle = complex(values["CPA"], values["CPO"])
-        points = [middle + cmath.rect(values["RAD"], turn) for turn in turns]
+        step = math.radians(number("INDA", 0.0) or 360.0 / count)
+        middle, radius = complex(number("CPA", 0.0), number("CPO", 0.0)), number("RAD", 0.0)
+        points = [middle + cmath.rect(radius, start + index * step) for index in range(count)]
     kept = plain.cycle[1]
     for point in points:
         go(state, block, {first: point.real, second: point.imag}, rapid=True)

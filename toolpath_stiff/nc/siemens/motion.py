@@ -11,206 +11,173 @@ import math
 
 import numpy as np
 
-from toolpath_stiff.nc.codes.motion import machine_move, record
-from toolpath_stiff.nc.geometry import PLANES, ArcError, center_from_radius
+from toolpath_stiff.nc.codes.motion import record
+from toolpath_stiff.nc.codes.tools import HOLDS_HINT
+from toolpath_stiff.nc.geometry import PLANES, ArcError
 from toolpath_stiff.nc.heidenhain import contour, functions
-from toolpath_stiff.nc.heidenhain.points import in_plane, named, present
+from toolpath_stiff.nc.heidenhain.points import in_plane, named, plane_of_pole, polar, present
 from toolpath_stiff.nc.moves import ARC, Arc, Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Word
 
-POLAR = frozenset(("AP", "RP", "IAP", "IRP", "@AP"))
+POLAR = frozenset(("PR", "PA", "IPR", "IPA"))  # RP and AP are named as Heidenhain's PR and PA
 SHORTER = ("DC", "ACP", "ACN")
 POINTS = POLAR | {f"{kind}{letter}" for letter in AXES for kind in ("", "I", "@", *SHORTER)}
-CENTERS = frozenset((*"IJK", "@I", "@J", "@K", "CR", "AR", "TURN"))
+CENTERS = frozenset((*"IJK", "@I", "@J", "@K", "R", "AR", "TURN"))  # CR is R
 VECTOR = ("A3", "B3", "C3")
 CORNERS = ("RND", "CHF", "CHR")
 SIDES = {"G40": "R0", "G41": "RL", "G42": "RR"}
 MACHINE = ("SUPA", "G53", "G153")
-ENDS = "the tool goes on the great circle from axis to axis (ORIVECT); between these ORIAXES would lead it otherwise"
+ENDS = "from tool axis to tool axis the tool goes on a great circle (ORIVECT), whatever leads it on the control"
 UNKNOWN_HOME = "goes to a machine position in a variable of the machine builder's: left out of the path"
 CHORDS = "a spline is taken as straight lines through its points"
 
 
-def rename(block: CurrentBlock, old: str, new: str) -> None:
-    """Give a word that is free another letter."""
+def rename(block: CurrentBlock, old: str, new: str, value: float | None = None) -> None:
+    """Give a word that is free another letter, and perhaps another number."""
     block.refuse_if(new in block.values, old, f"and {new} name the same in one block", "one of them")
-    block.values[new] = block.values.pop(old)
+    word = block.values.pop(old)
+    block.values[new] = word if value is None else word._replace(value=value)
     block.free = (block.free - {old}) | {new}
 
 
-def mark(block: CurrentBlock, letter: str) -> None:
-    """Give a block a word without a number."""
-    block.values[letter] = Word(letter, 0.0, block.block.words[0].column, letter)
+def mark(block: CurrentBlock, letter: str, shown: str = "", value: float = 0.0) -> None:
+    """Give a block a word that it is not written with."""
+    block.values[letter] = Word(letter, value, block.block.words[0].column, shown or letter)
     block.free.add(letter)
 
 
 def moves(state: State, block: CurrentBlock) -> bool:
-    """Whether a block moves: it names a point, or an arc's centre, in a motion mode."""
+    """Whether a block moves: it names a point, a tool's axis, or an arc's centre beside G2 or G3."""
     arcs = state.motion in ("G2", "G3") and "motion" in block.groups
-    return bool(block.free & POINTS) or bool(block.free & {*VECTOR}) or (arcs and bool(block.free & CENTERS))
+    return bool(block.free & (POINTS | {*VECTOR} | (CENTERS if arcs else frozenset())))
 
 
 def move(state: State, block: CurrentBlock) -> None:
     """Carry out the motion of a block, with its corner and its change of compensation."""
-    plain, mode = state.plain, state.motion or "G1"  # a control starts in G1
-    corner = next((letter for letter in CORNERS if block.has(letter)), None)
+    plain, mode = state.plain, state.motion or "G1"
+    corner = next((letter for letter in CORNERS if block.has(letter)), "")
     size = (block.take(corner) or 0.0) * state.length_scale if corner else 0.0
     block.refuse_if(size < 0.0, corner, "is the size of a corner", "more than 0")
     plain.to_corner = size > 0.0
-    once = next((name for name in MACHINE if name in block.codes), None)
-    if once is not None or plain.base == "machine":
-        _machine(state, block, once or "G500", mode)
-    else:
-        try:
+    once = next((name for name in MACHINE if name in block.codes), "G500" if plain.base == "machine" else "")
+    _name_steps(state, block)
+    try:
+        if once:
+            _machine(state, block, once, mode)
+        else:
             MOTIONS[mode](state, block, mode)
-        except ArcError as error:
-            raise block.fail(None, error.found, error.expected) from None
-    if plain.to_corner and plain.held is not None and corner is not None:
+    except ArcError as error:
+        raise block.fail(None, error.found, error.expected) from None
+    if plain.to_corner and plain.held is not None:
         head = Word("", size, block.values[corner].column, "RND" if corner == "RND" else "CHF")
-        values = {"size": head} | ({"across": head} if corner == "CHF" else {})
-        plain.corner = CurrentBlock(block.name, block.block, {}, {}, values)
-        plain.corner.block = type(block.block)(block.line, (head,))
+        plain.corner = CurrentBlock(block.name, type(block.block)(block.line, (head,)))
+        plain.corner.values |= {"size": head} | ({"across": head} if corner == "CHF" else {})
     plain.to_corner = False
 
 
-def _points(state: State, block: CurrentBlock) -> dict[int, float]:
-    """Axis -> coordinate of the words, polar ones about the pole; whether they are steps is said by word or mode."""
-    plain, scale = state.plain, state.length_scale
-    for letter in (*AXES, "AP", "RP"):
+def _name_steps(state: State, block: CurrentBlock) -> None:
+    """Name coordinates as Heidenhain's are named: X, and IX for a step."""
+    plain, here = state.plain, present(state)
+    for axis, letter in enumerate(AXES):
         if f"@{letter}" in block.free:
             rename(block, f"@{letter}", letter)
-        elif letter in block.free and not state.absolute and letter in AXES:
+        elif letter in block.free and not state.absolute:
             rename(block, letter, f"I{letter}")
         for kind in SHORTER:
             if kind + letter in block.free:
-                start = present(state)[AXES.index(letter)]
-                angle = block.values[kind + letter].value - start
+                angle = block.values[kind + letter].value - here[axis]
                 angle = math.remainder(angle, 360.0) if kind == "DC" else angle % 360.0 - 360.0 * (kind == "ACN")
-                rename(block, kind + letter, letter)
-                block.values[letter] = block.values[letter]._replace(value=start + angle)
-    for axis in sorted(plain.renumbered):
+                rename(block, kind + letter, letter, here[axis] + angle)
         problem = "is a step right after another frame, tool length or SUPA: a setting decides whether that is added"
-        block.refuse_if(f"I{AXES[axis]}" in block.free, f"I{AXES[axis]}", problem, f"{AXES[axis]} in G90 before it")
+        unsure = axis in plain.renumbered and f"I{letter}" in block.free
+        block.refuse_if(unsure, f"I{letter}", problem, f"{letter} in G90 before it")
+        plain.renumbered -= {axis} if letter in block.free else set()
     turned = plain.tilt is not None and any(block.has(step + letter) for letter in "ABC" for step in ("", "I"))
-    block.refuse_if(
-        turned, None, "turns rotary axes in a tilted plane (CYCLE800)", "no A, B, C, or CYCLE800() before it"
-    )
-    polar_words = block.free & POLAR
-    there = named(state, block)
-    plain.renumbered -= there.keys()
-    if polar_words:
-        block.refuse_if(plain.pole is None, None, "polar words without a pole", "G111 before it")
-        first, second, _ = PLANES[state.plane]
-        block.refuse_if(there.keys() & {first, second}, None, "polar words beside those of the plane")
-        pole = plain.pole[1] if plain.pole else 0j
-        here = in_plane(state, present(state)) - pole
-        given = block.take("RP"), block.take("IRP"), block.take("AP"), block.take("IAP")
-        radius = abs(here) if given[0] is None else given[0] * scale
-        heading = math.degrees(cmath.phase(here)) if given[2] is None else given[2]
-        place = pole + cmath.rect(radius + (given[1] or 0.0) * scale, math.radians(heading + (given[3] or 0.0)))
-        there |= {first: place.real, second: place.imag}
-    return there
+    block.refuse_if(turned, None, "turns rotary axes in a tilted plane (CYCLE800)", "CYCLE800() before it")
+    rotary = any(word.value for letter, word in block.values.items() if letter in block.free and letter[-1] in "ABC")
+    unknown = plain.transformed and state.frames.posted is None and rotary
+    block.refuse_if(unknown, None, "turns rotary axes under TRAORI", "A3, B3, C3", HOLDS_HINT)
+    lost = bool(block.free & POLAR) and plain.pole is None
+    block.refuse_if(lost, None, "polar words without a pole, or after a change of the coordinates", "G111 before it")
 
 
 def straight(state: State, block: CurrentBlock, code: str) -> None:
     """G0, G1: straight to a point, with the tool's axis where A3, B3, C3 give one; splines as their chords."""
-    rapid, plain = code == "G0", state.plain
+    plain, (first, second, _) = state.plain, PLANES[state.plane]
     if code in ("ASPLINE", "CSPLINE"):
         state.assume(CHORDS)
+    if code == "G0":
+        mark(block, "FMAX")
     if any(block.has(letter) for letter in VECTOR):
-        _lean(state, block, rapid)
+        _lean(state, block)
         return
-    there = _points(state, block)
-    _compensate(state, block, there)
-    contour.go(state, block, there, rapid=rapid)
-    plain.fast = rapid
+    in_the_plane = POLAR | {step + AXES[axis] for axis in (first, second) for step in ("", "I")}
+    if plain.side and block.free & in_the_plane:
+        mark(block, SIDES[plain.side], plain.side)
+        plain.side = ""
+    (contour.polar_line if block.free & POLAR else contour.line)(state, block, "L")
 
 
-def _lean(state: State, block: CurrentBlock, rapid: bool) -> None:
+def _lean(state: State, block: CurrentBlock) -> None:
     """A move with the tool's axis as a vector of the workpiece, turned with the frames in force."""
-    plain = state.plain
-    block.refuse_if(not plain.held_tip, "A3", "is the tool's axis without TRAORI", "TRAORI before it")
-    vector = [block.take(letter) or 0.0 for letter in VECTOR]
+    plain, vector = state.plain, [block.take(letter) or 0.0 for letter in VECTOR]
     length = math.hypot(*vector)
+    block.refuse_if(not plain.transformed, "A3", "is the tool's axis without TRAORI", "TRAORI before it")
     block.refuse_if(length < 1e-6, "A3", "is no direction", "A3, B3, C3")
     block.refuse_if(plain.mirrored or plain.side, "A3", "under MIRROR, or with G41 or G42", "G40, no mirror image")
-    x, y, z = state.frames.turn_direction((vector[0] / length, vector[1] / length, vector[2] / length))
-    there = _points(state, block)
-    here = present(state)
-    for letter, value in zip(("TX", "TY", "TZ"), (x, y, z), strict=True):
-        block.values[letter] = Word(letter, value, 1, letter)
-    block.free |= {"TX", "TY", "TZ"}
-    _restate(state, block, there)
-    if rapid:
-        mark(block, "FMAX")
-    if plain.orientation != "ORIVECT" and here[3:5] != [0.0, 0.0]:
-        state.assume(ENDS)
+    turned = state.frames.turn_direction((vector[0] / length, vector[1] / length, vector[2] / length))
+    for letter, value in zip(("TX", "TY", "TZ"), turned, strict=True):
+        mark(block, letter, "A3", value)
+    state.assume(ENDS)
     functions.vectors(state, block, "LN")
-
-
-def _restate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:
-    """Give a block its point as absolute words again, for what takes them."""
-    for axis, value in there.items():
-        block.values[AXES[axis]] = Word(AXES[axis], value / (state.length_scale if axis < 3 else 1.0), 1, AXES[axis])
-        block.free.add(AXES[axis])
-
-
-def _compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:
-    """G40, G41, G42 act with the next straight move in the plane."""
-    first, second, _ = PLANES[state.plane]
-    if state.plain.side and there.keys() & {first, second}:
-        mark(block, SIDES[state.plain.side])
-        state.plain.side = ""
-        contour.compensate(state, block, there)
 
 
 def arc(state: State, block: CurrentBlock, code: str) -> None:
     """G2, G3: by centre, radius (CR), opening angle (AR) or polar words, with whole turns (TURN)."""
-    (first, second, normal), clockwise, scale = PLANES[state.plane], code == "G2", state.length_scale
-    begin, turn = in_plane(state, present(state)), -1 if clockwise else 1
+    plain, (first, second, normal), scale = state.plain, PLANES[state.plane], state.length_scale
     _no_side(state, block)
-    polar_words = bool(block.free & POLAR)
-    there = _points(state, block)
-    end = complex(there.get(first, begin.real), there.get(second, begin.imag))
+    middle, given = in_plane(state, present(state)), False
+    for axis in (first, second, normal):
+        for absolute, letter in ((True, f"@{'IJK'[axis]}"), (False, "IJK"[axis])):
+            value = block.take(letter)
+            block.refuse_if(axis == normal and value, letter, f"is off the plane {state.plane}")
+            if value is not None and axis != normal:
+                shift, part = value * scale, [middle.real, middle.imag]
+                place = (first, second).index(axis)
+                part[place], given = shift if absolute else part[place] + shift, True
+                middle = complex(*part)
+    block.refuse_if(given and block.has("R"), "R", "and a centre are both given", "one of them")
+    if block.has("R"):
+        mark(block, "DR-" if code == "G2" else "DR+")
+        contour.radius_circle(state, block, code)
+        return
     turns = 1 + (block.whole("TURN", block.values["TURN"], 0) or 0 if block.has("TURN") else 0)
     block.refuse_if(turns > 1000, "TURN", "is not a number of turns", "0 to 999")
-    radius, opening = block.take("CR"), block.take("AR")
-    off = "IJK"[normal]
-    for letter in (off, f"@{off}"):
-        wrong = letter in block.values and letter[0] != "@" and block.take(letter)
-        block.refuse_if(wrong, letter, f"is off the plane {state.plane}")
-    center, by_center = [begin.real, begin.imag], False
-    for place, letter in enumerate("IJK"[axis] for axis in (first, second)):
-        absolute, step = block.take(f"@{letter}"), block.take(letter)
-        by_center |= absolute is not None or step is not None
-        center[place] = absolute * scale if absolute is not None else center[place] + (step or 0.0) * scale
-    middle = complex(*center)
-    block.refuse_if(by_center and radius is not None, "CR", "and a centre are both given", "one of them")
+    begin, opening, turn = in_plane(state, present(state)), block.take("AR"), -1 if code == "G2" else 1
+    if block.free & POLAR:
+        with plane_of_pole(state, block) as pole:
+            middle, given, there = (middle if given else pole), True, polar(state, block, pole)
+    else:
+        there = named(state, block)
     if opening is not None:
         block.refuse_if(not 0.0 < opening < 360.0, "AR", "is no opening angle", "0 to 360 degrees")
-        swept = cmath.exp(1j * turn * math.radians(opening))
-        if by_center:
-            end = middle + (begin - middle) * swept
-            there |= {first: end.real, second: end.imag}
-        else:
-            middle = (end - begin * swept) / (1.0 - swept)
-    elif radius is not None:
-        places = (begin.real, begin.imag), (end.real, end.imag)
-        middle = complex(*center_from_radius(*places, radius * scale, clockwise))
-    elif polar_words and not by_center:
-        middle = state.plain.pole[1] if state.plain.pole else 0j
-    else:
-        block.refuse_if(not by_center, None, "an arc without a centre", "I, J, K, CR= or AR=")
+        swept, end = (
+            cmath.exp(1j * turn * math.radians(opening)),
+            complex(there.get(first, begin.real), there.get(second, begin.imag)),
+        )
+        middle = middle if given else (end - begin * swept) / (1.0 - swept)
+        end = middle + (begin - middle) * swept
+        there, given = there | {first: end.real, second: end.imag}, True
+    block.refuse_if(not given, None, "an arc without a centre", "I, J, K, CR= or AR=")
+    plain.fast = False
     contour.go(state, block, there, middle, turn, turns)
 
 
 def tangent(state: State, block: CurrentBlock, code: str) -> None:
     """CT: an arc that goes on smoothly from the element before."""
     _no_side(state, block)
-    there = _points(state, block)
-    _restate(state, block, there)
-    contour.tangent_circle(state, block, code)
+    contour.tangent_circle(state, block, "CTP" if block.free & POLAR else "CT")
 
 
 def through(state: State, block: CurrentBlock, code: str) -> None:
@@ -225,7 +192,7 @@ def through(state: State, block: CurrentBlock, code: str) -> None:
             step, value = value, None
         value = absolute if absolute is not None else value
         middle[axis] = start[axis] + (step or 0.0) * scale if value is None else value * scale
-    there = _points(state, block)
+    there = named(state, block)
     contour.check_known(state, block, there, rapid=False)
     control = frames.to_control([there.get(axis, value) for axis, value in enumerate(start)])
     here, over = (np.array(frames.to_setup(frames.to_control(point))[:3]) for point in (start, middle))
@@ -248,27 +215,25 @@ def _no_side(state: State, block: CurrentBlock) -> None:
 
 def _machine(state: State, block: CurrentBlock, code: str, mode: str) -> None:
     """SUPA, G53, G153, and G500 where other offsets are in use: coordinates of the machine, of the tool's tip."""
-    plain, frames = state.plain, state.frames
+    plain, frames, moved = state.plain, state.frames, {axis for axis, letter in enumerate(AXES) if block.has(letter)}
     waits = state.cutter or plain.held or plain.to_corner or plain.side
     block.refuse_if(waits, None, f"{code} beside a contour with compensation or a corner", "G40 before it")
-    block.refuse_if(mode != "G0", None, f"{code} in a cut: where the work sits on the machine is not known", "G0")
-    for letter in AXES:
-        if f"@{letter}" in block.free:
-            rename(block, f"@{letter}", letter)
-    lost = {axis for axis, letter in enumerate(AXES) if letter in block.free and math.isnan(block.values[letter].value)}
+    cut = mode != "G0" and (code == "G500" or mode != "G1")
+    block.refuse_if(cut, None, f"{code} in a cut: where the work sits on the machine is not known", "G0")
+    lost = {axis for axis in moved if math.isnan(block.values[AXES[axis]].value)}
     if lost:
         state.warnings.append(Remark(UNKNOWN_HOME, block.line))
         block.free -= {AXES[axis] for axis in lost}
-        plain.unknown |= lost & {0, 1, 2}
-    block.codes.setdefault("G53", block.codes.get(code, block.block.words[0]))
-    moved = {axis for axis, letter in enumerate(AXES) if block.has(letter)}
-    state.motion, length, frames.tool = mode, frames.tool, 0.0
-    if moved:
-        machine_move(state, block, "G53")
+    mark(block, "M91", code)
+    if mode == "G0":
+        mark(block, "FMAX")
+    length, frames.tool = frames.tool, 0.0
+    if moved > lost:
+        contour.line(state, block, "L")
+    block.free -= {"M91", "FMAX"}
     frames.tool = length
     plain.renumbered |= moved
-    plain.unknown -= moved if plain.tilt is None else set()
-    plain.heading = plain.pole = None
+    plain.unknown |= lost & {0, 1, 2}
 
 
 MOTIONS = {

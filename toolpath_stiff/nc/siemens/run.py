@@ -6,26 +6,24 @@ SIEMENS, SINUMERIK 840D sl, Programming Manual Job Planning, "Flexible NC progra
 
 import math
 import re
+from itertools import zip_longest
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.heidenhain.statements import code_text
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.expressions import Value as Number
 from toolpath_stiff.nc.parametric.run import ParametricRun, Step
 from toolpath_stiff.nc.parametric.statements import Statement, Steering
+from toolpath_stiff.nc.parametric.variables import Values
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
-from toolpath_stiff.nc.siemens.cycles import repeated
+from toolpath_stiff.nc.siemens.blocks import carry_out, sort_words
 from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner, Value
-from toolpath_stiff.nc.siemens.motion import move, moves
-from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS, meaning_of
+from toolpath_stiff.nc.siemens.vocabulary import meaning_of
 from toolpath_stiff.nc.siemens.words import read_words, steering_of
-from toolpath_stiff.nc.state import STEPS as RANKS
-from toolpath_stiff.nc.state import CurrentBlock, Flow, GoTo, Group, Then
-from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
+from toolpath_stiff.nc.state import Flow, GoTo, Then
 from toolpath_stiff.nc.words import AXES, Block
 
 HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
@@ -37,12 +35,14 @@ IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)(?:\s*=\s*([^,)]+))?", re.ASCII)
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
-CHOICE = re.compile(r"([^\s()]+)\s+(GOTO[FB]?)\s+(\w+)", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
 RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
-SINGLE = ("motion", "distance", "plane", "cutter compensation", "work offset", "units", "feed mode")
-BETWEEN = frozenset((*SINGLE[:2], "F", "S", "look-ahead", "M coolant", "M stop"))  # the moves of a corner
+
+
+def _array(name: str) -> str:
+    """The name of the array that an element belongs to; of another variable none that there is."""
+    return name.partition("[")[0] + "[]" if "[" in name else ""
 
 
 class SiemensRun(ParametricRun):
@@ -73,7 +73,7 @@ class SiemensRun(ParametricRun):
             begin, program = HEAD.match(code), PROGRAM.match(code)
             assert begin is not None
             self._begins.append(begin)
-            for label in (begin[5], begin[2] and f"N{int(begin[2])}", begin[3]):
+            for label in (begin[5], begin[2] and f"N{begin[2]}", begin[3]):
                 self._labels.setdefault(label or "", []).append(row)
             if program is not None:
                 self._subs.setdefault(program[1] or program[2], opened if program[2] and opened >= 0 else row)
@@ -98,7 +98,7 @@ class SiemensRun(ParametricRun):
             self.state.plain.renumbered -= {axis for axis, letter in enumerate(AXES) if letter in words.values}
 
     def _scanner(self, row: int, begin: int) -> SiemensScanner:
-        text = code_text(self.lines[row])
+        text = self._begins[row].string
         columns, place = range(1, len(text) + 2), self._place(row)
         return SiemensScanner(text, columns, place, "Siemens' language", False, begin, self._variable)
 
@@ -108,7 +108,7 @@ class SiemensRun(ParametricRun):
             slash = begin[1] or begin[4] or ""
             block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
             steering = None
-            if PROGRAM.match(begin.string) is None and begin.string.strip() != "%":
+            if PROGRAM.match(begin.string) is None and begin.string.lstrip()[:1] != "%":
                 steering = steering_of(self._scanner(row, begin.end()), lambda place: self._at_place(row, place))
             self._statements[row] = Statement(block, steering=steering)
         return self._statements[row]
@@ -120,7 +120,7 @@ class SiemensRun(ParametricRun):
     def _read(self, row: int) -> Block:
         statement, code = self._statement(row), self._begins[row].string
         line = row + 1 if row < self._main_lines else self._line_of_call()
-        if PROGRAM.match(code) is not None or code.strip() == "%":
+        if PROGRAM.match(code) is not None or code.lstrip()[:1] == "%":
             return Block(line, ())
         self._homes = IN_MACHINE.search(code) is not None
         words = read_words(self._scanner(row, self._begins[row].end()), self._define)
@@ -128,116 +128,58 @@ class SiemensRun(ParametricRun):
 
     # Variables
 
+    def _scope(self, name: str) -> tuple[Values, str]:
+        """Where a variable is kept, R parameters for all programs, and its name there."""
+        parameter = re.fullmatch(r"R\[?(\d+)\]?", name)
+        return (self.variables.common, f"R{parameter[1]}") if parameter else (self.variables.levels[-1], name)
+
     def _variable(self, name: str, column: int) -> Value:
         """The value of a variable; nan for a machine builder's in a move in machine coordinates."""
-        state, name = self.state, re.sub(r"^R\[(\d+)\]$", r"R\1", name)
-        local, array = self.variables.levels[-1], name.partition("[")[0] + "[]"
-        for scope in (local, self.variables.common):
-            value = scope.get(name, scope.get(array) if "[" in name else None)
-            if value is not None and not math.isnan(value):
-                return value
+        scope, name = self._scope(name)
+        value = scope.get(name, scope.get(_array(name)))
         if name in self._texts:
             return self._texts[name]
         if name in SEARCHED:
-            state.assume(RUNS)
+            self.state.assume(RUNS)
             return False
-        known = {
-            "$P_TOOLR": state.plain.radius / state.length_scale, "$P_TOOLNO": float(state.tool),
-            "$P_F": state.feed or 0.0, "$P_S": state.speed,
-        }.get(name, math.nan)  # fmt: skip
-        if not math.isnan(known) or (self._homes and name[0] != "R"):
-            return known
-        reason = "a control keeps it from earlier programs, or its builder defines it"
-        raise self._fail(self._at, f"{name} is read before it is set: {reason}", f"{name}=... before", column=column)
+        if value is None or math.isnan(value):
+            reason = "a control keeps it from earlier programs, or its builder defines it"
+            if not self._homes or scope is self.variables.common:
+                problem = f"{name} is read before it is set: {reason}"
+                raise self._fail(self._at, problem, f"{name}=... before", column=column)
+            return math.nan
+        return value
 
     def _define(self, name: str, value: Value, column: int, kind: str) -> None:
         """Set a variable; `kind`: its type where it is declared."""
-        name, local, common = re.sub(r"^R\[(\d+)\]$", r"R\1", name), self.variables.levels[-1], self.variables.common
-        array = name.partition("[")[0] + "[]"
-        scope = common if re.fullmatch(r"R\d+", name) else local
-        known = kind or scope is common or name in local or name in self._texts or ("[" in name and array in local)
-        if not known:
+        (scope, name), array = self._scope(name), _array(name)
+        if not (kind or scope is self.variables.common or scope.keys() & {name, array} or name in self._texts):
             problem = f"{name} is no variable that is declared, and no address that is known"
             raise self._fail(self._at, problem, f"DEF REAL {name}, R parameters", column=column)
         if kind == "INT":
             self._whole.add(name)
         if isinstance(value, str):
             self._texts[name] = value
-        elif isinstance(local.get(name), bool):
+        elif isinstance(scope.get(name), bool):
             scope[name] = bool(value)
         else:
-            scope[name] = (
-                float(math.floor(value + 0.5)) if {name, array} & self._whole and math.isfinite(value) else value
-            )
+            whole = bool({name, array} & self._whole) and math.isfinite(value)
+            scope[name] = float(math.floor(value + 0.5)) if whole else value
 
     # Blocks
 
     def _execute(self, block: Block) -> Then:
+        state, plain = self.state, self.state.plain
         try:
-            return self._carry_out(block)
+            current = sort_words(state, block, self.tally)
+            carry_out(state, current)
         except InputError as error:
             error.file, error.line, _ = self._place(self._at)
             raise
-
-    def _carry_out(self, block: Block) -> Then:
-        """The codes of a block in their order, then its move, then cycles."""
-        state, plain, current = self.state, self.state.plain, self._sorted(block)
-        codes = sorted((TABLE[name] for name in current.codes), key=lambda code: code.rank)
-        waits = plain.held is not None and any(code.group not in BETWEEN for code in codes)
-        current.refuse_if(waits, None, "stands between a corner (RND, CHF, CHR) and the move behind it", "the move")
-        before = state.frames.to_program(state.frames.position)
-        for code in codes:
-            if code.rank <= RANKS["motion"]:
-                code.act(state, current, code.name)
-        now = state.frames.to_program(state.frames.position)
-        plain.renumbered |= {axis for axis in range(6) if abs(now[axis] - before[axis]) > 1e-9}
-        if moves(state, current):
-            move(state, current)
-            repeated(state, current)
-        for code in codes:
-            if code.rank > RANKS["motion"]:
-                code.act(state, current, code.name)
-        for letter in sorted(current.free):
-            current.refuse_if(
-                letter.lstrip("I@") not in WORDS, letter, "is not used by any code of its block", hint="remove it"
-            )
-            state.note(block.line, current.values[letter], "how the control moves: the path is taken as programmed")
-        slow = plain.modal or plain.held or plain.side or plain.unknown or plain.held_tip or plain.base == "machine"
+        slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
         self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
         called = any(level.stop < 0 for level in self._levels)
         return Flow.RETURN if current.flow is Flow.END and called else current.flow
-
-    def _sorted(self, block: Block) -> CurrentBlock:
-        """The words of a block by what they are."""
-        current, groups = CurrentBlock(self.name, block), dict[Group, str]()
-        numbers = {code_name("G", word.value) for word in block.words if word.letter == "G"}
-        acting = {"#": "T", '"': "T"} | ({} if numbers & {"G4", "G25", "G26"} else {"F": "F", "S": "S"}) | {"D": "D"}
-        for word in block.words:
-            coded = word.letter in ("G", "M")
-            name = code_name(word.letter, word.value) if coded else acting.get(word.letter, word.letter)
-            if name in REFUSED:
-                raise current.fail(word, f"is {REFUSED[name].what}, which is not supported", hint=REFUSED[name].hint)
-            code = TABLE.get(name) if coded or word.letter in acting or len(name) > 1 else None
-            if code is None and coded:
-                current.refuse_if(word.letter == "G", word, "is not a G code that is known", hint="post it without it")
-                self.state.note(block.line, word, "an M code of one control, not acted upon")
-                self.state.warnings.append(Remark(f"what {word.text} does on its control is not known", block.line))
-            if code is not None:
-                other = groups.setdefault(code.group, name)
-                current.refuse_if(other != name and code.group in SINGLE, word, f"and {other} act alike", "one of them")
-                current.codes[name], current.groups[code.group] = word, name
-                if code.listed:
-                    self.state.note(block.line, word, code.listed)
-                if self.tally is not None and not coded and word.letter not in acting:
-                    self.tally.first.setdefault(name, (block.line, word.column))
-                    self.tally.count[name] += 1
-            if not coded and (code is None or word.letter in acting):
-                current.refuse_if(word.letter in current.values, word, "repeats a word of its block", "each word once")
-                largest = LARGEST_MM if word.letter.lstrip("I@") in AXES else LARGEST_WORD
-                current.refuse_if(abs(word.value) > largest, word, "is beyond 100 m, or any number of a control")
-                current.values[word.letter] = word
-        current.free = set() if numbers & {"G25", "G26"} else set(current.values)
-        return current
 
     # Flow
 
@@ -262,7 +204,6 @@ class SiemensRun(ParametricRun):
 
     def _to_label(self, row: int, way: str, label: str) -> int:
         """The line of a label: ahead (GOTOF), behind (GOTOB), or first ahead (GOTO)."""
-        label = f"{label[0]}{int(label[1:])}" if label[1:].isdigit() and label[0] in "N:" else label
         first = self._program_of(row)
         stop = min((end for end in self._ends if end > first), default=len(self.lines))
         rows = [place for place in self._labels.get(label, []) if first <= place < stop]
@@ -285,15 +226,6 @@ class SiemensRun(ParametricRun):
         if way == "GOTOC" and label not in self._labels:
             return None
         return self._to_label(row, way, label)
-
-    def _case(self, row: int, steering: Steering) -> int | None:
-        scanner = self._scanner(row, self._begins[row].end())
-        scanner.part(NAME)
-        value = scanner.result()
-        for constant, way, label in CHOICE.findall(scanner.text, scanner.position):
-            if constant == "DEFAULT" or self._scanner_of(row, constant).result() == value:
-                return self._to_label(row, way, label)
-        return None
 
     def _scanner_of(self, row: int, text: str) -> SiemensScanner:
         """An expression that does not stand at its place."""
@@ -378,20 +310,15 @@ class SiemensRun(ParametricRun):
 
     def _bound(self, row: int, first: int, values: list[Value | None]) -> dict[str, float | None]:
         """The parameters of PROC with the values of a call."""
-        head = next(
-            (PROGRAM.match(code_text(line)) for line in self.lines[first : first + 20] if "PROC" in line.upper()), None
-        )
-        parameters = PARAMETER.findall(head[3]) if head is not None and head[3] else []
-        reference = next((name for by, _, name, _ in parameters if by), "")
-        if reference or len(values) > len(parameters):
+        heads = (PROGRAM.match(code_text(line)) for line in self.lines[first : first + 20])
+        parameters = PARAMETER.findall(next((head[3] for head in heads if head is not None and head[2]), ""))
+        if len(values) > len(parameters) or any(by for by, *_ in parameters):
             problem = f"a call with {len(values)} values; PROC has {len(parameters)}, or one by reference (VAR)"
             raise self._fail(row, problem, "values of REAL, INT, BOOL")
         bound = dict[str, float | None]()
-        for index, (_, kind, name, default) in enumerate(parameters):
-            value = values[index] if index < len(values) else None
-            if value is None:
-                value = self._scanner_of(row, default or "0").result()
-            bound[name] = bool(value) if kind == "BOOL" else float(value)
+        for (_, kind, name, default), value in zip_longest(parameters, values):
+            given = self._scanner_of(row, default or "0").result() if value is None else value
+            bound[name] = bool(given) if kind == "BOOL" else float(given)
         return bound
 
     def _load_sub(self, name: str) -> None:
@@ -413,7 +340,7 @@ class SiemensRun(ParametricRun):
 
 
 SIEMENS_STEPS: dict[str, Step] = {
-    "JUMP": SiemensRun._jump_to, "CASE": SiemensRun._case, "FOR": SiemensRun._for, "ENDFOR": SiemensRun._end_for,
+    "JUMP": SiemensRun._jump_to, "FOR": SiemensRun._for, "ENDFOR": SiemensRun._end_for,
     "UNTIL": SiemensRun._until, "SECTION": SiemensRun._section, "CALL": SiemensRun._call_sub,
     "ENDLOOP": SiemensRun._back, "RET": lambda run, row, steering: run._return(row, Flow.RETURN),
 }  # fmt: skip

@@ -7,6 +7,7 @@ are those of the SINUMERIK 840D sl (Fundamentals, Job Planning) and of the 840D 
 from toolpath_stiff.nc.codes.code import Act, Code, Refused, holds_anyway
 from toolpath_stiff.nc.codes.feeds import time_word
 from toolpath_stiff.nc.codes.registry import CODES, code_meaning
+from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.siemens import coordinates, cycles, tools
 from toolpath_stiff.nc.siemens.motion import SIDES
 from toolpath_stiff.nc.state import CurrentBlock, Flow, Group, State
@@ -54,6 +55,13 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
     state.recorder.add_dwell(seconds)
 
 
+def fixed_point(state: State, block: CurrentBlock, code: str) -> None:
+    """G74, G75: to points that the machine has: left out, and where the tool then stands is not known."""
+    state.warnings.append(Remark(f"{code} goes to points of the machine: left out of the path", block.line))
+    state.plain.unknown |= {0, 1, 2}
+    block.free.clear()
+
+
 def back(state: State, block: CurrentBlock, code: str) -> None:
     """M17: the end of a subprogram."""
     block.flow = Flow.RETURN
@@ -69,6 +77,7 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
     )),
     ("motion", f"{PLANNING}, Spline interpolation", (("ASPLINE CSPLINE", mode, "spline, as chords of its points"),)),
     ("non-modal", f"{BASICS}, Suppress frames", (("SUPA G53 G153", mode, "machine coordinates"),)),
+    ("non-modal", f"{BASICS}, Reference point, fixed point", (("G74 G75", fixed_point, "to points of the machine"),)),
     ("polar", f"{BASICS}, Travel commands with polar coordinates", (("G110 G111 G112", coordinates.pole, "pole"),)),
     ("work offset", f"{BASICS}, Settable zero offset", (
         (" ".join(["G54 G55 G56 G57", *(f"G{n}" for n in range(505, 600))]), coordinates.offset, "settable offset"),
@@ -96,9 +105,6 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
     ("rotation", f"{PLANNING}, Transformations", (
         ("TRAORI TRAFOOF", coordinates.transformation, "tool centre point control, on and off"),
     )),
-    ("path control", f"{PLANNING}, Orientation", (
-        ("ORIVECT ORIPLANE ORIAXES", coordinates.orientation, "how the tool turns from axis to axis"),
-    )),
     ("M subprogram", f"{PLANNING}, Subprogram technique", (("M17", back, "subprogram end"),)),
     ("cycle return", f"{CYCLES}, Drilling patterns", (("MCALL", cycles.modal, "the cycle behind each move"),)),
     ("corner", f"{CYCLES}, Drilling cycles", (
@@ -106,7 +112,9 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("CYCLE84 CYCLE840", cycles.cycle, "tapping"), ("CYCLE85", cycles.cycle, "reaming"),
         ("CYCLE86 CYCLE87 CYCLE88 CYCLE89", cycles.cycle, "boring"),
     )),
-    ("corner", f"{CYCLES}, Drilling patterns", (("HOLES1 HOLES2", cycles.pattern, "holes on a line, on a circle"),)),
+    ("corner", f"{CYCLES}, Drilling patterns", (
+        ("HOLES1 HOLES2 CYCLE802", cycles.pattern, "holes on a line, on a circle, at points"),
+    )),
     ("corner", f"{MANUAL}, Operating, Blank input", (("WORKPIECE", tools.blank, "blank"),)),
 )  # fmt: skip
 LISTED = {
@@ -116,7 +124,8 @@ LISTED = {
             "G9 G60 G64 G601 G602 G603 G641 G642 G643 G644 G645 G62 G621 BRISK BRISKA SOFT SOFTA DRIVE FFWON FFWOF "
             "COMPON COMPCURV COMPCAD COMPSURF COMPOF CYCLE832 DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC "
             "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CFC CFCIN CFTCP FGROUP ORISON "
-            "ORISOF ORIWKS ORIMKS ORIRESET VELOLIM CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 HIGH_SPEED",
+            "ORISOF ORIWKS ORIMKS ORIRESET CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 HIGH_SPEED "
+            "ORIVECT ORIPLANE ORIAXES",
         "message, stop of the look-ahead, display":
             "MSG STOPRE GROUP_BEGIN GROUP_END GROUP_ADDEND DISPLOF DISPLON NEWCONF WRITE SETAL PARAM_END EXTERN WAITM "
             "SETMS STOPREOF SAVE SBLOF SBLON ENDLABEL",
@@ -129,14 +138,14 @@ LISTED = {
 }  # fmt: skip
 WORDS = frozenset((
     "ADIS", "ADISPOS", "SPOS", "SPOSA", "OVR", "OVRRAP", "FGREF", "CTOL", "OTOL", "ACC", "H", "FRC", "FL", "LIMS",
-    "DISC",
+    "DISC", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF",
 ))  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
 REFUSED: dict[str, Refused] = {
     name: Refused(name, what, hint, source)
     for names, what, hint, source in (
         ("POCKET1 POCKET2 POCKET3 POCKET4 SLOT1 SLOT2 LONGHOLE CYCLE71 CYCLE72 CYCLE73 CYCLE74 CYCLE75 CYCLE76 CYCLE77 "
-         "CYCLE61 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 CYCLE90 CYCLE60 CYCLE899 CYCLE801 CYCLE802",
+         "CYCLE61 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 CYCLE90 CYCLE60 CYCLE899 CYCLE801",
          "a cycle whose path the manual draws without numbers", _BY_MOVES, f"{CYCLES}, Milling cycles"),
         ("CYCLE92 CYCLE93 CYCLE94 CYCLE95 CYCLE96 CYCLE97 CYCLE98 CYCLE99 CYCLE930 CYCLE940 CYCLE951 CYCLE952 DIAMON "
          "DIAM90 G33 G34 G35", "a code of lathes", "post it for a mill", f"{CYCLES}, Turning cycles"),
@@ -146,7 +155,6 @@ REFUSED: dict[str, Refused] = {
         ("TRANSMIT TRACYL TRAANG TRACON TOFRAME TOROT PAROT TCARR TCOFR CUTMOD", "a transformation of the machine's",
          "post X, Y, Z, A3, B3, C3 of the tool's tip", f"{PLANNING}, Transformations"),
         ("G58 G59", "an offset axis by axis", "TRANS, ATRANS", _FRAMES),
-        ("G74 G75", "the approach of a fixed point, which the machine has", "SUPA", f"{BASICS}, Reference point"),
         ("G63 G331 G332", "tapping without a cycle", "CYCLE84", f"{BASICS}, Tapping"),
         ("G140 G141 G142 G143 G147 G148 G247 G248 G340 G341 G347 G348", "smooth approach and retraction",
          "post its moves", f"{BASICS}, Smooth approach and retraction"),
@@ -154,7 +162,7 @@ REFUSED: dict[str, Refused] = {
         ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
         ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
          f"{PLANNING}, Orientation"),
-        ("WHEN WHENEVER EVERY DO ID IDS", "a synchronised action", "the program without it", f"{PLANNING}"),
+        ("WHEN WHENEVER EVERY DO ID IDS CASE", "a synchronised action, or a choice", "IF with GOTOF", PLANNING),
         ("EXTCALL PCALL CALL CALLPATH ISOCALL", "a call by path", "the subprogram's name, with --subprograms",
          f"{PLANNING}, Subprogram technique"),
     )

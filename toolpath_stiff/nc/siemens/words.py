@@ -11,19 +11,23 @@ from toolpath_stiff.nc.parametric.expressions import Value as Number
 from toolpath_stiff.nc.parametric.statements import Steering
 from toolpath_stiff.nc.siemens.cycles import SIGNATURES
 from toolpath_stiff.nc.siemens.expressions import BLANK, NAME, SiemensScanner, Value
-from toolpath_stiff.nc.siemens.motion import CENTERS, CORNERS, POINTS, VECTOR
+from toolpath_stiff.nc.siemens.motion import CORNERS, VECTOR
 from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS
-from toolpath_stiff.nc.words import Word
+from toolpath_stiff.nc.words import AXES, Word
 
 PLAIN = re.compile(r"([A-Z]) ?([+-]?(?:\d++\.?+\d*+|\.\d++)(?:EX[+-]?\d++)?)(?!\s*=(?!=)|\[|_)", re.ASCII)
-EQUALS = re.compile(r"=(?!=)")
+LITERAL = re.compile(r"([A-Z]\w*)=([+-]?(?:\d++\.?+\d*+|\.\d++))(?=\s|$)", re.ASCII)
 DIMENSION = re.compile(r"(IC|ACP|ACN|AC|DC)(?=\s*\()")
 PREFIX = {"IC": "I", "AC": "@", "DC": "DC", "ACP": "ACP", "ACN": "ACN", "": ""}
 JUMP = re.compile(r"(GOTO[FBC]?)\s+([A-Z_]\w*|:?\d+)\s*$", re.ASCII)
 SECTION = re.compile(r"REPEATB?\s+(?!P\s*=)[A-Z_:]\w*", re.ASCII)
 TYPES: dict[str, Value] = {"REAL": 0.0, "INT": 0.0, "BOOL": False, "CHAR": "", "STRING": ""}
-ADDRESSES = frozenset((*POINTS, *CENTERS, *VECTOR, *CORNERS, *WORDS, *"FSTDMGH", "I1", "J1", "K1", "RPL"))
-STEERING = ("ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "CASE", "FOR", "IF", "WHILE", "UNTIL")
+ADDRESSES = {
+    *AXES, *VECTOR, *CORNERS, *WORDS, *"IJKFSTDMGH", "RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL", "FP",
+    "X1", "Y1", "Z1",
+}  # fmt: skip
+STEERING = ("ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "FOR", "IF", "WHILE", "UNTIL")
+OTHERWISE = {"T": "#", "RP": "PR", "AP": "PA", "CR": "R"}  # names that words then have
 SPINDLE = re.compile(r"([SM])1")  # of the master spindle
 Define = Callable[[str, Value, int, str], None]  # sets a variable: name, value, column, its type if it is declared
 
@@ -61,6 +65,11 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
             letter = "#" if plain[1] == "T" else plain[1]
             words.append(Word(letter, float(plain[2].replace("EX", "E")), column, plain[0]))
             continue
+        literal = LITERAL.match(scanner.text, scanner.position)
+        if literal is not None and literal[1] in ADDRESSES:  # most of a program with tool vectors
+            scanner.position = literal.end()
+            words.append(Word(OTHERWISE.get(literal[1], literal[1]), float(literal[2]), column, literal[0]))
+            continue
         name = scanner.take(NAME)
         scanner.refuse_if(not name, f"{scanner.rest()} is no word", "words such as X10, X=R1, CR=5", column=column)
         if name == "DEF":
@@ -73,8 +82,8 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
         spindle = SPINDLE.fullmatch(name)
         name = spindle[1] if spindle else name
         if name in REFUSED:
-            words.append(Word(name, 0.0, column, name))
-            scanner.result()
+            if scanner.result():  # a zero switches it off
+                words.append(Word(name, 0.0, column, name))
         elif name in ADDRESSES:
             words.append(_addressed(scanner, name, column, begin))
         else:
@@ -90,12 +99,14 @@ def _addressed(scanner: SiemensScanner, name: str, column: int, begin: int) -> W
     if isinstance(value, str):
         scanner.refuse_if(name != "T", f"{shown} is no number", "a number", column=column)
         return Word('"', 0.0, column, value)
-    letter = "#" if name == "T" else PREFIX[dimension] + name
+    name = OTHERWISE.get(name, name)
+    letter = name if name in ("#", "PA", "PR") and dimension == "AC" else PREFIX[dimension] + name
     return Word(letter, float(value or 0.0), column, shown)
 
 
 def _named(scanner: SiemensScanner, name: str, column: int) -> list[Word]:
     """A word without a number, and the parameters in its brackets where these are known by name."""
+    scanner.take(BLANK)
     words, begin = [Word(name, 0.0, column, name)], scanner.position
     if name in SIGNATURES and scanner.begins("("):
         names, values = SIGNATURES[name].split(), scanner.arguments()
