@@ -197,6 +197,27 @@ def test_what_is_missing_is_named_with_where_to_write_it(tmp_path, name):
     assert words in str(error.value) and "\n" not in str(error.value)
 
 
+def test_rapids_through_material_and_tilted_cuts_are_warned_of(tmp_path):
+    lines = ["G21 G90", "T1 M6 S6000 M3", "G0 X-10 Y24 Z20", "G0 Z-3", "G1 X110 F900", "G0 X50 Y10", "G1 X60 A3", "M30"]
+    cut = cut_of(parse_program("\n".join(lines), "wall.nc"), tmp_path)
+    assert any(text.startswith("lines 6: rapids run into material") for text in cut.warnings)
+    assert any(text.startswith("lines 7: the tool is tilted") for text in cut.warnings)
+    assert not cut.mean_force[cut.samples.line == 7].any() and cut.mean_force[cut.samples.line == 5].any()
+
+
+def test_chords_shorter_than_a_tooth_s_feed_have_the_direction_of_the_path(tmp_path):
+    """Chords of 20 um whose ends are rounded up and down by a micrometre: 3 degrees each."""
+    chords = "\n".join(f"X{49 + 0.02 * i:.2f} Y{24 + 0.001 * (i % 2):.3f}" for i in range(101))
+    read = parse_program(f"G21 G90\nT1 M6 S6000 M3\nG0 X-10 Y24 Z20\nG0 Z-3\nG1 X49 F900\n{chords}\nM30", "wall.nc")
+    cut, straight = cut_of(read, tmp_path), cut_of(program(), tmp_path)
+    rows = np.flatnonzero(cut.samples.line > 6)[5:-10]
+    assert np.abs(cut.samples.tangent[rows, 1]).max() < 0.021  # 0.05 of the chords
+    expected = straight.wall_mean[
+        middle(straight), 1
+    ]  # the last degree before the wall is cut by every other chord only
+    np.testing.assert_allclose(cut.wall_mean[rows, 1], expected, rtol=0.1)
+
+
 def test_a_speed_of_the_setup_holds_where_the_program_has_none(tmp_path):
     text = SETUP.replace("[[tool]]", "[spindle]\nspeed_per_min = 6000\n[[tool]]")
     cut = cut_of(program(spindle="M5"), tmp_path, text)

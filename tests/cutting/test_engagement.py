@@ -194,3 +194,27 @@ def test_what_cannot_be_engaged_is_refused_with_its_line(text, line, message):
     with pytest.raises(ProgramError, match=message) as error:
         Milling(text)
     assert error.value.line == line
+
+
+@pytest.mark.parametrize(
+    "moves, lines",
+    [
+        ("G0 X-40 Y0 Z5\nG1 Z-3\nX0\nG0 X20\nZ5\n", [5, 6]),  # on through the material, and up out of it
+        ("G0 X-40 Y0 Z5\nG1 Z-3\nX0\nG0 X-20\nZ5\n", []),  # back through its own slot
+        ("G0 X1 Y1\nZ-2\nG1 X10\nG0 Z5\n", [3]),  # down into it, from nobody knows where
+        ("G0 X-36 Y0\nZ-2\nG1 X10\nG0 Z1\nX50 Y20\n", []),
+        ("G0 X-36 Y0\nZ-2\nG1 X10\nG0 Z1\nX50 Y20 Z-0.5\n", [6]),
+    ],
+)
+def test_rapids_through_material_are_told_by_their_lines(moves, lines):
+    milling = Milling(HEAD + moves + "M30\n")
+    milling.engaged()
+    assert np.unique(milling.samples.line[milling.engagement.struck]).tolist() == lines
+
+
+def test_what_a_tilted_tool_takes_off_counts_as_still_there():
+    text = HEAD + "G0 X-40 Y0 Z5\nG1 Z-3\nX0{}\nG0 Z5\nX-40\n{}G1 Z-3\nX-10\nM30\n"
+    tilted, upright = (Milling(text.format(*words)) for words in ((" B5", "G0 B0\n"), ("", "")))
+    volumes = [milling.removed()[milling.samples.line >= 7].sum() * 1e9 for milling in (tilted, upright)]
+    assert volumes[0] == pytest.approx(3.0 * (20.0 * 10.0 + np.pi * 25.0 / 2.0), rel=2e-3)
+    assert volumes[1] == pytest.approx(0.0, abs=1e-3)

@@ -58,13 +58,15 @@ def test_a_wall_through_the_stock_begins_at_its_underside():
         (5.0, 0.0, 0.1, (0.0, 0.0)),
         (5.0, 0.2, 1.0, (-0.5, 0.5)),
         (2.0, 0.0, 6.0, (-3, 3)),
+        (0.0, 0.2, 8.0, (-4.0, 4.0)),  # a trough: the edge behind is lower in the middle
+        (2.0, 0.2, 6.0, (-3, 3)),
+        (2.0, -0.2, 6.0, (-3, 3)),
     ],
 )
 def test_the_strip_between_two_passes_is_halfway_to_the_neighbours(corner, slope, over, strip):
-    """Of a flat end the later pass owns what both pass."""
+    """Of a flat end on a level the later pass owns what both pass."""
     passes = "".join(
-        f"G0 X-20 Y{y} Z{1 + 20 * slope}\nG1 Z{-3 + 20 * slope}\nX40 Z{-3 - 40 * slope}\nG0 Z25\n"
-        for y in (0.0, over, 2.0 * over)
+        f"G0 X-20 Y{y} Z25\nG1 Z{-3 + 20 * slope}\nX40 Z{-3 - 40 * slope}\nG0 Z25\n" for y in (0.0, over, 2.0 * over)
     )
     milling = Milling(HEAD + passes + "M30\n", corner=corner, low=(-30, -30, -20), high=(60, 60, 0))
     middle = of_line(milling, final_strip(*milling.context), 8)[5] * 1e3

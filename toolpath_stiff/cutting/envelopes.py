@@ -52,7 +52,8 @@ def distance(beside: FloatArray, away: FloatArray, spoke: FloatArray, arc: bool)
 def rise(reach: FloatArray, flat: FloatArray, beside: FloatArray) -> FloatArray:
     """M, height of the cutter's end above its tip at a distance from the axis of up to its radius."""
     corner, inset = reach - flat, np.maximum(beside - flat, 0.0)
-    return corner - np.sqrt(np.maximum(corner * corner - inset * inset, 0.0))
+    height: FloatArray = corner - np.sqrt(np.maximum(corner * corner - inset * inset, 0.0))
+    return height
 
 
 def down_slope(

@@ -67,10 +67,9 @@ def final_strip(work: Workpiece, samples: Samples, cutters: Mapping[int, Cutter]
         x, y = points_around(stations, away, np.arctan2(-back, offset))
         every = np.full(len(surface), len(work.pieces))
         ball = np.repeat(np.where(stations["flat"] == 0.0, SCALLOP * stations["reach"], 0.0), ACROSS)
-        stays: BoolArray = np.asarray(
-            np.abs(work.tops(x, y, (np.zeros_like(every), every))[0] - surface) < BESIDE + ball
-        )
-        stays &= (work.stock.bottoms(x, y) < surface) & ~np.repeat(stations["end_alone"], ACROSS)
+        near = np.abs(work.tops(x, y, (np.zeros_like(every), every))[0] - surface) < BESIDE + ball
+        material = (work.stock.bottoms(x, y) < surface) & ~np.repeat(stations["end_alone"], ACROSS)
+        stays: BoolArray = np.asarray(near & material)
         # A flat end passes a point of the floor twice, with its front and with its back.
         other = stations["path"] + LATER * stations["reach"] + 2.0 * stations["flat"]
         some = np.flatnonzero(stays)
@@ -79,7 +78,7 @@ def final_strip(work: Workpiece, samples: Samples, cutters: Mapping[int, Cutter]
         stays[some] = (above > TOUCHED) | ((above < -TOUCHED) & (ball[some] > 0.0))
         stays = stays.reshape(offset.shape)
         low, high = np.where(stays, offset, np.inf).min(axis=1), np.where(stays, offset, -np.inf).max(axis=1)
-        strips[rows] = np.where(stays.any(axis=1)[:, None], np.stack([low, high], axis=1), np.nan)
+        strips[rows] = np.where(np.isfinite(low)[:, None], np.stack([low, high], axis=1), np.nan)
     return strips
 
 

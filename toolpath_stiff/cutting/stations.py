@@ -61,11 +61,10 @@ def stations_at(
 def pieces_at(work: Workpiece, move: IntArray, path: FloatArray) -> IntArray:
     """(n,) the piece at places along moves; of a rapid the next."""
     first, count = work.first[move], work.first[move + 1] - work.first[move]
-    own = work.pieces[np.minimum(first, len(work.pieces) - 1)]
-    each = np.where(count > 0, own["after"] - own["before"], 1.0)
-    return np.asarray(
-        first + np.clip(((path - own["before"]) / each + 1e-9).astype(np.int64), 0, np.maximum(count - 1, 0))
-    )
+    row = np.minimum(first, len(work.pieces) - 1)
+    before, after = work.pieces["before"][row], work.pieces["after"][row]
+    number = ((path - before) / np.where(count > 0, after - before, 1.0) + 1e-9).astype(np.int64)
+    return np.asarray(first + np.clip(number, 0, np.maximum(count - 1, 0)))
 
 
 def stations_between(
