@@ -14,7 +14,7 @@ from toolpath_stiff.cutting.engagement import engage
 from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.passes import walls_of_all_passes
-from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.patches import Contact, Patches
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
 from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import Stock
@@ -171,10 +171,13 @@ def evaluate_cut(
     engaged = np.zeros(len(samples), dtype=bool)
     engaged[patches.station] = True
     repeated[1:] &= engaged[1:] == engaged[:-1]
+    level = np.hypot(samples.tangent[:, 0], samples.tangent[:, 1])
+    feed = cut.feed_per_tooth[:, None] * np.stack([level, samples.tangent[:, 2]], axis=1)
     for number, cutter in cutters.items():
+        contact = Contact(patches, cutter, setup.coefficients, feed, np.sign(spindle))
         rows = np.flatnonzero(engaged & ~repeated & (samples.tool == number))
-        for start in range(0, len(rows), BLOCK):
-            _evaluate(cut, model, origin, cutter, patches, spindle, strips, rows[start : start + BLOCK])
+        for part in (rows[start : start + BLOCK] for start in range(0, len(rows), BLOCK)):
+            _evaluate(cut, model, origin, contact.of(part), strips, part)
     again = np.flatnonzero(repeated)
     for values in (cut.mean_force, cut.peak_force, cut.deflection, cut.wall_force, profiles):
         values[again] = values[again - 1]
@@ -242,32 +245,20 @@ def _evaluate(
     cut: Cut,
     model: StiffnessModel,
     origin: Pose,
-    cutter: Cutter,
-    patches: Patches,
-    spindle: FloatArray,
+    contact: Contact,
     strips: FloatArray,
     rows: IntArray,
 ) -> None:
-    """Enter forces, deflections and errors of some samples (m,) that cut with one cutter, in their order.
-
-    `strips`: of floor (n, 2).
-    """
+    """Enter forces, deflections and errors of some samples (m,) with their contact; `strips`: of floor (n, 2)."""
     samples = cut.samples.take(rows)
-    kept = patches.take(slice(*np.searchsorted(patches.station, (rows[0], rows[-1] + 1))))
-    place = np.searchsorted(rows, kept.station).clip(max=len(rows) - 1)
-    kept = replace(kept, station=place).take(rows[place] == kept.station)
-    slope = np.hypot(samples.tangent[:, 0], samples.tangent[:, 1]), samples.tangent[:, 2]
-    feed = cut.feed_per_tooth[rows, None] * np.stack(slope, axis=1)
-    turning = np.sign(spindle[rows])
-    given = (kept, cutter, cut.coefficients, feed, turning)
-    mean = mean_force(*given)
-    cut.mean_force[rows], cut.peak_force[rows] = mean, peak_force(*given)
+    mean = mean_force(contact)
+    cut.mean_force[rows], cut.peak_force[rows] = mean, peak_force(contact)
     axes = station_axes(headings(samples), origin)
     machine = tip_compliances(model, samples, origin, axes, mean)
     whole = with_tools(machine, samples, cut.cutters)
     cut.deflection[rows] = product(whole, mean[:, :, None])[..., 0]
-    walls, of_walls, cut.wall_force[rows] = wall_error(*given, whole, cut.wall_heights[rows])
-    floors, of_floors = floor_error(*given, whole, strips[rows])
+    walls, of_walls, cut.wall_force[rows] = wall_error(contact, whole, cut.wall_heights[rows])
+    floors, of_floors = floor_error(contact, whole, strips[rows])
     cut.wall_profiles[rows] = walls
     _enter(cut, rows, slice(0, 2), walls @ shares()[1], walls)
     _enter(cut, rows, slice(2, 3), floors.mean(axis=1)[:, None], floors[:, None])

@@ -12,8 +12,9 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, product
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.cutting.coefficients import SHOWN, SYMBOLS, Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
-from toolpath_stiff.cutting.forces import TURN, force_at
-from toolpath_stiff.cutting.identification import SURE, least_squares, left_out, slot_patches, slot_responses
+from toolpath_stiff.cutting.forces import force_at
+from toolpath_stiff.cutting.identification import SURE, least_squares, left_out, slot, slot_responses
+from toolpath_stiff.cutting.patches import TURN
 from toolpath_stiff.documents import Document, json_number, records, without_nan
 from toolpath_stiff.errors import InputError, MeasurementError
 from toolpath_stiff.readings.force_records import ComplexArray, harmonics, mean_force, read_records
@@ -228,11 +229,10 @@ def _run_out(
 ) -> tuple[float, float]:
     """M and rad, the run-out that makes the force across the feed come back once a turn (`harmonics`) as it does."""
     turns = (np.arange(BINS) + 0.5) / BINS
-    slot, across = slot_patches(np.array([depth])), np.array([[feed, 0.0]])
     run_out, angle = PROBE, 0.0
     for _ in range(ROUNDS):  # teeth that lose contact make it bend
         tried = replace(cutter, run_out=run_out, run_out_angle=angle)
-        force = force_at(slot, tried, coefficients, across, np.ones(1), TURN * turns[None])[0, :, 1]
+        force = force_at(slot(tried, feed, depth, coefficients), TURN * turns[None])[0, :, 1]
         once, tooth = wave / harmonics(turns, force, cutter.flutes)
         run_out = min(max(run_out * float(np.abs(once)), NONE), feed)
         # What passes once a tooth tells where in its turn the record begins.
