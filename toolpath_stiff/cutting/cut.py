@@ -264,7 +264,7 @@ def _evaluate(
     _enter(cut, rows, slice(2, 3), floors.mean(axis=1)[:, None], floors[:, None])
     # Of the machine as a share of the compliance that acts along the normal.
     compliance = whole[:, (1, 1, 2), (1, 1, 2)]
-    share = machine_deviation(model, samples, origin, axes, machine)[:, (0, 0, 1)] / compliance
+    share = machine_deviation(model, samples, origin, axes, mean, machine)[:, (0, 0, 1)] / compliance
     of_coefficients = np.concatenate([of_walls, of_floors[:, None]], axis=1)
     cut.deviation[rows] = np.hypot(of_coefficients, share * cut.errors[rows])
 
