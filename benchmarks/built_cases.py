@@ -12,16 +12,15 @@ import numpy as np
 import toolpath_stiff as tps
 from benchmarks.bars import Record
 from benchmarks.case_loop import record_of
+from benchmarks.diagnosis_cases import kinds_of
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.planning.result import plan_csv
 from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text, read_plan
-from toolpath_stiff.rig.fem_faults import faults
 from toolpath_stiff.rig.fem_path import path_truth
 from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 GROUPS = ("sound", "single", "pair", "outside")
 BUILT = ("fem", "springs")
@@ -55,13 +54,6 @@ def make_jobs(first_seed: int, counts: Mapping[str, int], built: Sequence[str]) 
                 hidden = {"sound": "none", "pair": pair}.get(group, kinds[k % len(kinds)])
                 jobs.append(Job(way, group, first_seed + 100_000 * number + 10_000 * place + k, hidden))
     return jobs
-
-
-def kinds_of(built: str) -> tuple[list[str], list[str]]:
-    """What can be hidden in and outside the catalogue."""
-    if built == "fem":
-        return faults(in_catalogue=True), faults(in_catalogue=False)
-    return list(CATALOGUE), list(UNKNOWNS)
 
 
 def small_campaign(seed: int) -> Table:

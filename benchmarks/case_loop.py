@@ -14,6 +14,7 @@ from typing import Any
 
 from benchmarks.bars import Figure, Record, bars_table, summary
 from benchmarks.pages import write_page
+from toolpath_stiff.rig.case import BUILT
 
 
 def run_benchmark(
@@ -31,6 +32,8 @@ def run_benchmark(
     `make_jobs` makes the cases that the options say, `run` the record of a case, `report` the page of all records and
     of the command, and whether all bars are cleared. `records` and `out` are the usual files for them.
     """
+    if "--built" not in parser.format_usage():
+        parser.add_argument("--built", choices=BUILT, default=BUILT[0], help=f"machines (default: {BUILT[0]})")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
     parser.add_argument("--records", type=Path, default=records, help="JSON lines, one a case")
     parser.add_argument("--resume", action="store_true", help="keep the cases that --records holds")

@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--outside", type=int, default=60, help="cases outside the catalogue (default: 60)")
 
     def make(args: argparse.Namespace) -> list[Job]:
-        jobs = make_jobs(args.first_seed, args.each, args.none, args.outside)
+        jobs = make_jobs(args.first_seed, args.each, args.none, args.outside, built=args.built)
         # The longest cases first, so that no process is left with one at the end.
         return sorted(jobs, key=lambda job: (job.layout != "tilted", job.group != "outside"))
 

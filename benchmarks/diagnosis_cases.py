@@ -15,10 +15,13 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case as case_module
 from toolpath_stiff.rig import exercise
+from toolpath_stiff.rig.fem_faults import FAULTS, faults
+from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 LAYOUTS = ("tilted", "paper")
 # Distance of the seeds of layouts and of groups of cases, so that more cases of a group leave the others as they were.
 LAYOUT_SEEDS, GROUP_SEEDS = 100_000, 1_000
+NOT_IN_PAPER = frozenset(("force_N", "time_min", "temperature_C"))  # columns that the paper's layout lacks
 CHOICES = ("strut", "vertex", "direction", "setup")
 
 
@@ -30,23 +33,37 @@ class Job:
     layout: str
     seed: int
     hidden: str
+    built: str = "springs"
 
 
-def make_jobs(first_seed: int, each: int, none: int, outside: int, layouts: Sequence[str] = LAYOUTS) -> list[Job]:
+def kinds_of(built: str, layout: str = "tilted") -> tuple[list[str], list[str]]:
+    """What can be hidden in and outside the catalogue that a layout has the columns for."""
+    lacking = NOT_IN_PAPER if layout == "paper" else frozenset()
+    if built == "fem":
+        known, beyond = ({name: FAULTS[name] for name in faults(in_catalogue=inside)} for inside in (True, False))
+        inside = [name for name, fault in known.items() if lacking.isdisjoint(fault.columns)]
+    else:
+        inside, beyond = list(case_module.effects_of_layout(layout)), UNKNOWNS
+    return inside, [name for name, kind in beyond.items() if lacking.isdisjoint(kind.columns)]
+
+
+def make_jobs(
+    first_seed: int, each: int, none: int, outside: int, layouts: Sequence[str] = LAYOUTS, built: str = "springs"
+) -> list[Job]:
     """All cases, each with a seed of its own."""
     jobs = []
     for layout in layouts:
         start = first_seed + LAYOUT_SEEDS * LAYOUTS.index(layout)
-        groups = [(k, "one", name, each) for k, name in enumerate(case_module.effects_of_layout(layout))]
-        groups += [(20, "none", "none", none), (21, "outside", "outside", outside)]
+        groups = [(k, "one", name, each) for k, name in enumerate(kinds_of(built, layout)[0])]
+        groups += [(50, "none", "none", none), (51, "outside", "outside", outside)]
         for number, group, hidden, count in groups:
-            jobs += [Job(group, layout, start + GROUP_SEEDS * number + k, hidden) for k in range(count)]
+            jobs += [Job(group, layout, start + GROUP_SEEDS * number + k, hidden, built) for k in range(count)]
     return jobs
 
 
 def run(job: Job) -> dict[str, Any]:
     """The record of a case; with `error`, the traceback, where it failed."""
-    case = partial(case_module.make_case, job.seed, job.layout, job.hidden)
+    case = partial(case_module.make_case, job.seed, job.layout, job.hidden, built=job.built)
     return record_of(asdict(job), lambda folder: judged(*case(), folder)[0])
 
 
@@ -65,7 +82,7 @@ def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: 
     found = diagnosis.to_dict()
     cpu = time.process_time() - start
     record = {
-        "truth": truth["hidden"],
+        "truth": right_names(truth, found["plausible"]),
         "kind": truth["kind"],
         "effects": truth["effects"],
         "verdict": found["verdict"],
@@ -77,8 +94,14 @@ def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: 
         "cpu": round(cpu, 2),
     }
     if truth["kind"] == "one":
-        record |= _right_effect(found, truth["effects"][0])
+        record |= _right_effect(found, truth["effects"][0] | {"effect": record["truth"][0]})
     return record, found
+
+
+def right_names(truth: dict[str, Any], plausible: Sequence[str]) -> list[str]:
+    """Of each hidden effect its name; of a fault of finite elements a right one, if there is one in `plausible`."""
+    names = [effect.get("names") or [effect["effect"]] for effect in truth["effects"]]
+    return [next((name for name in right if name in plausible), right[0]) for right in names]
 
 
 def _right_effect(found: Document, hidden: dict[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.bars import Figure, Record, share
 from benchmarks.case_loop import document, record_of, run_benchmark, sound
-from benchmarks.diagnosis_cases import machine
+from benchmarks.diagnosis_cases import kinds_of, machine
 from benchmarks.pages import table
 from toolpath_stiff.correction.draft import draft
 from toolpath_stiff.diagnosis.diagnose import diagnose
@@ -30,7 +30,6 @@ from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case as case_module
 from toolpath_stiff.rig import exercise
 from toolpath_stiff.rig.hidden import Nuisances
-from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 FIRST_SEED = 83_000_000
 NOISE_SEEDS = 1_000_000  # distance of the seeds of the cases without anything hidden
@@ -47,13 +46,14 @@ class Job:
 
     seed: int
     hidden: str
+    built: str
 
 
-def make_jobs(first_seed: int, unknowns: int, noises: int) -> list[Job]:
+def make_jobs(first_seed: int, unknowns: int, noises: int, built: str) -> list[Job]:
     """Drafts of unknowns, of each kind in turn, those of different links mixed, and of noise."""
-    kinds = list(UNKNOWNS)
-    found = [Job(first_seed + k, kinds[k * STRIDE % len(kinds)]) for k in range(unknowns)]
-    return found + [Job(first_seed + NOISE_SEEDS + k, NOISE) for k in range(noises)]
+    kinds = kinds_of(built)[1]
+    found = [Job(first_seed + k, kinds[k * STRIDE % len(kinds)], built) for k in range(unknowns)]
+    return found + [Job(first_seed + NOISE_SEEDS + k, NOISE, built) for k in range(noises)]
 
 
 def run(job: Job) -> dict[str, Any]:
@@ -64,11 +64,11 @@ def run(job: Job) -> dict[str, Any]:
 def _drafted(job: Job, folder: Path) -> dict[str, Any]:
     """Draft from every other clamping, judge with all readings; the links that hold the truth and what was drafted."""
     noise = STATED if job.hidden == NOISE else None
-    case = case_module.draw_case(job.seed, "tilted", "none" if job.hidden == NOISE else job.hidden)
+    case = case_module.draw_case(job.seed, "tilted", "none" if job.hidden == NOISE else job.hidden, built=job.built)
     tables = {"same": case.rows}
     if job.hidden != NOISE:
         # The same seed: the same poses, struts, joints and scatter.
-        tables["gone"] = case_module.draw_case(job.seed, "tilted", "none", noise=Nuisances()).rows
+        tables["gone"] = case_module.draw_case(job.seed, "tilted", "none", noise=Nuisances(), built=job.built).rows
     old = np.asarray(case.rows["clamp"]) % 2 == 0
     file = folder / "old.csv"
     file.write_text(exercise.csv_text({name: np.asarray(values)[old] for name, values in case.rows.items()}))
@@ -150,10 +150,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--noise-cases", type=int, default=8, help="drafts of noise (default: 8)")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
 
-    return run_benchmark(
-        parser, arguments, lambda args: make_jobs(args.first_seed, args.cases, args.noise_cases), run, report,
-        records=RECORDS, out=OUT,
-    )  # fmt: skip
+    def make(args: argparse.Namespace) -> list[Job]:
+        return make_jobs(args.first_seed, args.cases, args.noise_cases, args.built)
+
+    return run_benchmark(parser, arguments, make, run, report, records=RECORDS, out=OUT)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""`python -m benchmarks.heidenhain [--programs N] [--seed S]`: random programs in Heidenhain's plain language.
+"""`python -m benchmarks.heidenhain [--language siemens] [--programs N] [--seed S]`: random programs in a language.
 
-Each is read by the package and by an independent small reader (`tests.nc.plain_language`): kinds of moves, points along
-them, the tool's axis must agree within 0.0001 mm. Prints what differs; exit code 1 if anything does, or a program is
-refused.
+Each is read by the package and by an independent small reader (`tests.nc.plain_language`, `siemens_reader`): kinds of
+moves, points along them, the tool's axis must agree within 0.0001 mm. Prints what differs; exit code 1 if
+anything does, or a program is refused.
 """
 
 import argparse
@@ -11,12 +11,13 @@ import sys
 
 import numpy as np
 
-from tests.nc.plain_language import SHARES, Reader, random_program
+from tests.nc import plain_language, siemens_reader
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.nc.reader import parse_program
 
 TOLERANCE_MM, TOLERANCE_AXIS = 1e-4, 1e-6
+READERS = {"heidenhain": (plain_language, "hunt.h"), "siemens": (siemens_reader, "hunt.mpf")}
 
 
 def seen(moves: Moves) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -25,7 +26,7 @@ def seen(moves: Moves) -> list[tuple[str, np.ndarray, np.ndarray]]:
     for i in range(len(moves)):
         start, end, normal = moves.start[i, :3] * 1e3, moves.end[i, :3] * 1e3, moves.arc_normal[i]
         out, points = start - moves.arc_center[i] * 1e3, []
-        for share in SHARES:
+        for share in plain_language.SHARES:
             turn, climb = moves.arc_sweep[i] * share, share * (end - start)
             if turn:
                 along = normal * (normal @ out)
@@ -39,11 +40,12 @@ def seen(moves: Moves) -> list[tuple[str, np.ndarray, np.ndarray]]:
     return rows
 
 
-def difference(text: str) -> str:
+def difference(text: str, language: str = "heidenhain") -> str:
     """What differs between both readings, or why one refuses; "" where they agree."""
-    witness = Reader(text).moves
+    readers, name = READERS[language]
+    witness = readers.Reader(text).moves
     try:
-        moves = seen(parse_program(text, "hunt.h").moves)
+        moves = seen(parse_program(text, name).moves)
     except TpsError as error:
         return f"refused: {error}"
     for number, (ours, theirs) in enumerate(zip(moves, witness, strict=False)):
@@ -58,11 +60,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--programs", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--language", choices=READERS, default="heidenhain")
     arguments = parser.parse_args()
     differing = 0
     for seed in range(arguments.seed, arguments.seed + arguments.programs):
-        text = random_program(seed)
-        if detail := difference(text):
+        text = READERS[arguments.language][0].random_program(seed)
+        if detail := difference(text, arguments.language):
             differing += 1
             sys.stdout.write(f"seed {seed}: {detail}\n{text}\n")
     sys.stdout.write(f"{arguments.programs} programs, {differing} read otherwise\n")

@@ -36,9 +36,8 @@ ODDITIES = (
     "G 0 1 X3|G1. X1|G +1 X1|G-1 X1|M3 M5|M3 M8|M7 M8|M8 M9|M0 M1|M6 M6|M3 M3|M62 P1|M64 P1|M66 P1 L0|M66 P0 L3 Q1|"
     "M67 E1 Q2|M68 E0 Q1|M50 P1|M51 P0|M52|M53 P1|M48|M49|M19 R10|M19 R10 Q2 P1|M70|M72|M73|M71|M200|M999|G4 P1|G4|"
     "G4 P-1|G4 X1|G4 P.5 G1 X3|G4 P1 P2|X1 X2|G1 G1 X2|F10 F20|X1 Y1 X1|U1|W3|E5|D3|H2|H1 X1|L2|L2 X3|P3|P3 X1|Q2 X1|"
-    "R3 X2|I2 X4|K1|J2|D1 X1|E1 X2|S10 X1|T2 X1|G1 X1 Y|X|G|M|G1 X*2|G1 X1,2|X1\0|X5=2|#1=5|X#1|X[1+2]|G1 @5 ^30|"
-    "@5 ^30|@5|^3|G91 @2 ^20|@7 ^-45 Z2|G90 G3 @5 ^90 R9|@3 ^30 X1|G81 @4 ^10 Z-1 R2|^100 L2|"
-    "G91 G81 R1 Z-1 ^30 L3|G0 @6 ^7|G18 @5 ^1|"
+    "R3 X2|I2 X4|K1|J2|D1 X1|E1 X2|S10 X1|T2 X1|G1 X1 Y|X|G|M|G1 X*2|G1 X1,2|X1\0|X5=2|#1=5|X#1|X[1+2]|"
+    "@5 ^30|G91 ^20|"
     "G33 K1 Z2|G33.1 K1 Z2|G38.2 X5|G5 X1 I1 J1|G5.1 X2 I1 J2|G5.2|G41|G42 D1|G41.1 D2|G40 X1|G76 P1 Z1|"
     "G68 X0 Y0 R30|G65 P1|G12 I3|G54 P1|G10|$1 M3 S5|M1 X3|M0 X3|M2 X3|M30 G1 X4|M6 T2 G43 H2 Z5|T3 M6 X1|F20 G20|"
     "G20 F20|S5 M3 G1 X1 F9|M9 X3 M5|G1 M8 X2 M3 Y4|:100|:5 X1|O5 X1|O<a>|o1 call|M01 X5|m02|G28 X0|G28 Z5 X1|G30 A5|"
@@ -340,7 +339,6 @@ class Zeros(Harsh):
             lambda: f"{self.one('G81', 'G82 P1', 'G83 Q2')} {self.words('XY')} Z-9 R3",
             lambda: "G80",
             lambda: self.one("G17", "G18", "G19"),
-            lambda: self.one("@3 ^10", "@5 ^90", "^45", "@4"),
         ]
         few = r.sample(kinds, r.randint(3, len(kinds)))
         lines = ["G21 F100", self.one("", "G0 X1 Y2 Z3", "T1 M6\nG43 H1\nG0 Z9")]

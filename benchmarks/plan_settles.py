@@ -18,6 +18,7 @@ import numpy as np
 
 from benchmarks.bars import Figure, Record, share
 from benchmarks.case_loop import document, record_of, run_benchmark, sound
+from benchmarks.diagnosis_cases import right_names
 from benchmarks.pages import table
 from benchmarks.random_visits import random_visits
 from toolpath_stiff.diagnosis.diagnose import diagnose
@@ -32,7 +33,8 @@ from toolpath_stiff.rig.exercise import csv_text, read_plan
 POSES = 6
 FIRST_SEED = 70_000
 RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_plan_settles.jsonl"
-JOINTS_EVERY = 4  # each fourth case hides joint_compliance, which the tip alone never names
+JOINTS_EVERY = 4  # each fourth case hides these, which the tip alone never names
+JOINTS = {"springs": "joint_compliance", "fem": "joints_soft"}
 MOST_DRAWS = 6  # seeds tried for one ambiguous case
 SETTLES = "identified"  # something is hidden in every case
 
@@ -43,12 +45,13 @@ class Job:
 
     seed: int
     hidden: str
+    built: str
 
 
-def make_jobs(count: int, first: int) -> list[Job]:
-    """So many cases; each fourth hides `joint_compliance`."""
+def make_jobs(count: int, first: int, built: str) -> list[Job]:
+    """So many cases; each fourth hides joints that give."""
     joints = [k % JOINTS_EVERY == JOINTS_EVERY - 1 for k in range(count)]
-    return [Job(first + 100 * k, "joint_compliance" if joint else "one") for k, joint in enumerate(joints)]
+    return [Job(first + 100 * k, JOINTS[built] if joint else "one", built) for k, joint in enumerate(joints)]
 
 
 def run(job: Job) -> Record:
@@ -59,25 +62,25 @@ def run(job: Job) -> Record:
 def _first_ambiguous(job: Job, folder: Path) -> Record:
     for draw in range(MOST_DRAWS):
         (folder / str(draw)).mkdir()
-        settled = _planned(job.seed + draw, job.hidden, folder / str(draw))
+        settled = _planned(replace(job, seed=job.seed + draw), folder / str(draw))
         if settled:
             return settled
     raise ValueError(f"the diagnosis settles each of {MOST_DRAWS} draws at once")
 
 
-def _planned(seed: int, hidden: str, folder: Path) -> Record:
+def _planned(job: Job, folder: Path) -> Record:
     """What was hidden, the verdict after the plan, minutes by plan and at random, what was expected; {} if settled.
 
     `expected` is the forecast that the plan prints, over all rivals; `expected_if` the same were what is hidden the
     truth, over all rivals where that is none of them.
     """
-    machine = load_machine("nist")
-    case = draw_case(seed, "paper", hidden, 0.02)
+    machine, seed = load_machine("nist"), job.seed
+    case = draw_case(seed, "paper", job.hidden, 0.02, built=job.built)
     tip = folder / "tip.csv"
     tip.write_text(csv_text(case.rows))
     data = read_measurements(str(tip), machine)
     before = diagnose(machine, data)
-    if before.verdict != "ambiguous" and hidden != "joint_compliance":
+    if before.verdict != "ambiguous" and job.hidden not in JOINTS.values():
         return {}
     proposal = plan(machine, data, replace(Menu.of(data), indicators=True), n=POSES, judgement=before.main)
     assert isinstance(proposal.choice, RivalPlan)
@@ -91,11 +94,12 @@ def _planned(seed: int, hidden: str, folder: Path) -> Record:
     after = diagnose(machine, read_measurements([str(tip), *files], machine))
     outlook = proposal.choice.after
     rivals = [rival.name for rival in proposal.choice.rivals]
-    true = " + ".join(sorted(case.truth["hidden"]))
+    names = right_names(case.truth, after.plausible)
+    true = " + ".join(sorted(names))
     return {
         "drawn": seed,
         "verdict": after.verdict,
-        "right": set(after.plausible if after.verdict == SETTLES else ()) == set(case.truth["hidden"]),
+        "right": set(after.plausible if after.verdict == SETTLES else ()) == set(names),
         "minutes": minutes,
         "expected": outlook.settled,
         "expected_if": outlook.settled_if[rivals.index(true)] if true in rivals else outlook.settled,
@@ -126,7 +130,7 @@ def _measured(case: DrawnCase, planned: RivalPlan, visit: int, file: Path, numbe
 def figures(records: Sequence[Record]) -> list[Figure]:
     """The figures beside their bars."""
     settled = [r["verdict"] == SETTLES for r in records]
-    joints = [r["right"] for r in records if r["hidden"] == "joint_compliance"]
+    joints = [r["right"] for r in records if r["hidden"] in JOINTS.values()]
     expected, known = (float(np.mean([r[name] for r in records])) for name in ("expected", "expected_if"))
     shorter = float(np.divide(*np.mean([r["minutes"] for r in records], axis=0)))
     off = 100.0 * abs(known - float(np.mean(settled)))
@@ -156,7 +160,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.plan_settles", description=__doc__)
     parser.add_argument("--cases", type=int, default=60, metavar="N", help="ambiguous cases (default: 60)")
     parser.add_argument("--seed", type=int, default=FIRST_SEED, metavar="N", help="of the first case")
-    return run_benchmark(parser, arguments, lambda args: make_jobs(args.cases, args.seed), run, report, records=RECORDS)
+    return run_benchmark(
+        parser, arguments, lambda args: make_jobs(args.cases, args.seed, args.built), run, report, records=RECORDS
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from benchmarks.bars import Record
 from benchmarks.case_loop import document, run_benchmark, sound
 from benchmarks.portrait_bars import calibration_table, failures_table, figures, kinds_table
 from benchmarks.portrait_cases import LAYOUTS, Job, make_jobs, run
+from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 FIRST_SEED = 63_000_000  # chosen once, before the first run
@@ -32,7 +33,7 @@ PROBABILITIES = (
 
 def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
     """The document, and whether all bars are cleared."""
-    order = ["none", *UNKNOWNS]
+    order = ["none", *UNKNOWNS, *FAULTS]
     good = sound(records, lambda r: (r["layout"] != "tilted", order.index(r["hidden"]), r["seed"]))
     counts = Counter((r["layout"], "sound" if r["hidden"] == "none" else "unknown", r["verdict"]) for r in good)
     parts = [
@@ -52,11 +53,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
     parser.add_argument("--layouts", nargs="+", choices=LAYOUTS, default=LAYOUTS, metavar="LAYOUT")
     parser.add_argument(
-        "--only", nargs="+", choices=list(UNKNOWNS), default=(), metavar="KIND", help="kinds of unknown"
+        "--only", nargs="+", choices=[*UNKNOWNS, *FAULTS], default=(), metavar="KIND", help="kinds of unknown"
     )
 
     def make(args: argparse.Namespace) -> list[Job]:
-        return make_jobs(args.first_seed, args.cases, args.sound, args.layouts, args.only)
+        return make_jobs(args.first_seed, args.cases, args.sound, args.layouts, args.only, args.built)
 
     return run_benchmark(parser, arguments, make, run, report, records=RECORDS, out=OUT)
 

@@ -17,13 +17,13 @@ PROBABILITIES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0 + 1e-9)
 def right_set(record: Record, name: str) -> bool:
     """Whether an acceptable word is in the portrait's set, and the set is short enough to say something."""
     found = (record["portrait"] or {}).get(name, {})
-    return 0 < len(found) <= LARGEST_SET[name] and not set(found).isdisjoint(record["effects"][0][name])
+    return 0 < len(found) <= LARGEST_SET[name] and not set(found).isdisjoint(record["effects"][0].get(name, found))
 
 
 def first_right(record: Record, name: str) -> bool:
     """Whether the likeliest word is an acceptable one."""
     found = (record["portrait"] or {}).get(name, {})
-    return bool(found) and max(found, key=lambda word: found[word]) in record["effects"][0][name]
+    return bool(found) and max(found, key=lambda word: found[word]) in record["effects"][0].get(name, found)
 
 
 def ratio(record: Record) -> float:
@@ -41,7 +41,7 @@ def named_by_catalogue(record: Record) -> bool:
 
 def told_beside(record: Record, name: str) -> bool:
     """Whether what looks the same as the name of the catalogue holds an acceptable word."""
-    return bool(record.get("same")) and not set(record["same"][name]).isdisjoint(record["effects"][0][name])
+    return bool(record.get("same")) and not set(record["same"][name]).isdisjoint(record["effects"][0].get(name, ()))
 
 
 def figures(records: Sequence[Record]) -> list[Figure]:
@@ -126,7 +126,9 @@ def calibration_table(records: Sequence[Record]) -> list[str]:
     drawn = [r for r in records if r["hidden"] != "none" and r["portrait"] and r["layout"] == "tilted"]
     for name in LARGEST_SET:
         claims = [
-            (weight, word in r["effects"][0][name]) for r in drawn for word, weight in r["portrait"][name].items()
+            (weight, word in r["effects"][0].get(name, ()))
+            for r in drawn
+            for word, weight in r["portrait"][name].items()
         ]
         for label, inside in by_probability(claims, PROBABILITIES):
             means = (f"{100 * fmean(column):.0f} %" for column in zip(*inside, strict=True))

@@ -8,13 +8,10 @@ from typing import Any
 
 from benchmarks.bars import Record
 from benchmarks.case_loop import record_of
-from benchmarks.diagnosis_cases import judged
+from benchmarks.diagnosis_cases import judged, kinds_of
 from toolpath_stiff.rig import case as rig
-from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 LAYOUTS = ("tilted", "paper")
-# Columns that the paper's layout lacks.
-NOT_IN_PAPER = frozenset(("force_N", "time_min", "temperature_C"))
 LAYOUT_SEEDS, KIND_SEEDS = 10_000_000, 1_000
 NAMES = ("links", "variables")  # sets in the truth and in a portrait
 # What one of their entries is called in a portrait.
@@ -29,15 +26,16 @@ class Job:
     layout: str
     seed: int
     hidden: str
-
-
-def kinds_of_layout(layout: str) -> tuple[str, ...]:
-    """Kinds of unknown that a layout has the columns for."""
-    return tuple(n for n, kind in UNKNOWNS.items() if layout == "tilted" or NOT_IN_PAPER.isdisjoint(kind.columns))
+    built: str = "springs"
 
 
 def make_jobs(
-    first_seed: int, cases: int, sound: int, layouts: Sequence[str] = LAYOUTS, only: Sequence[str] = ()
+    first_seed: int,
+    cases: int,
+    sound: int,
+    layouts: Sequence[str] = LAYOUTS,
+    only: Sequence[str] = (),
+    built: str = "springs",
 ) -> list[Job]:
     """`cases` of each kind and layout, `sound` machines of each layout.
 
@@ -47,13 +45,13 @@ def make_jobs(
     jobs = []
     for layout in layouts:
         start = first_seed + LAYOUT_SEEDS * LAYOUTS.index(layout)
-        kinds = [kind for kind in kinds_of_layout(layout) if not only or kind in only]
+        kinds = [kind for kind in kinds_of(built, layout)[1] if not only or kind in only]
         jobs += [
-            Job(layout, start + KIND_SEEDS * (1 + zlib.crc32(kind.encode()) % 9000) + k, kind)
+            Job(layout, start + KIND_SEEDS * (1 + zlib.crc32(kind.encode()) % 9000) + k, kind, built)
             for k in range(cases)
             for kind in kinds
         ]
-        jobs += [Job(layout, start + k, "none") for k in range(sound)]
+        jobs += [Job(layout, start + k, "none", built) for k in range(sound)]
     return jobs
 
 
@@ -63,7 +61,7 @@ def run(job: Job) -> dict[str, Any]:
 
 
 def _diagnosed(job: Job, folder: Path) -> Record:
-    record, document = judged(*rig.make_case(job.seed, job.layout, job.hidden), folder)
+    record, document = judged(*rig.make_case(job.seed, job.layout, job.hidden, built=job.built), folder)
     same = document.get("looks_the_same")
     return record | {
         "portrait": in_short(document.get("portrait")),

@@ -110,7 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS, metavar="GROUP", help=", ".join(GROUPS))
 
     def make(args: argparse.Namespace) -> list[Job]:
-        return make_jobs(args.first_seed, args.cases, args.only)
+        return make_jobs(args.first_seed, args.cases, args.only, args.built)
 
     return run_benchmark(parser, arguments, make, run, report, records=RECORDS, out=OUT)
 

@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +39,10 @@ class Job:
     way: str = ""
     factor: float = 1.0
     slip: str = ""
+    built: str = "springs"
 
 
-def make_jobs(first_seed: int, cases: int, groups: Sequence[str] = GROUPS) -> list[Job]:
+def make_jobs(first_seed: int, cases: int, groups: Sequence[str] = GROUPS, built: str = "springs") -> list[Job]:
     """All cases: `cases` pairs, half as many of three effects and of each kind with outliers, a tenth of the rest.
 
     Cases that are compared with each other share their seed. More cases leave the first ones as they were.
@@ -63,7 +64,7 @@ def make_jobs(first_seed: int, cases: int, groups: Sequence[str] = GROUPS) -> li
         for k in range(tenth if slip else half):
             # Alternately on a sound machine and on one that hides an effect.
             jobs.append(Job("slip", "tilted", start["slip"] + 1000 * number + k, "one" if k % 2 else "none", slip=slip))
-    return [job for job in jobs if job.group in groups]
+    return [replace(job, built=built) for job in jobs if job.group in groups]
 
 
 def run(job: Job) -> dict[str, Any]:
@@ -74,7 +75,8 @@ def run(job: Job) -> dict[str, Any]:
 def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     """Draw, disturb, diagnose, and what the document says of noise and rows."""
     nuisances = Nuisances(outliers=job.outliers)
-    case = rig.draw_case(job.seed, job.layout, HIDDEN[job.hidden], size=SIZES[job.hidden], noise=nuisances)
+    hidden, size = HIDDEN[job.hidden], SIZES[job.hidden]
+    case = rig.draw_case(job.seed, job.layout, hidden, size=size, noise=nuisances, built=job.built)
     rows, truth, stated = case.rows, case.truth, {}
     more: dict[str, Any] = {}
     if job.way == "column":

@@ -25,6 +25,7 @@ from toolpath_stiff.nc.cutter_location.vocabulary import DOUBTFUL, LISTED, READ,
 from toolpath_stiff.nc.cutter_location.vocabulary import REFUSED as REFUSED_WORD
 from toolpath_stiff.nc.heidenhain import functions as tnc
 from toolpath_stiff.nc.heidenhain import vocabulary as plain_language
+from toolpath_stiff.nc.siemens import vocabulary as siemens
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 from toolpath_stiff.stiffness.catalogue import packaged_effects
@@ -97,6 +98,28 @@ def statements_table() -> str:
     heading = ("statement", "meaning", "function in `nc/heidenhain`", "source", "held by")
     below = rows(("statement", "what it is", "instead", "source"), *_joined(refused))
     return "\n".join([*rows(heading, *cells), "", "Refused, with the line:", "", *below, ""])
+
+
+# Of Siemens' words those in random programs that an independent reader reads too.
+HUNTED_SIEMENS = (
+    "G0", "G1", "G2", "G3", "CIP", "CT", "G90", "G91", "G111", "TRANS", "ATRANS", "ROT", "AROT", "MIRROR", "AMIRROR",
+    "ASCALE", "CYCLE800", "CYCLE81", "CYCLE82", "CYCLE83", "CYCLE85", "CYCLE89", "MCALL", "HOLES2", "M17", "M30",
+)  # fmt: skip
+
+
+def siemens_table() -> str:
+    """Siemens' words, with what holds each of them; and those that are refused."""
+    cells = []
+    for code in siemens.TABLE.values():
+        held = "" if code.listed or code.controls == EVERYWHERE else "geometry by hand"
+        held = "geometry by hand; independent reader" if code.name in HUNTED_SIEMENS else held
+        meaning = f"{code.meaning} (listed)" if code.listed else code.meaning
+        if not re.fullmatch(r"G5(0[6-9]|[1-8]\d|9[0-8])", code.name):  # G505 to G599 are one
+            cells.append((code.name, meaning, _language_function(code), code.source, held))
+    refused = _joined((row.name, row.what, row.hint, row.source) for row in siemens.REFUSED.values())
+    below = rows(("word", "what it is", "instead", "source"), *refused)
+    heading = ("word", "meaning", "function", "source", "held by")
+    return "\n".join([*rows(heading, *_joined(cells)), "", "Refused, with the line:", "", *below, ""])
 
 
 def _language_function(code: Code) -> str:
@@ -325,6 +348,7 @@ COMMITTED: dict[str, Callable[[], str]] = {
     "codes": codes_table,
     "words": words_table,
     "statements": statements_table,
+    "siemens": siemens_table,
     "table of effects": effects_table,
     "effects": effects_in_full,
     "unknowns": unknowns_table,

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from toolpath_stiff.machine.model import Hexapod
     from toolpath_stiff.readings.measurements import Readings
     from toolpath_stiff.stiffness.contract import Effect
-    from toolpath_stiff.stiffness.model import StiffnessModel
 
 # No result depends on the clock: on a busy machine examples are drawn and run slowly. The `timeout` in pyproject.toml
 # ends a test that does not end by itself.
@@ -152,24 +151,15 @@ def joint_columns_are_shared() -> Iterator[None]:
     """What displaced joints do to readings hangs on the machine and on how they are taken: once a process for each."""
     from tests.updating.cases import joint_columns_once
     from toolpath_stiff.inference.prediction import Predictor
-    from toolpath_stiff.planning import forecasts
-    from toolpath_stiff.stiffness.effect_source import is_foreign
 
-    of_readings, of_plan = Predictor.joint_columns.func, forecasts.joint_columns
+    of_readings = Predictor.joint_columns.func
 
     def for_readings(own: Predictor) -> FloatArray:
         """`Predictor.joint_columns`."""
-        return joint_columns_once("readings", own.machine, own.data, lambda: of_readings(own), own.effect_files)
-
-    def for_plan(model: StiffnessModel, readings: Readings) -> FloatArray:
-        """`forecasts.joint_columns`."""
-        if model.given is None or any(is_foreign(one.effect) for one in (*model.effects, *model.instruments)):
-            return of_plan(model, readings)
-        return joint_columns_once("plan", model.given, readings, lambda: of_plan(model, readings))
+        return joint_columns_once(own.machine, own.data, lambda: of_readings(own), own.effect_files)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Predictor, "joint_columns", property(for_readings))
-        patch.setattr(forecasts, "joint_columns", for_plan)
         yield
 
 

@@ -214,7 +214,10 @@ NO_EXAMPLE = {
         *("counted", "along_axis", "plunging", "headline", "set_aside", "out_of_reach"),
     },
     "Case": {"preview", "record", "next_result"},
-    "Update": {  # steps and fits in SI, and what follows from them
+    "Update": {
+        "kept_law",
+        "known",
+        "rises",  # steps and fits in SI, and what follows from them
         *("described", "last", "changed", "worse", "supported", "verdict", "widening", "corrected", "fitted"),
         *("document", "noise", "question", "text", "assumptions", "errors"),
     },
@@ -328,8 +331,8 @@ def test_progress_is_told_what_how_much_and_of_how_much(here):
 
 
 def test_an_updated_machine_goes_on(here):
-    update = tps.update("nist-table1", "nist", strut_law=True)
-    assert update.accepted
+    refused, update = (tps.update("nist-table1", "nist", strut_law=True, force=force) for force in (False, True))
+    assert not refused.accepted and update.accepted  # readings that tell nothing of the law
     better = update.machine
     file = update.save_machine("mine.toml")
     again = tps.Machine.load(file)

@@ -19,6 +19,7 @@ def said(verdict, explanations, truths, *, left=1.0, portrait=()):
     return {
         "verdict": verdict,
         "explanations": explanations,
+        "entries": len(explanations),
         "truths": truths,
         "after": left,
         "portrait": list(portrait),

@@ -50,7 +50,7 @@ def test_figures_are_counted_by_what_the_draft_was_read_off() -> None:
 
 
 def test_more_jobs_leave_the_first_ones_and_all_kinds_come_in_turn() -> None:
-    few, many = make_jobs(FIRST_SEED, 5, 2), make_jobs(FIRST_SEED, len(UNKNOWNS), 3)
+    few, many = make_jobs(FIRST_SEED, 5, 2, "springs"), make_jobs(FIRST_SEED, len(UNKNOWNS), 3, "springs")
     assert set(few) <= set(many)
     assert {job.hidden for job in many} == {*UNKNOWNS, NOISE}
 

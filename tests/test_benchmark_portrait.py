@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from benchmarks.diagnosis_cases import kinds_of
 from benchmarks.portrait import FIRST_SEED, report
 from benchmarks.portrait_bars import figures, first_right, ratio, right_set
-from benchmarks.portrait_cases import in_short, kinds_of_layout, make_jobs
+from benchmarks.portrait_cases import in_short, make_jobs
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 TERM = {"link": "table", "where": None, "direction": "X", "variable": "y", "shape": "square", "size": 3.0,
@@ -82,10 +83,12 @@ def test_what_looks_the_same_as_a_name_is_counted() -> None:
 
 def test_jobs_are_the_same_whatever_else_is_run() -> None:
     jobs = make_jobs(FIRST_SEED, 2, 3)
-    assert len(jobs) == 2 * (len(UNKNOWNS) + len(kinds_of_layout("paper"))) + 6
+    assert len(jobs) == 2 * (len(UNKNOWNS) + len(kinds_of("springs", "paper")[1])) + 6
     assert len({(job.layout, job.seed) for job in jobs}) == len(jobs)
     assert set(make_jobs(FIRST_SEED, 1, 0, ["tilted"], ["bed_sag"])) <= set(jobs)
-    assert "damping_plate" not in kinds_of_layout("paper")
+    assert {job.hidden for job in make_jobs(1, 1, 0, ["paper"], built="fem")} == {*kinds_of("fem", "paper")[1]}
+    assert "joints_loose" not in kinds_of("fem", "paper")[1]
+    assert "damping_plate" not in kinds_of("springs", "paper")[1]
 
 
 def test_the_document_names_every_failure_and_broken_case() -> None:

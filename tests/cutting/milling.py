@@ -6,9 +6,9 @@ import numpy as np
 
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.engagement import engage
-from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.patches import of_stations
 from toolpath_stiff.cutting.stock import box_stock
-from toolpath_stiff.cutting.workpiece import workpiece_of
+from toolpath_stiff.cutting.workpiece import stages_of
 from toolpath_stiff.nc.courses import points_along
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path.sampling import sample_moves
@@ -23,15 +23,14 @@ class Milling:
         self.samples = sample_moves(self.moves, step * 1e-3)
         self.cutters = {0: self.cutter}
         stock = box_stock(tuple(np.multiply(low, 1e-3)), tuple(np.multiply(high, 1e-3)), "given")
-        self.work = workpiece_of(stock, self.moves, self.cutters)
-        self.context = self.work, self.moves, self.samples, self.cutters
+        self.stages = list(stages_of(stock, self.moves, self.cutters))
+        self.work = self.stages[-1]
+        self.context = self.work, self.samples, self.cutters
 
     def engaged(self):
         """All patches, and the removed volume of each sample."""
-        blocks = list(engage(*self.context))
-        assert [rows.start for rows, _, _ in blocks[1:]] == [rows.stop for rows, _, _ in blocks[:-1]]
-        _, patches, volume = zip(*blocks, strict=True)
-        return Patches.joined(patches), np.concatenate(volume)
+        self.engagement = engage(self.stages, self.moves, self.samples, self.cutters)
+        return of_stations(self.engagement.patches, self.engagement.source), self.engagement.removed
 
     def removed(self):
         return self.engaged()[1]

@@ -1,14 +1,12 @@
 """Engagement against closed forms, and against a simulation of discs that shares nothing with it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.cutting.milling import Milling
-from toolpath_stiff.cutting import workpiece
+from toolpath_stiff.cutting import engagement, workpiece
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import move_lengths, points_along
 
@@ -126,20 +124,21 @@ def test_contact_along_lines_arcs_ramps_and_helices_is_that_of_simulated_discs(c
     assert wrong <= 0.002 * points
 
 
-def test_neither_the_index_nor_the_compiled_loops_change_the_contact(monkeypatch):
+@pytest.mark.parametrize("changes", [{"CELL": 0.15}, {"STAGE": 10, "BEFORE": 8}, {"MANY": 1}])
+def test_neither_cells_nor_stages_nor_compiled_loops_change_the_contact(monkeypatch, changes):
+    monkeypatch.setattr(engagement, "STRIDES", (1,))  # which stations share a contact is told within a stage
     plain, volume = Milling(MIXED, corner=1.5).engaged()
-    monkeypatch.setattr(workpiece, "CELL", 0.5 * workpiece.CELL)
-    milling = Milling(MIXED, corner=1.5)
-    for compiled in (False, True):
-        milling.work = replace(milling.work, compiled=compiled)
-        if compiled:
+    for name, value in changes.items():
+        if name == "MANY":
             pytest.importorskip("numba")
-        milling.context = (milling.work, *milling.context[1:])
-        patches, removed = milling.engaged()
-        np.testing.assert_array_equal(patches.station, plain.station)
-        for name in ("low", "high", "entry", "exit"):
-            np.testing.assert_allclose(getattr(patches, name), getattr(plain, name), atol=1e-7)
-        np.testing.assert_allclose(removed, volume, atol=1e-15, rtol=1e-6)
+        monkeypatch.setattr(workpiece, name, value)
+    milling = Milling(MIXED, corner=1.5)
+    assert len(milling.stages) > 3 or "STAGE" not in changes
+    patches, removed = milling.engaged()
+    np.testing.assert_array_equal(patches.station, plain.station)
+    for name in ("low", "high", "entry", "exit"):
+        np.testing.assert_allclose(getattr(patches, name), getattr(plain, name), atol=1e-7)
+    np.testing.assert_allclose(removed, volume, atol=1e-15, rtol=1e-6)
 
 
 @pytest.mark.parametrize("corner, body", [(0.0, np.pi * 25 * 6), (5.0, np.pi * 25 * 6 - np.pi * 125 / 3)])
@@ -187,7 +186,7 @@ def test_what_is_removed_is_what_is_missing(points, corner):
 @pytest.mark.parametrize(
     "text, line, message",
     [
-        (HEAD + "G0 Z5\nG1 X10 B5\nM30\n", 3, "tilted tools are not supported"),
+        (HEAD + "G0 Z5\nG1 X10 B5\nM30\n", 3, "tilted tools: no cut of the program has the tool along Z"),
         (HEAD + "T3 M6\nG1 X10\nM30\n", 3, "tool 3 cuts and its geometry is not known"),
     ],
 )

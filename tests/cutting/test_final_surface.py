@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.cutting.milling import Milling
-from toolpath_stiff.cutting.final_surface import final_strip, final_walls, finished_surface
+from toolpath_stiff.cutting.final_surface import final_strip, finished_surface, walls_of_passes
 from toolpath_stiff.cutting.stock import box_stock, stock_from_stl, stock_of_extents
 from toolpath_stiff.errors import InputError
 
@@ -24,7 +24,7 @@ def of_line(milling, values, line):
 
 def test_the_last_pass_that_touches_a_wall_owns_it_over_the_height_that_stands():
     milling = Milling(POCKET + "G0 Z5\nM30\n")
-    walls = final_walls(*milling.context) * 1e3
+    walls = walls_of_passes(*milling.context)[1] * 1e3
     assert np.isnan(of_line(milling, walls, 4)).all()  # the second level touches it again
     # Clockwise: the wall on the left, up to the stock's top; on the right, across, the island's.
     np.testing.assert_allclose(
@@ -36,7 +36,7 @@ def test_the_last_pass_that_touches_a_wall_owns_it_over_the_height_that_stands()
 def test_a_spring_pass_owns_the_wall_and_a_roughing_pass_does_not():
     again = "G0 Z5\nG0 X0 Y0\nG1 Z-4\nX20\nG0 Z5\nG0 X0 Y0.4\nG1 Z-3\nX20\nG0 Z5\nM30\n"
     milling = Milling(POCKET + again)
-    walls = final_walls(*milling.context) * 1e3
+    walls = walls_of_passes(*milling.context)[1] * 1e3
     assert np.isnan(of_line(milling, walls, 9)[:, 0]).all()
     # The spring pass keeps what stays below the last one, which is 3 deep and 0.4 further out.
     np.testing.assert_allclose(of_line(milling, walls, 16)[:, 0], [[0.0, 1.0]] * 10, atol=1e-6)
@@ -45,7 +45,9 @@ def test_a_spring_pass_owns_the_wall_and_a_roughing_pass_does_not():
 
 def test_a_wall_through_the_stock_begins_at_its_underside():
     milling = Milling(HEAD + "G0 X-40 Y0 Z5\nG1 Z-12\nX70\nM30\n")
-    np.testing.assert_allclose(of_line(milling, final_walls(*milling.context), 4)[20, 0], [2e-3, 12e-3], atol=1e-9)
+    np.testing.assert_allclose(
+        of_line(milling, walls_of_passes(*milling.context)[1], 4)[20, 0], [2e-3, 12e-3], atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(

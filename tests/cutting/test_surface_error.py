@@ -1,7 +1,5 @@
 """Walls and floors against a cutter stepped through time, which shares nothing with the package."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,13 +7,13 @@ from tests.cutting.simulator import Corner, Mill
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.engagement import engage
-from toolpath_stiff.cutting.final_surface import final_walls
+from toolpath_stiff.cutting.final_surface import walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force
-from toolpath_stiff.cutting.patches import Contact, Patches
+from toolpath_stiff.cutting.patches import Contact, Patches, of_stations
 from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import box_stock
 from toolpath_stiff.cutting.surface_error import STRIPS, floor_error, shares, wall_error
-from toolpath_stiff.cutting.workpiece import workpiece_of
+from toolpath_stiff.cutting.workpiece import stages_of
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path.sampling import sample_moves
 
@@ -115,8 +113,8 @@ def test_an_inner_corner_of_a_program():
     samples = sample_moves(program.moves, 0.1e-3)
     cutter = Cutter(1, 0.010, 0.0, 3, np.radians(30.0))
     stock = box_stock((-0.040, -0.010, -0.010), (0.010, 0.040, 0.0), "")
-    work = workpiece_of(stock, program.moves, {1: cutter})
-    walls = final_walls(work, program.moves, samples, {1: cutter})
+    engaged = engage(stages_of(stock, program.moves, {1: cutter}), program.moves, samples, {1: cutter})
+    walls = walls_of_passes(engaged.work, samples, {1: cutter})[1]
     values = np.array(ALUMINIUM) * [1e6, 1e6, 1e6, 1e3, 1e3, 1e3]
     known = Coefficients(values[:3], values[3:], np.zeros((6, 6)))
     heading, count = headings(samples), len(samples)
@@ -124,12 +122,9 @@ def test_an_inner_corner_of_a_program():
     turned[:, 0, 0] = turned[:, 1, 1] = np.cos(heading)
     turned[:, 0, 1], turned[:, 1, 0], turned[:, 2, 2] = np.sin(heading), -np.sin(heading), 1.0
     compliance = turned @ (SLIM / 1e3) @ turned.swapaxes(1, 2)
-    mean, spread = np.full((2, count), np.nan)
-    for rows, patches, _ in engage(work, program.moves, samples, {1: cutter}):
-        part = replace(patches, station=patches.station - rows.start)
-        feed = np.tile([[8e-5, 0.0]], (rows.stop - rows.start, 1))
-        error, _, _ = wall_error(Contact(part, cutter, known, feed, np.ones(len(feed))), compliance[rows], walls[rows])
-        mean[rows], spread[rows] = 1e6 * error[:, 1] @ shares()[1], 1e6 * np.ptp(error[:, 1], axis=1)
+    patches, feed = of_stations(engaged.patches, engaged.source), np.tile([[8e-5, 0.0]], (count, 1))
+    error, _, _ = wall_error(Contact(patches, cutter, known, feed, np.ones(count)), compliance, walls)
+    mean, spread = 1e6 * error[:, 1] @ shares()[1], 1e6 * np.ptp(error[:, 1], axis=1)
     x, y, _ = 1e3 * samples.position.T
     compared = 0
     for past, left, reach in corner.walls():

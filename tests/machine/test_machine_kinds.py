@@ -315,14 +315,15 @@ def test_forward_undoes_inverse_with_any_tool(name, seed):
     rng, machine = np.random.default_rng(seed), KINDS[name].with_changes(reference_tool_length=0.1)
     n = 2 if name == "offset wrist" else 8  # each is searched from many starts
     position, rotation = poses(name, rng.uniform(-1, 1, (n, 6)), rng.uniform(-0.95, 0.95, (n, 7)))
-    tool = 0.1 + rng.uniform(0.0, 0.05, n)
+    tool = 0.1 + rng.uniform(0.0, 0.05 if n == 8 else 0.0, n)
     stance = machine.solve(position, rotation, tool)
     reached = np.isfinite(stance.joints).all(axis=1)
     start = {"start": np.column_stack([position, roll_pitch_yaw(rotation)])[reached]} if name == "glide" else {}
     if name == "pentapod":
         start = {"start": np.column_stack([position, roll_pitch_yaw(rotation)[:, :2]])[reached]}
     again = machine.forward(stance.joints[reached], tool[reached], **start)
-    assert reached.sum() >= (n // 2 if machine.kind == "serial" else n)  # a longer tool leaves some out of reach
+    # A longer tool leaves some out of reach of a chain; a search finds all that there are.
+    assert reached.sum() >= (n // 2 if machine.kind == "serial" and n == 8 else n)
     np.testing.assert_allclose(again[0], position[reached], atol=1e-9)
     np.testing.assert_allclose(again[1], rotation[reached], atol=1e-9)
 
@@ -394,8 +395,8 @@ BAD = [
     ("robot200", "min_deg = -65.0\n", "", "[[axis]] 2 min_deg is missing"),
     ("robot200", "alpha_deg = -90.0", "alpha_deg = -1.5707963", "right angle in radians; expected degrees: -90"),
     ("robot200", "x_axis = [0.0, 0.0, 1.0]", "x_axis = [0.0, 0.0, 1.0]\ny_axis = [0.0, -1.0, 0.0]", "mirrored"),
-    ("robot200", "x_axis = [0.0, 0.0, 1.0]", "x_axis = [0.0, 0.6, 0.8]\ny_axis = [1.0, 0.0, 0.0]", "square"),
-    ("robot200", "x_axis = [0.0, 0.0, 1.0]", "x_axis = [0.0, 0.0, 0.5]", "unit vector"),
+    ("robot200", "x_axis = [0.0, 0.0, 1.0]", "x_axis = [0.0, 0.6, 0.8]\ny_axis = [1.0, 0.0, 0.0]", "not square"),
+    ("robot200", "x_axis = [0.0, 0.0, 1.0]", "x_axis = [0.0, 0.0, 0.5]", "no unit vectors"),
     ("robot200", 'frame = "J3"', 'frame = "J9"', "one of J1, J2"),
     ("robot200", 'name = "J2"', 'name = "J1"', "twice"),
     ("robot200", 'type = "beam"', 'type = "bean"', "spring, joint, beam"),

@@ -29,6 +29,7 @@ class Reader:
         self.lines = [re.sub(r"^\d+ ", "", line) for line in text.splitlines()]
         self.q: dict[str, float] = {}
         self.at, self.pole, self.heading = np.zeros(3), None, None  # program coordinates
+        self.axes = [0, 1]  # of the pole
         self.where = np.zeros(3)  # of the part
         self.moves: list = []
         self.shift, self.inner, self.angle, self.mirror, self.factor = np.zeros(3), np.zeros(3), 0.0, set(), 1.0
@@ -120,7 +121,9 @@ class Reader:
         elif head in ("L", "LP", "C", "CP", "CR", "CT"):
             self.contour(head, line, words, row)
         elif head == "CC":
-            self.pole = np.array([self.coordinate(words, axis) for axis in range(2)])
+            named = {axis for axis in range(3) if {"XYZ"[axis], "I" + "XYZ"[axis]} & words.keys()}
+            self.axes = next((list(pair) for pair in ((2, 0), (1, 2)) if {*pair} == named), [0, 1])
+            self.pole = np.array([self.coordinate(words, axis) for axis in self.axes])
         elif line.startswith("CYCL CALL"):
             self.drill()
         elif head == "M30":
@@ -138,14 +141,17 @@ class Reader:
 
     def contour(self, head: str, line: str, words: dict[str, str], row: int) -> None:
         end = np.array([self.coordinate(words, axis) for axis in range(3)])
-        start, sweep, middle = self.at[:2], 0.0, None
+        axes = self.axes if head in ("LP", "C", "CP") else [0, 1]
+        start, sweep, middle = self.at[axes], 0.0, None
         if head in ("LP", "CP"):
             away = start - self.pole
             radius = self.number(words["PR"]) if "PR" in words else math.hypot(*away)
             radius += self.number(words["IPR"]) if "IPR" in words else 0.0
             heading = self.number(words["PA"]) if "PA" in words else math.degrees(math.atan2(away[1], away[0]))
             heading += self.number(words["IPA"]) if "IPA" in words else 0.0
-            end[:2] = self.pole + radius * np.array([math.cos(math.radians(heading)), math.sin(math.radians(heading))])
+            end[axes] = self.pole + radius * np.array(
+                [math.cos(math.radians(heading)), math.sin(math.radians(heading))]
+            )
         left = "DR+" in line
         if head in ("C", "CP"):
             middle = self.pole
@@ -161,7 +167,7 @@ class Reader:
             middle = start + across * (chord @ chord) / (2.0 * (across @ chord))
             left = bool(across @ chord > 0.0)
         if middle is not None:
-            sweep = self.span(start, end[:2], middle, left)
+            sweep = self.span(start, end[axes], middle, left)
             if head == "CP" and "IPA" in words:
                 sweep = math.radians(self.number(words["IPA"]))
         follow = self.lines[row + 1] if row + 1 < len(self.lines) else ""
@@ -194,14 +200,15 @@ class Reader:
             points = []
             for share in SHARES:
                 out = turn_about(2, math.degrees(sweep * share))[:2, :2] @ (start - middle)
-                points.append(np.array([*(middle + out), self.at[2] + share * (end[2] - self.at[2])]))
+                points.append(self.at + share * (end - self.at))
+                points[-1][axes] = middle + out
             self.add("F", points)
         ahead = (
             end[:2] - self.at[:2]
             if middle is None
-            else np.sign(sweep) * np.array([-(end - [*middle, 0])[1], (end - [*middle, 0])[0]])
+            else np.sign(sweep) * np.array([-(end[:2] - middle)[1], (end[:2] - middle)[0]])
         )
-        self.heading = ahead / math.hypot(*ahead) if math.hypot(*ahead) > 0.0 else None
+        self.heading = ahead / math.hypot(*ahead) if math.hypot(*ahead) > 0.0 and axes == [0, 1] else None
         self.at = end
         if "M99" in line or (self.modal and head == "L") or "M89" in line:
             self.modal = ("M89" in line or self.modal) and "M99" not in line
@@ -376,7 +383,7 @@ def _run(chance: random.Random, steps: bool = False) -> list[str]:
     lines = []
     for _ in range(chance.randrange(1, 6)):
         a, b = chance.uniform(3, 20), chance.uniform(-180, 180)
-        sign, kind = chance.choice("+-"), chance.randrange(9)
+        sign, kind = chance.choice("+-"), chance.randrange(10)
         if kind == 0:
             lines += [f"CC IX{a:+.3f} IY{b / 9:+.3f}", f"CP IPA{sign}{abs(b) + 1:.2f} DR{sign}"]
         elif kind == 1:
@@ -404,6 +411,8 @@ def _run(chance: random.Random, steps: bool = False) -> list[str]:
                 f"LP IPA{b / 2:+.2f} F300",
                 f"LP IPR{a / 5:+.2f}",
             ]
+        elif kind == 8:
+            lines += [f"CC I{chance.choice('XY')}{a:+.3f} IZ{b / 9:+.3f}", f"CP IPA{sign}{abs(b) + 1:.2f} DR{sign}"]
         elif kind == 7:
             lines += [f"L IX{a:+.3f} FMAX", "CC IX-4 IY+0", f"C IX-4 IY{sign}4 DR{chance.choice('+-')}"]
         else:

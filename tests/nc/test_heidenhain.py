@@ -23,6 +23,7 @@ from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.controller import Controller
 from toolpath_stiff.nc.heidenhain import functions
 from toolpath_stiff.nc.heidenhain.vocabulary import REFUSED, STATEMENTS
+from toolpath_stiff.nc.kinematics import TABLE, PostedKinematics, RotaryAxis
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import ToolEntry
@@ -151,7 +152,8 @@ REFUSALS = {
     "FC DR- R10": ("FC is free contour programming", 3),
     "CYCL DEF 251 POCKET": ("cycle that is not supported", 3),
     "CYCL DEF 208 BORE Q200=2": ("draws without numbers", 3),
-    "TCH PROBE 412 X": ("probing", 3),
+    "Q5 = 1\nTCH PROBE 0.0 PLANE Q5 X-\nTCH PROBE 0.1 X+5\nL X+Q5": ("Q5 is read before it is set", 6),
+    "TCH PROBE 412 X ~\n Q320=5\nL X+1": ("place is not known", 5),
     "PATTERN DEF POS1": ("points of other files or patterns|no statement", 3),
     "PLANE VECTOR BX1": ("given otherwise", 3),
     "G1 X10": ("no statement that is known", 3),
@@ -172,7 +174,7 @@ REFUSALS = {
     "CC X+1\n": ("other coordinates than two of a plane", 3),
     "L X+0 RL\nL X+20\nCC X+10 Z+0\nC X+10 Z+10 DR+": ("in another plane than G17", 6),
     "CC X+0 Y+0\nL X+10\nCP IPA+90 DR-": ("against the direction", 5),
-    "CR X+20 R+5 DR+": ("of radius 5 mm", 3),
+    "CR X+20 R+5 DR+": ("radius 5 mm cannot reach", 3),
     "CT X+10 Y+10": ("without a contour element", 3),
     "L X+10\nRND R20\nL Y+10": ("does not fit", 4),
     "L X+10\nRND R2\nL Z+10": ("out of the plane", 5),
@@ -190,7 +192,7 @@ REFUSALS = {
     "CC X+0 Y+0\nCYCL DEF 7.1 X+5\nLP PR+5 PA+0": ("after a change of the coordinates", 5),
     "PLANE SPATIAL SPA+0 SPB+9 SPC+0 STAY\nL X+1": ("tool's place is not known", 4),
     "M140 MB MAX\nL X+1": ("tool's place is not known", 4),
-    "M128\nL X+1 A+5": ("under M128", 4),
+    "M128\nL X+1 A+5": ("under tool centre point control", 4),
     "M99": ("calls a cycle, and none is defined", 3),
     "CYCL DEF 200 D Q200=2 Q201=-5\nM99": ("without Q206", 3),
     "CYCL DEF 200 D Q200=2 Q201=5 Q206=9 Q202=5 Q203=0": ("above the surface", 3),
@@ -228,7 +230,16 @@ def test_every_statement_and_function_has_its_source_and_meaning():
     bodies = "\n".join(body for body, _ in PATHS.values())
     silent = (functions.nothing, functions.listed)
     unproved = [name for name, row in STATEMENTS.items() if row.act not in silent and name not in bodies]
-    other = {"BEGIN PGM", "BLK FORM 0.1", "BLK FORM 0.2", "CYCL DEF 247", "CYCL DEF 240", "STOP"}
+    other = {
+        "BEGIN PGM",
+        "BLK FORM 0.1",
+        "BLK FORM 0.2",
+        "CYCL DEF 247",
+        "CYCL DEF 240",
+        "STOP",
+        "TCH PROBE",
+        "CYCL DEF 300",
+    }
     assert {*unproved} == other | {f"CYCL DEF 7.{n}" for n in (3, 4, 5, 6)} | {"FUNCTION RESET TCPM"}
 
 
@@ -255,6 +266,26 @@ def test_blank_tools_and_what_is_said():
     assert program.moves.tool_length[-1] == 0.05 and ("M8", 9) in [(u.word, u.line) for u in program.unsupported]
     assert program.moves.end[-1, 2] == pytest.approx(0.002 - 0.05)  # the numbers of the tip change with the length
     assert any("cycle 247" in text for text in program.assumptions)
+    left_out = read("CYCL DEF 392 ATC ~\n Q240=2\nBLK FORM 0.1 Z X+Q7 Y+0 Z-20\nL X+1")
+    assert "392 is left out" in left_out.warnings[0].text and left_out.stock is None and len(left_out.moves) == 1
+
+
+def test_m128_holds_the_tip_of_a_machine_that_kinematics_describe():
+    """A table that turns about X through zero: at A90 the point Z100 of the axes is Y-100 of the part."""
+    table = RotaryAxis("A", TABLE, direction=(1.0, 0.0, 0.0), point=(0.0, 0.0, 0.0))
+    control = Controller(kinematics=PostedKinematics("table", (table,), tcp=False))
+    text = "L Z+100 FMAX\nL A+90 F100\nL Y+20\nM128\nL X+5 Y+6 Z+7 A+45\nM129\nL A+0"
+    moves = read(text, controller=control).moves
+    ends = [[0, 0, 100], [0, -100, 0], [0, -100, 20], [5, 6, 7], [5, 13 / math.sqrt(2), 1 / math.sqrt(2)]]
+    last = np.flatnonzero(np.append(np.diff(moves.line), 1))  # the way of a turning table is cut into pieces
+    assert moves.end[last, :3] * 1e3 == pytest.approx(np.array(ends), abs=1e-9)
+    assert np.degrees(moves.end[last, 3]) == pytest.approx([0, 90, 90, 45, 0])
+
+
+def test_m13_and_m14_turn_the_spindle():
+    assert (read("L X+1 M13\nL X+2 M14\nL X+3 M5").moves.spindle * 30 / math.pi).round(6).tolist() == [1000, -1000, 0]
+    spindle = parse_program("G21 S500 F100 M13\nG1 X1\nM14 X2\n", "p.nc").moves.spindle
+    assert (spindle * 30 / math.pi).round(6).tolist() == [500, -500]
 
 
 def test_programs_that_are_called(tmp_path):
@@ -306,7 +337,8 @@ def test_a_program_is_written_for_another_placement(x, y, z, degrees):
     program, turn = parse_program(WRITTEN, "p.h", controller=TOOLS), math.radians(degrees)
     placement = (x / 1e3, y / 1e3, z / 1e3, 0.0, 0.0, turn)
     text = rewrite_program(program, placement, (0.0,) * 6, control=TOOLS).text
-    assert text.count("\n") == WRITTEN.count("\n") and "; start" in text and "15 L X+0 Y+0 Z+50 R0 FMAX M91" in text
+    frame = text.replace(WRITTEN[: WRITTEN.index("2 L")], "").partition("2 L")[0]
+    assert frame.count("\n") == (6 if degrees else 4) and text.replace(frame, "") == WRITTEN
     again, cuts = parse_program(text, "p.h", controller=TOOLS).moves, program.moves.motion > 0
     a, b = program.moves.end[cuts, 0] * 1e3, program.moves.end[cuts, 1] * 1e3
     there = np.column_stack([a * math.cos(turn) - b * math.sin(turn) + x, a * math.sin(turn) + b * math.cos(turn) + y])
@@ -315,15 +347,23 @@ def test_a_program_is_written_for_another_placement(x, y, z, degrees):
     assert again.arc_sweep == pytest.approx(program.moves.arc_sweep, abs=1e-3)
 
 
+def test_cycles_parameters_and_repeats_are_placed_by_the_frame():
+    body = "Q1 = 5\nLBL 1\nL X+Q1 Y+2 Z+9 F9\n" + DRILL.format(depth=4, far=9) + "L IX+1 M99\nCALL LBL 1 REP 1"
+    program = read(body)
+    text = rewrite_program(program, (0.1, 0, 0.003, 0, 0, math.pi / 2), (0.0,) * 6, control=TOOLS).text
+    cuts, again = program.moves.end[:, :3], parse_program(text, "p.h", controller=TOOLS).moves.end[:, :3]
+    assert again == pytest.approx(np.column_stack([0.1 - cuts[:, 1], cuts[:, 0], cuts[:, 2] + 0.003]), abs=1e-7)
+
+
 @pytest.mark.parametrize(
     ("body", "placement", "line"),
     [
-        ("LBL 1\nL X+1 F9\nCALL LBL 1 REP 1", (0, 0, 0, 0, 0, 0.5), 4),
-        ("CYCL DEF 7.1 X+5\nL X+1 Y+1 F9", (0.1, 0, 0, 0, 0, 0), 3),
-        ("Q1 = 5\nL X+Q1 F9", (0.1, 0, 0, 0, 0, 0), 4),
-        (DRILL.format(depth=4, far=9) + "L X+1 Y+1 F9 M99", (0, 0, 0.1, 0, 0, 0), 3),
+        ("CYCL DEF 7.1 X+5\nL X+1 Y+1 F9", (0.1, 0, 0, 0, 0, 0), 4),
+        ("L X+1 Y+1 Z+1 F9\nCYCL DEF 7.1 X+5\nL X+1 Y+1", (0.1, 0, 0, 0, 0, 0), 5),
         ("L X+1 Y+1 F9", (0, 0, 0, 0.1, 0, 0), 1),
-        ("LBL 1\nL IX+1 F9\nL Y+3\nCALL LBL 1 REP 1", (0.1, 0, 0, 0, 0, 0.5), 5),
+        ("L IX+1 F9\nL Y+3", (0.1, 0, 0, 0, 0, 0.5), 3),
+        ("L X+1 Y+1 Z+1 F9\nL A+5", (0, 0, 0, 0, 0, 0.5), 4),
+        ("PLANE SPATIAL SPA+0 SPB+9 SPC+0 STAY\nL X+1 Y+1 Z+1 FMAX\nL X+5 F9", (0, 0, 0, 0, 0, 0.5), 3),
     ],
 )
 def test_what_cannot_be_written_is_refused_by_line(body, placement, line):

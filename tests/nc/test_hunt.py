@@ -34,7 +34,7 @@ def test_what_one_refuses_is_left_out_and_the_rest_compared(tmp_path):
     assert outcome.verdict == hunt.SAME and outcome.text == "G21 F100\nG1 X5\nG1 X15\nM2\n"
 
 
-@pytest.mark.parametrize("line", ["M101", "m 1 5 0", ";py,open('x','w')"])
+@pytest.mark.parametrize("line", ["M[101]", "m[1 5 0]", ";py,open('x','w')"])
 def test_what_would_run_programs_is_not_given_to_it(line, tmp_path, monkeypatch):
     monkeypatch.setattr(hunt.rs274, "run", None)
     assert hunt.hunt_one(f"G1 X1 F100\n{line}\nM2\n", tmp_path) is None

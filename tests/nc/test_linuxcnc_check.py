@@ -11,7 +11,7 @@ from toolpath_stiff.cli.main import main
 
 needs_rs274 = pytest.mark.skipif(shutil.which("rs274") is None, reason="LinuxCNC's rs274 is not installed")
 # Variables and a loop, and a code that the built-in reader refuses.
-LOOP = "#1=5\nG21 G90 F100\nG1 X#1\no1 repeat [3]\nG91 G1 Y1 M8\no1 endrepeat\nM70\nM2\n"
+LOOP = "#1=5\nG21 G90 F100\nG1 X#1\no1 repeat [3]\nG91 G1 Y1 M8\no1 endrepeat\nG7\nM2\n"
 
 
 def check(capsys, file, *options):
@@ -50,11 +50,11 @@ def test_auto_is_the_built_in_check_where_that_reads_all(program, capsys):
 
 @needs_rs274
 def test_both_refuse(program, capsys):
-    code, found = check(capsys, program("G1 X5 F100\n#1 = 3 M70\nM101\nM2\n"), "--interpreter", "auto")
+    code, found = check(capsys, program("G1 X5 F100\n#1 = 3 G7\nM[101]\nM2\n"), "--interpreter", "auto")
     assert code == 1 and not found["complete"] and found["interpreter"] == "builtin"
     errors = [(finding["line"], finding["text"]) for finding in found["findings"] if finding["severity"] == "error"]
     assert [line for line, _ in errors] == [2, 3]
-    assert "nor by LinuxCNC: the user M code M101" in errors[1][1]
+    assert "nor by LinuxCNC: an M code that is computed" in errors[1][1]
 
 
 @needs_rs274

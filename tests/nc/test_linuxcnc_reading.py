@@ -282,7 +282,7 @@ def test_where_it_is_missing_the_message_says_how_to_get_it(monkeypatch, tmp_pat
     with pytest.raises(InputError, match="apt install linuxcnc-uspace"):
         linuxcnc("G1 X1 F100\n")
     program = tmp_path / "part.nc"
-    program.write_text("G1 X1 F100\nM70\n")
+    program.write_text("G1 X1 F100\nG7\n")
     assert main(["path", str(program), "--interpreter", "auto"]) == 2
     message = capsys.readouterr().err
     assert "part.nc:2:1" in message and "apt install linuxcnc-uspace" in message
@@ -293,7 +293,7 @@ def test_where_it_is_missing_the_message_says_how_to_get_it(monkeypatch, tmp_pat
 @needs_rs274
 def test_auto_takes_the_second_only_where_the_first_refuses(monkeypatch):
     assert parse_program("G1 X1 F100\n", interpreter="auto").interpreter == "builtin"
-    program = parse_program("#1 = 5\nG1 X#1 F100\nM70\n", interpreter="auto")
+    program = parse_program("#1 = 5\nG1 X#1 F100\nG7\n", interpreter="auto")
     assert program.interpreter == "linuxcnc"
     assert program.moves.end[0, 0] == pytest.approx(5e-3)
     assert any("rs274" in sentence for sentence in program.assumptions)
@@ -314,7 +314,7 @@ def test_an_unknown_interpreter_is_an_error():
 @needs_rs274
 def test_the_report_names_who_read_the_program(tmp_path, capsys):
     program = tmp_path / "part.nc"
-    program.write_text("G21 G90 F500 M70\n#1 = 5\no1 repeat [3]\nG1 X#1\n#1 = [#1 + 5]\no1 endrepeat\nG1 Y4\n")
+    program.write_text("G21 G90 F500 G7\nG8\n#1 = 5\no1 repeat [3]\nG1 X#1\n#1 = [#1 + 5]\no1 endrepeat\nG1 Y4\n")
     common = ["analyze", str(program), "--interpreter", "auto", "--no-plots", "--out", str(tmp_path / "out")]
     assert main([*common, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["interpreter"] == "linuxcnc"
@@ -346,7 +346,14 @@ def test_a_placement_is_found_but_no_program_rewritten(tmp_path, capsys):
 
 
 @needs_rs274
-@pytest.mark.parametrize("block", ["M150", "M1 50", "M200 M150", "M99.9", "M[100+50]", "M200 M0150 P1"])
+@pytest.mark.parametrize("block", ["M200 M150", "M99.9", "M[100+50]", "M200 M0150 P1"])
 def test_leaving_words_out_opens_no_gap_in_the_fence(block):
-    with pytest.raises(InputError, match=r"is not started on such a program|not an M code"):
+    with pytest.raises(InputError, match=r"is not started on such a program|not an M code|M-code greater than 199"):
         parse_program(f"F100\nG1 X1\n{block}\nM2\n", interpreter="linuxcnc")
+
+
+@needs_rs274
+def test_user_codes_are_nothing_with_a_warning():
+    program = parse_program("F100\nG1 X1\nM150 P1 Q2\nG1 X2 M101\nM2\n", interpreter="linuxcnc")
+    assert [(remark.line, remark.text[:4]) for remark in program.warnings] == [(3, "M150"), (4, "M101")]
+    assert (program.moves.end[:, 0] * 1e3).round(6).tolist() == [1, 2]

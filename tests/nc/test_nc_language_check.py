@@ -102,6 +102,8 @@ def test_the_command(tmp_path, capsys):
     assert main(["check", str(program)]) == 0
     assert "codes used" in capsys.readouterr().out
     program.write_text("G41 D1\nG1 X5 F100\n")
+    assert main(["check", str(program), "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["extents_mm"] == {}
     assert main(["check", str(program), "--json", "--machine", "none"]) == 1
     (finding,) = json.loads(capsys.readouterr().out)["findings"]
     assert set(finding) == {"line", "column", "code", "text", "severity"}

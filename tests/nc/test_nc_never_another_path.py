@@ -59,12 +59,6 @@ SAME = {
     "G49 of no length before M6": "F100 G1 X2\nG49\nT2 M6\nG1 X3",
     "a length changed before M6, then cycles": "F100 G1 X2\nG43 H3\nT2 M6\nG98 G89 P1 X1 Z-1 R2\nG80 G1 X3",
     "a length changed before M6, then G52": "F100 G1 X2\nG43 H3\nT2 M6\nG52 Z5\nG0 Z3\nG1 X3",
-    "polar words": "F100 G1 X3 Y4\n@10\n^90\n@5 ^30 Z1 A2\nG91 @5\n^90 Z1\n@-1 ^20\nG90 G92 X1\n@7\n^10",
-    "polar words of arcs": "F100 G1 X5\nG3 @5 ^90 I-5 J0\nG2 ^-30 R9\nG20 F9 G90.1 G3 ^120 I0 J0 Z1",
-    "polar words of cycles": "F100 G1 X5 Z5\nG81 Z-1 R1 @5 ^0\n^90\n^180 L2\nG91 @1 Z-2 R.5",
-    "polar words of a circle of holes": "G20 G0 X1.5 F10\nG91 G81 R.1 Z-.5 ^60 L6\n@.1 L2\nG80 G90\n"
-    "G81 R.1 Z-.5 ^10 L2\n@1 L2",
-    "polar words in a turned offset": "G10 L2 P2 X10 Y3 R30\nF100 G55 G1 X3 Y4\n@5 ^0\n^77",
     "E of M66 to M68 is no exponent": "F100 G1 X2\nM67 Q2E1\nM68E0Q1\nG1 X3",
     "a length changed before M6, then Z": "F100 G1 X2\nG43 H3\nT2 M6\nG0 X4\nG0 Z3\nG1 X5",
     "a length changed before M6, then G53 Z": "F100 G1 X2\nG43 H3\nT2 M6\nG53 G0 Z3\nG1 X5",

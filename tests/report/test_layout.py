@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -18,7 +18,6 @@ from toolpath_stiff.analysis.grid import map_stiffness
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.comparison.compare import compare
 from toolpath_stiff.placement.case_study import run_case_study
-from toolpath_stiff.planning.gap_map import MOST_LEVELS, group_of, height_groups
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.visits import Visits
 from toolpath_stiff.readings.measurements import read_measurements
@@ -31,7 +30,7 @@ from toolpath_stiff.report.map import page as map_page
 from toolpath_stiff.report.pages import asset
 from toolpath_stiff.report.pictures import files
 from toolpath_stiff.report.pictures.diagnose import ladder
-from toolpath_stiff.report.pictures.plan import visits_drawn
+from toolpath_stiff.report.pictures.plan import MOST_LEVELS, visits_drawn
 from toolpath_stiff.stiffness.model import build_model
 
 TOUCH = 1.5  # pixels that boxes may share: they are a little larger than the letters
@@ -129,7 +128,7 @@ def test_every_pose_is_in_the_panel_of_its_own_height(heights):
     visits = visits_at(np.array([*heights, heights[0]]))
     count = len(heights) + 1
     with files.house_style():
-        figure = visits_drawn(visits, range(count), ["vertical"] * count, None, ("title", "text"))
+        figure = visits_drawn(visits, range(count), ["vertical"] * count, ("title", "text"))
     found = {}
     for axes in figure.axes:
         z = float(re.match(r"z = ([\d.]+) mm", axes.get_title(loc="left")).group(1))
@@ -144,12 +143,12 @@ def test_every_pose_is_in_the_panel_of_its_own_height(heights):
 
 
 def test_many_heights_are_put_together_with_their_neighbours():
-    z = np.random.default_rng(1).permutation(np.linspace(0.4, 1.2, 30))
-    groups = height_groups(z)
-    assert len(groups) == MOST_LEVELS
-    assert np.concatenate(groups).tolist() == sorted(np.round(z, 4))
-    for height, which in zip(z, group_of(z, groups), strict=True):
-        assert np.round(height, 4) in groups[which]
+    visits = visits_at(np.linspace(0.4, 1.2, 30))
+    with files.house_style():
+        axes = visits_drawn(visits, range(30), ["vertical"] * 30, ("title", "text")).axes
+    assert len(axes) == MOST_LEVELS
+    ends = [list(map(float, re.findall(r"[\d.]+", each.get_title(loc="left")))) for each in axes]
+    assert all(high < low for (_, high), (low, _) in pairwise(ends)) and (ends[0][0], ends[-1][1]) == (400.0, 1200.0)
 
 
 # -- pages -------------------------------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.fem_path import pulled, reference_rows
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.nominal import load_nominal, rotations
+from toolpath_stiff.rig.sizes import Scale
 
 NIST = load_nominal("nist")
 SOUND = fem.sound_machine(NIST)
@@ -273,3 +274,10 @@ def test_an_exercise_on_elements_is_made_measured_and_opened(tmp_path, capsys):
         assert json.loads(capsys.readouterr().out)["verdict"] == verdict
     assert main(["rig", "reveal", folder, "--claim", "table_compliance"]) == 0
     assert "it is in: table" in capsys.readouterr().out
+
+
+def test_a_machine_that_cannot_take_a_pose_has_too_much_of_its_fault():
+    """Frame joints three metres off: no struts of these lengths reach."""
+    machine = dataclasses.replace(SOUND, frame_errors=np.full((6, 3), 5.0) * np.eye(6)[:, :3])
+    scale = Scale(NIST, REFERENCE, np.arange(len(REFERENCE.force)), Nuisances(0.02), SOUND)
+    assert np.isinf(scale.change(machine)).all() and np.isfinite(scale.change(SOUND)).all()

@@ -187,18 +187,14 @@ READ_OFF = ("stiffness", "sd", "file", "line", "notes", "warnings")  # what read
 
 
 def joint_columns_once(
-    which: str,
     machine: Hexapod,
     data: Readings,
     columns: Callable[[], FloatArray],
     files: Sequence[str | Path] = (),
 ) -> FloatArray:
-    """`columns()`, what 36 coordinates of joints do to readings; of one machine and design worked out once a process.
-
-    `which`: of the two ways there are, a predictor's and a plan's.
-    """
+    """`columns()`, what 36 coordinates of joints do to readings: once a process for each machine and design."""
     design = [_content(getattr(data, each.name)) for each in fields(data) if each.name not in READ_OFF]
-    parts = (which, machine_toml(machine), [Path(file).read_bytes() for file in files], design)
+    parts = (machine_toml(machine), [Path(file).read_bytes() for file in files], design)
     key = hashlib.sha256(pickle.dumps(parts)).digest()
     if key not in JOINT_COLUMNS:
         JOINT_COLUMNS[key] = columns()

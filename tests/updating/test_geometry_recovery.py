@@ -1,4 +1,4 @@
-"""The NIST machine's six lengths, fitted anew to the 42 modelled stiffnesses of Table 1, are those of the packaged file.
+"""The NIST machine, six lengths fitted anew to the 42 modelled stiffnesses of Table 1, is that of the packaged file.
 
 Each value is printed to 1 N/mm: off by a uniform error, sd 1 / sqrt(12). What the table does not tell (the scale of the
 platform about the tip) is tested as well.

@@ -28,7 +28,7 @@ from toolpath_stiff.diagnosis.examination import odds_words
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.words import next_steps, verdict_text, why
 from toolpath_stiff.hints import Asked, parted
-from toolpath_stiff.inference.errors import raised_text, scatter_text
+from toolpath_stiff.inference.errors import LAW_REFITTED, raised_text, scatter_text
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.planning.rivals import errors_so_far, rivals_of
 from toolpath_stiff.readings.measurements import Readings
@@ -136,7 +136,7 @@ def test_nothing_added_leaves_the_machine_file_as_it_is():
     assert not found.accepted and not found.changed
     assert [step.name for step in found.steps] == ["as given", "strut law refitted"]
     assert found.last is found.steps[0]
-    assert build_ladder(UpdateTask(nist(), table_1(), strut_law=True)).accepted
+    assert build_ladder(UpdateTask(nist(), table_1(), strut_law=True, force=True)).accepted
 
 
 # -- one sign ----------------------------------------------------------------------------------------------------------
@@ -335,7 +335,9 @@ def test_a_real_ladder_falls_whatever_the_order():
     for names in (("gauge_scale:direction=Y", "contact_nonlinearity"), ("contact_nonlinearity", "gauge_scale")):
         found = updated(data, *names)
         for key in (MEAN, "held_out_error_percent"):
-            assert all(later[key] < earlier[key] for earlier, later in pairwise(found["steps"]))
+            # The last step gives the refitted law up again, for which left-out points do not ask.
+            assert all(later[key] < earlier[key] for earlier, later in pairwise(found["steps"][:-1]))
+        assert found["steps"][-1]["name"] == "strut law as given" and found["rejected"][-1]["effect"] == LAW_REFITTED
         assert set(found["steps"][-1]["effects"]) == {"contact_nonlinearity", "gauge_scale"}
 
 

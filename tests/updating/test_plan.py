@@ -20,7 +20,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all, joint_columns
+from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all
 from toolpath_stiff.planning.gaps import ReadingNoise, expected_outcome, pair_shares
 from toolpath_stiff.planning.menu import COSTS, Menu
 from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
@@ -112,7 +112,7 @@ def test_a_gauge_off_by_a_known_factor(scale):
     """Readings along X, two a visit, differ by ln(1 + s), all others by nothing: sqrt(2 n) |ln(1 + s)| / (sqrt 2 r)."""
     known = [Rival("none"), Rival("gauge_scale", effects=(active("gauge_scale", [scale]),))]
     visits = possible_visits(nist(), menu(oblique=False), (), np.random.default_rng(0))
-    forecasts, _, scatter = forecast_all(nist(), known, visits.readings, strut_spread=0.0, joint_error=0.0)
+    forecasts, _, scatter = forecast_all(nist(), known, visits.readings, strut_spread=0.0, joint_error=0.0, rest=0.0)
     assert not scatter.any()
     share = pair_shares(visits, *forecasts, ReadingNoise(0.02, 0.0, scatter))
     twice = np.flatnonzero(visits.counts == 6)[:5]
@@ -161,12 +161,14 @@ def test_a_verdict_is_settled_where_a_diagnosis_would_name_it():
     assert found.settled == pytest.approx(weights @ found.settled_if)
 
 
-def test_columns_of_the_joints_agree_with_the_predictors():
-    """One tensor a pose here, one reading after the other there; 0.1 % of a step's own curvature apart."""
+def test_a_plan_counts_what_readings_of_one_machine_have_in_common():
+    """Struts, joints and the links taken for rigid, as a diagnosis does; joints there by differences over half a mm."""
     visits = possible_visits(nist(), menu(), (), np.random.default_rng(2))
     some = visits.readings.select(np.arange(0, len(visits.readings), 401))
-    predictor = Predictor(nist(), some)
-    assert joint_columns(predictor.base, some) == pytest.approx(predictor.joint_columns, rel=1e-6, abs=1e-9)
+    predictor, factor = Predictor(nist(), some), forecast_all(nist(), [Rival("none")], some)[2]
+    parts = (0.01 * predictor.strut_columns(), 5e-4 * predictor.joint_columns, 0.003 * predictor.rest_columns())
+    expected = sum(part @ part.T for part in parts)
+    assert np.abs(factor @ factor.T - expected).max() < 0.02 * np.diag(expected).max()
 
 
 # -- what splits what --------------------------------------------------------------------------------------------------

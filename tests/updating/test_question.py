@@ -87,7 +87,7 @@ def test_a_machine_that_fits_worse_is_never_written():
 
 
 def test_a_mean_error_that_rises_within_rounding_is_no_worse_fit():
-    found = update(UpdateTask(nist(), TABLE, strut_law=True))
+    found = update(UpdateTask(nist(), TABLE, strut_law=True, force=True))
     before, after = (step.fit.errors.mean() for step in found.steps)
     assert after > before  # 9.62 to 9.72 %: likelier, by fewer readings far off
     assert not found.worse and found.corrected is not None

@@ -58,6 +58,22 @@ def test_the_best_pair_and_its_components_are_found_among_all() -> None:
     assert all(triple.log_evidence < pairs[0].log_evidence for triple in more)
 
 
+def test_what_the_law_takes_up_explains_no_scatter():
+    """Under one load a curved load cell is a factor on all readings, and so is a common factor on both ends of the law.
+
+    At another law than the law's columns have, the difference of the two would be the residual itself.
+    """
+    data = DATA.select(DATA.force == DATA.force.max())
+    problem, _ = make_problem(nist(), data, simple_noise(len(data), 0.02))
+    logs = problem.predictor.log_stiffness((-0.1, -0.2), [WEAK])
+    problem.observed = logs + 0.02 * np.random.default_rng(5).standard_normal(len(data))
+    base = problem.score_base()
+    search = LinearSearch(problem, families_of(problem, ("load_cell_curvature",)), base)
+    law = base.jacobian[:, :2] * np.exp(base.residual)[:, None]
+    cell = search.columns[0, 0]
+    assert law @ np.linalg.lstsq(law, cell, rcond=None)[0] == pytest.approx(cell, rel=1e-6)
+
+
 def test_triples_hold_one_of_the_best_pairs() -> None:
     """Likelier than every pair: they are found where a pair stands already, too."""
     problem = problem_with(WEAK, TABLE, DRIFT)

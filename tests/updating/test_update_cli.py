@@ -16,7 +16,7 @@ from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.report.update import page as update_html
 
-WEAK = ("--add", "weak_strut:strut=3", "--strut-law")
+WEAK = ("--add", "weak_strut:strut=3", "--believe", "machine")
 
 
 @pytest.fixture(scope="module")
@@ -101,15 +101,10 @@ def test_table_1_bears_no_effect(tmp_path, capsys):
     assert {one["effect"] for one in told["rejected"]} >= {"joint_moment_stiffness"}
 
 
-def test_the_papers_own_estimation_with_its_figure_3(tmp_path, capsys):
+def test_the_papers_own_estimation(tmp_path, capsys):
     arguments = ["update", "nist-table1", "--strut-law", "--objective", "mean-error", "--out", str(tmp_path)]
     assert main(arguments) == 0
     assert "46.30 N/um" in capsys.readouterr().out
-    assert (tmp_path / "figure3.png").read_bytes().startswith(b"\x89PNG")
-    curve = np.genfromtxt(tmp_path / "figure3.csv", delimiter=",", names=True)
-    stiff = curve["bar_stiffness_N_per_m"] >= 1e10
-    # The paper: above 1e10 N/m the platform makes no difference.
-    assert np.ptp(curve["error_percent"][stiff]) < 0.1
     told = json.loads((tmp_path / "update.json").read_text())
     assert told["search"]["agreeing"] == len(told["search"]["end_errors_percent"])
 

@@ -109,7 +109,7 @@ def evaluate(
     """
     n, load = len(position), load or Load()
     if not isinstance(model.machine, Hexapod):
-        return _by_elements(model, position, abc, tangent, tool_length, load, progress)
+        return _by_elements(model, (position, abc, tangent), tool_length, load, force, progress)
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
     corners = _corners(position, abc, lengths)
     route = core.choose_route(model, n - int(np.count_nonzero(corners)))
@@ -243,17 +243,17 @@ def joint_columns(machine: MachineTool, joints: FloatArray) -> dict[str, FloatAr
 
 def _by_elements(
     model: StiffnessModel,
-    position: FloatArray,
-    abc: FloatArray,
-    tangent: FloatArray,
+    samples: tuple[FloatArray, FloatArray, FloatArray],
     tool_length: FloatArray | float,
     load: Load,
+    force: float,
     progress: Progress | None,
 ) -> Evaluation:
-    """A machine of elements at n poses under any load, as `evaluate`; poses with a tangent are a path.
+    """A machine of elements at n samples (position, abc, tangent), as `evaluate`; those with a tangent are a path.
 
     Along a path the machine keeps one configuration, that with the largest smallest margin.
     """
+    position, abc, tangent = samples
     machine, n = model.machine, len(position)
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
     follows = bool(tangent.any())
@@ -269,7 +269,7 @@ def _by_elements(
         rows = np.arange(start, min(start + BLOCK, n))
         turn = rotation_matrices(abc[rows]) if abc[rows].any() else None
         stance = machine.solve(position[rows], turn, lengths[rows], kept, before)
-        result.put(rows, evaluate_stance(model, stance, (position[rows], turn, tangent[rows]), load))
+        result.put(rows, evaluate_stance(model, stance, (position[rows], turn, tangent[rows]), load, force))
         if before is not None and np.isfinite(stance.joints[-1]).all():
             before = stance.joints[-1]
         if progress:
@@ -288,14 +288,11 @@ def kept_configuration(machine: MachineTool, position: FloatArray, abc: FloatArr
 
 
 def evaluate_stance(
-    model: StiffnessModel,
-    stance: Stance,
-    in_work: WorkPoses,
-    load: Load,
+    model: StiffnessModel, stance: Stance, in_work: WorkPoses, load: Load, force: float = defaults.FORCE
 ) -> Evaluation:
     """A machine of elements where it stands; tip, tool axes and tangent in work axes."""
-    machine, n, (position, _, tangent) = model.machine, len(stance), in_work
-    stand = reach(machine, position, stance)
+    position, _, tangent = in_work
+    n, stand = len(stance), reach(model.machine, position, stance)
     along, substituted = np.full(n, np.nan), np.zeros(n, dtype=bool)
     direction, known = geometric_directions(load, *in_work)
     if stance.work_axes is not None and load.kind in OF_THE_WORK:
@@ -304,7 +301,7 @@ def evaluate_stance(
         if not len(rows):
             continue
         part = stance if len(rows) == n else stance.take(rows)
-        path, towards = path_of_stance(model, part, **model.conditions.columns(len(rows))), direction[rows]
+        path, towards = path_of_stance(model, part, force=force, **model.conditions.columns(len(rows))), direction[rows]
         if not known[rows[0]]:  # the compliance directs the load
             compliance = element_sum.tip_compliance(model, path)
             some = (part.position, part.rotation, tangent[rows])

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 # N/um of a strut: screws, bearings and joints in series. Below, it is no machine's; above, no screw's.
 STRUT_SOFTEST, STRUT_STIFFEST = 1.0, 1000.0
+SOFTEST_ARM = 0.05  # N/um at the tool of a stretched arm; assumed
 ODD_STRUT, MOST_ODD = 0.005, 2  # of the usual length: no other strut is nearer to one that a slip has moved
 # N/um at the tool: "usually less than 1" for articulated robots, "very often greater than 50" for machining centres
 # (Pan, Zhang, Zhu, Wang 2006, J. Mater. Process. Technol. 173, 301).
@@ -120,7 +121,7 @@ def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
     doubtful = _odd_struts(neutral.joints[0]) if isinstance(machine, Hexapod) else []
     if neutral.reach.reachable[0]:
         softest = n_per_um_from_n_per_m(float(neutral.softest_stiffness[0]))
-        if not ROBOT <= softest <= BEYOND:
+        if not (ROBOT if isinstance(machine, Hexapod) else SOFTEST_ARM) <= softest <= BEYOND:
             beside = "less than a robot arm has" if softest < ROBOT else "more than any machine tool has"
             doubtful.append(f"at the neutral pose the softest direction has {softest:.3g} N/um at the tool, {beside}")
     if neutral.extrapolated[0]:

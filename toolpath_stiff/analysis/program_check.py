@@ -170,6 +170,9 @@ def check_program(request: Request, machine: MachineTool | None, step: float = d
     if machine is not None and len(program.moves):
         more, speed = machine_findings(program, machine, step)
         findings += more
+    figures = move_figures(program.moves, machine.rapid_feed if machine else defaults.RAPID_FEED)
+    if not checked.complete:  # the extents of a part of the path say nothing of the whole
+        figures |= {"extents_mm": {}, "extents_deg": {}}
     return ProgramCheck(
         program=program.name,
         interpreter=program.interpreter,
@@ -181,7 +184,7 @@ def check_program(request: Request, machine: MachineTool | None, step: float = d
         used=checked.used,
         unsupported=checked.unsupported,
         findings=in_order(findings),
-        **move_figures(program.moves, machine.rapid_feed if machine else defaults.RAPID_FEED),
+        **figures,
         fastest_strut=speed,
         modal_start=checked.start,
         modal_end=checked.end,

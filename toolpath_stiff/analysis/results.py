@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from toolpath_stiff import defaults
+from toolpath_stiff.analysis.assumptions import assumptions_of, pose_words, words_turn_the_platform
 from toolpath_stiff.analysis.cut_figures import cut_columns, cut_document, lines_beyond
 from toolpath_stiff.analysis.evaluation import Progress, evaluate
 from toolpath_stiff.analysis.loads import Load, parse_load
@@ -22,8 +23,9 @@ from toolpath_stiff.analysis.statistics import (
     sample_columns,
     share,
 )
+from toolpath_stiff.analysis.turning import FIXED, TurnChoice, choose_turn
 from toolpath_stiff.analysis.uncertainty import band_figures
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
@@ -37,19 +39,18 @@ from toolpath_stiff.poses import Pose, pose_in_mm
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.model import (
     StiffnessModel,
-    acting_effects,
     build_model,
     condition_warnings,
-    conditions_stated,
     effects_stated,
 )
-from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s, n_per_mm_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
 
+STANDING = ("weakest", "out_of_reach_samples", "extrapolated_share")  # of a machine compared with
 MOST_NAMED = 5  # lines in a warning
 
 
@@ -59,6 +60,8 @@ class Analysis(EvaluatedPath, FolderResult):
 
     Attributes
     ----------
+    turn
+        The turn about the tool's axis, where it is not as programmed.
     required
         Stiffness that every cut must have, N/m; None: none.
     on_other
@@ -90,6 +93,7 @@ class Analysis(EvaluatedPath, FolderResult):
     command: ClassVar[str] = "analyze"
     shown_by: ClassVar[str] = "analysis"
 
+    turn: TurnChoice | None = None
     required: float | None = None
     on_other: Analysis | None = None
     cut: Cut | None = None
@@ -200,6 +204,7 @@ def analyze(
     step: float = defaults.STEP,
     force: float = defaults.FORCE,
     partial: bool = False,
+    turn: str = FIXED,
     progress: Progress | None = None,
 ) -> Analysis:
     r"""Stiffness along the path of a program.
@@ -220,6 +225,8 @@ def analyze(
         Size of the load, N: for deflections, and for effects that depend on it.
     partial
         Keep the reachable samples of a program that leaves the workspace.
+    turn
+        How the tool is turned about its axis: "fixed", "feed" or "best", see `turning`.
     progress
         Called with (samples done, samples in all).
 
@@ -243,6 +250,12 @@ def analyze(
     place_at, source = _effective_origin(model.machine, program, origin)
     words = model.machine.angles_of if program.native else None
     samples = sample_moves(place(program.moves, place_at), step, model.machine.rapid_feed, place_at, words)
+    choice = None
+    if turn != FIXED:
+        poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+        choice = choose_turn(model, *poses, direction, turn)
+        samples = replace(samples, abc=choice.abc)
+        model = replace(model, machine=choice.kept(model.machine))
     poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
     analysis = Analysis(
         program=program,
@@ -254,6 +267,7 @@ def analyze(
         step=step,
         samples=samples,
         at=evaluate(model, *poses, direction, force, progress),
+        turn=choice,
     )
     _check_reach(analysis, partial)
     return analysis
@@ -278,6 +292,11 @@ def _effective_origin(machine: MachineTool, program: ReadProgram, origin: Pose |
 def _warnings(analysis: Analysis) -> list[str]:
     """What the evaluation itself has to say."""
     warnings, samples, there = [], analysis.samples, analysis.at
+    if analysis.turn is not None and len(changes := np.unique(samples.line[analysis.turn.changes])):
+        at_lines = ", ".join(map(str, changes[:MOST_NAMED]))
+        warnings.append(
+            f"lines {at_lines}: the joints cannot go on as they stand, the configuration has to change there"
+        )
     rapids, swapped = ~samples.cutting & ~there.reachable, samples.cutting & there.substituted
     if rapids.any():
         first = int(np.argmax(rapids))
@@ -286,10 +305,10 @@ def _warnings(analysis: Analysis) -> list[str]:
             f"{_sample_words(analysis, first)}"
         )
     if swapped.any():
-        lines = np.unique(samples.line[swapped])
-        more = f" and {len(lines) - MOST_NAMED} more" if len(lines) > MOST_NAMED else ""
+        where = np.unique(samples.line[swapped])
+        more = f" and {len(where) - MOST_NAMED} more" if len(where) > MOST_NAMED else ""
         warnings.append(
-            f"lines {', '.join(map(str, lines[:MOST_NAMED]))}{more}: the load direction does not exist there "
+            f"lines {', '.join(map(str, where[:MOST_NAMED]))}{more}: the load direction does not exist there "
             "(rotary axes alone, or a move along the tool axis); the softest direction stands in"
         )
     return warnings
@@ -298,12 +317,7 @@ def _warnings(analysis: Analysis) -> list[str]:
 def _sample_words(analysis: Analysis, i: int) -> str:
     """Where sample i is, as a control would show it, and which limit it breaks."""
     pose = [*analysis.samples.position[i], *analysis.samples.abc[i]]
-    return f"at {_pose_words(pose, '.3f')} (machine coordinates, mm): {analysis.at.reach.describe(i)}"
-
-
-def _pose_words(pose: Sequence[float], digits: str) -> str:
-    words = [f"{axis}{value:{digits}}" for axis, value in zip("XYZABC", pose_in_mm(pose), strict=True)]
-    return " ".join(words if any(pose[3:]) else words[:3])
+    return f"at {pose_words(pose, '.3f')} (machine coordinates, mm): {analysis.at.reach.describe(i)}"
 
 
 def _check_reach(analysis: Analysis, partial: bool) -> None:
@@ -318,7 +332,7 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
     first = int(np.argmax(bad))
     hint = "place the work elsewhere with --origin"
     hint += "" if partial else ", or keep the reachable part with --partial"
-    if _words_turn_the_platform(analysis.program):
+    if words_turn_the_platform(analysis.program):
         hint += "; if the program was posted for another machine, name it with [kinematics] in a controller file"
     raise UnreachableError(
         f"{int(bad.sum())} of {int(cutting.sum())} cutting samples are out of reach, first "
@@ -327,61 +341,6 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
         file=analysis.program.name,
         line=int(analysis.samples.line[first]),
     )
-
-
-def _assumptions(analysis: Analysis) -> list[str]:
-    """Everything that was assumed or recovered rather than published or given."""
-    machine, model = analysis.machine, analysis.model
-    sentences = list(analysis.program.assumptions)
-    if _words_turn_the_platform(analysis.program) and isinstance(machine, Hexapod):
-        sentences.append(
-            "A, B, C of the program are roll, pitch, yaw of the platform (see [kinematics] of controller files)"
-        )
-    if analysis.origin_source == "default":
-        sentences.append(
-            f"program zero (G54) sits at {_pose_words(analysis.origin, 'g')} in machine coordinates, the machine's "
-            f"default; --origin puts it elsewhere"
-        )
-    for quantity, origin in machine.origins.items():
-        if origin != "published":
-            remark = machine.remarks.get(quantity)
-            sentences.append(f"machine {machine.name}: {quantity} {origin}" + (f": {remark}" if remark else ""))
-    secant = "; the stiffness is the secant one at this load" if model.load_dependent else ""
-    sentences += [
-        f"rapid moves take {mm_per_min_from_m_per_s(machine.rapid_feed):g} mm/min (time only)",
-        *conditions_stated(model),
-        f"a force of {analysis.force:g} N for deflections{secant}: these are along the load, under an assumed force, "
-        "not an error of the surface (--cut computes that)",
-    ]
-    if isinstance(machine, Hexapod):
-        law = machine.strut_law
-        low, high = sorted((mm_from_m(law.length_1), mm_from_m(law.length_2)))
-        range_of_law = f"the strut law is extrapolated outside {low:.1f} to {high:.1f} mm of strut length"
-        sentences.append("the stiffness of a strut is the same at every length" if law.constant else range_of_law)
-    else:
-        sentences += _of_elements(analysis)
-    if analysis.parameter_band is not None:
-        whole = ", of struts, joints and what the model lacks, as `[uncertainty.errors]` of the machine file has them"
-        beside = whole if analysis.parameter_band.form.any() else " alone"
-        sentences.append(
-            f"the band of the stiffness holds the uncertainty of the fitted parameters{beside}, propagated linearly: "
-            f"{', '.join(analysis.parameter_band.names)}"
-        )
-    if not acting_effects(model) and isinstance(machine, Hexapod):
-        sentences.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
-    return sentences
-
-
-def _of_elements(analysis: Analysis) -> list[str]:
-    """What is assumed of a machine of elements on a path."""
-    machine = analysis.machine
-    names = ", ".join(dict.fromkeys(element.name for element in machine.elements))
-    sentences = [f"what gives way is {names}; everything else is rigid"]
-    if analysis.at.configuration:
-        sentences.append(f"the configuration of the joints is kept over the program: {analysis.at.configuration}")
-    if np.isnan(machine.reference_tool_length) and not np.isnan(analysis.samples.tool_length).all():
-        sentences.append("tools of the program are as long as the machine file's tool, which states no length")
-    return sentences
 
 
 def _summary(analysis: Analysis) -> Document:
@@ -413,13 +372,20 @@ def _summary(analysis: Analysis) -> Document:
         "min_margin_limit": there.reach.describe(nearest),
         "min_margin_line": int(samples.line[nearest]),
         "out_of_reach_samples": int(analysis.out_of_reach.sum()),
-        "extrapolated_share": share(there.extrapolated, cutting),
+        **_of_kind(analysis, cutting),
         **effects_stated(analysis.model),
         "unsupported": to_dict(program.unsupported),
-        "assumptions": _assumptions(analysis),
+        "assumptions": assumptions_of(analysis, analysis.turn.sentence if analysis.turn else ""),
         "warnings": analysis.warnings,
         "version": defaults.VERSION,
     }
+
+
+def _of_kind(analysis: Analysis, cutting: BoolArray) -> Document:
+    """What belongs to one kind of machine: the range of a strut law, the configuration of joints that is kept."""
+    if isinstance(analysis.machine, Hexapod):
+        return {"extrapolated_share": share(analysis.at.extrapolated, cutting)}
+    return {"configuration": analysis.at.configuration or None}
 
 
 def compare_summaries(summary: Document, other: Document) -> Document:
@@ -433,7 +399,7 @@ def compare_summaries(summary: Document, other: Document) -> Document:
     return {
         "machine": other["machine"],
         "effects": list(other["effects"]),
-        **{name: other[name] for name in (*FIGURES, "weakest", "out_of_reach_samples", "extrapolated_share")},
+        **{name: other[name] for name in (*FIGURES, *STANDING) if name in other},
         "difference_percent": {short: _higher(summary[name], other[name]) for name, short in names.items()},
         "headline": other["headline"],
         "plunges": other["plunges"],
@@ -444,11 +410,6 @@ def compare_summaries(summary: Document, other: Document) -> Document:
 def _higher(first: float | None, second: float | None) -> float | None:
     """By how much the second is higher, in percent of the first; None where that cannot be said."""
     return None if first is None or second is None or not first else (second - first) / first * 100.0
-
-
-def _words_turn_the_platform(program: ReadProgram) -> bool:
-    """Whether rotary words were taken for the platform's own angles."""
-    return program.native and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())
 
 
 def required_stiffness_missed(analysis: EvaluatedPath, required: float) -> list[tuple[int, float]]:

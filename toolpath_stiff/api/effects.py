@@ -3,17 +3,32 @@
 from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
+from typing import Annotated
 
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.model import as_hexapod
+from toolpath_stiff.machine.file import KINDS
+from toolpath_stiff.machine.model import Hexapod, as_hexapod
+from toolpath_stiff.options import Option, checked
 from toolpath_stiff.results import TextFile
 from toolpath_stiff.stiffness.catalogue import EffectCatalogue, effects_from_file, known_effects
 from toolpath_stiff.stiffness.trial import EffectCheck, try_effect
 
 
-def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
+@checked
+def effects(
+    files: Iterable[str | Path] = (),
+    *,
+    kind: Annotated[str, Option("--kind", choices=tuple(KINDS))] = Hexapod.kind,
+) -> EffectCatalogue:
     """The effects that a machine can carry: the catalogue's, and those in files of one's own.
+
+    Parameters
+    ----------
+    files
+        Files with effects of one's own.
+    kind
+        Of machine that they hold for.
 
     Raises
     ------
@@ -26,7 +41,7 @@ def effects(files: Iterable[str | Path] = ()) -> EffectCatalogue:
     >>> tps.effects()["weak_strut"].title
     'one strut is weak'
     """
-    return EffectCatalogue(list(known_effects(list(map(str, files))).values()))
+    return EffectCatalogue(list(known_effects(list(map(str, files)), kind).values()))
 
 
 def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> EffectCheck:

@@ -48,6 +48,7 @@ def place(
     y_mm: Annotated[Range | None, Option("--y", "LO:HI", read=low_high)] = None,
     z_mm: Annotated[Range | None, Option("--z", "LO:HI", read=low_high)] = None,
     z_values_mm: Annotated[Sequence[float], Option("--z-values", "Z,Z,...", read=numbers, instead_of="z_mm")] = (),
+    base_mm: Annotated[Sequence[float], Option("--base", "X,Y,Z", read=numbers)] = (0.0, 0.0, 0.0),
     rotate_deg: Annotated[Range, Option("--rotate", "LO:HI", read=low_high)] = (0.0, 360.0),
     tilt_a_deg: Annotated[Range, Option("--tilt-a", "LO:HI", read=low_high)] = 0.0,
     tilt_b_deg: Annotated[Range, Option("--tilt-b", "LO:HI", read=low_high)] = 0.0,
@@ -81,6 +82,8 @@ def place(
         Of program zero, mm: low and high, or a number to fix it; unless given, as far as the machine reaches.
     z_values_mm
         The only heights that there are, mm.
+    base_mm
+        Where the work's table stands, from the machine's base: bounds and heights that are given count from there.
     rotate_deg, tilt_a_deg, tilt_b_deg
         Turn and tilts of the set-up, degrees: low and high, or a number to fix it.
     keep_out
@@ -133,6 +136,11 @@ def place(
     """
     if write is None and not (decimals is None and linearise_mm is None):
         raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
+    base = [inputs.finite("--base", value) for value in base_mm]
+    if len(base) != 3:
+        raise InputError(f"--base of {len(base)} numbers", expected="X,Y,Z in mm")
+    box = [_moved(side, offset) for side, offset in zip((x_mm, y_mm, z_mm), base, strict=True)]
+    heights = [z + base[2] for z in z_values_mm]
     on, part = machine_from(machine), program_from(program)
     model, origin = on.running(part), origin_si(origin_mm_deg)
     default, setup = model.machine.default_origin, cut_setup(cut, material, stock_mm)
@@ -147,7 +155,7 @@ def place(
         program=read,
         present=present,
         read=lambda other: part.moves(other, default),
-        bounds=_bounds(model.machine, (x_mm, y_mm, z_mm), z_values_mm, (tilt_a_deg, tilt_b_deg, rotate_deg)),
+        bounds=_bounds(model.machine, box, heights, (tilt_a_deg, tilt_b_deg, rotate_deg)),
         rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
         load=parse_load(load),
         step=step,
@@ -187,6 +195,13 @@ def _bounds(
         raise InputError("bounds beyond reason", expected=f"within 100 m and {FARTHEST_TURN_DEG:g} degrees")
     low, high = np.concatenate([m_from_mm(lengths), rad_from_deg(angles)]).T
     return Bounds(low, high, tuple(m_from_mm(z) for z in heights))
+
+
+def _moved(side: Range | None, offset: float) -> Range | None:
+    """A bound, or both, counted from elsewhere."""
+    if side is None or not offset:
+        return side
+    return side + offset if isinstance(side, int | float) else (side[0] + offset, side[1] + offset)
 
 
 def _pair(given: Range) -> tuple[float, float]:

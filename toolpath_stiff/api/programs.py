@@ -8,6 +8,7 @@ from typing import Annotated
 from toolpath_stiff.analysis.program_check import ProgramCheck, check_program
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.results import analyze as analyze_path
+from toolpath_stiff.analysis.turning import BEST, FEED, FIXED
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, Tolerance, cut_setup
 from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
@@ -39,6 +40,7 @@ def analyze(
     step_mm: Step = 1.0,
     force_N: Force = FORCE,
     partial: Annotated[bool, Option("--partial")] = False,
+    turn: Annotated[str, Option("--turn", choices=(FIXED, FEED, BEST))] = FIXED,
     require_N_per_mm: Annotated[float | None, Option("--require", "N/mm", above=0, at_most=1e7)] = None,
     compare_with: Annotated[Machine | str | Path | None, Option("--compare", "MACHINE")] = None,
     cut: Cutting = None,
@@ -64,6 +66,9 @@ def analyze(
         Size of the load: for deflections, and for effects that depend on it.
     partial
         Keep the reachable samples of a program that leaves the workspace (exit code 1).
+    turn
+        How a robot turns the tool about its axis: fixed as programmed, with the feed, or best: the stiffest within the
+        limits of the joints, constant unless a changing turn gains or is needed.
     require_N_per_mm
         Stiffness that every cutting move must have; those below are listed (exit code 3).
     compare_with
@@ -117,7 +122,15 @@ def analyze(
         read = part.moves(origin, model.machine.default_origin)
         step = m_from_mm(step_mm)
         return analyze_path(
-            model, read, origin=origin, load=load, step=step, force=force_N, partial=partial, progress=progress
+            model,
+            read,
+            origin=origin,
+            load=load,
+            step=step,
+            force=force_N,
+            partial=partial,
+            turn=turn,
+            progress=progress,
         )
 
     analysis = on(first, second, counter(progress, f"{part.name}: samples"))

@@ -5,6 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
+
 from toolpath_stiff.api.effects import effect_name
 from toolpath_stiff.api.inputs import Origin, origin_si
 from toolpath_stiff.api.machines import Machine, machine_from
@@ -18,6 +20,7 @@ from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
+from toolpath_stiff.diagnosis.on_elements import ElementDiagnosis, diagnose_elements
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
@@ -28,6 +31,7 @@ from toolpath_stiff.planning.menu import COSTS, Menu
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.result import plan as plan_visits
 from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.readings.pulls import pull_tables
 from toolpath_stiff.results import Progress, one_of, teller
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.units import m_from_mm, rad_from_deg
@@ -89,6 +93,19 @@ class Question:
         """The machine as its file has it. Raises `InputError` where it is of another kind, which `asking` cannot do."""
         return as_hexapod(self.model, asking)
 
+    @property
+    def has_pulls(self) -> bool:
+        """Whether the measurements are forces and displacements as vectors, on a machine of elements."""
+        if self.data is None or isinstance(self.model, Hexapod):
+            return False
+        return bool(pull_tables(self.data.files, self.model, self.data.columns))
+
+    def of_elements(self) -> ElementDiagnosis:
+        """A diagnosis of pulls, or stiffnesses, on a machine of elements."""
+        assert self.data is not None
+        noise = None if self.request.noise is None else float(np.hypot.reduce(np.atleast_1d(self.request.noise)))
+        return diagnose_elements(self.model, self.data.files, self.data.columns, noise)
+
     def diagnosed(self, tell: Callable[[str], None], *words: str, inputs: Iterable[str] = ()) -> Diagnosis:
         """A diagnosis of the readings; `words` are further ones of the command that gives it."""
         return replace(
@@ -120,7 +137,7 @@ def compare(
     strut_spread_percent: StrutSpread = 1.0,
     seed: Seed = 0,
     progress: Progress | None = None,
-) -> Comparison:
+) -> Comparison | ElementDiagnosis:
     """See where the model fails: the machine as its file has it, against measurements.
 
     Parameters
@@ -152,9 +169,12 @@ def compare(
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     teller(progress)("comparing")
+    if question.has_pulls:
+        return question.of_elements()
     comparison = compare_readings(question.model, question.readings, **question.common)
     following = hint("which effect would explain it", question.request.command("diagnose"))
-    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=(following,)))
+    onwards = (following,) if isinstance(question.model, Hexapod) else ()
+    return replace(comparison, inputs=question.inputs, summary=replace(comparison.summary, next=onwards))
 
 
 @checked
@@ -169,7 +189,7 @@ def diagnose(
     program: Annotated[Program | str | Path | None, Option("--program", "PROGRAM")] = None,
     origin_mm_deg: Origin = None,
     progress: Progress | None = None,
-) -> Diagnosis:
+) -> Diagnosis | ElementDiagnosis:
     """Find out which physical effect the model lacks, if any.
 
     Parameters
@@ -202,6 +222,8 @@ def diagnose(
     (['diagnose.json', 'residuals.csv'], 7)
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
+    if not isinstance(question.model, Hexapod):
+        return question.of_elements()
     on, part, origin = question.on, None if program is None else program_from(program), origin_si(origin_mm_deg)
     words = [
         *words_of(diagnose, {"program": part.file if part else None, "origin_mm_deg": origin_mm_deg, "seed": seed}),
@@ -244,9 +266,9 @@ def update(
     add
         Effects to add: "weak_strut", or with what they act on, "weak_strut:strut=3".
     strut_law
-        Write the refitted strut law even without an effect.
+        Write the refitted strut law even without an effect, if the data support it.
     keep_strut_law
-        Keep the strut law as given; else its two stiffnesses are refitted along with every effect.
+        Keep the strut law as given; else it is refitted along with every effect, and written if the data support it.
     auto
         Add effects as long as the error at left-out points falls and the data support it.
     force
@@ -273,15 +295,15 @@ def update(
     Examples
     --------
     >>> import toolpath_stiff as tps
-    >>> update = tps.update("nist-table1", "nist", strut_law=True)
+    >>> update = tps.update("nist-table1", "nist", strut_law=True)  # refused: no left-out point asks for another law
     >>> update.to_frame()["name"].tolist()
     ['as given', 'strut law refitted']
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     task = UpdateTask(
         question.hexapod("update"), question.readings, [add] if isinstance(add, str) else list(add),
-        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe, objective=objective,
-        files=question.request.data, machine_file=str(machine_file), request=question.request,
+        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe,
+        objective=objective, files=question.request.data, machine_file=str(machine_file), request=question.request,
         progress=teller(progress), **question.common,
     )  # fmt: skip
     return replace(update_machine(task), inputs=question.inputs, opened=question.on.carrying)

@@ -29,10 +29,10 @@ MACHINE, EFFECTS = (arguments_of(tps.Machine.load)[name] for name in ("machine",
 File = Annotated[str, Option("FILE.py", help="file with your own physical effects")]
 
 
-@command("effects list", EFFECTS, JSON)
+@command("effects list", "effects", EFFECTS, JSON)
 def list_effects(args: Namespace) -> int:
     """All effects, in the order of the load path."""
-    return run.show(args, tps.effects(args.effects))
+    return run.show(args, tps.effects(args.effects, kind=args.kind))
 
 
 @command("effects show", EFFECTS, JSON)

@@ -30,7 +30,7 @@ def pose(
     pose: Annotated[Sequence[float], Option("X Y Z [A B C]", read=finite_number, count="*")] = (),
     csv: Annotated[str | None, Option("--csv", "FILE")] = None,
 ) -> int:
-    """Stiffness, softest and stiffest direction, strut lengths at single poses.
+    """Stiffness, softest and stiffest direction, joint values at single poses.
 
     for example:
       tps pose -300 300 300 -30 0 0
@@ -133,29 +133,35 @@ def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Pi
     return run.show(args, check, written, code=0 if check.good else NOT_GOOD)
 
 
-@command("machine new", "machine_template", REPLACE, without=["file"])
+@command("machine new", "machine_template", REPLACE)
 def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
     """Write a commented template."""
     text = tps.machine_template(file, kind=args.kind).text
     return run.write_text(args, file, text, "edit it, then", "machine", "check", file, fresh=True)
 
 
-@command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
-def from_linuxcnc(
-    args: Namespace,
-    file: Annotated[str, Option("FILE.hal")],
-    out: Annotated[str | None, Option("-o --out", "FILE")] = None,
-) -> int:
-    """Read the genhexkins pins of a LinuxCNC HAL file.
+Made = Annotated[str | None, Option("-o --out", "FILE", help="machine file to write (default: standard output)")]
 
-    Parameters
-    ----------
-    out
-        Machine file to write (default: standard output).
-    """
-    machine_file = tps.machine_from_linuxcnc(file, args.units)
-    run.tell("note", machine_file.notes)
-    if out:
-        return run.write_text(args, out, machine_file.text, "next", "machine", "check", out)
-    sys.stdout.write(machine_file.text)
-    return 0
+
+@command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
+def from_linuxcnc(args: Namespace, file: Annotated[str, Option("FILE.hal")], out: Made = None) -> int:
+    """Read the kinematics pins of a LinuxCNC HAL file."""
+    return run.made(args, tps.machine_from_linuxcnc(file, args.units), out)
+
+
+@command("machine from-urdf", "machine_from_urdf", REPLACE)
+def from_urdf(args: Namespace, file: Annotated[str, Option("FILE.urdf")], out: Made = None) -> int:
+    """Read a robot of a URDF file."""
+    return run.made(args, tps.machine_from_urdf(file, args.tip), out)
+
+
+@command("machine from-dh", "machine_from_dh", REPLACE)
+def from_dh(args: Namespace, file: Annotated[str, Option("TABLE")], out: Made = None) -> int:
+    """Read a robot of a table of Denavit-Hartenberg rows."""
+    return run.made(args, tps.machine_from_dh(file, args.convention), out)
+
+
+@command("machine from-freecad", "machine_from_freecad", REPLACE)
+def from_freecad(args: Namespace, file: Annotated[str, Option("FILE.fcm")], out: Made = None) -> int:
+    """Read a mill of FreeCAD."""
+    return run.made(args, tps.machine_from_freecad(file, args.order), out)

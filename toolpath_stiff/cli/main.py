@@ -31,7 +31,7 @@ GROUPS = {
         "compensate": "a program shifted against the deflection of its final walls",
     },
     "machine": {
-        "pose": "stiffness, softest and stiffest direction, strut lengths at single poses",
+        "pose": "stiffness, softest and stiffest direction, joint values at single poses",
         "map": "stiffness over planes of the workspace: picture, table, 3-D page",
         "machine": "list, show, check, make and import machine files",
     },

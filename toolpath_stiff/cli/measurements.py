@@ -113,7 +113,7 @@ def update(
 
     An effect that the data do not support is refused, with the reason, unless --force is given; the exit code is 0 all
     the same. Files written to --out: update.json, residuals.csv, machine.toml (unless refused or -o names another
-    place), before_after.png, report.html; with --objective mean-error also figure3.csv and figure3.png.
+    place), before_after.png, report.html.
 
     Parameters
     ----------

@@ -16,9 +16,10 @@ from typing import Annotated
 from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import JSON, REPLACE, command
 from toolpath_stiff.documents import Document
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.options import Option
-from toolpath_stiff.rig.exercise import FILES, blind_case, measured_again, new_exercise, reveal
+from toolpath_stiff.rig.exercise import FILES, blind_case, measured_again, new_exercise, new_robot, reveal
 
 LAYOUTS = ("paper", "tilted", "campaign")
 Exercise = Annotated[str, Option("DIR", help="folder that `tps rig new` wrote")]
@@ -34,7 +35,7 @@ def new(
     hidden: Annotated[str | None, Option("--hidden", "WHAT")] = None,
     noise: Annotated[float, Option("--noise", "%")] = 2.0,
     machine: Annotated[str, Option("--machine", "NAME|FILE")] = "nist",
-    built: Annotated[str, Option("--built", choices=("springs", "fem"))] = "springs",
+    built: Annotated[str, Option("--built", choices=("springs", "fem", "serial"))] = "springs",
 ) -> int:
     """Make a blind exercise.
 
@@ -56,8 +57,15 @@ def new(
     machine
         Nominal machine.
     built
-        How the hidden machine is built: springs and bars, or finite elements (whose faults have other names).
+        How the hidden machine is built: springs and bars, or finite elements (whose faults have other names); serial:
+        an invented robot of six joints, pulled along X, Y and Z.
     """
+    if built == "serial":
+        if at or layout != "tilted" or machine != "nist":
+            raise InputError("--built serial with a layout, a plan or a machine", expected="--seed, --hidden, --noise")
+        count = new_robot(out, seed, hidden, noise / 100.0, run.rules_of(args, fresh=True))
+        print(f"{out}: {count} pulls, the nominal machine and the sealed truth", _diagnose(out), sep="\n")
+        return 0
     case = blind_case(seed, layout, hidden, noise / 100.0, machine, at, built)
     count = new_exercise(out, case, run.rules_of(args, fresh=True))
     print(f"{out}: {count} measurements, the nominal machine and the sealed truth", _diagnose(out), sep="\n")

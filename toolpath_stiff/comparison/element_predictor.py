@@ -48,7 +48,7 @@ class ElementPredictor(Predictor):
     def strut_columns(self) -> FloatArray:
         """(n, e) d ln k / d ln(stiffness of element i): its share of the compliance."""
         shares = energies(stance_of(self.full_path), self.data.direction)
-        return np.stack(shares, axis=1) * np.exp(self._base_log)[:, None]
+        return np.asarray(np.stack(shares, axis=1) * np.exp(self._base_log)[:, None])
 
     @cached_property
     def joint_columns(self) -> FloatArray:

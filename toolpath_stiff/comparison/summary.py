@@ -169,10 +169,13 @@ def summary_of(
         return {str(level): _errors(values, structures, label == level) for level in np.unique(label)}
 
     where, along = planes(data), directions(data)
-    problem = Problem(predictor, Scatter.of(last.scattering.noise, last.scattering.covariance))
     machine = predictor.base.machine
     hexapod = machine if isinstance(machine, Hexapod) else None
-    law = base_fit(problem, law_free=True) if hexapod and len(values) >= FEWEST_TO_REFIT else None
+    law, suspects = None, suspect_entries([], data, left_out=None)
+    if hexapod and len(values) >= FEWEST_TO_REFIT:
+        problem = Problem(predictor, Scatter.of(last.scattering.noise, last.scattering.covariance))
+        law = base_fit(problem, law_free=True)
+        suspects = suspect_entries(suspect_rows(problem, law), data, left_out=None)
     baseline = AllErrors(
         **vars(_errors(values, structures, np.ones(len(values), dtype=bool))),
         probability={found.scattering.noise.name: found.probability for found in structures},
@@ -180,7 +183,6 @@ def summary_of(
         strut_law_refitted=_refitted(hexapod.strut_law, law) if hexapod and law else None,
     )
     findings, noises = _findings(structures, values), [found.scattering.noise for found in structures]
-    suspects = suspect_entries([] if law is None else suspect_rows(problem, law), data, left_out=None)
     doubts = [*dict.fromkeys(noise.remark for noise in noises if noise.remark)]
     doubts += [suspect.words for suspect in suspects]
     text = [question_text, overall_text(baseline, pattern=bool(findings))]

@@ -14,7 +14,7 @@ import numpy as np
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.correction.machines import fitted_machine
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
-from toolpath_stiff.correction.strut_law import BarCurve, StrutLawSearch
+from toolpath_stiff.correction.strut_law import StrutLawSearch
 from toolpath_stiff.correction.task import LIKELIHOOD, UpdateTask
 from toolpath_stiff.diagnosis.examination import percent_of, rounded_errors
 from toolpath_stiff.documents import Document, json_number, to_dict
@@ -61,8 +61,8 @@ class Update(FolderResult):
         Of every effect that was asked for, or that `auto` took; of those that it tried last and did not take.
     drawn
         How effects stand whose form was read off these readings; None where there are none.
-    search, bars
-        Of the paper's own estimation: how its searches ended; its Figure 3. None otherwise.
+    search
+        Of the paper's own estimation: how its searches ended; None otherwise.
     provenance
         Where the fitted values come from, for the record.
     next
@@ -76,9 +76,9 @@ class Update(FolderResult):
     --------
     >>> import pathlib, tempfile
     >>> import toolpath_stiff as tps
-    >>> update = tps.update("nist-table1", "nist", strut_law=True, noise_percent=5)
+    >>> update = tps.update("nist-table1", "nist", strut_law=True, noise_percent=5, force=True)
     >>> update
-    <Update: updated, mean error 9.62 to 9.62 %>
+    <Update: forced, mean error 9.62 to 9.62 %>
     >>> update.accepted, update.to_dict()["objective"]
     (True, 'likelihood')
     >>> update.to_frame()["mean_abs_error_percent"].round(2).tolist()
@@ -106,7 +106,6 @@ class Update(FolderResult):
     turned_down: tuple[Support, ...] = ()
     drawn: Drawn | None = None
     search: StrutLawSearch | None = None
-    bars: BarCurve | None = None
     provenance: Document = field(default_factory=dict)
     next: Sequence[str] = ()
     inputs: tuple[str, ...] = ()
@@ -209,7 +208,8 @@ class Update(FolderResult):
         """How far the last model may be off at a pose; None where too little was measured to tell."""
         if self.task.objective != LIKELIHOOD:
             return None
-        return error_model(self.known, self.task.problem.predictor.data, self.noise)
+        given = self.last.fit if self.kept_law else None
+        return error_model(self.known, self.task.problem.predictor.data, self.noise, given)
 
     @cached_property
     def corrected(self) -> Hexapod | None:
@@ -249,8 +249,7 @@ class Update(FolderResult):
 
     def files(self, *, plots: bool = True, machine: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps update`; the machine file too, unless it is said not."""
-        there = {"machine.toml": machine and self.accepted, "figure3.csv": self.bars is not None}
-        return self._files(plots, [name for name in there if not there[name]])
+        return self._files(plots, [] if machine and self.accepted else ["machine.toml"])
 
     def _short(self) -> str:
         first, last = (100.0 * step.error for step in (self.steps[0], self.steps[-1]))

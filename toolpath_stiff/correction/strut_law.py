@@ -1,12 +1,11 @@
-"""The paper's own estimation: strut law and platform bars that make the mean relative error smallest.
+"""The paper's own estimation: the strut law that makes the mean relative error smallest.
 
 Clinton, Zhang and Wavering (1997) choose the strut's stiffness at two lengths so that |model - measured| / measured,
-averaged over all readings, is smallest, and show in their Figure 3 how that error hangs on the stiffness of the bars
-that stand for the platform. The objective has a kink wherever the model meets a reading: a search without derivatives
-(Nelder and Mead 1965) from several starts; the paper searched one variable at a time.
+averaged over all readings, is smallest. The objective has a kink wherever the model meets a reading: a search without
+derivatives (Nelder and Mead 1965) from several starts; the paper searched one variable at a time.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +15,7 @@ from numpy.typing import ArrayLike
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.diagnosis.diagnose import check_measured
 from toolpath_stiff.inference.prediction import NO_CHANGE, Predictor, at_both_ends, scaled_law
-from toolpath_stiff.machine.model import Hexapod, StrutLaw
-from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.units import n_per_um_from_n_per_m
+from toolpath_stiff.machine.model import StrutLaw
 
 STARTS = 6
 START_SPREAD = 0.2  # sd of the starts' logarithms: a law wrong by 20 %
@@ -26,8 +23,6 @@ FIRST_STEPS = 0.05 * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 FINE, ROUGH = (1e-7, 1e-10), (1e-5, 1e-7)  # law and mean error; a resampled search scatters a thousand times as much
 SAME = 1e-5  # of the mean error: two ends that close are one minimum
 RESAMPLES = 200
-# N/m; the paper's Figure 3 spans platforms far softer than any real one up to rigid ones.
-FIGURE_3_BARS = tuple(float(k) for k in np.geomspace(1e8, 1e13, 26))
 
 
 @dataclass(frozen=True)
@@ -156,58 +151,3 @@ def resampled_covariance(predictor: Predictor, law: FloatArray, seed: int = 0) -
         count = np.bincount(rng.integers(len(labels), size=len(labels)), minlength=len(labels))
         laws.append(_downhill(_objective(predictor, count[which.reshape(-1)].astype(float)), law, *ROUGH))
     return np.asarray(np.cov(np.array(laws).T))
-
-
-@dataclass(frozen=True)
-class BarCurve:
-    """The paper's Figure 3: mean error over the stiffness of the platform's bars.
-
-    Attributes
-    ----------
-    bars
-        (b,) N/m of each bar, inf last: a rigid platform.
-    error
-        (b,) mean relative error with the machine's own strut law.
-    error_refitted
-        (b,) with the law that makes it smallest there.
-    stiffness
-        (b, 2) N/m, that law at its two lengths.
-    """
-
-    bars: FloatArray
-    error: FloatArray
-    error_refitted: FloatArray
-    stiffness: FloatArray
-
-
-def bar_curve(
-    machine: Hexapod, data: Readings, bars: Sequence[float] = FIGURE_3_BARS, seed: int = 0, starts: int = 3
-) -> BarCurve:
-    """Mean error for platforms from soft to rigid, with the machine's strut law and with the best one.
-
-    Parameters
-    ----------
-    machine, data
-        What was measured; the machine's own platform bars are replaced.
-    bars
-        N/m; a rigid platform is added.
-    seed, starts
-        As in `minimise_mean_error`.
-    """
-    stiffnesses = np.unique([*bars, np.inf])
-    machines = [machine.with_changes(platform_bar_stiffness=float(k)) for k in stiffnesses]
-    searches = [minimise_mean_error(Predictor(other, data), seed, starts) for other in machines]
-    laws = np.array([[search.strut_law.stiffness_1, search.strut_law.stiffness_2] for search in searches])
-    given, refitted = (np.array([getattr(s, name) for s in searches]) for name in ("error_before", "error"))
-    return BarCurve(stiffnesses, given, refitted, laws)
-
-
-def bar_curve_csv(curve: BarCurve) -> str:
-    """The curve as CSV: N/m, per cent, N/um."""
-    errors = 100 * np.column_stack([curve.error, curve.error_refitted])
-    figures = np.column_stack([errors, n_per_um_from_n_per_m(curve.stiffness)])
-    rows = ["bar_stiffness_N_per_m,error_percent,error_refitted_percent,stiffness_1_N_per_um,stiffness_2_N_per_um"]
-    rows += [
-        ",".join([f"{k:.6g}", *(f"{value:.4f}" for value in row)]) for k, row in zip(curve.bars, figures, strict=True)
-    ]
-    return "\n".join(rows) + "\n"

@@ -28,7 +28,7 @@ from toolpath_stiff.correction.additions import parse_addition
 from toolpath_stiff.correction.machines import data_hash, fitted_machine
 from toolpath_stiff.correction.result import NEEDED, Update
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
-from toolpath_stiff.correction.strut_law import bar_curve, leave_points_out, minimise_mean_error, resampled_covariance
+from toolpath_stiff.correction.strut_law import leave_points_out, minimise_mean_error, resampled_covariance
 from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, MEAN_ERROR, UpdateTask
 from toolpath_stiff.diagnosis.diagnose import check_measured
 from toolpath_stiff.diagnosis.examination import percent_of
@@ -338,8 +338,4 @@ def update_by_mean_error(task: UpdateTask) -> Update:
     )  # fmt: skip
     left_out = HeldOut(leave_points_out(predictor, law), np.zeros((0, 2)), data.point)
     steps = LadderStep.of(AS_GIVEN, as_given, data), LadderStep.of("strut law by mean error", last, data, left_out)
-    bars = None
-    if not any(entry.name == "platform_flexibility" for entry in task.machine.effects):
-        task.progress("the platform's bars, soft to rigid")
-        bars = bar_curve(task.machine, data, seed=task.seed, starts=1)
-    return Update(task, steps, LadderStep.of(LAW_REFITTED, law_refitted, data), search=search, bars=bars)
+    return Update(task, steps, LadderStep.of(LAW_REFITTED, law_refitted, data), search=search)

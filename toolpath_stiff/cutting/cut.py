@@ -14,15 +14,17 @@ from toolpath_stiff.cutting.engagement import engage
 from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.passes import walls_of_all_passes
-from toolpath_stiff.cutting.patches import Contact, Patches
+from toolpath_stiff.cutting.patches import Contact, Patches, of_stations
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
 from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
+from toolpath_stiff.cutting.sweeps import tilted_moves
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
-from toolpath_stiff.cutting.workpiece import Workpiece, workpiece_of
+from toolpath_stiff.cutting.workpiece import Workpiece, stages_of
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.nc.moves import ReadProgram
+from toolpath_stiff.nc.courses import move_lengths
+from toolpath_stiff.nc.moves import Moves, ReadProgram
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Progress
@@ -33,7 +35,7 @@ BLOCK = 16_384  # stations at a time
 MOST_NAMED = 5  # lines in a warning
 OTHER = 0.1  # of the error of a wall: where a pass has less of it by itself, most is of an earlier one
 ROUNDED = 1e-12  # of a cosine
-TURN = 0.02  # rad between two moves, below which the second begins as the first ends: chords of a curve
+SAME_WALL = 1e-6  # m, ranges of height closer than this are one
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -136,84 +138,90 @@ def evaluate_cut(
     model
         The machine with its effects, under its conditions; those that depend on the load take the force that acts.
     program
-        As it was read; the tool has to stand upright in the set-up frame.
+        As it was read; cuts with a tilted tool are left out, with a warning.
     progress
         Called with what is being done, samples done, samples in all.
 
     Raises
     ------
     InputError
-        Something is missing (which, and where to write it), or a tool is tilted.
+        Something is missing (which, and where to write it), or every cut has a tilted tool.
     """
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
     spindle = spindle_of(setup, program, samples)
+    feed_per_tooth = _feed_per_tooth(samples, cutters, spindle)
+    samples = _along_teeth(samples, program.moves, feed_per_tooth)
     stock = stock_of(setup, program.moves, cutters)
     try:
-        work = workpiece_of(stock, program.moves, cutters)
+        engaged = engage(stages_of(stock, program.moves, cutters), program.moves, samples, cutters, progress)
     except ProgramError as error:  # which knows no file
         raise error.in_line(program.name, error.line or 0) from None
-    cut = _nothing_cut(samples, cutters, work, setup.coefficients, spindle)
-    given, parts, removed = (work, program.moves, samples, cutters), [], np.zeros(len(samples))
-    for block, some, volume in engage(*given, progress):
-        removed[block] = volume
-        parts.append(some)
-    patches = Patches.joined(parts)
-    repeated = _repeats_the_one_before(samples)
-    first, few = np.cumsum(~repeated) - 1, (work, program.moves, samples.take(~repeated), cutters)
-    (walls, own), strips = (made[first] for made in walls_of_passes(*few)), final_strip(*few)[first]
-    cut = replace(cut, removed=removed, wall_heights=walls)
+    walls, own = walls_of_passes(engaged.work, samples, cutters)
+    # Samples that share a contact are computed once, but where their walls differ.
+    source = engaged.source.copy()
+    apart = ~np.isclose(walls, walls[source], rtol=0.0, atol=SAME_WALL, equal_nan=True).all(axis=(1, 2))
+    source[apart] = np.flatnonzero(apart)
+    rows = np.unique(source)
+    strips = np.full((len(samples), 2), np.nan)
+    strips[rows] = final_strip(engaged.work, samples.take(rows), cutters)
+    patches = of_stations(engaged.patches, engaged.source[rows])
+    patches = replace(patches, station=rows[patches.station])
+    cut = _nothing_cut(samples, cutters, engaged.work, setup.coefficients, feed_per_tooth)
+    cut = replace(cut, removed=engaged.removed, wall_heights=walls)
     made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
         values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
-    profiles = cut.wall_profiles
-    profiles[made[:, :2]] = 0.0
+    cut.wall_profiles[made[:, :2]] = 0.0
     _note_engagement(cut, patches)
-    engaged = np.zeros(len(samples), dtype=bool)
-    engaged[patches.station] = True
-    repeated[1:] &= engaged[1:] == engaged[:-1]
+    cutting = np.unique(patches.station)
     level = np.hypot(samples.tangent[:, 0], samples.tangent[:, 1])
     feed = cut.feed_per_tooth[:, None] * np.stack([level, samples.tangent[:, 2]], axis=1)
     for number, cutter in cutters.items():
         contact = Contact(patches, cutter, setup.coefficients, feed, np.sign(spindle))
-        rows = np.flatnonzero(engaged & ~repeated & (samples.tool == number))
-        for part in (rows[start : start + BLOCK] for start in range(0, len(rows), BLOCK)):
-            _evaluate(cut, model, origin, contact.of(part), strips, part)
-    again = np.flatnonzero(repeated)
-    for values in (cut.mean_force, cut.peak_force, cut.deflection, cut.wall_force, profiles):
-        values[again] = values[again - 1]
-    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
-        values[again] = values[again - 1]
+        some = cutting[samples.tool[cutting] == number]
+        for rows in (some[start : start + BLOCK] for start in range(0, len(some), BLOCK)):
+            _evaluate(cut, model, origin, contact.of(rows), strips, rows)
+    for values in (cut.ap, cut.ae, cut.entry, cut.exit, cut.mean_force, cut.peak_force, cut.deflection, cut.wall_force):
+        values[:] = values[source]
+    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation, cut.wall_profiles):
+        values[:] = values[source]
     cut = _with_walls_of_all_passes(cut, own, step)
-    return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=_warnings(cut))
+    tilted = samples.cutting & tilted_moves(program.moves)[samples.move]
+    warnings = _warnings(cut, engaged.struck, tilted)
+    return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=warnings)
 
 
-def _repeats_the_one_before(samples: Samples) -> BoolArray:
-    """(n,) samples where a move goes on from the one before with hardly a turn, and nothing else differs."""
-    first, second = slice(None, -1), slice(1, None)
-    straight = (samples.tangent[first] * samples.tangent[second]).sum(axis=1) >= np.cos(TURN)
-    straight &= (samples.position[first] == samples.position[second]).all(axis=1) & samples.cutting[first]
-    straight &= (samples.tool[first] == samples.tool[second]) & (samples.feed[first] == samples.feed[second])
-    straight &= samples.spindle[first] == samples.spindle[second]
-    straight[1:] &= ~straight[:-1]
-    return np.concatenate([[False], straight])
+def _feed_per_tooth(samples: Samples, cutters: Mapping[int, Cutter], spindle: FloatArray) -> FloatArray:
+    """(n,) m; nan where nothing turns or cuts."""
+    teeth = np.ones(len(samples))
+    for number, cutter in cutters.items():
+        teeth[samples.tool == number] = cutter.flutes
+    per_second = np.where(samples.cutting & (np.abs(spindle) > 0.0), teeth * np.abs(spindle) / (2.0 * np.pi), np.nan)
+    return np.asarray(samples.feed / per_second)
+
+
+def _along_teeth(samples: Samples, moves: Moves, feed: FloatArray) -> Samples:
+    """Samples with the direction of feed over a tooth's feed, where moves are shorter: rounding turns short chords."""
+    rows = np.flatnonzero(samples.cutting & (move_lengths(moves)[samples.move] < feed))
+    ends = (samples.s[rows] + side * feed[rows] for side in (0.5, -0.5))
+    after, before = ([np.interp(path, samples.s, axis) for axis in samples.position.T] for path in ends)
+    along = np.subtract(after, before).T
+    length, tangent = np.linalg.norm(along, axis=1, keepdims=True), samples.tangent.copy()
+    tangent[rows] = np.divide(along, length, out=tangent[rows], where=length > 0.0)
+    return replace(samples, tangent=tangent)
 
 
 def _nothing_cut(
-    samples: Samples, cutters: Mapping[int, Cutter], work: Workpiece, coefficients: Coefficients, spindle: FloatArray
+    samples: Samples, cutters: Mapping[int, Cutter], work: Workpiece, coefficients: Coefficients, feed: FloatArray
 ) -> Cut:
     """A cut to be filled in."""
     n = len(samples)
-    teeth = np.ones(n)
-    for number, cutter in cutters.items():
-        teeth[samples.tool == number] = cutter.flutes
-    turning = samples.cutting & (np.abs(spindle) > 0.0)
-    per_second = np.where(turning, teeth * np.abs(spindle) / (2.0 * np.pi), 1.0)
     return Cut(
         samples=samples,
         cutters=cutters,
         work=work,
         coefficients=coefficients,
-        feed_per_tooth=np.where(turning, samples.feed / per_second, np.nan),
+        feed_per_tooth=feed,
         **{name: np.zeros(n) for name in ("ap", "ae", "entry", "exit", "removed")},
         **{name: np.zeros((n, 3)) for name in ("mean_force", "peak_force", "deflection")},
         wall_heights=np.full((n, 2, 2), np.nan),
@@ -308,7 +316,7 @@ def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str,
     return tuple(sentences)
 
 
-def _warnings(cut: Cut) -> tuple[str, ...]:
+def _warnings(cut: Cut, struck: BoolArray, tilted: BoolArray) -> tuple[str, ...]:
     """What deserves a look, a sentence each."""
     samples, warnings = cut.samples, []
     if cut.machine_only:
@@ -319,9 +327,13 @@ def _warnings(cut: Cut) -> tuple[str, ...]:
         )
     engaged = cut.ap > 0.0
     plunges = (cut.removed > 0.0) & (np.abs(samples.tangent[:, 2]) >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
-    warnings += _lines_warning(
-        samples, plunges, "plunges: cutting with the end is not modelled, no force is known there"
-    )
+    for rows, words in (
+        (struck, "rapids run into material, which counts as still there afterwards"),
+        (plunges, "plunges: cutting with the end is not modelled, no force is known there"),
+        (tilted, "the tool is tilted: no force is known there, and what these cuts take off counts as still there, so "
+         "that later cuts are foretold too heavy, never too light"),
+    ):  # fmt: skip
+        warnings += _lines_warning(samples, rows, words)
     chip = np.where(engaged, cut.feed_per_tooth, np.nan)
     thin, thick = cut.coefficients.thinnest, cut.coefficients.thickest
     for beyond, words in ((chip < thin, "thinner"), (chip > thick, "thicker")):

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.envelopes import down_slope, foot, rise, within
 from toolpath_stiff.cutting.stations import blocks_of_stations, points_around
-from toolpath_stiff.cutting.sweeps import nearest
 from toolpath_stiff.cutting.workpiece import Workpiece
-from toolpath_stiff.nc.moves import Moves
+from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.path.sampling import Samples
 
 BESIDE = 2e-6  # m, outside of a wall, where it must stand; and how far above the finished surface still is that surface
@@ -21,21 +21,14 @@ ACROSS = 41  # points across the cutter's end
 SCALLOP = 8e-4
 
 
-def final_walls(work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
+def walls_of_passes(work: Workpiece, samples: Samples, cutters: Mapping[int, Cutter]) -> tuple[FloatArray, FloatArray]:
     """(n, 2, 2) m above the tip: lowest and highest point of the wall that a sample makes on its left and right.
 
-    nan where the finished part has no wall there, or a later pass has touched it (a spring pass makes it anew). A
-    corner's radius is below the wall.
+    First the walls that no later pass has cut deeper, then those of them that none has touched since (a spring pass
+    makes a wall anew). nan where the finished part has no wall there. A corner's radius is below the wall.
     """
-    return walls_of_passes(work, moves, samples, cutters)[1]
-
-
-def walls_of_passes(
-    work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]
-) -> tuple[FloatArray, FloatArray]:
-    """Walls that no later pass has cut deeper than a sample did, and `final_walls`, which none has touched since."""
     made, own = np.full((2, len(samples), 2, 2), np.nan)
-    for rows, stations in blocks_of_stations(work, moves, samples, cutters):
+    for rows, stations in blocks_of_stations(work, samples, cutters, _cutting(samples)):
         sides, reach = np.array([[0.0, np.pi]]), stations["reach"][:, None]
         wall = points_around(stations, reach + BESIDE, sides)
         every, tip = np.full(len(wall[0]), len(work.pieces)), np.repeat(stations["z"], 2)
@@ -44,7 +37,7 @@ def walls_of_passes(
         high = work.tops(*wall, (np.zeros_like(every), every))[0] - tip
         high = np.minimum(high, np.repeat(stations["longest"], 2))
         low = np.maximum(work.stock.bottoms(*wall) - tip, np.repeat(stations["reach"] - stations["flat"], 2))
-        stands = np.flatnonzero((high - low > BESIDE) & ~np.repeat(stations["plunge"], 2))
+        stands = np.flatnonzero((high - low > BESIDE) & ~np.repeat(stations["end_alone"], 2))
         for walls, offset in ((made, TOUCHED), (own, -TOUCHED)):
             x, y = (axis[stands] for axis in points_around(stations, reach + offset, sides))
             top = np.minimum(high[stands], work.tops(x, y, (later[stands], every[stands]))[0] - tip[stands])
@@ -55,26 +48,29 @@ def walls_of_passes(
     return made, own
 
 
-def final_strip(work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
+def final_strip(work: Workpiece, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
     """(n, 2) m across the feed, + to the left: lowest and highest offset at which a sample makes the finished surface.
 
     With the end of the cutter: of a flat end the strip of floor, of a ball the scallop around its point of contact
     kappa = asin(|offset| / R). nan: none.
     """
     strips = np.full((len(samples), 2), np.nan)
-    for rows, stations in blocks_of_stations(work, moves, samples, cutters):
+    for rows, stations in blocks_of_stations(work, samples, cutters, _cutting(samples)):
         offset = stations["reach"][:, None] * np.sin(np.linspace(-0.5, 0.5, ACROSS) * np.pi)[None, :]
-        corner, flat = (stations["reach"] - stations["flat"])[:, None], stations["flat"][:, None]
-        # Where the envelope is left behind its normal is across the motion: on a slope not straight beside the tip.
-        inset = np.clip(np.abs(offset) - flat, 0.0, corner)
-        depth = np.sqrt(corner**2 - inset**2)
-        ahead = -depth * stations["down"][:, None]
-        surface = (stations["z"][:, None] + corner - depth * stations["level"][:, None]).ravel()
-        x, y = points_around(stations, np.hypot(offset, ahead), np.arctan2(ahead, offset))
+        reach, flat = stations["reach"][:, None], stations["flat"][:, None]
+        # On a slope the envelope leaves a point behind the tip, or before it, where its normal is square to the motion.
+        slope = stations["down"] / np.maximum(stations["level"], 1e-12)
+        back = down_slope(np.abs(slope)[:, None], np.abs(offset), reach, flat)
+        back = np.where(slope == 0.0, 0.0, np.sign(slope))[:, None] * back
+        away = np.hypot(offset, back)
+        surface = (stations["z"][:, None] + rise(reach, flat, away)).ravel()
+        x, y = points_around(stations, away, np.arctan2(-back, offset))
         every = np.full(len(surface), len(work.pieces))
         ball = np.repeat(np.where(stations["flat"] == 0.0, SCALLOP * stations["reach"], 0.0), ACROSS)
-        stays = np.abs(work.tops(x, y, (np.zeros_like(every), every))[0] - surface) < BESIDE + ball
-        stays &= (work.stock.bottoms(x, y) < surface) & ~np.repeat(stations["plunge"], ACROSS)
+        stays: BoolArray = np.asarray(
+            np.abs(work.tops(x, y, (np.zeros_like(every), every))[0] - surface) < BESIDE + ball
+        )
+        stays &= (work.stock.bottoms(x, y) < surface) & ~np.repeat(stations["end_alone"], ACROSS)
         # A flat end passes a point of the floor twice, with its front and with its back.
         other = stations["path"] + LATER * stations["reach"] + 2.0 * stations["flat"]
         some = np.flatnonzero(stays)
@@ -104,7 +100,14 @@ def finished_surface(
         column = np.full(len(y), x[i])
         top[i], piece = work.tops(column, y, (np.zeros(len(y), np.int64), np.full(len(y), len(work.pieces))))
         part: AnyArray = work.pieces[piece]
-        share = nearest(part, column, y)[0] / np.where(part["extent"] > 0.0, part["extent"], 1.0)
+        arc = part["turn"] != 0.0
+        along = np.where(arc, foot(part, column, y, True)[0], foot(part, column, y, False)[0])
+        share = within(along, part["extent"]) / np.where(part["extent"] > 0.0, part["extent"], 1.0)
         path = part["before"] + share * (part["after"] - part["before"])
         owner[i] = np.where(piece < 0, -1, np.searchsorted(0.5 * (samples.s[1:] + samples.s[:-1]), path))
     return x, y, np.where(top <= work.stock.bottom.min(), -np.inf, top), owner
+
+
+def _cutting(samples: Samples) -> IntArray:
+    """Rows of samples that cut and move."""
+    return np.flatnonzero((samples.motion != RAPID) & (samples.tangent != 0.0).any(axis=1))

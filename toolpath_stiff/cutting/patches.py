@@ -38,6 +38,14 @@ class Patches(ArrayColumns):
     exit: FloatArray
 
 
+def of_stations(patches: Patches, stations: IntArray) -> Patches:
+    """The patches of some stations (n,), counted among these; a station may come more than once."""
+    first, last = (np.searchsorted(patches.station, stations, side) for side in ("left", "right"))
+    station = np.repeat(np.arange(len(stations)), last - first)
+    rows = np.arange(len(station)) + np.repeat(last - np.cumsum(last - first), last - first)
+    return replace(patches.take(rows), station=station)
+
+
 @dataclass(frozen=True)
 class Contact(ArrayColumns):
     """How one cutter cuts at n stations: where it touches the stock, its feed, how it turns, what its edges are met by.
@@ -67,12 +75,8 @@ class Contact(ArrayColumns):
         return self.cutter.hand * max(angle, LEAST_LAG) * self.turning
 
     def of(self, rows: IntArray) -> "Contact":
-        """Some of the stations, in ascending order, counted anew."""
-        ends = np.searchsorted(self.patches.station, [*rows[:1], *rows[-1:] + 1])
-        patches = self.patches.take(slice(*ends) if len(ends) else slice(0))
-        place = np.searchsorted(rows, patches.station).clip(max=len(rows) - 1)
-        patches = replace(patches, station=place).take(rows[place] == patches.station)
-        return replace(self.take(rows), patches=patches)
+        """Some of the stations, counted anew."""
+        return replace(self.take(rows), patches=of_stations(self.patches, rows))
 
     def blocks(self) -> Iterator[tuple[slice, "Contact"]]:
         """Slices of stations with what is theirs."""

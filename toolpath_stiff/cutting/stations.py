@@ -1,4 +1,4 @@
-"""Stations: places along the cutting path with the cutter there, one record each; SI, set-up frame."""
+"""Stations: places along the path with the cutter there, one record each; SI, set-up frame."""
 
 from collections.abc import Iterator, Mapping
 
@@ -8,8 +8,8 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.workpiece import Workpiece
-from toolpath_stiff.nc.courses import move_lengths, points_along
-from toolpath_stiff.nc.moves import RAPID, Moves
+from toolpath_stiff.nc.courses import points_along
+from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.path.sampling import Samples
 
 BLOCK = 2048  # stations at a time
@@ -24,51 +24,70 @@ STATION = np.dtype([
     *((name, np.float64) for name in ("level", "down")),  # parts of the motion in the plane and down the axis
     *((name, np.float64) for name in ("reach", "flat", "longest")),  # cutter: radius, of its flat end, cutting length
     ("move", np.int64),
-    ("share", np.float64),  # of the move
-    ("piece", np.int64),  # the station's own
+    ("piece", np.int64),  # the station's own, of a rapid the next
     ("recent", np.int64),  # first piece of those just before
     ("path", np.float64),  # from the program's start
-    ("plunge", np.bool_),
+    ("end_alone", np.bool_),  # a plunge or a rapid: only what is below the cutter's end is looked at
 ])  # fmt: skip
 
 
-def stations_along(
-    work: Workpiece, moves: Moves, cutters: Mapping[int, Cutter], move: IntArray, share: FloatArray
+def stations_at(
+    work: Workpiece,
+    cutters: Mapping[int, Cutter],
+    columns: tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray],
 ) -> AnyArray:
-    """(n,) records at shares of cutting moves of some length."""
-    position, tangent = points_along(moves, move, share)
-    stations, length = np.zeros(len(move), dtype=STATION), move_lengths(moves)
+    """(n,) records of places along moves of some length; tool, move, path from the start, tip and tangent of each."""
+    tool, move, path, position, tangent = columns
+    stations = np.zeros(len(move), dtype=STATION)
     stations["x"], stations["y"], stations["z"] = position.T
     level = np.hypot(tangent[:, 0], tangent[:, 1])
-    still = np.where(level > 0.0, level, 1.0)
-    stations["ahead_x"] = np.where(level > 0.0, tangent[:, 0] / still, 1.0)
-    stations["ahead_y"] = tangent[:, 1] / still
+    stations["ahead_x"], stations["ahead_y"] = np.divide(
+        tangent[:, :2].T, level, out=np.tile([[1.0], [0.0]], len(move)), where=level > 0.0
+    )
     stations["level"], stations["down"] = level, -tangent[:, 2]
-    stations["plunge"] = np.abs(tangent[:, 2]) >= np.cos(defaults.PLUNGE_ANGLE) - 1e-12
-    for tool in np.unique(moves.tool[move]).tolist():
-        rows, cutter = moves.tool[move] == tool, cutters[tool]
+    for number, cutter in cutters.items():
+        rows = tool == number
         stations["reach"][rows], stations["flat"][rows] = cutter.radius, cutter.radius - cutter.corner_radius
         stations["longest"][rows] = np.nan_to_num(cutter.cutting_length, nan=np.inf)
-    counts = np.diff(work.first)[move]
-    stations["piece"] = work.first[move] + np.minimum((share * counts + 1e-9).astype(np.int64), counts - 1)
-    stations["move"], stations["share"] = move, share
-    stations["path"] = (np.cumsum(length) - length)[move] + share * length[move]
-    stations["recent"] = np.searchsorted(work.pieces["after"], stations["path"] - RECENT * stations["reach"], "right")
+    stations["move"], stations["path"] = move, path
+    stations["piece"] = pieces_at(work, move, path)
+    rapid = work.first[move + 1] == work.first[move]
+    stations["end_alone"] = rapid | (np.abs(tangent[:, 2]) >= np.cos(defaults.PLUNGE_ANGLE) - 1e-12)
+    recent = np.searchsorted(work.pieces["after"], path - RECENT * stations["reach"], "right")
+    stations["recent"] = np.where(rapid, len(work.pieces), recent)
     return stations
 
 
+def pieces_at(work: Workpiece, move: IntArray, path: FloatArray) -> IntArray:
+    """(n,) the piece at places along moves; of a rapid the next."""
+    first, count = work.first[move], work.first[move + 1] - work.first[move]
+    own = work.pieces[np.minimum(first, len(work.pieces) - 1)]
+    each = np.where(count > 0, own["after"] - own["before"], 1.0)
+    return np.asarray(
+        first + np.clip(((path - own["before"]) / each + 1e-9).astype(np.int64), 0, np.maximum(count - 1, 0))
+    )
+
+
+def stations_between(
+    work: Workpiece, moves: Moves, cutters: Mapping[int, Cutter], move: IntArray, path: FloatArray
+) -> AnyArray:
+    """(n,) records of places between samples, along cutting moves, ascending."""
+    begin = int(move[0])
+    some = moves.take(slice(begin, int(move[-1]) + 1))
+    before, after = work.pieces["before"][work.first[move]], work.pieces["after"][work.first[move + 1] - 1]
+    share = np.clip((path - before) / (after - before), 0.0, 1.0)
+    return stations_at(work, cutters, (moves.tool[move], move, path, *points_along(some, move - begin, share)))
+
+
 def blocks_of_stations(
-    work: Workpiece, moves: Moves, samples: Samples, cutters: Mapping[int, Cutter]
+    work: Workpiece, samples: Samples, cutters: Mapping[int, Cutter], rows: IntArray
 ) -> Iterator[tuple[IntArray, AnyArray]]:
-    """Rows of samples that lie on cutting moves of some length, and their records, in blocks."""
-    length = move_lengths(moves)
-    before = np.cumsum(length) - length
-    rows = np.flatnonzero((moves.motion[samples.move] != RAPID) & (length[samples.move] > 0.0))
+    """Some rows of samples that move, and their records, in blocks."""
     for first in range(0, len(rows), BLOCK):
         some = rows[first : first + BLOCK]
-        move = samples.move[some]
-        share = np.clip((samples.s[some] - before[move]) / length[move], 0.0, 1.0)
-        yield some, stations_along(work, moves, cutters, move, share)
+        names = ("tool", "move", "s", "position", "tangent")
+        tool, move, path, position, tangent = (getattr(samples, name)[some] for name in names)
+        yield some, stations_at(work, cutters, (tool, move, path, position, tangent))
 
 
 def headings(samples: Samples) -> FloatArray:

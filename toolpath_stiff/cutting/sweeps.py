@@ -1,18 +1,10 @@
-r"""What the cutter has swept, piece by piece of the path, without a grid: heights left above any point x, y.
-
-A piece is a straight line or an arc in the plane, with a slope. The surface that it leaves above a point is the lowest
-height of the cutter's envelope while its axis passes: z0 + m s + p(d(s)) least over s, where p is the profile of the
-cutter's end, d(s) the distance of the point from the axis. Level pieces have it at the nearest point of the path; a
-flat end at the lower end of the part of the path within its radius; a ball of radius r at a distance
-m sqrt((r^2 - d^2) / (1 + m^2)) down the slope from the nearest point (d the distance from the path): a tilted
-cylinder. On an arc these lengths are taken along the circle through the point.
-"""
+"""What the cutter sweeps, piece by piece of the path: straight lines and arcs in the plane, with a slope."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
@@ -44,13 +36,14 @@ PIECE = np.dtype([(name, np.float64) for name in FIELDS])
 
 
 def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, IntArray]:
-    """The pieces of all cutting moves, and (moves + 1,) the first piece of each move.
+    """The pieces of all cutting moves with an upright tool, and (moves + 1,) the first piece of each move.
 
-    Raises `ProgramError` where the tool is not upright or not known.
+    Raises `ProgramError` where none is upright, or a tool is not known.
     """
     length = move_lengths(moves)
-    cuts = (moves.motion != RAPID) & (length > 0.0)
-    _refuse(moves, cuts, cutters)
+    every = (moves.motion != RAPID) & (length > 0.0)
+    cuts = every & ~tilted_moves(moves)
+    _refuse(moves, every, cuts, cutters)
     radius, flat = np.zeros(len(moves)), np.zeros(len(moves))
     for tool in np.unique(moves.tool[cuts]).tolist():
         radius[cuts & (moves.tool == tool)] = cutters[tool].radius
@@ -95,93 +88,17 @@ def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, In
     return pieces, first
 
 
-def _refuse(moves: Moves, cuts: BoolArray, cutters: Mapping[int, Cutter]) -> None:
-    tilted = cuts & ((moves.start[:, 3:5] != 0.0).any(axis=1) | (moves.end[:, 3:5] != 0.0).any(axis=1))
-    unknown = cuts & ~np.isin(moves.tool, list(cutters))
+def tilted_moves(moves: Moves) -> BoolArray:
+    """(n,) moves with a tool that is not along Z at either end."""
+    return np.asarray((moves.start[:, 3:5] != 0.0).any(axis=1) | (moves.end[:, 3:5] != 0.0).any(axis=1))
+
+
+def _refuse(moves: Moves, cuts: BoolArray, upright: BoolArray, cutters: Mapping[int, Cutter]) -> None:
     for rows, text, hint in (
-        (tilted, "tilted tools are not supported with --cut yet", "leave --cut out"),
-        (unknown, "tool {tool} cuts and its geometry is not known", "give it a [[tool]] in the file of --cut"),
-    ):
+        (cuts & ~upright.any(), "tilted tools: no cut of the program has the tool along Z", "leave --cut out"),
+        (cuts & ~np.isin(moves.tool, list(cutters)), "tool {tool} cuts and its geometry is not known",
+         "give it a [[tool]] in the file of --cut"),
+    ):  # fmt: skip
         if rows.any():
             row = int(np.flatnonzero(rows)[0])
             raise ProgramError(text.format(tool=moves.tool[row]), hint=hint, line=int(moves.line[row]))
-
-
-def foot(sweeps: AnyArray, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """(e,) place along the line or circle of a piece that is nearest to a point, the distance, and two more.
-
-    These are the unit of the place, m, at the point, and for arcs its square, else 0.
-    """
-    dx, dy = x - sweeps["x"], y - sweeps["y"]
-    along = dx * sweeps["cos"] + dy * sweeps["sin"]
-    beside = np.abs(dx * sweeps["sin"] - dy * sweeps["cos"])
-    unit, spoke = np.ones(len(x)), np.zeros(len(x))
-    arc = np.flatnonzero(sweeps["turn"])
-    if len(arc):
-        half, turn = 0.5 * sweeps["extent"][arc], sweeps["turn"][arc]
-        angle = turn * (np.arctan2(dy[arc], dx[arc]) - sweeps["heading"][arc])
-        along[arc] = (angle - half + np.pi) % (2.0 * np.pi) - np.pi + half
-        spoke[arc] = np.hypot(dx[arc], dy[arc])
-        radius = sweeps["radius"][arc] + sweeps["growth"][arc] * np.clip(along[arc], 0.0, sweeps["extent"][arc])
-        beside[arc] = np.abs(spoke[arc] - radius)
-        spoke[arc] *= radius
-        unit[arc] = np.sqrt(np.maximum(spoke[arc], 1e-18))
-    return along, beside, unit, spoke
-
-
-def heights_above(sweeps: AnyArray, x: FloatArray, y: FloatArray, slack: FloatArray) -> FloatArray:
-    """(e,) m, lowest height of the cutter's envelope above the point of each row; inf: not passed.
-
-    `slack`, m: the cutter is taken for so much smaller and higher.
-    """
-    along, beside, unit, spoke = foot(sweeps, x, y)
-    place = np.clip(along, 0.0, sweeps["extent"])
-    shortest = _distance(along, beside, spoke, place)
-    reach = sweeps["reach"]
-    sloped = np.flatnonzero((sweeps["slope"] != 0.0) & (shortest <= reach))
-    if len(sloped):
-        part, d, u = sweeps[sloped], beside[sloped], unit[sloped]
-        down = _down_slope(part["slope"] / u, d, part["reach"], part["flat"])
-        arc = part["turn"] != 0.0
-        ratio = np.minimum(down[arc] / (2.0 * u[arc]), 1.0)
-        down[arc] = 2.0 * u[arc] * np.arcsin(ratio)  # along the circle, whose chord this is
-        place[sloped] = np.clip(along[sloped] - np.sign(part["slope"]) * down / u, 0.0, part["extent"])
-    distance = np.minimum(_distance(along, beside, spoke, place), reach)
-    height = sweeps["z"] + sweeps["slope"] * place + rise(sweeps, distance) + slack
-    return np.where(shortest <= reach - slack, height, np.inf)
-
-
-def nearest(sweeps: AnyArray, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(e,) place along each piece that is nearest to the point of its row; m, distance from there."""
-    along, beside, _, spoke = foot(sweeps, x, y)
-    place = np.clip(along, 0.0, sweeps["extent"])
-    return place, _distance(along, beside, spoke, place)
-
-
-def rise(sweeps: AnyArray, distance: FloatArray) -> FloatArray:
-    """(e,) m, height of the cutter's end above its tip at a distance from the axis of up to its radius."""
-    corner = sweeps["reach"] - sweeps["flat"]
-    return np.asarray(corner - np.sqrt(np.maximum(corner**2 - np.maximum(distance - sweeps["flat"], 0.0) ** 2, 0.0)))
-
-
-def _distance(along: FloatArray, beside: FloatArray, spoke: FloatArray, place: FloatArray) -> FloatArray:
-    """Distance of a point from the axis at a place; `spoke` 0: a line."""
-    across = np.where(spoke > 0.0, 4.0 * spoke * np.sin(0.5 * (place - along)) ** 2, (place - along) ** 2)
-    return np.asarray(np.sqrt(beside**2 + across))
-
-
-def _down_slope(slope: FloatArray, beside: FloatArray, reach: FloatArray, flat: FloatArray) -> FloatArray:
-    """m, how far down the slope from the nearest point the envelope is lowest: p'(d) u / d = |slope|."""
-    slope, corner = np.abs(slope), reach - flat
-    down = np.sqrt(np.maximum(reach**2 - beside**2, 0.0) / np.where(flat == 0.0, 1.0 + 1.0 / slope**2, 1.0))
-    bull = np.flatnonzero((flat > 0.0) & (corner > 0.0))
-    if len(bull):
-        d, a, r, m = beside[bull], flat[bull], corner[bull], slope[bull]
-        low, high = np.arcsin(np.clip((d - a) / r, 0.0, 1.0)), np.full(len(bull), 0.5 * np.pi)
-        for _ in range(24):
-            angle = 0.5 * (low + high)
-            radius = a + r * np.sin(angle)
-            steep = np.tan(angle) * np.sqrt(np.maximum(radius**2 - d**2, 0.0)) > m * radius
-            low, high = np.where(steep, low, angle), np.where(steep, angle, high)
-        down[bull] = np.sqrt(np.maximum((a + r * np.sin(low)) ** 2 - d**2, 0.0))
-    return np.asarray(down)

@@ -1,32 +1,41 @@
-"""The stock and what the program takes from it: heights of the part at any point and any time, by an index of cells.
+"""The stock and what the program takes from it: heights of the part at any point and time, by an index of cells.
 
 A cell of the index lists the pieces that pass over it, in the order of time. A piece that lies nowhere in the cell
 below what an earlier one left all over it is not listed; a query begins at the first piece that still counts at its
 time. So neither levels nor passes lengthen a query, and there is no grid on which heights would be rounded.
+
+Long programs are indexed in stages: what the pieces of one have outdone is not in the next.
 """
 
 import importlib.util
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from types import ModuleType
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cells import cells_of_boxes, portions
 from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.envelopes import (
+    CLEAR,
+    Index,
+    bounds,
+    compiled,
+    distance,
+    foot,
+    height_above,
+    within,
+)
 from toolpath_stiff.cutting.stock import Stock
-from toolpath_stiff.cutting.sweeps import FIELDS, PIECE, heights_above, nearest, rise, sweeps_of
+from toolpath_stiff.cutting.sweeps import PIECE, sweeps_of
 from toolpath_stiff.nc.moves import Moves
 
-CELL, COMPILED_CELL = 0.3, 0.12  # radii of the smallest cutter, size of a cell of the index
-MANY = 3_000  # pieces from where on it pays to import numba: half a second
-CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
-MOST_ENTRIES = 60_000_000  # of the index; larger cells beyond
+CELL = 0.25  # radii of the smallest cutter, size of a cell of the index
+MANY = 500  # pieces from where on it pays to import numba: half a second
+STAGE = 16_384  # pieces
+BEFORE = 1024  # pieces: between a station of the stage before and the first of a stage are fewer
 OFFSET = np.array([0.3819e-3, 0.2764e-3])  # m: walls at round coordinates shall not run along borders of cells
-
-Index = tuple[IntArray, IntArray, IntArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -39,23 +48,26 @@ class Workpiece:
         Before the first cut.
     pieces, first
         (m,) of `sweeps.PIECE`; (moves + 1,) the first piece of each move.
+    until
+        The pieces before this are in the index: it serves from those of the stage before on.
     corner, size, columns
         (2,) m of the lowest cell; m; number of cells along y.
     index
         (cells + 1,) first entry of each cell; (e,) piece of each entry, ascending in a cell; (e,) the first of its
         entries that counts after it; (e,) m, the piece leaves no less anywhere in the cell.
-    compiled
+    quick
         Whether numba looks up.
     """
 
     stock: Stock
     pieces: AnyArray
     first: IntArray
+    until: int
     corner: FloatArray
     size: float
     columns: int
     index: Index
-    compiled: bool
+    quick: bool
 
     @cached_property
     def key(self) -> IntArray:
@@ -77,10 +89,10 @@ class Workpiece:
         taken for smaller and higher by `slack`, m.
         """
         top, owner = self.stock.tops(x, y), np.full(len(x), -1)
-        if self.compiled:
-            late = np.full(len(x), len(self.pieces)) if slack_from is None else slack_from
-            cells, index = (self.corner, self.size, self.columns, CLEAR), self.index
-            _compiled().lowest(_table(self.pieces), cells, index, (x, y), window, (late, slack), (top, owner))
+        late = np.full(len(x), len(self.pieces)) if slack_from is None else slack_from
+        if self.quick:
+            grid = self.corner, self.size, self.columns
+            compiled()[1](self.pieces, grid, self.index, (x, y), window, (late, slack), (top, owner))
             return top, owner
         low, high = self._entries(x, y, window)
         counts = high - low
@@ -89,9 +101,8 @@ class Workpiece:
             point = np.repeat(np.arange(rows.start, rows.stop), some)
             entry = np.arange(len(point)) + np.repeat(low[rows] - np.cumsum(some) + some, some)
             piece = self.index[1][entry]
-            smaller = np.zeros(len(point)) if slack_from is None else np.where(piece >= slack_from[point], slack, 0.0)
-            part = np.take(_table(self.pieces), piece, axis=0).view(PIECE)[:, 0]
-            height = heights_above(part, x[point], y[point], smaller)
+            smaller = np.where(piece >= late[point], slack, 0.0)
+            height = _heights(np.take(self.pieces, piece), x[point], y[point], smaller)
             hit = np.flatnonzero(some)
             if not len(hit):
                 continue
@@ -118,57 +129,73 @@ class Workpiece:
         return low, np.maximum(high, low)
 
 
-def workpiece_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> Workpiece:
-    """The stock with all pieces of the program's cuts. Raises `ProgramError`."""
+def stages_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> Iterator[Workpiece]:
+    """The stock with the pieces of the program's cuts up to one after the other; the last has all.
+
+    Raises `ProgramError`.
+    """
     pieces, first = sweeps_of(moves, cutters)
+    quick = len(pieces) >= MANY and importlib.util.find_spec("numba") is not None
     if not len(pieces):
-        none = np.zeros(0, dtype=np.int64)
-        index = np.zeros(1, dtype=np.int64), none, none, np.zeros(0)
-        return Workpiece(stock, np.zeros(1, PIECE), first, np.zeros(2), 1.0, 0, index, False)
-    compiled = len(pieces) >= MANY and importlib.util.find_spec("numba") is not None
+        pieces = np.zeros(1, PIECE)  # far from everything: its reach is 0
     low, high = _boxes(pieces)
-    size = (COMPILED_CELL if compiled else CELL) * float(pieces["reach"].min())
-    while float((np.ceil((high - low) / size) + 1.0).prod(axis=1).sum()) > MOST_ENTRIES:
-        size *= 1.5
+    size = CELL * max(float(pieces["reach"].min()), 1e-6)
     corner = low.min(axis=0) - OFFSET - size
     low, high = (np.floor((ends - corner) / size).astype(np.int64) for ends in (low, high))
-    columns = int(high[:, 1].max()) + 1
-    if compiled:
-        cells = corner, size, columns, CLEAR
-        index = _compiled().index_of(_table(pieces), low, high, _half(size), cells)
+    rows, columns = (high.max(axis=0) + 1).tolist()
+    cell, piece, below, above = (np.zeros(0, dtype) for dtype in (np.int64, np.int64, float, float))
+    for begin in range(0, len(pieces), STAGE):
+        until = min(begin + STAGE, len(pieces))
+        parts = [(cell, piece, below, above)]
+        for number, place in cells_of_boxes(low[begin:until], high[begin:until]):
+            parts.append(_bounded(pieces, begin + number, place, corner, size, columns, quick))
+        cell, piece, below, above = (np.concatenate([part[k] for part in parts]) for k in range(4))
+        order = np.argsort(cell, kind="stable")
+        cell, piece, below, above = (values[order] for values in (cell, piece, below, above))
+        starts = np.searchsorted(cell, np.arange(rows * columns + 1))
+        outdone = np.minimum(_outdone(cell, below, above), starts[cell + 1])
+        kept = outdone > np.arange(len(cell))
+        before = np.append(0, np.cumsum(kept))
+        counts_from = np.searchsorted(np.maximum.accumulate(before[outdone[kept]]), np.arange(before[-1]), side="right")
+        index = before[starts], piece[kept], counts_from, below[kept]
+        yield Workpiece(stock, pieces, first, until, corner, size, columns, index, quick)
+        kept &= ~_redone(cell, below, np.where(piece < until - BEFORE, above, np.inf))
+        cell, piece, below, above = cell[kept], piece[kept], below[kept], above[kept]
+
+
+def _bounded(
+    pieces: AnyArray, piece: IntArray, cell: IntArray, corner: FloatArray, size: float, columns: int, quick: bool
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Cells (k,) that pieces pass, the piece, and m, bounds of the height that it leaves there."""
+    x, y = (corner + (cell + 0.5) * size).T
+    half = float(size / np.sqrt(2.0)) + 1e-6  # of a cell's diagonal, and a little for rounding
+    rows = np.empty((3, len(piece)))
+    if quick:
+        compiled()[0](pieces, piece, np.ascontiguousarray(x), np.ascontiguousarray(y), half, rows)
     else:
-        index = _index(pieces, low, high, corner, size)
-    return Workpiece(stock, pieces, first, corner, size, columns, index, compiled)
+        part = pieces[piece]
+        for arc in (False, True):
+            some = np.flatnonzero((part["turn"] != 0.0) == arc)
+            rows[:, some] = bounds(part[some], x[some], y[some], half, arc)
+    far, below, above = rows
+    reach = pieces["reach"][piece]
+    near = np.flatnonzero(far <= reach + half)
+    above = np.where(far + half <= reach, above, np.inf)
+    return (cell[:, 0] * columns + cell[:, 1])[near], piece[near], below[near], above[near]
 
 
-def _compiled() -> ModuleType:
-    """The compiled loops. numba comes with them: half a second, and some seconds to compile the first time."""
-    from toolpath_stiff.cutting import compiled_sweeps
-
-    return compiled_sweeps
-
-
-def _index(pieces: AnyArray, low: IntArray, high: IntArray, corner: FloatArray, size: float) -> Index:
-    """The index of the pieces between cells `low` and `high` (m, 2)."""
-    columns = int(high[:, 1].max()) + 1
-    parts = list(_rasters(pieces, low, high, corner, size))
-    cell, piece, below, above = (np.concatenate([part[k] for part in parts]) for k in range(4))
-    cell = cell[:, 0] * columns + cell[:, 1]
-    order = np.argsort(cell, kind="stable")
-    cell, piece, below, outdone = _without_outdone(cell[order], piece[order], below[order], above[order])
-    counts_from = np.searchsorted(np.maximum.accumulate(outdone), np.arange(len(cell)), side="right")
-    starts = np.searchsorted(cell, np.arange((int(cell[-1]) // columns + 1) * columns + 1))
-    return starts, piece, counts_from, below
-
-
-def _table(pieces: AnyArray) -> FloatArray:
-    """(m, fields) of the pieces as numbers."""
-    return np.asarray(pieces.view(np.float64).reshape(len(pieces), len(FIELDS)))
-
-
-def _half(size: float) -> float:
-    """Half of a cell's diagonal, m, and a little for rounding."""
-    return float(size / np.sqrt(2.0)) + 1e-6
+def _heights(part: AnyArray, x: FloatArray, y: FloatArray, smaller: FloatArray) -> FloatArray:
+    """(e,) m that pieces leave above the point of each row; inf: not passed."""
+    heights, kind = np.full(len(x), np.inf), 2 * (part["turn"] != 0.0) + (part["slope"] != 0.0)
+    for arc, sloped in ((False, False), (False, True), (True, False), (True, True)):
+        rows = np.flatnonzero(kind == 2 * arc + sloped)
+        if len(rows):
+            some = part[rows]
+            along, beside, spoke = foot(some, x[rows], y[rows], arc)
+            near = distance(beside, within(along, some["extent"]) - along, spoke, arc) <= some["reach"] - smaller[rows]
+            rows, some = rows[near], some[near]
+            heights[rows] = height_above(some, along[near], beside[near], spoke[near], arc, sloped) + smaller[rows]
+    return heights
 
 
 def _boxes(pieces: AnyArray) -> tuple[FloatArray, FloatArray]:
@@ -187,35 +214,20 @@ def _along(pieces: AnyArray, share: float) -> tuple[FloatArray, FloatArray]:
     return pieces["x"] + radius * np.cos(angle), pieces["y"] + radius * np.sin(angle)
 
 
-def _rasters(
-    pieces: AnyArray, low: IntArray, high: IntArray, corner: FloatArray, size: float
-) -> Iterator[tuple[IntArray, IntArray, FloatArray, FloatArray]]:
-    """(k, 2) cells that pieces pass, in portions, (k,) the piece, and m, bounds of the height that it leaves there."""
-    half = _half(size)
-    for piece, cell in cells_of_boxes(low, high):
-        part, middle = pieces[piece], corner + (cell + 0.5) * size
-        place, distance = nearest(part, middle[:, 0], middle[:, 1])
-        near = np.flatnonzero(distance <= part["reach"] + half)
-        part, place, distance = part[near], place[near], distance[near]
-        height = part["z"] + part["slope"] * place
-        bottom = part["z"] + np.minimum(part["slope"] * part["extent"], 0.0)
-        below = bottom + rise(part, np.clip(distance - half, 0.0, part["reach"]))
-        above = np.where(distance + half <= part["reach"], height + rise(part, distance + half), np.inf)
-        yield cell[near], piece[near], below, above
+def _outdone(cell: IntArray, below: FloatArray, above: FloatArray) -> IntArray:
+    """(e,) the first entry of the cell that leaves less than each all over it; beyond the cell: none.
 
-
-def _without_outdone(
-    cell: IntArray, piece: IntArray, below: FloatArray, above: FloatArray
-) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
-    """Cell, piece and lower bound of the entries that are lowest somewhere in their time, and where they cease to be.
-
-    By the lowest bound so far in each cell: a running minimum over all entries, the cells set apart by a large step.
+    By the least bound so far in each cell: a running minimum over all entries, the cells set apart by a large step.
     """
-    highest = float(below.max()) + 1e-4
-    apart = (highest - float(below.min()) + 1e-3) * cell
+    highest = float(below.max(initial=0.0)) + 1e-4
+    apart = (highest - float(below.min(initial=0.0)) + 1e-3) * cell
     bound = np.minimum.accumulate(np.minimum(above, highest) - apart)
-    outdone = np.searchsorted(-bound, CLEAR + apart - below, side="right")
-    outdone = np.minimum(outdone, np.searchsorted(cell, cell, side="right"))
-    kept = outdone > np.arange(len(cell))
-    before = np.append(0, np.cumsum(kept))
-    return cell[kept], piece[kept], below[kept], before[outdone[kept]]
+    return np.searchsorted(-bound, CLEAR + apart - below, side="right")
+
+
+def _redone(cell: IntArray, below: FloatArray, above: FloatArray) -> BoolArray:
+    """(e,) whether a later entry of the cell leaves no more than each all over it."""
+    highest = float(below.max(initial=0.0)) + 1e-4
+    apart = (highest - float(below.min(initial=0.0)) + 1e-3) * (cell.max(initial=0) - cell)
+    bound = np.minimum.accumulate((np.minimum(above, highest) - apart)[::-1])[::-1]
+    return np.asarray(np.append(bound[1:], np.inf)[: len(cell)] + apart <= below + CLEAR)

@@ -14,7 +14,7 @@ from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.comparison.loop_readings import beside_tip
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.diagnosis.examination import NAMING
+from toolpath_stiff.diagnosis.examination import NAMING, SHOWN
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, TpsError
@@ -112,9 +112,10 @@ def diagnose(
     tested, tip = {family.name for family in main.families}, data.tip
     cannot |= {effect.name: () for effect in effects if effect.name not in tested}
     as_given, refitted = baseline(main.problem)
-    # Of every family that the judgement has only on tables, the best once more with the model itself.
-    best = {family.name: family.best for family in main.families if family.best is not None}
-    fits = main.fits | {name: refine(main.problem, fit) for name, fit in best.items() if name not in main.fits}
+    # Of every family that the judgement has only on tables and that is not ruled out, once more with the model itself.
+    fits = {family.name: family.best for family in main.families if family.best is not None} | main.fits
+    likely = [name for name in fits if name not in main.fits and main.probability.get(name, 0.0) >= SHOWN]
+    fits |= {name: refine(main.problem, fits[name]) for name in likely}
     likeliest = fits.get(max(main.probability, key=lambda name: main.probability[name], default=NONE), main.base)
     log_model = main.problem.observed - likeliest.residual
     verdict, plausible = common_verdict(list(judgements.values()))

@@ -200,7 +200,8 @@ class Examination:
     @property
     def entries(self) -> list[tuple[str, ...]]:
         """The explanations, those together that sit at one place and that these readings could not tell apart."""
-        return entries(self.main.problem, self.main.fits, self.explanations)
+        bests = {family.name: family.best for family in self.main.families if family.best is not None}
+        return entries(self.main.problem, bests | self.main.fits, self.explanations)
 
     @cached_property
     def best(self) -> str | None:

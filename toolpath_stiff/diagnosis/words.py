@@ -14,7 +14,17 @@ from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
-from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, HELD, NONE, OUTSIDE, POSITIVE, STANDS, Judgement
+from toolpath_stiff.inference.judgement import (
+    ADEQUATE,
+    FALSE_ALARM,
+    HELD,
+    LEFT,
+    NONE,
+    OUTSIDE,
+    POSITIVE,
+    STANDS,
+    Judgement,
+)
 from toolpath_stiff.inference.noise import REST
 from toolpath_stiff.inference.nuisances import findings, nuisance_words
 from toolpath_stiff.inference.repeats import OUTLIERS
@@ -90,7 +100,7 @@ def _cause(diagnosis: Examination, name: str) -> str:
     fit = diagnosis.fits[name]
     if diagnosis.main.probability.get(name, 0.0) < SHOWN and name in diagnosis.main.votes:
         titles = joined([candidate.effect.title for candidate in fit.candidates])
-        return f"{titles} ({name}: less likely than {100 * SHOWN:g} %, but foretells left-out poses as well)"
+        return f"{titles} ({name}: less likely than {100 * SHOWN:g} %, but foretells pose after pose as well)"
     unusual = f", more than is usual ({joined(sizes)}) " if (sizes := _unusual(fit)) else " "
     return f"{joined(fit.findings)}{unusual}({name}, probability {chance})"
 
@@ -272,8 +282,11 @@ def assumptions(diagnosis: Examination) -> list[str]:
         "stiffness, as far as these data could show them; typical sizes rank, bounds alone exclude: assumed",
         f"gates: {100 * FALSE_ALARM:g} % false alarms, explanations are dropped below {100 * ADEQUATE:g} %; "
         f"the plausible set holds {100 * HELD:g} %",
-        f"a name has foretold left-out poses better than every rival of another part by {SMALL:g} of log probability "
-        f"and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, else it is one of several",
+        f"a name has foretold pose after pose better than every rival of another part, by {SMALL:g} of log probability "
+        f"and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, or by {SMALL:g} without the pose that "
+        "says most; else it is one of several",
+        f"a model is adequate where its refitted strut law moves the stiffness by up to {100 * LEFT:g} % (95 %), or "
+        "nothing else explains the readings as well beside the file's law: assumed",
         f"a further effect matters from {100 * MATTERS:g} % of the tip's stiffness on",
     ]
     if "force_N" in diagnosis.data.missing:

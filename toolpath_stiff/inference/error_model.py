@@ -6,7 +6,8 @@ The logarithm of the true stiffness differs from a fit's by three errors, whose 
     geometry   struts that are not alike, joints off their places: times `GEOMETRIES` of what the noise model assumes.
                They belong to the machine: where law and sizes have taken them up they are no error, elsewhere they are;
     form       what neither describes (links that the model takes for rigid, too), smooth over poses and different by
-               direction, of `FORMS` (relative sd).
+               direction, of `FORMS` (relative sd). An effect that is added was chosen for fitting these readings, and
+               its form is its part's only nearly: what it changes is off by some `SHARE` of it.
 
 A quarter of the measured poses is left out at a time, a region each, for a reading whose neighbours were fitted tells
 little of what is away from all of them. The sizes count by how likely they make the errors there: with four to eight
@@ -35,6 +36,9 @@ from toolpath_stiff.readings.measurements import Readings
 SCATTERS = np.geomspace(0.5, 3.0, 13)
 GEOMETRIES = {0.0: 1.0, 0.35: 1.0, 0.7: 1.0, 1.0: 1.0, 1.4: 0.5, 2.0: 0.25}
 FORMS = {0.0: 3.0, 0.0025: 0.5, 0.005: 0.5, 0.01: 0.5, 0.02: 0.5, 0.04: 0.5, 0.08: 0.5}
+# Share of what effects change by which their forms are expected to be off, and the factor of one standard deviation of
+# that; assumed: constants along axes stand for parts that are no springs.
+SHARE, SHARE_FACTOR = 0.05, 3.0
 FEWEST_PLACES, HALVINGS = 8, 2  # poses to be told from each other; regions are halved so often
 MOST_READINGS = 400  # spread over the campaign, from which the sizes are read
 MOST_DIRECTIONS, FORM_IN_AXES = 12, 0.01  # along which a region's errors may be other than scatter; by what form
@@ -42,10 +46,11 @@ TAILS = 4.0  # degrees of freedom of the expected scatter
 ROUNDING, BISECTIONS = 1e-12, 25
 
 
-def error_model(fit: Fit, data: Readings, noise: Noise) -> ErrorModel | None:
+def error_model(fit: Fit, data: Readings, noise: Noise, given: Fit | None = None) -> ErrorModel | None:
     """The errors of a fit to n readings; None where too few poses were measured to tell.
 
-    Its loadings are those of law and free sizes, in units of the fit.
+    Its loadings are those of law and free sizes, in units of the fit. `given`: the same effects beside the machine
+    file's law, if that is what is written: either may be right.
     """
     place = coordinates(data.position, data.angles)
     places = np.unique(place, axis=0)
@@ -64,7 +69,7 @@ def error_model(fit: Fit, data: Readings, noise: Noise) -> ErrorModel | None:
     sizes = np.stack([axis.ravel() for axis in np.meshgrid(SCATTERS, [*GEOMETRIES], [*FORMS], indexing="ij")], axis=1)
     beyond = np.log(SCATTERS) / np.sqrt(0.5 / noise.freedom)
     expected = (1.0 + beyond**2 / TAILS) ** (-0.5 * (TAILS + 1.0))
-    prior = expected[:, None, None] * np.array([*GEOMETRIES.values()])[:, None] * np.array([*FORMS.values()])
+    prior = expected[:, None, None] * np.array([*GEOMETRIES.values()])[:, None] * _expected_forms(fit)
     log_weights, away = np.log(prior.ravel()), list[FloatArray]()
     for out in regions(place[rows], data.point[rows]):
         left = _left_out(out, jacobian, assumed, fit.law_free)
@@ -83,11 +88,30 @@ def error_model(fit: Fit, data: Readings, noise: Noise) -> ErrorModel | None:
     typical = np.array([*(float((part**2).sum(axis=1).mean()) for part in here), near])
     factor = _coverage_factor(weights, sizes**2 @ typical)
     scatter, of_geometry, form = (factor * np.sqrt(weights @ sizes**2)).tolist()
+    either = np.zeros((len(own), 0)) if given is None else _apart(fit, given)[:, None] * np.sqrt(0.5)
     return ErrorModel(
-        np.concatenate([scatter * own, of_geometry * geometry], axis=1),
+        np.concatenate([either, scatter * own, of_geometry * geometry], axis=1),
         of_geometry * noise.strut_spread, of_geometry * noise.joint_error,
         form * float(np.sqrt(near)), form * float(np.sqrt(max(float(np.concatenate(away).mean()), near))), places,
     )  # fmt: skip
+
+
+def _expected_forms(fit: Fit) -> FloatArray:
+    """(forms,) weights of `FORMS`, by how much the effects of the machine change."""
+    owners = [candidate for candidate in fit.candidates for _ in candidate.components]
+    sizes = [0.0 if owners[i].effect.is_instrument else fit.parts[i][1] for i in fit.free]
+    change = float(np.sqrt(np.mean((fit.jacobian[:, 2:] @ np.array(sizes)) ** 2)))
+    if not change > 0.0:
+        return np.array([*FORMS.values()])
+    forms = np.array([*FORMS])
+    deviates = np.log(np.maximum(forms, 1e-12) / (SHARE * change)) / np.log(SHARE_FACTOR)
+    return np.asarray(np.exp(-0.5 * deviates**2) + np.finfo(float).tiny)
+
+
+def _apart(fit: Fit, given: Fit) -> FloatArray:
+    """(q,) by how much law and free sizes of two fits with the same effects differ."""
+    both = [np.concatenate([each.law, *each.sizes])[[0, 1, *(2 + i for i in fit.free)]] for each in (fit, given)]
+    return np.asarray(both[0] - both[1])
 
 
 def regions(place: FloatArray, point: TextArray) -> Iterator[IntArray]:

@@ -45,7 +45,7 @@ from toolpath_stiff.inference.nuisances import findings, fitted_nuisances
 from toolpath_stiff.inference.rivals import INSTRUMENT, entries, left_out_of, lowers_error, rivals_of, rivals_of_law
 from toolpath_stiff.inference.several import search_pairs, search_triples
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
-from toolpath_stiff.inference.votes import MOST_OPEN, Votes, left_open, outvoted
+from toolpath_stiff.inference.votes import Votes, outvoted
 from toolpath_stiff.stiffness.contract import Effect
 
 NONE = "none"
@@ -54,6 +54,7 @@ OUTSIDE = "outside the catalogue"
 PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_TRIPLES, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.03, 0.10
 FALSE_ALARM = 0.05  # of the base model's gate
 ADEQUATE = 0.005  # below this probability an explanation does not explain the data
+MOST_OPEN = 3  # entries that an ambiguous verdict lists; all votes are in the document
 NAMED = 0.90  # probability from which a single name is the answer
 HELD = 0.95  # probability that the plausible set adds up to where it is not a single name
 STANDS = 0.05  # probability from which something outside the catalogue, or another pair, is not ruled out
@@ -66,7 +67,7 @@ POSITIVE = 3.0
 # Share of the stiffness that `adequate` may leave along a path; assumed: a third of what cutting forces are known to.
 LEFT = 0.03
 ONE_SIDED = 1.645  # normal quantile of 95 %
-TAKEN_UP = ("joint_offset", "weak_strut")  # effects that the nuisances take up
+TAKEN_UP = {"joint_offset": "joint", "weak_strut": "strut"}  # effects that nuisances take up, of which kind
 Evidence = dict[tuple[str, ...], float]  # of effects, pairs and triples by their names
 
 
@@ -160,12 +161,12 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     seed
         Of the simulated readings.
     """
-    candidates = find_candidates(problem, effects)
+    candidates = find_candidates(problem, noise, effects)
     gates = apply_gates(problem, noise, candidates, seed)
     probability, form = weigh(problem, noise, candidates, gates)
     doubtful = question(problem.predictor)
     verdict, explanations = ("unexplained", ()) if doubtful else decide(gates, probability)
-    verdict, explanations, ballots = put_to_vote(problem, noise, candidates, gates, verdict, explanations)
+    verdict, explanations, ballots = put_to_vote(problem, candidates, gates, verdict, explanations)
     doubt, factor = ("", 1.0) if doubtful else noise_doubt(problem, noise, gates.base, verdict, seed)
     described = None
     if verdict == "identified":
@@ -189,23 +190,28 @@ class Candidates:
         All effects that do something to these data, the most likely first.
     forms
         Forms that a discrepancy may take which no effect describes.
+    within
+        Effects of which there is no more than the nuisances assume of every joint and strut: no explanations.
     """
 
     base: Fit
     families: tuple[Family, ...]
     forms: Forms
+    within: tuple[str, ...] = ()
 
     @property
     def offered(self) -> list[tuple[Family, Fit]]:
         """Effects that fit best when they are there, with that fit."""
-        return [(family, family.best) for family in self.families if family.best is not None]
+        return [(f, f.best) for f in self.families if f.best is not None and f.name not in self.within]
 
 
-def find_candidates(problem: Problem, effects: Sequence[Effect]) -> Candidates:
+def find_candidates(problem: Problem, noise: Noise, effects: Sequence[Effect]) -> Candidates:
     """Fit every effect with each of its choices beside the strut law."""
     base = problem.score_base()
     forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
-    return Candidates(base, tuple(score_families(problem, effects, base)), forms)
+    told = {entry["nuisance"] for entry in findings(fitted_nuisances(base, noise))}
+    within = tuple(name for name, nuisance in TAKEN_UP.items() if nuisance not in told)
+    return Candidates(base, tuple(score_families(problem, effects, base)), forms, within)
 
 
 @dataclass
@@ -282,7 +288,7 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: in
             singles.append(family)
     gates.singles = tuple(family.name for family in singles)
     evidence: Evidence = {(f.name,): f.log_evidence for f in families}
-    pairs, search = search_pairs(problem, families, base)
+    pairs, search = search_pairs(problem, [f for f in families if f.name not in candidates.within], base)
     gates.add(pairs, evidence, passes)
     # What an effect beside another must add to be considered: its prior, and odds of 3 to 1.
     price = float(np.log(POSITIVE * _prior(families, 1) / _prior(families, 2)))
@@ -401,9 +407,9 @@ def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str
 
 
 def put_to_vote(
-    problem: Problem, noise: Noise, candidates: Candidates, gates: Gates, verdict: str, explanations: tuple[str, ...]
+    problem: Problem, candidates: Candidates, gates: Gates, verdict: str, explanations: tuple[str, ...]
 ) -> tuple[str, tuple[str, ...], Votes]:
-    """Verdict and explanations after the votes of left-out poses, and the votes for the first explanation.
+    """Verdict and explanations after the votes of the readings, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer. A name that has not outvoted every rival of another part is
     one of several; the closest of these stand beside it. A model that passes because its nuisances have taken up more
@@ -411,7 +417,7 @@ def put_to_vote(
     """
     base, fits = candidates.base, {family.name: best for family, best in candidates.offered} | gates.fits
     if verdict == "adequate":
-        taken = [name for name in TAKEN_UP if name in fits] if findings(fitted_nuisances(base, noise)) else []
+        taken = [name for name in TAKEN_UP if name in fits]
         instead, ballots = _instead_of_law(problem, base)
         gates.fits |= instead
         beside = _shortened(problem, fits | instead, (NONE, *taken, *instead))
@@ -431,8 +437,9 @@ def put_to_vote(
     ballots = votes(problem, fits[top], rivals)
     ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
     open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
-    left = _shortened(problem, fits, left_open(top, standing, open_rivals, ballots))
-    return ("ambiguous" if open_rivals else verdict), left, ballots
+    others = [name for name in standing if name != top and name not in ballots]
+    others += [name for name in ballots if name in (*standing, *open_rivals)]  # the closest first
+    return ("ambiguous" if open_rivals else verdict), _shortened(problem, fits, (top, *others)), ballots
 
 
 def _shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
@@ -449,11 +456,12 @@ def _instead_of_law(problem: Problem, base: Fit) -> tuple[dict[str, Fit], Votes]
 
     None where the law has moved the stiffness by less than an adequate model may leave along a path, beyond chance.
     """
-    columns = base.jacobian[problem.predictor.data.tip]
+    columns, given = base.jacobian[problem.predictor.data.tip], with_given_law(problem, base)
     spread = np.sqrt(np.einsum("ni,ij,nj->n", columns, base.covariance, columns))
-    if float(np.mean(np.abs(columns @ base.law) + ONE_SIDED * spread)) <= LEFT:
+    moved = float(np.mean(np.abs(columns @ base.law) + ONE_SIDED * spread)) > LEFT
+    if not moved or not outvoted(votes(problem, base, {NONE: given})[NONE]):
         return {}, {}
-    rivals = rivals_of_law(problem, with_given_law(problem, base), (INSTRUMENT, "joints"))
+    rivals = rivals_of_law(problem, given, (INSTRUMENT, "joints"))
     ballots = votes(problem, base, rivals)
     return {name: rivals[name] for name in ballots if not outvoted(ballots[name])}, ballots
 

@@ -41,10 +41,9 @@ def _squares_by_point(residuals: FloatArray, covariance: Covariance, points: Gro
     solved = covariance.blocks.times(rows)
     products = np.cumsum([solved[:, out] @ rows[:, out].T for out in points.members()], axis=0)
     known, pull = np.eye(count) + products[:, :count, :count], products[:, :count, count:]
-    whole = np.diagonal(products[:, count:, count:], axis1=1, axis2=2) - (pull * np.linalg.solve(known, pull)).sum(
-        axis=1
-    )
-    return np.diff(whole, axis=0, prepend=0.0).T
+    foretold = (pull * np.linalg.solve(known, pull)).sum(axis=1)
+    whole = np.diagonal(products[:, count:, count:], axis1=1, axis2=2) - foretold
+    return np.asarray(np.diff(whole, axis=0, prepend=0.0).T)
 
 
 def closest(*ballots: Votes) -> dict[str, FloatArray]:

@@ -112,8 +112,9 @@ class LinearSearch:
         self.low, self.high, self.columns = np.zeros(shape), np.zeros(shape), np.zeros((*shape, len(measured)))
         for k, (table, columns, bounds) in enumerate(pieces):
             count = columns.shape[1]
-            # An instrument reads a factor on the whole compliance, which is the measured one.
-            whole = problem.base_compliance if table.candidate.effect.is_instrument else measured
+            # An instrument reads a factor on the model's compliance: at the law as refitted, like the law's columns.
+            refitted = problem.base_compliance * np.exp(-base.residual)
+            whole = refitted if table.candidate.effect.is_instrument else measured
             self.columns[k, :count] = -columns.T / whole
             self.low[k, :count], self.high[k, :count] = bounds.T
 

@@ -1,10 +1,12 @@
-"""How left-out readings vote between explanations: a name needs more than a probability.
+"""How readings vote between explanations, pose after pose: a name needs more than a probability.
 
-A probability holds the price of an explanation's parameters (Occam's factor). Of two explanations that foretell what
-their fits have not seen equally well it prefers the one with fewer, and so names a part for its bookkeeping. So every
-pose is left out in turn, and its readings are foretold from all the others: strut law and sizes integrated out, what
-struts, joints and clampings have in common known from the other readings (Rasmussen and Williams 2006, Gaussian
-Processes, 2.7 and 5.4.2). The differences of log predictive densities, paired by pose, are the votes.
+A probability holds the price of an explanation's parameters (Occam's factor). Of two explanations that foretell the
+readings equally well it prefers the one with fewer, and so names a part for its bookkeeping. So each pose is foretold
+from those before it (Dawid 1984, Present position and potential developments: the prequential approach): sizes and law
+as fitted, at a price of 1 each (Akaike 1973); what struts, joints, links and clampings have in common known from the
+poses before, under the scatter that is assumed of them: an explanation that needs a joint five standard deviations off
+pays for it. (Were each pose left out and foretold from all others, it would not.) The log densities add up to that of
+all readings; their differences between two explanations are the votes, and independent but for the fits.
 
 A rival is outvoted where the sum of them is
 
@@ -12,10 +14,10 @@ A rival is outvoted where the sum of them is
   error of their sum (Sivula, Magnusson, Matamoros and Vehtari 2020, Uncertainty in Bayesian leave-one-out
   cross-validation based model comparison, arXiv 2008.10296);
 - above 0 in all but `CHANCE` of the draws of a Bayesian bootstrap over the poses (Rubin 1981), which unlike a standard
-  error sees where one pose carries it all.
+  error sees where one pose carries it all; or more than `SURE`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -26,7 +28,6 @@ SMALL = 4.0
 CHANCE = 0.05  # one-sided
 DRAWS = 2000
 CERTAIN = 4  # decimals of a vote on which all processors agree
-MOST_OPEN = 3  # explanations that a verdict lists for their votes; all votes are in the document
 FEWEST_POSES = 6  # below, no spread over poses can be told
 Votes = Mapping[str, FloatArray]  # rival -> (poses,) log predictive density of the explanation above the rival's
 
@@ -41,7 +42,9 @@ def chance_of_losing(differences: FloatArray) -> float:
 
 def outvoted(differences: FloatArray) -> bool:
     """Whether votes (poses,) are against the rival beyond chance."""
-    return float(differences.sum()) > SMALL and chance_of_losing(differences) <= CHANCE
+    gain, most = float(differences.sum()), float(differences.max(initial=0.0))
+    even = len(differences) >= FEWEST_POSES and gain - most > SMALL
+    return even or (gain > SMALL and chance_of_losing(differences) <= CHANCE)
 
 
 def standard_error(differences: FloatArray) -> float:
@@ -63,25 +66,4 @@ def vote_document(rival: str, differences: FloatArray) -> Document:
 def vote_words(rival: str, differences: FloatArray) -> str:
     """The same as a clause."""
     gain, error = float(differences.sum()), standard_error(differences)
-    return f"{rival} foretells left-out poses {'worse' if gain > 0.0 else 'better'} by {abs(gain):.1f} +- {error:.1f}"
-
-
-def left_open(first: str, standing: Sequence[str], rivals: Sequence[str], against: Votes) -> tuple[str, ...]:
-    """Explanations that are left: the first, then the others from the closest by votes on.
-
-    Parameters
-    ----------
-    first, standing
-        The explanation that is voted for; all that stand by their probability.
-    rivals, against
-        Those that it has not outvoted, the closest first; the votes against each. They fill up to `MOST_OPEN`; one that
-        foretells better than the first is told in any case, and what it has outvoted itself stands no more.
-    """
-    if not rivals:
-        return tuple(standing)
-    closest_rival, kept = against[rivals[0]], [name for name in standing if name != first]
-    if better := bool(closest_rival.sum() < 0.0):
-        kept = [n for n in kept if n in rivals[:1] or n not in against or not outvoted(against[n] - closest_rival)]
-    new = [name for name in rivals if name not in standing][: max(MOST_OPEN - 1 - len(kept), int(better))]
-    gains = {name: round(float(np.sum(against.get(name, 0.0))), CERTAIN - 1) for name in (*kept, *new)}
-    return first, *sorted(gains, key=lambda name: (gains[name], name))
+    return f"{rival} foretells pose after pose {'worse' if gain > 0.0 else 'better'} by {abs(gain):.1f} +- {error:.1f}"

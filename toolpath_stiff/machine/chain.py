@@ -59,7 +59,7 @@ class Placement:
         return Placement(self.axes.T, -self.axes.T @ self.origin)
 
 
-def placement(xyz: Sequence[float] = (0.0, 0.0, 0.0), rpy: Sequence[float] = (0.0, 0.0, 0.0)) -> Placement:
+def placement(xyz: ArrayLike = (0.0, 0.0, 0.0), rpy: ArrayLike = (0.0, 0.0, 0.0)) -> Placement:
     """From m and roll, pitch, yaw in rad, R = Rz(yaw) Ry(pitch) Rx(roll), as URDF has origins; right angles exact."""
     axes = rotation_matrices(np.asarray(rpy, dtype=float))
     return Placement(np.where(np.abs(axes) < TINY, 0.0, axes), np.asarray(xyz, dtype=float))

@@ -155,9 +155,9 @@ def beam_compliance(length: FloatArray | float, stiffness: Sequence[float]) -> F
     cantilever's (Gere and Timoshenko, Mechanics of Materials, appendix G). `stiffness` is EA (N), EIy, EIz, GJ (N m2).
     """
     ea, eiy, eiz, gj = stiffness
-    one = np.asarray(length, dtype=float)
-    bending = one**3 / 12.0
-    return np.stack([one / ea, bending / eiz, bending / eiy, one / gj, one / eiy, one / eiz], axis=-1)
+    span = np.asarray(length, dtype=float)
+    bending = span**3 / 12.0
+    return np.stack([span / ea, bending / eiz, bending / eiy, span / gj, span / eiy, span / eiz], axis=-1)
 
 
 def beam_axes(along: FloatArray, near_z: FloatArray) -> FloatArray:

@@ -93,8 +93,10 @@ def parse_machine(text: str, file: str = "machine.toml") -> MachineTool:
     if not isinstance(kind, str) or kind not in KINDS:
         raise toml.fault("", "kind", f" = {shortened(kind)}", expected=f"one of {', '.join(KINDS)}")
     machine = KINDS[kind](toml)
-    if isinstance(machine, Hexapod) or "setup" in toml.data:
-        return machine.with_changes(text=text)
+    if isinstance(machine, Hexapod):
+        return machine
+    if "setup" in toml.data:
+        return machine.with_changes(text=text, limits=replace(machine.limits, neutral_pose=machine.default_origin))
     middle = upright_middle(machine)
     return machine.with_changes(
         text=text,

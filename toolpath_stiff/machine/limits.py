@@ -223,13 +223,13 @@ def stand(machine: MachineTool, pose: ArrayLike) -> tuple[FloatArray, Struts | S
 
 
 def upright_middle(machine: MachineTool) -> Pose:
-    """The place farthest from all limits with the tool upright, by draws in boxes around the best, each half as wide."""
+    """The place farthest from all limits with the tool upright, by draws in ever smaller boxes around the best."""
     rng, best = np.random.default_rng(0), np.zeros(3)
     for half in WIDEST * 0.5 ** np.arange(ROUNDS):
         places = best + half * rng.uniform(-1.0, 1.0, (DRAWN, 3))
         places[0] = best
         best = places[int(np.argmax(reach(machine, places, machine.solve(places)).margin))]
-    x, y, z = best.round(3).tolist()
+    x, y, z = (best.round(2) + 0.0).tolist()  # to 10 mm
     return (x, y, z, 0.0, 0.0, 0.0)
 
 

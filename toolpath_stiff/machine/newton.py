@@ -22,14 +22,15 @@ def newton(equations: Equations, start: FloatArray, largest: FloatArray | float)
     residual = np.empty((len(start), 0))
     for _ in range(MOST_STEPS):
         residual, slopes = equations(values)
-        if not (np.abs(residual).max(axis=1) > TOLERANCE).any():
-            break
+        last = not (np.abs(residual).max(axis=1) > TOLERANCE).any()  # one step more reaches the last digits
         transposed = np.swapaxes(slopes, 1, 2)
         normal = transposed @ slopes
         size = np.trace(normal, axis1=1, axis2=2)[:, None, None]
         normal = normal + DAMPING * (size + DAMPING) * np.eye(start.shape[1])
         step = np.linalg.solve(normal, transposed @ residual[..., None])[..., 0]
         values = values - step / np.maximum(1.0, np.abs(step / largest).max(axis=1))[:, None]
+        if last:
+            break
     good = np.abs(residual).max(axis=1) < 1e3 * TOLERANCE
     return np.where(good[:, None], values, np.nan)
 

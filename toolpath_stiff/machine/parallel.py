@@ -60,7 +60,8 @@ class Legs:
     def determinant(self) -> FloatArray:
         """(n,) |det W|, m^3."""
         wrenches = np.concatenate([self.directions, np.cross(self.arms, self.directions)], axis=-1)
-        return np.asarray(np.abs(np.linalg.det(wrenches)))
+        with np.errstate(invalid="ignore", divide="ignore"):  # out of reach
+            return np.asarray(np.abs(np.linalg.det(wrenches)))
 
 
 @dataclass(frozen=True, kw_only=True)

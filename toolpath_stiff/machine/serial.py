@@ -58,6 +58,8 @@ class Serial(MachineTool):
         What gives way on either side.
     least
         Smallest admissible singularity measures, by name.
+    only
+        Number of the one configuration that is used; None: any.
     """
 
     kind: ClassVar[str] = "serial"
@@ -71,6 +73,7 @@ class Serial(MachineTool):
     tool_bodies: tuple[Body | SpanningBeam, ...] = ()
     work_bodies: tuple[Body | SpanningBeam, ...] = ()
     least: dict[str, float] = field(default_factory=dict)
+    only: int | None = None
 
     @property
     def joints(self) -> tuple[ChainJoint, ...]:
@@ -106,7 +109,9 @@ class Serial(MachineTool):
     @property
     def configurations(self) -> tuple[str, ...]:
         """Names of the ways to reach a pose."""
-        return CONFIGURATIONS if self.wrist else ("",)
+        if self.wrist is None:
+            return ("",)
+        return CONFIGURATIONS if self.only is None else (CONFIGURATIONS[self.only],)
 
     @property
     def wrist(self) -> SphericalWrist | None:
@@ -202,10 +207,11 @@ class Serial(MachineTool):
         """
         limits, linear = self.joint_limits, [joint.linear for joint in self.joints]
         best, chosen, margin = np.empty(0), np.zeros(tip.shape[1], dtype=np.int64), np.empty(0)
-        for number, solution in self._solutions(tip, axes, configuration, start):
+        kept = configuration if self.only is None else self.only
+        for number, solution in self._solutions(tip, axes, kept, start):
             values = wound(solution, limits, linear, start)
-            if configuration is not None or len(self.configurations) == 1:
-                return values, np.full(tip.shape[1], number)
+            if kept is not None or len(self.configurations) == 1:
+                return values, np.full(tip.shape[1], number if self.only is None else 0)
             room = joint_margin(values, limits)
             if not len(best):
                 best, margin = values, room

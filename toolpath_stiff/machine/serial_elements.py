@@ -22,7 +22,7 @@ BEAM = ("EA_MN", "EIy_MNm2", "EIz_MNm2", "GJ_MNm2")
 ELEMENT = {
     "name": Key(text=True),
     "type": Key(text=True),
-    **dict.fromkeys(("side", "at", "centre", "frame", "link", "origin", "remark"), TEXT),
+    **dict.fromkeys(("side", "at", "centre", "frame", "link"), TEXT),
     **dict.fromkeys(("moves_with", "to_moves_with"), NAMES),
     **dict.fromkeys(("centre_mm", "from_mm", "to_mm"), POINT),
     **dict.fromkeys(("x_axis", "z_axis"), DIRECTION),

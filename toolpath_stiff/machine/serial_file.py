@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.chain import (
@@ -17,6 +16,8 @@ from toolpath_stiff.machine.chain import (
     standard_dh,
 )
 from toolpath_stiff.machine.common_sections import common_fields
+from toolpath_stiff.machine.elements import beam_axes
+from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections, read_rows, read_sections
 from toolpath_stiff.machine.serial import Serial
 from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
@@ -69,17 +70,20 @@ SHORTEST_ARM = 0.05  # m from the first joint to the tip: less is a description 
 def read(toml: MachineToml) -> Serial:
     """A serial machine of a machine file. Raises `InputError`."""
     values = read_sections(toml, SCHEMA, SECTIONS_BESIDE, stated=False)
-    names = ["X", "Y", "Z", "A", "B", "C"]
     if rows := read_rows(toml, "axis", AXIS):
-        names = [row["name"] for row in rows]
-        tool, work, tip, table = _of_rows(toml, rows, values)
+        names, convention = [row["name"] for row in rows], values[""].get("convention", MODIFIED)
+        if "trunnion" in values or "limits" in values:
+            section = "trunnion" if "trunnion" in values else "limits"
+            raise toml.fault(section, "", ": the file has [[axis]] rows", expected="limits and places of axes there")
     else:
-        tool, work, tip, table = _of_mill(toml, values)
+        rows, names, convention = _rows_of_mill(toml, values), ["X", "Y", "Z", "A", "B", "C"], MODIFIED
+    tool, work, tip, table = _of_rows(toml, rows, values, convention)
     bodies = read_bodies(toml, (tool, work), (tip, table))
     if not any(bodies):
         raise InputError("no [[element]]: nothing gives way", expected="springs, joints or beams", file=toml.file)
+    common = common_fields(toml, values)
     machine = Serial(
-        **common_fields(toml, values),
+        **{"limits": Limits(neutral_pose=common["default_origin"]), **common},
         reference_tool_length=m_from_mm(values.get("reference_tool", {}).get("length_mm", np.nan)),
         tool_joints=tool,
         work_joints=work,
@@ -95,15 +99,11 @@ def read(toml: MachineToml) -> Serial:
 
 
 def _of_rows(
-    toml: MachineToml, rows: Sequence[Document], values: Sections
+    toml: MachineToml, rows: Sequence[Document], values: Sections, convention: str
 ) -> tuple[tuple[ChainJoint, ...], tuple[ChainJoint, ...], Placement, Placement]:
     """Joints of tool and work, the tip in the last frame of the one, the work in that of the other."""
-    convention = values[""].get("convention", MODIFIED)
     if convention not in (MODIFIED, STANDARD):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{MODIFIED!r} or {STANDARD!r}")
-    for section in ("trunnion", "limits"):
-        if section in values:
-            raise toml.fault(section, "", ": the file has [[axis]] rows", expected="limits and places of axes there")
     sides: dict[str, list[ChainJoint]] = {"tool": [], "work": []}
     rests = {"tool": STILL, "work": STILL}  # what follows the last joint of each side
     for nth, row in enumerate(rows, 1):
@@ -187,107 +187,66 @@ def _check_units(toml: MachineToml, joints: Sequence[ChainJoint]) -> None:
 
 def _tip(toml: MachineToml, tool: Document) -> Placement:
     """The tip in the flange; its axes by two columns, the third checked if it is there."""
-    names = [name for name in ("x_axis", "y_axis", "z_axis") if name in tool]
-    if not names:
+    given = {name: tool[name] for name in ("x_axis", "y_axis", "z_axis") if name in tool}
+    if not given:
         return Placement(np.eye(3), m_from_mm(tool["tip_mm"]))
-    if len(names) == 1:
-        raise toml.fault("tool", names[0], " is given alone", expected="x_axis and z_axis")
-    for name in names:
-        length = float(np.linalg.norm(tool[name]))
-        if not 0.999 < length < 1.001:
-            raise toml.fault("tool", name, f" has the length {length:.4g}", expected="a unit vector")
-    given = {name: tool[name] / np.linalg.norm(tool[name]) for name in names}
-    for first, second in zip(names, names[1:] + names[:1], strict=True):
-        if abs(float(given[first] @ given[second])) > 1e-3 and first != second:
-            raise toml.fault("tool", second, f" is not square to {first}", expected="axes square to each other")
-    x = given.get("x_axis", np.cross(given.get("y_axis", np.zeros(3)), given.get("z_axis", np.zeros(3))))
-    z = given.get("z_axis", np.cross(x, given.get("y_axis", np.zeros(3))))
-    y = np.cross(z, x)
-    if len(names) == 3 and float(y @ given["y_axis"]) < 0.0:
+    if "x_axis" not in given or "z_axis" not in given:
+        raise toml.fault("tool", next(iter(given)), " is given alone", expected="x_axis and z_axis")
+    y = given.get("y_axis", np.cross(given["z_axis"], given["x_axis"]))
+    axes = np.column_stack([given["x_axis"], y, given["z_axis"]])
+    if np.abs(axes.T @ axes - np.eye(3)).max() > WRITTEN:
+        raise toml.fault("tool", "x_axis", ": the axes are not square, or no unit vectors", expected="a frame")
+    if np.linalg.det(axes) < 0.0:
         raise toml.fault("tool", "y_axis", ": the frame is mirrored", expected="a right-handed frame, y = z cross x")
-    return Placement(np.column_stack([x, y, z]), m_from_mm(tool["tip_mm"]))
+    return Placement(beam_axes(axes[:, 0], axes[:, 2]), m_from_mm(tool["tip_mm"]))
 
 
-def _of_mill(
-    toml: MachineToml, values: Sections
-) -> tuple[tuple[ChainJoint, ...], tuple[ChainJoint, ...], Placement, Placement]:
-    """Axes X, Y, Z by their limits: on the work's side where an element moves against one; a trunnion of two more."""
-    limits, convention = values.get("limits", {}), values[""].get("convention")
-    moved = [(row.get("side"), row.get("moves_with", ())) for row in read_rows(toml, "element", ELEMENT)]
-    against = {name[1:] for _, names in moved for name in names if name.startswith("-")}
-    joints = {}
-    for i, axis in enumerate("XYZ"):
-        key = f"{axis}_mm"
-        if key not in limits:
-            raise toml.fault("limits", key, " is missing", expected="[min, max] in mm; or [[axis]] rows")
-        low, high = m_from_mm(limits[key])
-        if not low < high:
-            raise toml.fault("limits", key, f" = [{1e3 * low:g}, {1e3 * high:g}]", expected="min below max")
-        direction = np.eye(3)[i] * (-1.0 if axis in against else 1.0)
-        joints[axis] = (direction, float(low), float(high))
-    # In the order in which elements say that they move with them: the axis of the most elements is nearest the base.
-    carried = {axis: sum(axis in [name.strip("-") for name in names] for _, names in moved) for axis in "XYZ"}
-    order = sorted("XYZ", key=lambda axis: -carried[axis])
-    chains = [
-        _square_chain([(axis, True, *joints[axis]) for axis in order if (axis in against) == of_work], np.zeros(3))
-        for of_work in (False, True)
-    ]
-    tool, work = chains
-    if convention is None:
-        return tool, work, _home(tool).inverse(), _home(work).inverse()
-    return tool, *_trunnion(toml, values, convention, work, _home(tool).inverse())
-
-
-def _square_chain(
-    rows: Sequence[tuple[str, bool, FloatArray, float, float]], start: FloatArray
-) -> tuple[ChainJoint, ...]:
-    """Joints along or about machine axes: name, whether linear, direction, limits."""
-    joints, rest = [], Placement(np.eye(3), start)
-    for name, linear, direction, low, high in rows:
-        turn = aligned(direction)
-        joints.append(ChainJoint(name, linear, rest.then(turn), low, high))
-        rest = turn.inverse()
-    return tuple(joints)
-
-
-def _home(joints: Sequence[ChainJoint]) -> Placement:
-    """The last frame at joint values of 0."""
-    home = STILL
-    for joint in joints:
-        home = home.then(joint.place)
-    return home
-
-
-def _trunnion(
-    toml: MachineToml, values: Sections, convention: str, work: tuple[ChainJoint, ...], tip: Placement
-) -> tuple[tuple[ChainJoint, ...], Placement, Placement]:
-    """C on A or B on the base: X = r + o + Rx(A) (Rz(C) (p - r) - o) (xyzac-trt-kins(9), xyzbc-trt-kins(9))."""
-    names = {XYZAC: "A", XYZBC: "B"}
-    if convention not in names:
+def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
+    """`[[axis]]` rows of X, Y, Z by limits: the work's side where an element moves against one; and of a trunnion."""
+    convention = values[""].get("convention")
+    if convention not in (None, XYZAC, XYZBC):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{XYZAC!r}, {XYZBC!r}, or [[axis]] rows")
-    if work:
-        raise toml.fault("limits", f"{work[0].name}_mm", ": an element moves against it", "X, Y, Z on the tool's side")
-    trunnion, limits = values.get("trunnion"), values.get("limits", {})
+    turning = {XYZAC: "AC", XYZBC: "BC"}.get(str(convention), "")
+    if foreign := [key for key in values.get("limits", {}) if key[0] not in f"XYZ{turning}"]:
+        expected = f"limits of {', '.join(f'XYZ{turning}')}"
+        raise toml.fault("limits", foreign[0], ": there is no such axis", expected=expected)
+    moved = [name for row in read_rows(toml, "element", ELEMENT) for name in row.get("moves_with", ())]
+    side = {axis: "work" if f"-{axis}" in moved else "tool" for axis in "XYZ"}
+    rows: list[Document] = []
+    # The axis that most elements move with is nearest the base; rows do not cross sides, so the order serves both.
+    for axis in sorted("XYZ", key=lambda axis: -moved.count(axis) - moved.count(f"-{axis}")):
+        direction = np.eye(3)["XYZ".index(axis)] * (1.0 if side[axis] == "tool" else -1.0)
+        row = {"name": axis, "type": "linear", "side": side[axis], "axis": direction}
+        rows.append({**row, **_ends(toml, values, axis)})
+    if convention is None:
+        return rows
+    letter, idle = turning[0], {"A": "x_offset_mm", "B": "y_offset_mm"}[turning[0]]
+    trunnion = values.get("trunnion")
     if trunnion is None:
         raise toml.fault("", "convention", f" = {convention!r}: section [trunnion] is missing", ", ".join(TRUNNION))
-    letter = names[convention]
-    for key in ("x_offset_mm",) if letter == "A" else ("y_offset_mm",):
-        if trunnion.get(key):
-            raise toml.fault(
-                "trunnion", key, f" = {trunnion[key]:g}", expected=f"none: {convention} has no such offset"
-            )
-    if (letter == "A" and "B_deg" in limits) or (letter == "B" and "A_deg" in limits):
-        raise toml.fault("limits", "B_deg" if letter == "A" else "A_deg", f": the machine turns {letter} and C")
-    point, offset = (m_from_mm(np.array([trunnion.get(key, 0.0) for key in TRUNNION[i : i + 3]])) for i in (0, 3))
-    axis = np.eye(3)["AB".index(letter)]
-    bounds = {name: rad_from_deg(limits.get(f"{name}_deg", np.array([-np.inf, np.inf]))) for name in (letter, "C")}
-    for name, (low, high) in bounds.items():
-        if not low < high:
-            raise toml.fault("limits", f"{name}_deg", ": min is not below max", expected="min below max")
-    first = aligned(axis)
-    turn = ChainJoint(letter, False, Placement(np.eye(3), point + offset).then(first), *map(float, bounds[letter]))
-    table = ChainJoint("C", False, first.inverse().then(Placement(np.eye(3), -offset)), *map(float, bounds["C"]))
-    return (turn, table), tip, Placement(np.eye(3), -point)
+    if trunnion.get(idle):
+        mistake = f" = {trunnion[idle]:g}"
+        raise toml.fault("trunnion", idle, mistake, expected=f"none: {convention} has no such offset")
+    if "work" in side.values():
+        raise toml.fault("limits", "X_mm", ": an element moves against an axis", "X, Y, Z on the tool's side")
+    # C on A or B: X = r + o + Rx(A) (Rz(C) (p - r) - o) (xyzac-trt-kins(9), xyzbc-trt-kins(9)).
+    point, offset = (np.array([trunnion.get(key, 0.0) for key in TRUNNION[i : i + 3]]) for i in (0, 3))
+    values["work"] = {"xyz_mm": -point}
+    for name, place, axis in ((letter, point + offset, np.eye(3)["AB".index(letter)]), ("C", -offset, np.eye(3)[2])):
+        row = {"name": name, "type": "rotary", "side": "work", "xyz_mm": place, "axis": axis}
+        rows.append({**row, **_ends(toml, values, name)})
+    return rows
+
+
+def _ends(toml: MachineToml, values: Sections, axis: str) -> Document:
+    """Keys of the limits of a mill's axis; a rotary one without limits turns without end."""
+    unit = "mm" if axis in "XYZ" else "deg"
+    ends = values.get("limits", {}).get(f"{axis}_{unit}", None if unit == "mm" else np.array([-np.inf, np.inf]))
+    if ends is None:
+        raise toml.fault("limits", f"{axis}_mm", " is missing", expected="[min, max] in mm; or [[axis]] rows")
+    if not ends[0] < ends[1]:
+        raise toml.fault("limits", f"{axis}_{unit}", f" = {ends.tolist()}", expected="min below max")
+    return {f"min_{unit}": float(ends[0]), f"max_{unit}": float(ends[1])}
 
 
 def _check_solvable(toml: MachineToml, machine: Serial) -> None:

@@ -19,9 +19,10 @@ from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
-from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun, Tally
+from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun
 from toolpath_stiff.nc.reader import INTERPRETERS, LANGUAGE_RUNS, in_language, on_the_part, program_of, read
 from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.run_records import Tally
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import WORK_OFFSETS
 

@@ -129,10 +129,14 @@ DIALECTS = {
             aliases={"G234": "G43.4"},
         ),
         Dialect("heidenhain", retract="G98", repeats_in_p=False, additional=()),
+        Dialect("siemens", additional=()),
     )
 }
 # Dialects that are languages of their own, with a reader each: what they are called.
-LANGUAGES = {"heidenhain": "Heidenhain's conversational language"}
+LANGUAGES = {
+    "heidenhain": "Heidenhain's conversational language",
+    "siemens": "Siemens' own language (Sinumerik)",
+}
 
 
 def dialect_named(name: str) -> Dialect:

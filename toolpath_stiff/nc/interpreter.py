@@ -14,11 +14,11 @@ from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.codes.tools import list_numbers
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.state import LAST_MODE, POINT_WORDS, CurrentBlock, Flow, Group, State, Then
+from toolpath_stiff.nc.state import LAST_MODE, CurrentBlock, Flow, Group, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
 
-COORDINATES = frozenset((*AXES, "@"))
+NAMES = {"O": "program number", "$": "a setting of grbl or TinyG"}
 WORDS_THAT_ACT = ("F", "S", "T")
 TAKERS: tuple[Group, ...] = ("non-modal", "rotation", "tool length")  # groups whose codes may take the axis words
 
@@ -76,8 +76,8 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
     for word in block.words:
         if word.letter in "GM":
             _sort_code(state, current, word)
-        elif word.letter == "O":
-            state.note(block.line, word, "program number")
+        elif word.letter in NAMES:
+            state.note(block.line, word, NAMES[word.letter])
         elif word.letter in current.values:
             raise current.fail(word, f"repeats the word {word.letter} of its block", "each word once")
         else:
@@ -87,7 +87,7 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
         if letter in current.values and not homes_standing(current, letter):
             raise current.fail(letter, "moves an axis that this machine does not have", "X Y Z A B C")
     for letter, word in current.values.items():
-        if letter in COORDINATES:
+        if letter in AXES:
             if abs(word.value) > LARGEST_MM:
                 raise current.fail(word, "is beyond 100 m", f"at most {LARGEST_MM:g}")
         elif abs(word.value) > LARGEST_WORD:
@@ -154,7 +154,7 @@ def _move(state: State, block: CurrentBlock) -> None:
     once = block.groups.get("non-modal")
     instead = once if once is not None and CODES[once].when == "motion" else None  # G53
     if state.motion is None:
-        for letter in POINT_WORDS:
+        for letter in AXES:
             block.refuse_if(
                 block.has(letter), letter, "has no motion mode to move in", "G0, G1, G2, G3 or a cycle before it"
             )

@@ -26,13 +26,13 @@ STATEMENT = re.compile(
 
 G_CODE, CUTTER_LOCATION_FILE = "G code", "cutter-location file (APT)"
 _HEIDENHAIN = LANGUAGES["heidenhain"]
-_SIEMENS = "Siemens' own language (Sinumerik)"
+_SIEMENS = LANGUAGES["siemens"]
 _ISG = "ISG's own language (Beckhoff TwinCAT CNC)"
 _ACRAMATIC = "the language of Acramatic controls (Cincinnati, Vickers)"
 _SUB = "neither LinuxCNC's language (o<name> sub) nor Fanuc's"
 HINTS = {
     _HEIDENHAIN: "post it as ISO G code, in X, Y, Z, A, B, C of the tool tip",
-    _SIEMENS: "post it as ISO G code: no frames (TRANS, ROT), no CYCLE calls, no variables, no X=... words",
+    _SIEMENS: "one language throughout, or the program alone",
     _ISG: "post it as ISO G code: no # commands, no $IF, no V. variables",
     _ACRAMATIC: "post it as ISO G code of Fanuc's or LinuxCNC's kind",
     _SUB: "post it as ISO G code, or write its subprograms as LinuxCNC's O words",
@@ -57,6 +57,12 @@ _SIGNS = (
 _PATTERNS = [(what, re.compile(rf"\s*(?:N\d+\s+|\d+\s+)?(?:{sign})", re.IGNORECASE)) for what, sign in _SIGNS]
 
 PLAIN_LANGUAGE = re.compile(r"\s*(?:N?\d+\s+)?BEGIN\s+PGM\b", re.IGNORECASE)  # also behind a long heading
+# Of Siemens' programs that begin as G code does.
+LATE_SIGN = re.compile(
+    r"\s*(?:N\d+\s+)?(?:(?:MCALL\s+)?CYCLE\d+\s*\(|MSG\s*\(|A?TRANS\b|TRAORI\b|SUPA\b|R\d+\s*=|T\s*=\s*\"|"
+    r"(?:[A-Z]++[\d.+-]*+\s++)*(?:CR|[XYZ])\s*=)",
+    re.IGNORECASE,
+)
 LATHE_LINES = 2000  # lines: a lathe's program shows what it is at its beginning
 _NO_CODE = re.compile(r"\([^)]*\)?|;.*|<[^>]*>")  # comments, names
 _M6, _Y = r"M0*6(?![\d.])", r"(?<![A-Z])Y[-+]?[\d.#\[]"
@@ -102,8 +108,11 @@ def recognise(lines: tuple[str, ...], name: str, dialect: Dialect) -> tuple[str,
         return LANGUAGES[dialect.name], f"as asked for: --dialect {dialect.name}"
     if looks_like_cutter_location(lines, name):
         return CUTTER_LOCATION_FILE, "its ending, or statements such as GOTO/"
+    if name.lower().endswith((".mpf", ".spf")):
+        return _SIEMENS, "its ending"
     for index, line in enumerate(lines[:LATHE_LINES]):
         language = language_of(line) if index < HEAD_LINES else _HEIDENHAIN if PLAIN_LANGUAGE.match(line) else None
+        language = language or (_SIEMENS if LATE_SIGN.match(line) else None)
         if language is not None:
             return language, f"line {index + 1}: {line.strip()[:40]!r}"
     return G_CODE, "no sign of another language"

@@ -27,7 +27,9 @@ File = str | Path
 class Reading(TypedDict, total=False):
     """Options of reading: the arguments of `Program.read`."""
 
-    dialect: Annotated[str | None, Option("--dialect", choices=("generic", "linuxcnc", "fanuc", "haas", "heidenhain"))]
+    dialect: Annotated[
+        str | None, Option("--dialect", choices=("generic", "linuxcnc", "fanuc", "haas", "heidenhain", "siemens"))
+    ]
     controller: Annotated[File | None, Option("--controller", "FILE")]
     offsets: Annotated[File | None, Option("--offsets", "FILE")]
     tools: Annotated[File | None, Option("--tools", "FILE")]
@@ -76,7 +78,8 @@ class Program:
             NC program or cutter-location file.
         dialect
             The control, for what controls read differently: X10 without a decimal point, the time of G4 P, G70 and G71,
-            `;`. Unless given, as the controller file says, else generic. Heidenhain's language is recognised anyway.
+            `;`. Unless given, as the controller file says, else generic. Heidenhain's and Siemens' languages are
+            recognised anyway.
         controller
             File of what belongs to the control (TOML: dialect, block_delete, offsets, tools, the kinematics that the
             program was posted for; or LinuxCNC's .var or .tbl).

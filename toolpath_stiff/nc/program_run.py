@@ -7,15 +7,14 @@ call unchanged.
 """
 
 import re
-from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning
+from toolpath_stiff.nc.codes.saved import leave_call
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Jump, Remark
@@ -23,8 +22,9 @@ from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
-from toolpath_stiff.nc.words import Block, read_block
+from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
+from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, Then
+from toolpath_stiff.nc.words import Block, Word, read_block
 
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
 MOST_BLOCKS = 1_000_000  # that run, all repeats counted; a count beyond is a slip in a number of repeats
@@ -37,50 +37,6 @@ REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before t
 
 Argument = TypeVar("Argument", int, Block)
 Outcome = TypeVar("Outcome")
-
-
-@dataclass
-class Subprogram:
-    """A subprogram that runs.
-
-    Attributes
-    ----------
-    name, first, back, again
-        Its name, first line (from 0), where to go on, and how often it runs again.
-    arguments
-        The local variables with which each of its runs begins; None: it has those of its caller.
-    modal
-        Whether G66 calls it.
-    """
-
-    name: str
-    first: int
-    back: int
-    again: int
-    arguments: dict[int, float | None] | None = None
-    modal: bool = False
-
-
-@dataclass
-class Tally:
-    """What a check gathers while a program runs: its errors, and of each code its first place and how often it runs."""
-
-    errors: list[InputError] = field(default_factory=list)
-    first: dict[str, tuple[int, int]] = field(default_factory=dict)
-    count: Counter[str] = field(default_factory=Counter)
-
-    def add(self, block: Block) -> None:
-        """Count the codes of a block."""
-        for word in block.words:
-            if word.letter in "GM":
-                code = code_name(word.letter, word.value)
-                self.first.setdefault(code, (block.line, word.column))
-                self.count[code] += 1
-
-
-def beyond_the_end(what: str, row: int, lines: int) -> list[Remark]:
-    """The warning that lines follow what ends a program in line `row` (from 0), if any do."""
-    return [Remark(f"what follows {what} is not part of the program (lines: {lines})", row + 1)] if lines else []
 
 
 class ProgramRun:
@@ -189,7 +145,7 @@ class ProgramRun:
     def _block(self, row: int) -> Block:
         block = self._called.get(row) if self._levels else None
         if self._levels:
-            self._step(row)
+            self._count_block(row)
         if block is None:
             block = self._tried(self._read, row, Block(row + 1, ()))
             if self._levels:
@@ -218,7 +174,7 @@ class ProgramRun:
         """The line of the main file from which a subprogram's file is called: its moves are of that line."""
         return next((level.back for level in reversed(self._levels) if level.back <= self._main_lines), 1)
 
-    def _step(self, row: int) -> None:
+    def _count_block(self, row: int) -> None:
         """Count a block that runs."""
         self._blocks += 1
         if self._blocks > MOST_BLOCKS:
@@ -298,6 +254,7 @@ class ProgramRun:
                 column=column,
             )
         self._levels.append(level)
+        self.state.saved.append(None)
 
     def _jump(self, row: int, to: int) -> int:
         self.jumps.append(Jump(len(self.state.recorder), row + 1, to))
@@ -329,7 +286,7 @@ class ProgramRun:
         to = self._block_numbered(row, "M99 P goes to", flow.number, flow.column)
         if not self._levels:
             return to if to > row else None
-        level = self._levels.pop()
+        level = self._pop_level(row)
         if level.again or to < level.back:
             raise self._fail(
                 row,
@@ -344,8 +301,12 @@ class ProgramRun:
         if level.again:
             level.again -= 1
             return level.first
-        self._levels.pop()
+        self._pop_level(row)
         return level.back
+
+    def _pop_level(self, row: int) -> Subprogram:
+        leave_call(self.state, CurrentBlock(self.name, Block(row + 1, (Word("M", 99.0, 1, "the end of the call"),))))
+        return self._levels.pop()
 
     def _target(self, row: int, call: Call) -> tuple[int, int]:
         """Program number and repeats of a call."""

@@ -26,13 +26,17 @@ from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
 from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import ORIGIN_WINS, ZERO, Request
+from toolpath_stiff.nc.siemens.run import SiemensRun
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.poses import Pose, pose_in_si
 from toolpath_stiff.units import m_from_mm, mm_per_min_from_m_per_s
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
-LANGUAGE_RUNS: dict[str, type[ProgramRun]] = {LANGUAGES["heidenhain"]: HeidenhainRun}
+LANGUAGE_RUNS: dict[str, type[ProgramRun]] = {
+    LANGUAGES["heidenhain"]: HeidenhainRun,
+    LANGUAGES["siemens"]: SiemensRun,
+}
 
 
 def read_program(

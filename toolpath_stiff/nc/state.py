@@ -16,7 +16,7 @@ from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import ToolEntry
-from toolpath_stiff.nc.words import AXES, POLAR, Block, Word
+from toolpath_stiff.nc.words import Block, Word
 from toolpath_stiff.units import MM_PER_INCH
 
 # Modal groups in the order in which the codes and words of a block act: both are LinuxCNC's (manual, "G-Code Overview",
@@ -30,12 +30,11 @@ Group = Literal[
     "units", "feed mode", "F", "S", "T", "M tool change", "dwell", "plane", "polar", "tool length", "M subprogram",
     "work offset", "path control", "exact stop", "look-ahead", "dynamic offset", "spindle mode", "distance",
     "arc distance", "cycle return", "cutter compensation", "lathe diameter", "scaling", "mirror image", "stroke check",
-    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M rigid tapping",
+    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M saved modes", "M rigid tapping",
     "rotation", "non-modal", "M stop", "motion", "corner",
 ]  # fmt: skip
 STEPS: dict[Group, int] = {group: place for place, group in enumerate(get_args(Group))}
 LAST_MODE = STEPS["M rigid tapping"]
-POINT_WORDS = (*AXES, *POLAR)
 LATHE_HINT = "this reads the programs of mills: post it for a mill, with X as a position"
 
 
@@ -89,8 +88,6 @@ class CurrentBlock:
         Modal group -> code; no two codes of a group are in one block.
     values
         Letter -> word, of the other words; `free` are the letters that nothing has taken yet.
-    polar_words
-        Its polar words (@, ^): the first one, radius and angle.
     flow
         What it asks of whoever runs the blocks, once its own moves are made.
     """
@@ -101,7 +98,6 @@ class CurrentBlock:
     groups: dict[Group, str] = field(default_factory=dict)
     values: dict[str, Word] = field(default_factory=dict)
     free: set[str] = field(default_factory=set)
-    polar_words: tuple[Word, float | None, float | None] | None = None
     flow: Then = Flow.NEXT
 
     @property
@@ -158,7 +154,7 @@ START = "before its first move the tool stands at 0, 0, 0 of the control, as Lin
 
 @dataclass
 class Conversational:
-    """What a control of Heidenhain's keeps besides, in its plain language; mm and degrees, points in program axes.
+    """What controls with words of their own (Heidenhain, Siemens) keep besides; mm and degrees, points in program axes.
 
     Attributes
     ----------
@@ -185,7 +181,17 @@ class Conversational:
     kept
         Position, shift and linear part of the frames for which the present point was worked out last, and that point.
     preset, names, stock, parameters
-        The datum of cycle 247; numbers given to tools of a name; the corners of BLK FORM; Q parameters.
+        The datum of cycle 247; numbers given to tools of a name; the corners of the blank; Q parameters.
+    inner
+        Siemens' programmable frame without its shift: turn, mirror image, scale.
+    renumbered
+        Axes whose numbers changed while they stood, until they are named.
+    side, entry
+        G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450.
+    base
+        G500 in force: "machine", or "zero" where the program takes no other offset; "": it is not.
+    offsets_named, changes_by_t, transformed
+        Whether the program takes settable offsets, and changes tools by T alone; TRAORI in force.
     """
 
     pole: tuple[str, complex] | None = None
@@ -213,6 +219,14 @@ class Conversational:
     names: dict[str, int] = field(default_factory=dict)
     stock: dict[str, list[float]] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
+    inner: list[list[float]] = field(default_factory=lambda: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    renumbered: set[int] = field(default_factory=set)
+    side: str = ""
+    entry: str = ""
+    base: str = ""
+    offsets_named: bool = False
+    changes_by_t: bool = False
+    transformed: bool = False
     kept: tuple[tuple[object, object, object], list[float]] = (
         (None, None, None),
         [],
@@ -284,7 +298,7 @@ class State:
     turning
         What makes the program look like a lathe's, with its line.
     plain
-        What Heidenhain's plain language keeps besides.
+        What controls with words of their own keep besides.
     """
 
     name: str
@@ -326,6 +340,7 @@ class State:
     beside: list[float] | None = None
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
+    saved: list[tuple[str, "State", int, float] | None] = field(default_factory=lambda: [None])
     plain: Conversational = field(default_factory=Conversational)
 
     def __post_init__(self) -> None:

@@ -20,18 +20,19 @@ from toolpath_stiff.nc.place import Place
 
 NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)"  # possessive: an attempt that fails does not try shorter numbers
 # ASCII digits alone: the digits of other scripts are not numbers to any control.
-WORD = re.compile(rf"([A-Z@^]|,[CR])({NUMBER})(E[+-]?\d++)?", re.ASCII)
+WORD = re.compile(rf"([A-Z]|,[CR])({NUMBER})(E[+-]?\d++)?", re.ASCII)
 AXES = "XYZABC"
-POLAR = "@^"  # LinuxCNC's polar words, which pygcode does not know
 CORNERS = (",C", ",R")  # chamfer and rounding of the corner to the next block (Fanuc, Haas)
-NOT_PYGCODES = (*POLAR, *CORNERS)
-LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *POLAR, *CORNERS))
+LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *CORNERS))
 COMMENT = re.compile("[();]")
 EXPRESSION = re.compile(r"[#\[]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
 # Longer is no block.
 LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
 MOST_DIGITS = 9  # of a program number, its O included
+NAMED_TAPE = re.compile(r"%[^,%();]{1,24},[-MX]*,?", re.ASCII)  # `%name,MX--,` begins a program (Fagor 8055)
+# Marlin's texts to the operator: M117 Milling, M0 Attach the probe.
+MESSAGE = re.compile(r"(\s*(?:N\d+\s*)?M0*(?:117|118|0|1))\s+[A-Z\"']{2}", re.IGNORECASE)
 HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and outputs, numbered by E
 
 
@@ -73,11 +74,14 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     [('G', 1.0, 5), ('X', 1.5, 9), ('Y', -2.0, 29)]
     """
     place = Place(name, line)
-    compact, columns = without_comments(text, place, semicolon)
+    message = MESSAGE.match(text)
+    compact, columns = without_comments(message[1] if message else text, place, semicolon)
     if not compact:
         return Block(line, ())
-    if compact == "%":
+    if compact == "%" or NAMED_TAPE.fullmatch(compact):
         return Block(line, (), percent=True)
+    if compact[0] == "$" and "=" in compact:
+        return Block(line, (Word("$", 0.0, columns[0], text.strip()),))
     if len(compact) > LONGEST_BLOCK:
         raise place.fail(
             f"a block of {len(compact)} characters without comments and blanks", f"at most {LONGEST_BLOCK}"
@@ -187,7 +191,10 @@ def _tokens(
             raise place.fail(f"word {original!r} is not known", column=column)
         if not math.isfinite(value):
             raise place.fail(f"{original!r} is not a finite number", column=column)
-        if letter != "N":
+        if letter == "T" and value != int(value):  # Fagor's T1.2: tool 1 with offset 2
+            offset = float(number.partition(".")[2])
+            words += [Word("T", float(int(value)), column, original), Word("D", offset, column, original)]
+        elif letter != "N":
             words.append(Word(letter, value, column, original))
         elif words:
             raise place.fail(
@@ -201,6 +208,9 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
     character, follower = compact[position], compact[position + 1 : position + 3].lstrip("+-")[:1]
     if character == "%":
         return place.fail("`%` among other words", "`%` alone on its line", "take the name behind it away", column)
+    if character in "@^":
+        hint = "X and Y, or --interpreter linuxcnc"
+        raise place.fail(f"{compact[position : position + 12]!r} is a polar word of LinuxCNC's", "", hint, column)
     if character in LETTERS and (not follower or follower in LETTERS or follower == "/"):
         return place.fail(f"the word {character!r} has no number", f"a number after {character}", column=column)
     return place.fail(f"{compact[position : position + 12]!r} is not a word", "a letter and a number", column=column)
@@ -208,7 +218,7 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
 
 def through_pygcode(words: Sequence[Word], place: Place) -> None:
     """Let pygcode read the normalised words; what it does not return exactly is an error."""
-    known = [word for word in words if word.letter not in NOT_PYGCODES]
+    known = [word for word in words if word.letter not in CORNERS]
     returned: list[tuple[str, float]] = []
     try:
         for word in text2words(" ".join([_plain(word) for word in known])):

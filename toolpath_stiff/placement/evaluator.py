@@ -215,13 +215,13 @@ class Evaluator:
             rows = np.flatnonzero(chosen == configuration)
             stance, in_work = stand(rows, np.arange(n), configuration)
             margin[rows] = reach(machine, in_work[0], stance).margin.reshape(-1, n)
-            possible = np.asarray(margin[rows][:, self.cuts] >= 0.0).all(axis=1)
-            wanted = np.flatnonzero((possible[:, None] & self.path.headline).ravel())
+            possible = margin[rows][:, self.cuts].min(axis=1, initial=np.inf) >= 0.0
+            wanted = np.flatnonzero(np.logical_and.outer(possible, self.path.headline).ravel())
             if len(wanted):
                 tip, turns, towards = in_work
                 some = tip[wanted], None if turns is None else turns[wanted], towards[wanted]
                 values = np.full(len(rows) * n, np.nan)
-                values[wanted] = evaluate_stance(self.model, stance.take(wanted), some, self.load).stiffness
+                values[wanted] = evaluate_stance(self.model, stance.take(wanted), some, self.load, self.force).stiffness
                 stiffness[rows] = values.reshape(-1, n)
         return stiffness, margin
 

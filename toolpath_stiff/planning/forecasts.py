@@ -1,8 +1,7 @@
 """Forecasts of rivals: the mean of each reading, and how they vary together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import product
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +9,12 @@ import numpy as np
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.inference.candidates import Component
-from toolpath_stiff.inference.noise import JOINT_ERROR
-from toolpath_stiff.inference.prediction import JOINT_STEP, Predictor
+from toolpath_stiff.inference.noise import JOINT_ERROR, REST
+from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.stiffness import exact
+from toolpath_stiff.readings.measurements import Readings, measured_path
 from toolpath_stiff.stiffness.active import ActiveEffect
-from toolpath_stiff.stiffness.model import StiffnessModel, load_path
+from toolpath_stiff.stiffness.geometry_slopes import geometry_slopes
 
 LAW_STEP = 1e-4  # of the strut law's logarithms, for differences
 LARGEST_STEP = 0.3  # of a size, for differences: a secant over the posterior's width where that is wide
@@ -86,46 +84,22 @@ def forecast_all(
     effect_files: Sequence[str | Path] = (),
     strut_spread: float = STRUT_SPREAD,
     joint_error: float = JOINT_ERROR,
+    rest: float = REST,
 ) -> tuple[list[Forecast], BoolArray, FloatArray]:
     """The rivals' forecasts, which readings (m,) all of them can answer, and what the machine scatters by.
 
-    The last is (m, k), a factor of the covariance that the struts' spread (relative sd) and the joints' errors (m, sd
-    of each coordinate) cause.
-
+    The last is (m, k), a factor of the covariance that the struts' spread (relative sd), the joints' errors (m, sd of
+    each coordinate) and the links that the model takes for rigid (rms over the readings) cause.
     """
     predictor = Predictor(machine, readings, effect_files)
     forecasts = [_forecast(rival, predictor) for rival in rivals]
     good = np.all([np.isfinite(f.mean) & np.isfinite(f.factor).all(axis=1) for f in forecasts], axis=0)
     # What a loop beside the tip reads hangs on the joints' places too little to count them.
-    joints = np.zeros((len(readings), 36))
-    joints[readings.tip] = joint_columns(predictor.base, readings.of_tip) * joint_error
-    return forecasts, good, principal(np.concatenate([strut_spread * predictor.strut_columns(), joints], axis=1))
-
-
-def joint_columns(model: StiffnessModel, readings: Readings) -> FloatArray:
-    """(m, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.
-
-    As `Predictor.joint_columns`, but every pose is solved once for all its directions, without load-dependent effects:
-    plans choose from thousands of readings.
-    """
-    first, which = readings.poses
-    places = readings.select(first)
-
-    def log_stiffness(of: StiffnessModel) -> FloatArray:
-        length = places.tool_extension + of.machine.reference_tool_length
-        path = load_path(of, places.position, places.rotation, length, setup=places.setup)
-        tensor = exact.tip_compliance(of, path)[which]
-        return np.asarray(-np.log(np.einsum("mi,mij,mj->m", readings.direction, tensor, readings.direction)))
-
-    base, columns = log_stiffness(model), []
-    for name in ("frame_joints", "platform_joints"):
-        for strut, axis in product(range(6), range(3)):
-            joints = np.array(getattr(model.machine, name))
-            joints[strut, axis] += JOINT_STEP
-            true = model.machine.with_changes(**{name: joints})
-            moved = replace(model, machine=true, control=model.control or model.machine)
-            columns.append((log_stiffness(moved) - base) / JOINT_STEP)
-    return np.stack(columns, axis=1)
+    joints, tip = np.zeros((len(readings), 36)), readings.of_tip
+    path = measured_path(predictor.base, tip)
+    joints[readings.tip] = geometry_slopes(predictor.base, path, tip.direction)[:, 6:] * joint_error
+    shared = [strut_spread * predictor.strut_columns(), joints, rest * predictor.rest_columns()]
+    return forecasts, good, principal(np.concatenate(shared, axis=1))
 
 
 def principal(columns: FloatArray, share: float = 1e-3) -> FloatArray:

@@ -42,8 +42,16 @@ def facts(summary: Document) -> list[tuple[str, str]]:
         *_band(summary),
         *_weakest(summary["weakest"]),
         ("limits", limit),
-        ("extrapolated", f"{summary['extrapolated_share']:.1%} of the cutting samples are outside the strut law"),
+        *_of_kind(summary),
     ]
+
+
+def _of_kind(summary: Document) -> list[tuple[str, str]]:
+    """The range of a strut law, or the configuration of joints."""
+    if "extrapolated_share" in summary:
+        share = summary["extrapolated_share"]
+        return [("extrapolated", f"{share:.1%} of the cutting samples are outside the strut law")]
+    return [("configuration", f"{name}, kept")] if (name := summary["configuration"]) else []
 
 
 def _plunges(summary: Document) -> list[tuple[str, str]]:
@@ -185,7 +193,8 @@ def comparison(summary: Document, other: Document) -> ShownTable:
     if any(map(beside, sides)):
         rows.append([PLUNGES, *(number((beside(side) or {}).get("mean_N_per_mm")) for side in sides), shown[-1]])
     rows.append(["weakest line", *(str((side["weakest"] or {"line": "-"})["line"]) for side in sides), ""])
-    rows.append(["extrapolated", *(f"{side['extrapolated_share']:.1%}" for side in sides), ""])
+    if all("extrapolated_share" in side for side in sides):
+        rows.append(["extrapolated", *(f"{side['extrapolated_share']:.1%}" for side in sides), ""])
     if any(side["out_of_reach_samples"] for side in sides):
         rows.append(["out of reach", *(number(side["out_of_reach_samples"]) for side in sides), ""])
     return ShownTable(("", *(f">{shortened(machine_text(side), 32)}" for side in sides), ">difference"), rows)

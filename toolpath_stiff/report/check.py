@@ -36,7 +36,7 @@ def text(check: ProgramCheck) -> str:
         "codes used (times, first line)": [
             f"{code.code:<6} {code.count:>7}  {code.line:>7}  {code.text}" for code in check.used
         ],
-        "extents of cuts": extents if check.complete else [],
+        "extents of cuts": extents,
         "lengths and times": lengths,
         "modal state at the start, at the end": [
             f"{key:<18} {value:<10} {check.modal_end[key]}" for key, value in check.modal_start.items()

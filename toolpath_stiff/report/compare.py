@@ -29,8 +29,8 @@ QUESTIONS = {
     ),
     "variables.png": (
         "Which variable is missing?",
-        "The strongest first; residuals.csv has all. A trend in one direction of load alone says more than one in all: compare with what "
-        "every effect of the catalogue would do with tps diagnose.",
+        "The strongest first; residuals.csv has all. A trend in one direction of load alone says more than one in all: "
+        "compare with what every effect of the catalogue would do with tps diagnose.",
     ),
 }
 

@@ -64,7 +64,7 @@ def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
         ("What the missing thing looks like", *_portrait(diagnosis.portrait)),
         "portrait.png",
         ("What the fits say", _candidates(diagnosis)),
-        ("How left-out poses vote", *_votes(diagnosis)),
+        ("How the readings vote", *_votes(diagnosis)),
         "before_after.png",
         ("What can these data not tell apart?", *_alike(diagnosis)),
         ("What could be there unseen?", *_unseen(diagnosis)),
@@ -124,8 +124,8 @@ def _votes(diagnosis: Diagnosis) -> list[Part]:
         rows.append((rival, gain, chance, "outvoted" if outvoted(votes) else "not beyond chance"))
     first = next((name for name in diagnosis.explanations if name in diagnosis.fits), "")
     remark = (
-        f"By how much {plain(first)} foretells left-out poses better than each rival of another part: log probability, "
-        "summed over the poses; and how often not, in draws of the poses. A name needs all of these."
+        f"By how much {plain(first)} foretells pose after pose better than each rival of another part: log "
+        "probability, summed over the poses; and how often not, in draws of the poses. A name needs all of these."
     )
     return [remark if rows else "", ShownTable(("rival", ">gain", ">chance of none", ""), rows)]
 

@@ -5,7 +5,6 @@ from textwrap import fill
 
 from toolpath_stiff.correction.result import FORCED, NOTHING, REFUSED, UPDATED, Update, residuals_csv
 from toolpath_stiff.correction.steps import LadderStep
-from toolpath_stiff.correction.strut_law import bar_curve_csv
 from toolpath_stiff.diagnosis.examination import FittedSize, percent_of
 from toolpath_stiff.documents import number
 from toolpath_stiff.report.pages import Section, hints, page_of, readings_head
@@ -31,11 +30,6 @@ QUESTIONS = {
         "Did the error fall, and what remains?",
         f"{DEVIATION}, {MINUS_IS_SOFTER} (red); blue: stiffer; both halves on one colour scale. A pattern that remains "
         "is something else that the model lacks.",
-    ),
-    "figure3.png": (
-        "How stiff must the platform be taken?",
-        "The paper: above 1e10 N/m a stiffer platform changes nothing. With the strut law refitted for each, "
-        "the curve is all but flat: these readings cannot tell a soft platform from soft struts.",
     ),
 }
 
@@ -189,14 +183,8 @@ def text(update: Update) -> str:
     return "\n".join(lines).rstrip()
 
 
-def _bar_curve(update: Update) -> str:
-    assert update.bars is not None
-    return bar_curve_csv(update.bars)
-
-
 DATA = {
     "update.json": Update.to_json,
     "residuals.csv": residuals_csv,
     "machine.toml": Update.machine_text,
-    "figure3.csv": _bar_curve,
 }

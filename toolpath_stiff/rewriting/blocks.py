@@ -11,7 +11,7 @@ from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.interpreter import begin, finish
 from toolpath_stiff.nc.moves import RAPID, Arc, Move
 from toolpath_stiff.nc.state import Flow
-from toolpath_stiff.nc.words import AXES, CORNERS, POLAR, Block
+from toolpath_stiff.nc.words import AXES, CORNERS, Block
 from toolpath_stiff.rewriting.controls import FEED_DECIMALS, OFF, SAME, Controls, LineEdit
 from toolpath_stiff.rewriting.side_shift import Course
 from toolpath_stiff.rewriting.turn import LEAN, LEVER, chords, lean, point_at
@@ -34,7 +34,7 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     refused = {
         "a subprogram (M98, M99), which may run at several places,": current.flow is not Flow.NEXT,
         "cutter compensation (G41, G42)": source.cutter is not None,
-        "polar words (G16, @, ^)": source.polar is not None or bool(letters & set(POLAR)),
+        "polar words (G16)": source.polar is not None,
         "a corner with the next block (,R ,C)": bool(letters & set(CORNERS)),
         "a block with a slash in its middle": block.rest is not None,
     }

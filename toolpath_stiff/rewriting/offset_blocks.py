@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.nc.controller import LANGUAGES
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS
 from toolpath_stiff.poses import Pose
@@ -20,7 +21,9 @@ OTHER_OFFSETS = (*WORK_OFFSETS[1:], *ADDITIONAL_OFFSETS)
 G_WORD, COMMENTS = re.compile(r"[Gg]\+?(0*1\d{1,2}|0*5\d(?:\.\d)?)"), re.compile(r"\([^)]*\)|;.*")
 VERTICAL = 1e-9  # rad, and of a unit vector: what is left of a zero after conversions
 NOT_POSTED = "a cutter-location file has no work offsets: place the program that is posted from it"
-PRESET = "Heidenhain's controls have no such blocks: set the preset (and its basic rotation) to the placement"
+PRESET = (
+    "Heidenhain's and Siemens' controls have no such blocks: set the preset or G54 (and its rotation) to the placement"
+)
 USE_WRITE = "use --write, which transforms the program itself"
 
 
@@ -69,7 +72,7 @@ def offset_blocks(program: ReadProgram, placement: Pose, *, decimals: int = 4) -
         "post it for this machine"
     )
     reason = NOT_POSTED if program.dialect == CUTTER_LOCATION else posted if program.kinematics else ""
-    reason = reason or (PRESET if program.dialect == "heidenhain" else "")
+    reason = reason or (PRESET if program.dialect in LANGUAGES else "")
     reason = reason or _not_about_z(program, placement) or _not_g54_alone(program)
     if reason:
         return OffsetBlocks("", "", reason, reason)

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import write_atomically
-from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.controller import LANGUAGES, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.lines import read_text, split_lines
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
@@ -132,7 +132,7 @@ def rewrite_program(
     M30
     """
     placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
-    if program.dialect == "heidenhain" and not program.kinematics:
+    if program.dialect in LANGUAGES and not program.kinematics:
         text, encoding = _text(program)
         turn = Turn(placement, original)
         written = text if placement == original else write_placed(program, text, turn, decimals, control)

@@ -30,6 +30,8 @@ from toolpath_stiff.rig.fem_faults import FAULTS, faults
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
 from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
 from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable
+from toolpath_stiff.rig.robot import FAULTS as ROBOT_FAULTS
+from toolpath_stiff.rig.robot import robot_case
 from toolpath_stiff.rig.unknown import Unknown
 from toolpath_stiff.rig.unknowns import OUTSIDE
 
@@ -75,18 +77,31 @@ def seal(case: DrawnCase) -> bytes:
     }
     if isinstance(case.machine, FemMachine):
         content["built"] = "fem"
+    return sealed_bytes(content)
+
+
+def sealed_bytes(content: Document) -> bytes:
+    """`sealed.bin` of what it holds."""
     packed = zlib.compress(json.dumps(content, sort_keys=True).encode(), 9)
     body = packed + hashlib.shake_256(packed).digest(-len(packed) % BLOCK)
     return MAGIC + hashlib.sha256(body).digest() + body
 
 
-def unseal(file: str | Path) -> tuple[DrawnCase, Document]:
-    """The case (without its rows) and what else was sealed. Raises `InputError` if the file was changed."""
+def opened(file: str | Path) -> Document:
+    """What was sealed. Raises `InputError` if the file was changed."""
     content = read_bytes(file, "the sealed truth")
     digest, body = content[len(MAGIC) : len(MAGIC) + DIGEST], content[len(MAGIC) + DIGEST :]
     if not content.startswith(MAGIC) or hashlib.sha256(body).digest() != digest:
         raise InputError("the seal is broken: the file was changed or is no sealed truth", file=str(file))
     sealed: Document = json.loads(zlib.decompressobj().decompress(body))
+    return sealed
+
+
+def unseal(file: str | Path) -> tuple[DrawnCase, Document]:
+    """The case (without its rows) and what else was sealed. Raises `InputError` if the file was changed."""
+    sealed = opened(file)
+    if sealed.get("built") == "serial":
+        raise InputError("a robot is pulled once", hint="make another exercise, with another --seed", file=str(file))
     machine: Table = {
         name: np.array(value) if isinstance(value, list) else value for name, value in sealed["machine"].items()
     }
@@ -103,7 +118,8 @@ def score(hidden: list[str], claim: list[str]) -> str:
     """
     claimed, truth = set(claim) - set(SOUND), set(hidden)
     if claimed & set(OTHER):
-        beyond = {*OUTSIDE, *faults(in_catalogue=False)}
+        of_robots = {name for name, fault in ROBOT_FAULTS.items() if not fault[0]}
+        beyond = {*OUTSIDE, *faults(in_catalogue=False), *of_robots}
         claimed = (claimed - set(OTHER)) | ((truth & beyond) or {"outside"})
     if claimed == truth:
         return "right" if truth else "correctly none"
@@ -216,6 +232,15 @@ def new_exercise(folder: str | Path, case: DrawnCase, rules: Rules = NO_OTHER) -
     return len(case.rows["x_mm"])
 
 
+def new_robot(folder: str | Path, seed: int, hidden: str | None, noise: float, rules: Rules = NO_OTHER) -> int:
+    """Write an exercise on an invented robot (`robot`), as `new_exercise`."""
+    text, table, truth = robot_case(seed, hidden, noise)
+    sealed = sealed_bytes({"seed": seed, "layout": "robot", "truth": truth, "built": "serial"})
+    contents: dict[str, Content] = {MACHINE: text, MEASUREMENTS: csv_text(table), SEALED: sealed}
+    write_folder(folder, contents, command="rig new", rules=rules)
+    return len(table["sd_um"])
+
+
 def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[str, int]:
     """Measure the hidden machine of an exercise at a plan: the measurement file as text, and the number of rows.
 
@@ -237,15 +262,17 @@ def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
     """What was hidden, and how the claim scores: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
     claims = [name.strip() for name in claim.split(",") if name.strip()]
-    known = (*SOUND, *OTHER, *CATALOGUE, *OUTSIDE, *FAULTS)
+    of_robots = (*ROBOT_FAULTS, *(name for fault in ROBOT_FAULTS.values() for name in fault[0]))
+    known = tuple(dict.fromkeys((*SOUND, *OTHER, *CATALOGUE, *OUTSIDE, *FAULTS, *of_robots)))
     alone = len(claims) == 1 or (claims and not {*SOUND} & {*claims})
     if not alone or not {*claims} <= {*known}:
         raise InputError(f"a claim {claim!r}", expected=f"none, or one or several of {', '.join(known)}")
-    case, sealed = unseal(Path(folder) / SEALED)
+    sealed = opened(Path(folder) / SEALED)
+    truth = sealed["truth"]
     # A fault of elements that the catalogue has a name for is claimed by that.
     hidden = [
         next((name for name in claims if name in effect.get("names", ())), effect["effect"])
-        for effect in case.truth["effects"]
+        for effect in truth["effects"]
     ]
     verdict = {"verdict": score(hidden, claims), "claim": claims}
-    return {**verdict, **case.truth, "seed": sealed["seed"], "layout": sealed["layout"]}
+    return {**verdict, **truth, "seed": sealed["seed"], "layout": sealed["layout"]}

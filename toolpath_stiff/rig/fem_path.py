@@ -7,8 +7,8 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.rig.campaigns import POSE
 from toolpath_stiff.rig.fem_parts import mean_radius
-from toolpath_stiff.rig.hidden import HiddenMachine
-from toolpath_stiff.rig.nominal import Nominal, reachable
+from toolpath_stiff.rig.hidden import HiddenMachine, true_geometry
+from toolpath_stiff.rig.nominal import ClosureError, Nominal, commanded_lengths, reachable, rotations
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
@@ -49,7 +49,7 @@ def path_truth(nominal: Nominal, machine: HiddenMachine, rows: Rows, rng: Genera
         some = measured[rng.integers(len(measured), size=2)] - middle
         amid, far = rng.uniform(0.3, 0.9) * some.mean(axis=0), rng.uniform(1.2, 1.8) * some[0]
         pose = (middle + (amid if len(poses) < NEAR else far)).round(6)
-        if reachable(nominal, pose[None, :3], pose[None, 3:], np.zeros(1))[0]:
+        if reachable(nominal, pose[None, :3], pose[None, 3:], np.zeros(1))[0] and _taken(nominal, machine, pose):
             poses.append(pose)
     drawn = np.array(poses).reshape(-1, len(POSE))
     true = machine.stiffness(nominal, pulled(drawn[:, :3], drawn[:, 3:])).reshape(-1, 3)
@@ -57,3 +57,14 @@ def path_truth(nominal: Nominal, machine: HiddenMachine, rows: Rows, rng: Genera
     names = (*POSE, *(f"{axis}_N_per_mm" for axis in "xyz"))
     path = dict(zip(names, np.column_stack(columns).round(6).T.tolist(), strict=True))
     return {**path, "measured_near": [k < NEAR for k in range(len(drawn))]}
+
+
+def _taken(nominal: Nominal, machine: HiddenMachine, pose: FloatArray) -> bool:
+    """Whether the true machine can take a pose (6,) that the nominal one reaches."""
+    rows = pulled(pose[None, :3], pose[None, 3:])
+    turned = rotations(rows.angles)
+    try:
+        true_geometry(nominal, machine, rows, turned, commanded_lengths(nominal, rows.position, turned, rows.extension))
+    except ClosureError:
+        return False
+    return True

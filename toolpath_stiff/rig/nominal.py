@@ -186,6 +186,10 @@ def platform_points(points: FloatArray, tips: FloatArray, turned: FloatArray, ex
     return np.asarray(tips[:, None, :] + np.einsum("nij,nkj->nki", turned, raised))
 
 
+class ClosureError(RuntimeError):
+    """Struts of the commanded lengths carry the true platform nowhere near the commanded pose."""
+
+
 def true_poses(
     lengths: FloatArray, frame: FloatArray, platform: FloatArray, tips: FloatArray, turned: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -196,8 +200,8 @@ def true_poses(
 
     Raises
     ------
-    RuntimeError
-        No convergence: the errors are beyond anything that the rig draws.
+    ClosureError
+        The true machine cannot take a pose: struts of these lengths carry no platform near it.
     """
     position, orientation = tips.copy(), turned.copy()
     for _ in range(20):
@@ -213,7 +217,7 @@ def true_poses(
         orientation = _turn(step[:, 3:]) @ orientation
         if np.abs(step).max() < 1e-12:
             return position, orientation
-    raise RuntimeError("the closure equations of the platform did not converge")
+    raise ClosureError("the closure equations of the platform did not converge")
 
 
 def _turn(vector: FloatArray) -> FloatArray:

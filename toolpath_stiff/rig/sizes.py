@@ -16,7 +16,7 @@ from toolpath_stiff.rig.draws import Shape
 from toolpath_stiff.rig.effects import at_strength, draw_shape, with_effect
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
-from toolpath_stiff.rig.nominal import Nominal
+from toolpath_stiff.rig.nominal import ClosureError, Nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.unknowns import UNKNOWNS
 
@@ -43,8 +43,14 @@ class Scale:
         self.whitened_length = whitened_length(clamps, _spread(self, nuisances), nuisances)
 
     def change(self, machine: HiddenMachine) -> FloatArray:
-        """(n,) change of ln stiffness; infinite beyond `LARGEST_SINGLE`, or where an indicator would run backwards."""
-        shown = readings(self.nominal, machine, self.rows)
+        """(n,) change of ln stiffness; infinite beyond `LARGEST_SINGLE`, or where an indicator would run backwards.
+
+        And of a machine that cannot take a pose of the campaign.
+        """
+        try:
+            shown = readings(self.nominal, machine, self.rows)
+        except ClosureError:
+            return np.full(len(self.base), math.inf)
         with np.errstate(invalid="ignore", divide="ignore"):
             logs = np.log(shown)
         change = np.where(np.isfinite(logs), logs - self.base, math.inf)

@@ -49,7 +49,8 @@ class ActiveEffect:
             return None
         added: FloatArray | None = self._called(hook, path)
         if added is not None and is_foreign(self.effect):
-            self._check_shape(hook, added, (len(path), *ADDING[hook]))
+            shape = path.element_zeros().shape[1:] if hook == "element_compliance" else ADDING[hook]
+            self._check_shape(hook, added, (len(path), *shape))
             unsound = ~(np.abs(added) <= LARGEST)
             if path.strut_forces is not None:  # nan at a singular pose, where nothing can be asked
                 unsound[~np.isfinite(path.strut_forces).all(axis=1)] = False

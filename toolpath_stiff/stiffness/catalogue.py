@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.results import Result, frame_of
-from toolpath_stiff.stiffness import effects
+from toolpath_stiff.stiffness import effects, element_effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect
 from toolpath_stiff.stiffness.declarations import check_declarations
 from toolpath_stiff.stiffness.effect_source import line_in, line_of
@@ -40,15 +41,24 @@ def packaged_effects() -> dict[str, Effect]:
     return packaged
 
 
-def known_effects(files: Iterable[str | Path] = ()) -> dict[str, Effect]:
-    """Name -> effect: packaged, and those of the given files, sorted along the load path.
+@cache
+def effects_of_elements() -> dict[str, Effect]:
+    """Name -> packaged effect that holds for machines of elements."""
+    packaged = {name: effect for name, effect in packaged_effects().items() if effect.holds_for == "all"}
+    for module in sorted(module.name for module in pkgutil.iter_modules(element_effects.__path__)):
+        packaged |= _effects_in(import_module(f"toolpath_stiff.stiffness.element_effects.{module}"), module)
+    return packaged
+
+
+def known_effects(files: Iterable[str | Path] = (), kind: str = Hexapod.kind) -> dict[str, Effect]:
+    """Name -> effect that holds for a kind of machine: packaged, and those of the files, sorted along the load path.
 
     Raises
     ------
     InputError
         A file cannot be loaded, holds no effect, or names one that exists already.
     """
-    known = dict(packaged_effects())
+    known = dict(packaged_effects() if kind == Hexapod.kind else effects_of_elements())
     for file in files:
         for name, effect in effects_from_file(file).items():
             if name in known:
@@ -62,6 +72,8 @@ def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
     """The effect of that name. Raises `InputError` with the nearest name if there is none."""
     files = list(files)
     known = known_effects(files)
+    if name not in known and name in effects_of_elements():
+        return effects_of_elements()[name]
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1)
         listed = f"`{command_line('effects', 'list', *options(effects=files))}` lists them"

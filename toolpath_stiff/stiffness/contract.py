@@ -22,7 +22,8 @@ from typing import Any, Literal
 import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
-from toolpath_stiff.machine.elements import Stance
+from toolpath_stiff.errors import EffectError
+from toolpath_stiff.machine.elements import LoadRows, Spring, Stance
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
@@ -31,7 +32,7 @@ from toolpath_stiff.units import mm_from_m
 
 Values = Mapping[str, Any]  # name of a parameter -> SI value, or what is chosen: a number, a name
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
-HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading")
+HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading", "element_compliance")
 
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
@@ -111,6 +112,11 @@ def setup_parameter(meaning: str) -> Parameter:
     return Parameter(SETUP, "", 1.0, (0, 0), (0, 0), source=source, meaning=meaning, kind="text")
 
 
+def element_parameter(meaning: str) -> Parameter:
+    """The parameter that names an element of the machine."""
+    return Parameter("element", "", 1.0, (0, 0), (0, 0), source="machine file", meaning=meaning, kind="text")
+
+
 def compliance(name: str, largest: float, typical: tuple[float, float], source: str, meaning: str) -> Parameter:
     """The parameter of a part that gives way along a line, nm/N, from 0 to the largest."""
     return Parameter(name, "nm/N", 1e-9, (0.0, largest), typical, source=source, meaning=meaning)
@@ -135,6 +141,9 @@ class LoadPath(ArrayColumns):
     strut_forces
         (n, 6) N, forces in the struts under that load, these effects included; None where no direction is given. Only
         effects that depend on the load (`load_dependent`) may ask for it.
+    element_loads
+        (n, r) N and N m, the loads of all elements one after the other under that load, of a machine of elements; None
+        where no direction is given.
     direction
         (n, 3) unit vectors, along which the load acts and the displacement is read; None where no direction is given.
     setup
@@ -150,6 +159,7 @@ class LoadPath(ArrayColumns):
     tool_extension: FloatArray
     force: FloatArray
     strut_forces: FloatArray | None = None
+    element_loads: FloatArray | None = None
     direction: FloatArray | None = None
     setup: TextArray | None = None
     time: FloatArray | None = None
@@ -161,6 +171,23 @@ class LoadPath(ArrayColumns):
     def take(self, rows: IntArray | BoolArray | slice) -> LoadPath:
         """Some of the poses; repeated as an index says."""
         return replace(super().take(rows), stance=self.stance.take(rows))
+
+    def element(self, name: str) -> tuple[slice, Spring | LoadRows]:
+        """Columns of an element's loads among all, and these; of a machine of elements. Raises `EffectError`."""
+        assert isinstance(self.stance, Stance)
+        start = 0
+        for element, load in zip(self.machine_tool.elements, self.stance.loads, strict=True):
+            columns = slice(start, start + load.compliance.shape[-1])
+            if element.name == name:
+                return columns, load
+            start = columns.stop
+        names = ", ".join(element.name for element in self.machine_tool.elements)
+        raise EffectError(f"machine {self.machine_tool.name} has no element {name!r}", expected=f"one of {names}")
+
+    def element_zeros(self) -> FloatArray:
+        """(n, r) nothing added to any load of the elements."""
+        assert isinstance(self.stance, Stance)
+        return np.zeros((len(self), sum(load.compliance.shape[-1] for load in self.stance.loads)))
 
     @property
     def machine(self) -> Hexapod:
@@ -268,8 +295,8 @@ class Effect:
         A reading that tells it from what looks the same at the tip, words for people; "" where its link says it.
     vector
         Whether its real parameters are one vector, which is there as a whole or not at all.
-    every_kind
-        Whether it holds on machines of every kind: it asks neither struts nor their joints.
+    holds_for
+        Machines that it holds for: "hexapods", those of "elements", or "all", where it asks for neither.
     described_from
         Of an effect whose form was read off measurements: the marks of those readings (`measurements.reading_marks`).
         A diagnosis of the same readings calls it `described`, not `identified`, until others confirm it.
@@ -304,7 +331,7 @@ class Effect:
     parts: tuple[tuple[str, str], ...] = ()  # parameter, words after its size, where the clause says {sizes}
     told_by: str = ""
     vector: bool = False
-    every_kind: bool = False
+    holds_for: Literal["hexapods", "elements", "all"] = "hexapods"
     described_from: tuple[str, ...] = ()
     file: str = ""  # that declares it without code
 
@@ -335,6 +362,17 @@ class Effect:
         >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
         >>> tps.effects()["spindle_compliance"].load_compliance(path, {"radial": 5e-9, "axial": 1e-9}).shape
         (1, 12, 12)
+        """
+        return None
+
+    def element_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
+        """(n, r) m/N and rad/(N m) in series with each load of the elements, on a machine that has these.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> "element_compliance" in tps.effects(kind="serial")["joint_torsion"].hooks
+        True
         """
         return None
 

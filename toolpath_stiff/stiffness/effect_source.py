@@ -10,7 +10,8 @@ from toolpath_stiff.stiffness.contract import Effect
 
 def is_foreign(effect: Effect) -> bool:
     """Whether the effect comes from a user's file or another package."""
-    return not type(effect).__module__.startswith("toolpath_stiff.stiffness.effects.")
+    packages = tuple(f"toolpath_stiff.stiffness.{name}." for name in ("effects", "element_effects"))
+    return not type(effect).__module__.startswith(packages)
 
 
 def file_of(effect: Effect) -> str:

@@ -4,6 +4,8 @@ Along a direction d the tip gives sum c (s . d)^2 for a force along it (Castigli
 gives what each element carries). That runs over columns, poses last: three numbers a spring, no matrix a pose.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
@@ -20,27 +22,52 @@ def stance_of(path: LoadPath) -> Stance:
 
 
 def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
-    """(n, 3, 3) m/N, base axes: displacements of the tip under forces at it; nan where nothing holds the tip."""
-    compliance = stance_of(path).tip_compliance()[:, :3, :3] + _of_effects(model, path)
+    """(n, 3, 3) m/N, base axes: displacements of the tip under forces at it; nan where nothing holds the tip.
+
+    Effects that depend on the load are left out.
+    """
+    compliance = stance_of(path).tip_compliance()[:, :3, :3]
+    at_tip, in_elements = _of_effects(model, path)
+    if at_tip is not None:
+        compliance = compliance + at_tip
+    if in_elements is not None:
+        rows = element_rows(stance_of(path))
+        compliance = compliance + np.einsum("nri,nr,nrj->nij", rows, in_elements, rows)
     return exact.possible(model, path, compliance)
 
 
 def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> FloatArray:
-    """(n,) m/N, displacement along unit vectors (n, 3), base axes, per force along them."""
-    along = elements_along(stance_of(path), direction)
+    """(n,) m/N, displacement along unit vectors (n, 3), base axes, per force along them, effects under that load."""
+    along, loads = elements_along(stance_of(path), direction), None
     if model.effects:
-        along = along + np.einsum("ni,nij,nj->n", direction, _of_effects(model, path), direction)
+        if model.load_dependent:
+            loads = np.einsum("nri,ni->nr", element_rows(stance_of(path)), direction)
+            path = replace(path, element_loads=loads * path.force[:, None])
+        at_tip, in_elements = _of_effects(model, path)
+        if at_tip is not None:
+            along = along + np.einsum("ni,nij,nj->n", direction, at_tip, direction)
+        if in_elements is not None:
+            rows = np.einsum("nri,ni->nr", element_rows(stance_of(path)), direction) if loads is None else loads
+            along = along + (in_elements * rows**2).sum(axis=1)
     return exact.possible(model, path, along[:, None, None])[:, 0, 0]
 
 
-def _of_effects(model: StiffnessModel, path: LoadPath) -> FloatArray:
-    """(n, 3, 3) m/N that effects add at the tip."""
-    added = np.zeros((len(path), 3, 3))
+def _of_effects(model: StiffnessModel, path: LoadPath) -> tuple[FloatArray | None, FloatArray | None]:
+    """What effects add: (n, 3, 3) m/N at the tip, (n, r) m/N and rad/(N m) in the elements' loads; None: nothing."""
+    at_tip: FloatArray | None = None
+    in_elements: FloatArray | None = None
     for active in model.effects:
-        form = active.adds("load_compliance", path)
+        form, more = active.adds("load_compliance", path), active.adds("element_compliance", path)
         if form is not None:
-            added += form[:, 6:9, 6:9]
-    return added
+            at_tip = form[:, 6:9, 6:9] if at_tip is None else at_tip + form[:, 6:9, 6:9]
+        if more is not None:
+            in_elements = more if in_elements is None else in_elements + more
+    return at_tip, in_elements
+
+
+def element_rows(stance: Stance) -> FloatArray:
+    """(n, r, 3) all loads of the elements, one after the other, per unit force at the tip in base axes."""
+    return np.concatenate([load.rows(stance.position)[:, :, :3] for load in stance.loads], axis=1)
 
 
 def elements_along(stance: Stance, direction: FloatArray) -> FloatArray:

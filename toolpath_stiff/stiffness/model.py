@@ -129,9 +129,11 @@ def build_model(
         actives.insert(0, ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness}))
     actives += extra
     names = [active.effect.name for active in actives]
-    for active in () if isinstance(machine, Hexapod) else actives:
-        if not active.effect.every_kind:
-            mistake = f"effect {active.effect.name} holds on hexapods only, {machine.name} is of kind {machine.kind}"
+    beside = "elements" if isinstance(machine, Hexapod) else "hexapods"
+    for active in actives:
+        if active.effect.holds_for == beside:
+            only = "hexapods" if beside == "hexapods" else "machines of elements"
+            mistake = f"effect {active.effect.name} holds on {only} only, {machine.name} is of kind {machine.kind}"
             raise EffectError(mistake, hint="leave it out")
     for name in names:
         if names.count(name) > 1:

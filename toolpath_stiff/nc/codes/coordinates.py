@@ -23,7 +23,7 @@ def work_offset(state: State, block: CurrentBlock, code: str) -> None:
     if code == "G54" and "P" in block.values and state.dialect.name == "fanuc":
         _take_additional(state, block, word, "G54.1", block.whole("P", word))
     else:
-        _take_offset(state, block, word, WORK_OFFSETS.index(code))
+        take_offset(state, block, word, WORK_OFFSETS.index(code))
 
 
 def additional_offset(state: State, block: CurrentBlock, code: str) -> None:
@@ -52,10 +52,10 @@ def _take_additional(state: State, block: CurrentBlock, word: Word, code: str, n
             f"is {code} P{number}, an offset that nothing defines",
             hint=f'give it in the controller file: [offsets] "{code} P{number}" = [x, y, z]',
         )
-    _take_offset(state, block, word, len(WORK_OFFSETS) + number - 1)
+    take_offset(state, block, word, len(WORK_OFFSETS) + number - 1)
 
 
-def _take_offset(state: State, block: CurrentBlock, word: Word, index: int) -> None:
+def take_offset(state: State, block: CurrentBlock, word: Word, index: int) -> None:
     """The work offset of an index from here on."""
     frames = state.frames
     if index != frames.active:

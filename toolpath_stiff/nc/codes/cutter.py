@@ -94,8 +94,6 @@ def _check_codes(state: State, block: CurrentBlock, also: tuple[str, ...]) -> No
     for group, name in block.groups.items():
         wrong = name not in harmless and (group == "motion" or group not in GROUPS | {*also})
         block.refuse_if(wrong, name, "while cutter compensation is on (G41, G42)", "G40 in a block before it")
-    polar = next((letter for letter in "@^" if block.has(letter)), None)
-    block.refuse_if(polar is not None, polar, "while cutter compensation is on", "X and Y")
 
 
 _ON = {"G41": "cutter compensation, tool on the left", "G42": "cutter compensation, tool on the right"}

@@ -8,9 +8,9 @@ from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes
 from toolpath_stiff.nc.codes.feeds import time_word
 from toolpath_stiff.nc.codes.motion import record
-from toolpath_stiff.nc.codes.points import destination, point_words, xy_of_polar_words
+from toolpath_stiff.nc.codes.points import destination, point_words
 from toolpath_stiff.nc.moves import RAPID
-from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM, Drilling, strokes
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import SECONDS_PER_DAY
@@ -37,7 +37,7 @@ def begin_cycle(state: State, code: str) -> None:
 def cycle(state: State, block: CurrentBlock, code: str) -> None:
     """One block of a canned cycle: its holes, expanded."""
     given = "motion" in block.groups
-    if not given and not any(block.has(letter) for letter in POINT_WORDS):
+    if not given and not any(block.has(letter) for letter in AXES):
         return
     if code == "G76" and not state.dialect.increments:
         raise block.fail(
@@ -69,9 +69,7 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     peck, dwell, first, less, least = (state.sticky.get(letter, 0.0) for letter in "QPIJK")
     out_at_r = code in TAPS and state.dialect.increments
     hole = Drilling(code, bottom, retract, clear, peck, dwell, first, less, least, out_at_r)
-    for number in range(repeats):
-        if number and block.polar_words is not None:  # each hole's polar words count from the one before
-            words |= xy_of_polar_words(state, block)
+    for _ in range(repeats):
         place = destination(state, block, frames.to_program(frames.position), words)
         place[normal] = level
         record(state, block, RAPID, frames.to_control(place), words)

@@ -4,10 +4,12 @@ from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes
 from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
 from toolpath_stiff.nc.courses import length_of_move
 from toolpath_stiff.nc.frames import Numbers
-from toolpath_stiff.nc.moves import Arc
-from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.nc.moves import Arc, Remark
+from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
+LONG_PAUSE = 100.0  # s; a longer one may count milliseconds
 SLOWEST = 1e-6  # mm/min, or 1/min: slower is a slip, and its time beyond all numbers
 
 
@@ -22,6 +24,8 @@ def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
 
 def feed_word(state: State, block: CurrentBlock, code: str) -> None:
     """F: the feed from here on; F0 takes it away."""
+    if dwells_by(state, block) == "F":
+        return
     feed, word = block.take("F") or 0.0, block.values["F"]
     slow = feed < 0.0 or 0.0 < feed * state.feed_scale < SLOWEST
     block.refuse_if(slow, word, "is no feed that moves", "F above 0, a nanometre a minute or more")
@@ -59,8 +63,8 @@ def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def turn_spindle(state: State, block: CurrentBlock, code: str) -> None:
-    """M3: clockwise, M4: the other way, M5, M19: it stands."""
-    state.turn = {"M3": 1, "M4": -1}.get(code, 0)
+    """M3: clockwise, M4: the other way, M5, M19: it stands; M13, M14: as M3, M4, with coolant."""
+    state.turn = {"M3": 1, "M13": 1, "M4": -1, "M14": -1}.get(code, 0)
 
 
 def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: list[float], arc: Arc | None) -> float:
@@ -89,26 +93,37 @@ def rotary_feed(state: State, feed: Numbers) -> Numbers:
 
 
 def dwells_by(state: State, block: CurrentBlock) -> str:
-    """The word that holds the time of a block's G4: P; X on Fanuc's controls, S in Marlin; "" for no such word."""
+    """The word that holds the time of a block's G4: P; in generic programs those of `TIMES`; "" for no such word."""
     if "G4" not in block.codes:
         return ""
-    letters = {"linuxcnc": "P", "generic": "PXS"}.get(state.dialect.name, "XP")
+    letters = {"linuxcnc": "P", "generic": "PXSKF"}.get(state.dialect.name, "XP")
     return next((letter for letter in letters if letter in block.values), "")
+
+
+# Who means a time by a letter beside G4, and the seconds of 1 (Fanuc, Dwell (G04); Marlin, G004; Fagor, 8055,
+# programming manual, G04: hundredths of a second; Siemens, Fundamentals, Dwell time).
+TIMES = {"X": ("Fanuc", 1.0), "S": ("Marlin", 1.0), "K": ("Fagor", 0.01), "F": ("Siemens", 1.0)}
 
 
 def dwell(state: State, block: CurrentBlock, code: str) -> None:
     """G4: a pause, before the block's own moves."""
     letter = dwells_by(state, block)
     seconds = time_word(state, block, letter) if letter else None
-    if not letter and state.dialect.name in ("generic", "fanuc") and "F" not in block.values:  # F: Siemens' seconds
+    if not letter and state.dialect.name in ("generic", "fanuc"):
         state.assume("G4 without a time is no pause: an exact stop (Fanuc), the end of the moves before it (Marlin)")
         seconds = 0.0
-    if state.dialect.name == GENERIC.name and letter in ("X", "S"):
-        word = block.values[letter]
-        doubtful = letter == "X" and ("." not in word.text or any(block.has(axis) for axis in POINT_WORDS))
+    if state.dialect.name == GENERIC.name and letter in TIMES and seconds is not None:
+        word, (control, unit) = block.values[letter], TIMES[letter]
+        doubtful = any(block.has(axis) for axis in AXES) or (letter == "X" and "." not in word.text)
         expected = f"{word.text.rstrip('.')}. alone, for seconds"
         block.refuse_if(doubtful, word, "beside G4 may count milliseconds", expected, "name the control with --dialect")
-        state.assume(f"the {letter} of G4 is a time in seconds, as {'Fanuc' if letter == 'X' else 'Marlin'} means it")
+        counts = "hundredths of a second" if letter == "K" else "seconds"
+        state.assume(f"the {letter} of G4 is a time in {counts}, as {control} means it")
+        seconds *= unit
+    long = seconds is not None and seconds >= LONG_PAUSE and state.dialect.name == GENERIC.name and letter == "P"
+    if long and "." not in block.values["P"].text:
+        text = f"G4 {block.values['P'].text} is a pause of as many seconds; Marlin and Mach3 may count milliseconds"
+        state.warnings.append(Remark(text, block.line))
     if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
         raise block.fail(code, "needs its time", "P with the seconds, 0 or more")
     state.recorder.add_dwell(seconds)
@@ -134,6 +149,13 @@ FEED_CODES = (
     Code("S", "S", speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
     *family(_FEEDS, "feed mode", feed_mode, g_codes("G93 G94 G95")),
     Code("G96", "spindle mode", surface_speed, "constant surface speed", _SPINDLE, listed=_UNUSED),
-    Code("G4", "non-modal", dwell, "dwell", f"{g_codes('G4')}; {FANUC}, Dwell (G04); Marlin, G004", step="dwell"),
+    Code(
+        "G4",
+        "non-modal",
+        dwell,
+        "dwell",
+        f"{g_codes('G4')}; {FANUC}, Dwell; Marlin, G004; Fagor, G04; Siemens, G4",
+        step="dwell",
+    ),
     Code("G97", "spindle mode", surface_speed, "spindle speed in revolutions", _SPINDLE),
 )

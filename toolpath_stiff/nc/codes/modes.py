@@ -4,6 +4,7 @@ import math
 
 from toolpath_stiff.nc.codes.code import FANUC, family, g_codes
 from toolpath_stiff.nc.codes.points import forget_polar, refuse_while_rotated
+from toolpath_stiff.nc.controller import INCH_METRIC
 from toolpath_stiff.nc.state import CurrentBlock, State
 
 
@@ -15,7 +16,11 @@ def units(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def no_units(state: State, block: CurrentBlock, code: str) -> None:
-    """G70, G71: G20 and G21 where the dialect or the controller file says so; what comes here is something else."""
+    """G70, G71: G20 and G21 where dialect or controller file say so, or no cycle's word is beside them."""
+    if state.dialect.name == "generic" and not block.values.keys() - {*"FS"}:
+        state.assume("G70 and G71 without the words of a cycle are inch and mm (Siemens, Fagor, Mach3)")
+        units(state, block, INCH_METRIC[code])
+        return
     what, hint = state.dialect.g70
     raise block.fail(code, f"is {what}, which is not supported", hint=hint)
 
@@ -49,7 +54,7 @@ _POLAR = f"{FANUC} of the series 16 and 15i, Polar coordinate command (G15, G16)
 MODE_CODES = (
     *family({"G17": "plane XY", "G18": "plane ZX", "G19": "plane YZ"}, "plane", plane, g_codes("G17 - G19.1")),
     *family({"G20": "inch", "G21": "mm"}, "units", units, g_codes("G20 G21")),
-    *family({"G70": "inch, as G20", "G71": "mm, as G21"}, "units", no_units, _INCH, ("fanuc",)),
+    *family({"G70": "inch, as G20", "G71": "mm, as G21"}, "units", no_units, _INCH, ("generic", "fanuc")),
     *family({"G90": "absolute", "G91": "incremental"}, "distance", distance, g_codes("G90 G91")),
     *family(_CENTERS, "arc distance", arc_distance, g_codes("G90.1 G91.1")),
     *family({"G15": "Cartesian words", "G16": "polar words"}, "polar", polar_mode, _POLAR),

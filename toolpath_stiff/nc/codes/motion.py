@@ -27,9 +27,9 @@ from toolpath_stiff.nc.codes.points import (
 )
 from toolpath_stiff.nc.frames import standing
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Move
-from toolpath_stiff.nc.state import POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import tool_of
-from toolpath_stiff.nc.words import Word
+from toolpath_stiff.nc.words import AXES, Word
 
 ARCS = ("G2", "G3")
 MOST_TURNS = 10_000
@@ -106,7 +106,7 @@ def know_position(state: State, block: CurrentBlock, word: Word, axes: Collectio
 def straight(state: State, block: CurrentBlock, code: str) -> None:
     """G0, G1: straight to the point that the axis words name."""
     motion = RAPID if code == "G0" else FEED
-    if any(block.has(letter) for letter in POINT_WORDS):
+    if any(block.has(letter) for letter in AXES):
         point, words = target(state, block)
         if state.corner is not None and code == "G1":
             cut_corner(state, block, point)
@@ -119,7 +119,7 @@ def straight(state: State, block: CurrentBlock, code: str) -> None:
 
 def arc(state: State, block: CurrentBlock, code: str) -> None:
     """G2, G3: clockwise and counter-clockwise in the plane in force, to the point that the axis words name."""
-    if not (any(block.has(letter) for letter in (*POINT_WORDS, *geometry.CENTER_LETTERS)) or "motion" in block.groups):
+    if not (any(block.has(letter) for letter in (*AXES, *geometry.CENTER_LETTERS)) or "motion" in block.groups):
         return
     if state.beside is not None:
         raise block.fail(block.block.words[0], "is an arc as the first move after cutter compensation", "G0 or G1")

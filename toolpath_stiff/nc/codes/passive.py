@@ -6,20 +6,21 @@ What Fanuc's and Haas' programs begin with ("safe start") is here: it switches o
 from toolpath_stiff.nc.codes.code import FANUC, HAAS, Code, family, g_codes, holds_anyway, m_codes
 from toolpath_stiff.nc.codes.feeds import turn_spindle
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.state import LATHE_HINT, POINT_WORDS, CurrentBlock, State
+from toolpath_stiff.nc.state import LATHE_HINT, CurrentBlock, State
+from toolpath_stiff.nc.words import AXES
 
 WAIT_FOR_INPUT = 66  # LinuxCNC, M-Codes, M66: P or E, and L with the kind of wait
 # Code -> the words that it takes. With other words, or none, G5 and G5.1 are splines.
 TAKEN = {
     "G5": "P", "G5.1": "QR", "G5.4": "Q", "G8": "P", "G103": "P", "G187": "PE", "G61": "PQ", "G61.1": "PQ", "G64": "PQ",
-    "G22": (*POINT_WORDS, *"IJK"), "G25": "PQRI", "G26": "PQRI",
+    "G22": (*AXES, *"IJK"), "G25": "PQRI", "G26": "PQRI",
 }  # fmt: skip
 SPLINES = ("G5", "G5.1")
 
 
 def m_parameters(state: State, block: CurrentBlock) -> None:
     """M codes may carry P, Q, E, R, S words, M66 an L too; unless the block moves, these are theirs."""
-    moves = "motion" in block.groups or "non-modal" in block.groups or any(block.has(letter) for letter in POINT_WORDS)
+    moves = "motion" in block.groups or "non-modal" in block.groups or any(block.has(letter) for letter in AXES)
     if not moves:
         waits = any(word.letter == "M" and word.value == WAIT_FOR_INPUT for word in block.block.words)
         for letter in "PQERSL" if waits else "PQERS":
@@ -57,6 +58,7 @@ _OFF = "none is on, since switching it on is refused"
 _ZONE, _SPEED = "the zone that the tool must not enter", "the spindle's speed"
 FANUC_ONLY, HAAS_ONLY = ("generic", "fanuc"), ("generic", "haas")
 _SPINDLE = {"M3": "spindle on", "M4": "spindle on, reversed", "M5": "spindle off"}
+_BOTH = {"M13": "spindle on, with coolant", "M14": "spindle on, reversed, with coolant"}
 _COOLANT = {"M7": "mist coolant on", "M8": "flood coolant on", "M9": "coolant off"}
 _OVERRIDES = dict.fromkeys(("M48", "M49", "M50", "M51", "M52", "M53"), "speed and feed overrides")
 _WATCHED = {"G25": "spindle speed not watched", "G26": "spindle speed watched"}
@@ -77,6 +79,7 @@ PASSIVE_CODES = (
     Code("G64", "path control", take_words, "path blending", g_codes("G64"), listed=_BLENDED),
     *family(_SPINDLE, "M spindle", turn_spindle, m_codes("M3 M4 M5")),
     Code("M19", "M spindle", turn_spindle, "spindle orientation", m_codes("M19"), listed="spindle orientation"),
+    *family(_BOTH, "M spindle", turn_spindle, f"{FANUC}, builders' M codes", FANUC_ONLY, listed="coolant"),
     *family(_COOLANT, "M coolant", holds_anyway, m_codes("M7 M8 M9"), listed="coolant"),
     *family(_OVERRIDES, "M overrides", holds_anyway, m_codes("M48 - M53"), listed="overrides"),
     Code(

@@ -1,7 +1,6 @@
 """Points: what the axis words and polar words of a block mean, and what a turned program makes uncertain. mm, degrees.
 
-Polar words: LinuxCNC, "G-Code Overview", "Polar Coordinates"; Fanuc's operator's manuals of the series 16 and 15i,
-"Polar coordinate command" (G16).
+Polar words: Fanuc's operator's manuals of the series 16 and 15i, "Polar coordinate command" (G16).
 """
 
 import math
@@ -27,10 +26,6 @@ def axis_words(state: State, block: CurrentBlock) -> dict[int, float]:
 
 def point_words(state: State, block: CurrentBlock) -> dict[int, float]:
     """As `axis_words`, of a block that moves in program coordinates: under G16 the second one is an angle."""
-    block.polar_words = None
-    if block.has("@") or block.has("^"):
-        xy = _at_radius_and_angle(state, block)
-        return {**axis_words(state, block), **xy}
     if state.polar is None:
         words = axis_words(state, block)
         if state.unsettled:
@@ -77,36 +72,6 @@ def target(state: State, block: CurrentBlock) -> tuple[list[float], dict[int, fl
     """Control coordinates of the point that a block names, and the words that name it."""
     words = point_words(state, block)
     return control_point(state, block, state.frames.to_program(state.frames.position), words), words
-
-
-def _at_radius_and_angle(state: State, block: CurrentBlock) -> dict[int, float]:
-    """LinuxCNC's polar words: @ the radius, ^ the angle about the program zero, of the XY plane."""
-    word = block.values["@" if block.has("@") else "^"]
-    turned = state.polar is not None or state.unsettled or state.frames.rotation is not None
-    elsewhere = state.dialect.increments or state.plane != "G17" or turned or block.has("X") or block.has("Y")
-    problem = "is a polar word of LinuxCNC's, beside X or Y, outside of G17, or under G16 or a rotation"
-    block.refuse_if(elsewhere, word, problem, "X and Y, or G16")
-    block.polar_words = (word, block.take("@"), block.take("^"))
-    return xy_of_polar_words(state, block)
-
-
-def xy_of_polar_words(state: State, block: CurrentBlock) -> dict[int, float]:
-    """X and Y, as words in the distance mode in force, of the block's polar words at the present point.
-
-    As measured on `rs274` 2.9: the one that is absent is that of the present point; in G91 both add to it.
-    """
-    assert block.polar_words is not None
-    word, radius, angle = block.polar_words
-    here = state.frames.to_program(state.frames.position)
-    present, turn = math.hypot(here[0], here[1]), math.atan2(here[1], here[0])
-    at_zero = present < SAME_PLACE_MM and (radius is None or angle is None or not state.absolute)
-    block.refuse_if(at_zero, word, "counts from the present point, which is the program zero", "both @ and ^, in G90")
-    if radius is not None:
-        present = radius * state.length_scale + (0.0 if state.absolute else present)
-    if angle is not None:
-        turn = math.radians(angle) + (0.0 if state.absolute else turn)
-    point = (present * math.cos(turn), present * math.sin(turn))
-    return {axis: value if state.absolute else value - here[axis] for axis, value in enumerate(point)}
 
 
 def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle: float | None) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from toolpath_stiff.nc.codes.motion import machine_move, record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
 from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
+from toolpath_stiff.nc.elements import direction as direction_of
 from toolpath_stiff.nc.geometry import PLANES, ArcError
 from toolpath_stiff.nc.heidenhain.points import (
     ON_CIRCLE_MM,
@@ -44,8 +45,8 @@ def pole(state: State, block: CurrentBlock, code: str) -> None:
     if plane is None:
         raise block.fail(code, "with other coordinates than two of a plane", "two of X, Y, Z, or none")
     first, second, _ = PLANES[plane]
-    here = present(state)
-    state.plain.pole = plane, complex(point.get(first, here[first]), point.get(second, here[second]))
+    point = point or dict(enumerate(present(state)))
+    state.plain.pole = plane, complex(point[first], point[second])
 
 
 def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:
@@ -71,7 +72,8 @@ def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> No
 def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
     """The tool beside the contour from the next move on, by its radius in the tool table or TOOL DEF and its DR."""
     radius = state.plain.radius
-    hint = f"give it in a tool table (--tools FILE), or TOOL DEF {state.tool} L.. R.."
+    table, own = "give it in a tool table (--tools FILE)", f", or TOOL DEF {state.tool} L.. R.."
+    hint = table + own * (state.dialect.name == "heidenhain")
     block.refuse_if(math.isnan(radius), side, f"needs the radius of tool {state.tool}", hint=hint)
     state.assume(COMPENSATED)
     scale = state.plain.scale
@@ -171,7 +173,9 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
     block.refuse_if(all(inner[:2]), None, "under cycle 8 and cycle 10: their order decides the path", "one of them")
     if plain.held_tip and state.frames.posted is None:
         leans = any(state.frames.position[3:]) or any(there.get(axis) for axis in (3, 4, 5))
-        block.refuse_if(leans, None, "turns rotary axes under M128 (FUNCTION TCPM)", hint=HOLDS_HINT)
+        block.refuse_if(
+            leans, None, "turns rotary axes under tool centre point control (M128, TRAORI)", hint=HOLDS_HINT
+        )
 
 
 def line(state: State, block: CurrentBlock, code: str) -> None:
@@ -260,13 +264,12 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
         raise block.fail(None, "without its radius", "R")
     start = in_plane(state, present(state))
     end = in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
-    size, chord = abs(radius) * state.length_scale, abs(end - start)
-    block.refuse_if(
-        not 0.0 < chord <= 2.0 * (size + ON_CIRCLE_MM), None, f"of radius {size:g} mm to a point {chord:.4f} mm away"
-    )
-    height = math.sqrt(max(size * size - chord * chord / 4.0, 0.0))
-    side = turn if radius > 0.0 else -turn
-    _round(state, block, there, (start + end) / 2.0 + side * height * 1j * (end - start) / chord, turn)
+    try:
+        places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
+        center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
+    except ArcError as error:
+        raise block.fail(None, error.found, error.expected) from None
+    _round(state, block, there, center, turn)
 
 
 def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
@@ -313,6 +316,9 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     first, second, _ = PLANES[state.plane]
     size, rounded = corner_block.values["size"].value, corner_block.block.words[0].text == "RND"
     after.refuse_if(rapid or there.keys() - {first, second}, None, *_NO_CORNER)
+    if "across" in corner_block.values:  # the chamfer's own length, not that along the lines
+        turned = cmath.phase(direction_of(element, held[1]) / direction_of(held, held[1]))
+        size /= 2.0 * max(math.cos(turned / 2.0), STRAIGHT_ON)
     lines = held[2] is None and element[2] is None
     corner_block.refuse_if(not rounded and not lines, None, "beside an arc", "CHF between two lines")
     try:

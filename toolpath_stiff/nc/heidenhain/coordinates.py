@@ -15,23 +15,12 @@ from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
 Matrix = list[list[float]]
-TIP_TURNS = "PLANE and cycle 19 turn the tool about its tip where it stands: how the machine's axes turn is not known"
-HOW_AXES_TURN = [
-    "STAY",
-    "MOVE",
-    "TURN",
-    "F",
-    "FMAX",
-    "SEQ+",
-    "SEQ-",
-    "SYM",
-    "DIST",
-    "ABST",
-    "MB",
-    "MBMAX",
-    "TABLEROT",
-    "COORDROT",
-]
+TIP_TURNS = (
+    "PLANE, cycle 19 and CYCLE800 turn the tool about its tip where it stands: how the machine's axes turn is not known"
+)
+HOW_AXES_TURN = (
+    "STAY", "MOVE", "TURN", "F", "FMAX", "SEQ+", "SEQ-", "SYM", "DIST", "ABST", "MB", "MBMAX", "TABLEROT", "COORDROT",
+)  # fmt: skip
 SPATIAL = "the angles of cycle 19 are spatial angles, not positions of the machine's axes"
 
 
@@ -141,9 +130,15 @@ def tilt(state: State, block: CurrentBlock, code: str) -> None:
     if not leans:
         plain.outer, plain.shift = [0.0] * 3, plain.outer
     apply(state, block)
+    turn_tool(state, block)
+
+
+def turn_tool(state: State, block: CurrentBlock) -> None:
+    """Turn the tool upright on the tilted plane; where its tip then is, is not known."""
+    plain = state.plain
     axis = [row[2] for row in plain.tilt] if plain.tilt is not None else [0.0, 0.0, 1.0]
     state.assume(TIP_TURNS)
-    record(state, block, RAPID, [*frames.position[:3], *roll_pitch_of_axis(*axis), 0.0], (3, 4, 5))
+    record(state, block, RAPID, [*state.frames.position[:3], *roll_pitch_of_axis(*axis), 0.0], (3, 4, 5))
     plain.unknown |= {0, 1, 2}
 
 
@@ -164,5 +159,7 @@ def hold_tip(state: State, block: CurrentBlock, code: str) -> None:
     plain, on = state.plain, code in ("M128", "FUNCTION TCPM")
     if code[0] == "F":
         block.free.clear()
+    elif block.block.words[0].text == "M":  # M128 F1000: the feed of the axes that follow
+        block.take("F"), block.take("FMAX")
     tools.hold_tip(state, block, code, on)
     plain.held_tip = on

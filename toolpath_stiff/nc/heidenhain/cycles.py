@@ -7,7 +7,7 @@ mm/min, dwells s; a stroke without a feed is a rapid.
 
 import cmath
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.geometry import PLANES
@@ -97,16 +97,16 @@ def _check(block: CurrentBlock, number: int, values: Values) -> None:
 
 def call(state: State, block: CurrentBlock, change: Values | None = None) -> None:
     """The cycle defined last, at the present point (CYCL CALL, M99, M89); `change`: other parameters of this call."""
-    plain, frames, normal = state.plain, state.frames, PLANES[state.plane][2]
+    plain, normal = state.plain, PLANES[state.plane][2]
     if plain.cycle is None:
         raise block.fail(None, "calls a cycle, and none is defined", "CYCL DEF before it")
     waits = state.cutter is not None or plain.held is not None or plain.approach is not None
     block.refuse_if(waits, None, "calls a cycle inside a contour", "R0 before it")
-    unit, modal, (number, values) = state.length_scale, state.feed, plain.cycle
+    unit, (number, values) = state.length_scale, plain.cycle
     values = values | (change or {})
     if "Q203" not in values:  # an older one
         ahead = min(max(LEAST_AHEAD_MM, abs(values.get("Q201", 0.0) * unit) / 50.0), MOST_AHEAD_MM) / unit
-        here = frames.to_program(frames.position)[normal] / unit
+        here = present(state)[normal] / unit
         values = {"Q258": ahead, "Q259": ahead, "Q203": here - values.get("Q200", 0.0)} | values
         missing = next((name for name in NEEDED[number] if name not in values), None)
         block.refuse_if(missing, None, "calls a cycle that is not whole", "all its statements (CYCL DEF 1.0 to 1.5)")
@@ -116,18 +116,31 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
     check_known(state, block, {normal: 0.0}, rapid=True)
     block.refuse_if(plain.unknown, None, "calls a cycle where X or Y is not known", "X and Y before it")
     block.refuse_if(number in TAPS and state.speed <= 0.0, None, "taps without a speed", "S above 0")
-    for height, rate, wait in strokes(number, values, state.speed):
+    pitch = unit if number in TAPS else inch_tenths(state)
+    auto = plain.tool_feed or 0.0
+    plunge(
+        state,
+        block,
+        (
+            (height * unit, None if rate in (None, MAX) else auto if rate == AUTO else rate * pitch, wait)
+            for height, rate, wait in strokes(number, values, state.speed)
+        ),
+    )
+
+
+def plunge(state: State, block: CurrentBlock, path: Iterable[Stroke]) -> None:
+    """Carry out strokes at the present point, in mm and mm/min; a feed of 0 is none that was given."""
+    frames, normal, modal = state.frames, PLANES[state.plane][2], state.feed
+    for height, rate, wait in path:
         place = frames.to_program(frames.position)
-        if abs(place[normal] - height * unit) > SAME_HEIGHT_MM:
-            place[normal] = height * unit
-            pitch = unit if number in TAPS else inch_tenths(state)
-            fed = plain.tool_feed if rate == AUTO else None if rate is None else rate * pitch
-            block.refuse_if(rate is not None and not fed, None, "cuts without a feed", "its feed above 0")
-            state.feed = fed
-            record(state, block, RAPID if rate in (None, MAX) else CYCLE, frames.to_control(place), (normal,))
+        if abs(place[normal] - height) > SAME_HEIGHT_MM:
+            place[normal] = height
+            block.refuse_if(rate is not None and not rate > 0.0, None, "cuts without a feed", "its feed above 0")
+            state.feed = rate
+            record(state, block, RAPID if rate is None else CYCLE, frames.to_control(place), (normal,))
         if wait:
             state.recorder.add_dwell(wait)
-    state.feed, plain.heading = modal, None
+    state.feed, state.plain.heading = modal, None
 
 
 def strokes(number: int, values: Values, speed: float) -> Iterator[Stroke]:
@@ -185,7 +198,7 @@ def _pattern(state: State, block: CurrentBlock, number: int, values: Values) -> 
     plain, unit = state.plain, state.length_scale
     if plain.cycle is None:
         raise block.fail(None, "without a cycle to call", "CYCL DEF before it")
-    change = {name: values[name] for name in ("Q200", "Q203", "Q204") if name in values}
+    change: Values = {name: values[name] for name in ("Q200", "Q203", "Q204") if name in values}
     cycle = plain.cycle[1] | change
     clear, far = cycle["Q203"] + cycle["Q200"], values.get("Q301", 1.0)
     second = max(clear, cycle["Q203"] + cycle.get("Q204", 0.0))

@@ -18,8 +18,7 @@ from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import SECONDS_PER_DAY
 
 # M functions that are those of the one table of codes.
-SHARED = ("M0", "M1", "M2", "M3", "M4", "M5", "M7", "M8", "M9", "M19", "M30")
-SPINDLE = {"M13": "M3", "M14": "M4"}  # with coolant
+SHARED = ("M0", "M1", "M2", "M3", "M4", "M5", "M7", "M8", "M9", "M13", "M14", "M19", "M30")
 # Others that leave the programmed path alone, and those that do not: by what they do.
 PASSIVE = {
     name: what
@@ -66,9 +65,6 @@ def miscellaneous(state: State, block: CurrentBlock) -> None:
             CODES[letter].act(state, block, letter)
             if CODES[letter].listed:
                 state.note(block.line, word, CODES[letter].listed)
-        elif letter in SPINDLE:
-            CODES[SPINDLE[letter]].act(state, block, SPINDLE[letter])
-            state.note(block.line, word, CODES["M8"].listed)
         elif letter in PASSIVE or letter in REFUSED:
             state.note(block.line, word, PASSIVE.get(letter) or REFUSED[letter])
             if letter in ("M103", "M112", "M118", "M120", "M124", "M101"):
@@ -155,3 +151,13 @@ def listed(state: State, block: CurrentBlock, code: str) -> None:
     """A statement that leaves the path alone; its words go with it."""
     block.free.clear()
     state.note(block.line, block.block.words[0], "leaves the path as it is")
+
+
+def left_out(state: State, block: CurrentBlock, code: str) -> None:
+    """A cycle that makes no cut and whose moves are the control's: after probing the tool's place is not known."""
+    probes, shown = code.startswith("TCH"), block.block.words[0].text
+    block.free.clear()
+    what = "probing; where it sets the datum, that is program zero" if probes else "a cycle of the machine builder's"
+    state.warnings.append(Remark(f"{shown} is left out of the path: {what}", block.line))
+    if probes:
+        state.plain.unknown |= {0, 1, 2}

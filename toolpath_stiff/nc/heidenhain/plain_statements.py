@@ -8,7 +8,7 @@ PLAIN = re.compile(
     r"(?:\s*F\s*(?:(MAX)|(\d{0,5}[1-9]\d{0,5}(?:\.\d*)?)))?\s*(?:;.*)?",
     re.IGNORECASE,
 )
-EMPTY = re.compile(r"\s*\d*\s*(?:[;*].*)?")
+EMPTY = re.compile(r"\s*\d*\s*(?:[;*%].*)?")
 CORNER = re.compile(r"\s*/?\s*(?:N?\d+\s)?\s*(?:RND|CHF)\b", re.IGNORECASE)
 INCH = re.compile(r"\s*(?:N?\d+\s+)?BEGIN\s+PGM\b.*\bINCH\s*(?:;.*)?$", re.IGNORECASE)
 

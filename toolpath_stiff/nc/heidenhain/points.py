@@ -43,7 +43,8 @@ def in_plane(state: State, point: list[float]) -> complex:
 def named(state: State, block: CurrentBlock) -> dict[int, float]:
     """Axis -> coordinate of the axis words, steps added to the present point; they then count as used."""
     words = block.free & WORDS_OF_AXES.keys()
-    here, there = present(state), dict[int, float]()
+    relative = state.plain.shorter or any(letter[0] == "I" for letter in words)
+    here, there = present(state) if relative else [], dict[int, float]()
     for letter in sorted(words):
         axis, value = WORDS_OF_AXES[letter], block.values[letter].value
         value = value * state.length_scale if axis < 3 else value

@@ -6,6 +6,7 @@ straight statements, most of a CAM system's program, are written as G0 and G1 an
 
 import math
 import re
+from contextlib import nullcontext, suppress
 from pathlib import PurePath
 
 from toolpath_stiff.errors import InputError
@@ -20,8 +21,9 @@ from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
-from toolpath_stiff.nc.program_run import ProgramRun, Subprogram, Tally, beyond_the_end
+from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.state import CurrentBlock, Flow
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import Block, Word
@@ -49,9 +51,11 @@ class HeidenhainRun(ProgramRun):
         self._row = 0
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
-        """Count plain statements."""
-        for row in words.count.nonzero()[0] + first if self.tally is not None else ():
-            self._count(self._statement(int(row)))
+        """Count plain statements, which are all L."""
+        rows = words.count.nonzero()[0]
+        if self.tally is not None and len(rows):
+            self._count(self._statement(first + int(rows[0])))
+            self.tally.count["L"] += len(rows) - 1
 
     @staticmethod
     def meaning(code: str) -> str:
@@ -66,7 +70,7 @@ class HeidenhainRun(ProgramRun):
     def _steered(self, row: int) -> int:
         """Carry out the statement in a line; where the run goes on."""
         self._row = row
-        self._step(row)
+        self._count_block(row)
         try:
             return self._carried_out(row, self._statement(row))
         except InputError as error:
@@ -131,7 +135,10 @@ class HeidenhainRun(ProgramRun):
             word = words[place]
             # Of axes that the control turns to a plane 0, which counts in an untilted one alone.
             turns = word.letter in ("A", "B", "C") and text.lstrip("+-") in TILTING
-            words[place] = word._replace(value=0.0 if turns else self._value(row, text, word.column))
+            with suppress(InputError) if statement.head.startswith("BLK") else nullcontext():  # a blank not known yet
+                word = word._replace(value=math.nan)
+                word = word._replace(value=0.0 if turns else self._value(row, text, word.column))
+            words[place] = word
         line = statement.line if row < self._main_lines else self._line_of_call()
         head = Word("", 0.0, statement.column, statement.head)
         block = CurrentBlock(self.name, Block(line, (head, *words), optional=statement.optional))
@@ -179,7 +186,7 @@ class HeidenhainRun(ProgramRun):
             raise self._fail(row, f"{head}{rest}: turning is not supported", "FUNCTION MODE MILL")
         elif head == "FN14":
             raise self._fail(row, f"the program stops with its error {rest.strip()}", "a program that runs through")
-        elif head in OF_CONTROL:  # what it reads is not known from here on
+        elif head in OF_CONTROL or head.startswith("TCH"):  # what it reads is not known from here on
             for name in re.findall(r"Q\d+", rest):
                 self.state.plain.parameters.pop(name, None)
         elif head[0] == "Q" or head in FORMULAS:

@@ -8,6 +8,7 @@ the TNC 640, "Programming fundamentals", "Structuring programs", "Fixed cycles")
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up
@@ -15,7 +16,7 @@ from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.words import LONGEST_BLOCK, MOST_DIGITS, Word
 
 NUMBER = r"(?:\d+[.,]?\d*|[.,]\d+)"
-VALUE = rf"[+-]?\s*(?:{NUMBER}|Q[LR]?\d+)"
+VALUE = rf"(?:[+-]\s*)?(?:{NUMBER}|Q[LR]?\d+)"
 _BEGIN = re.compile(r"\s*(/?)\s*(?:N?\d+(?![\d.,])\s*)?(/?)\s*", re.IGNORECASE)
 _COMMENT = re.compile(r'"[^"]*"|;.*')
 _HEAD = re.compile(
@@ -29,7 +30,8 @@ _WORD = re.compile(
     rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
     rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
     r"|([XYZABCUVW])(?![A-Z])"
-    rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"|[FRM](?![A-Z\d])",
+    rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"|[FRM](?![A-Z\d])"
+    r"|\([^)]*\)?|(\S)",  # a remark, as simulators have it; what is no word
 )
 _LABEL = re.compile(r'\s*/?\s*(?:N?\d+\s+)?/?\s*LBL\s*(?:0*(\d+)|"([^"]*)")\s*$')
 PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
@@ -39,7 +41,7 @@ _OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|17)\.[1-5])")
 _VALUES = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
 # Heads whose rest has another form, or does not matter.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
+    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|TCH|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
     r"|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 
@@ -78,27 +80,33 @@ def labels(lines: Sequence[str], first: int, stop: int) -> dict[str, list[int]]:
     return places
 
 
+@lru_cache(256)
+def _form(head: str) -> tuple[str, re.Pattern[str] | None, bool]:
+    """A head as messages have it, what is looked for behind it alone, and whether words follow it."""
+    shown = " ".join(head.split()).replace(",", ".").replace("FN ", "FN").rstrip(": ")
+    if shown.startswith("CYCL DEF"):
+        shown = "CYCL DEF " + shown.removeprefix("CYCL DEF").replace(" ", "")
+    special = _INCH if shown == "BEGIN PGM" else _NUMBER_BEHIND if _OLD.match(shown) else None
+    return shown, special, special is None and look_up(shown) is not None and not _OTHERWISE.match(shown)
+
+
 def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
     """The statement that begins in a line (from 0), with what continues it. Raises `InputError`."""
     text, after, place = code_text(lines[row]), row + 1, Place(name, row + 1)
     begin = _BEGIN.match(text)
     assert begin is not None
     head = _HEAD.match(text, begin.end())
-    if begin.end() == len(text) or text[begin.end()] in "*(":
+    if begin.end() == len(text) or text[begin.end()] in "*(%":
         return PlainStatement(row + 1, "", 1, (), {}, "", False, after)
     if head is None:
         raise place.fail(
             f"{text[begin.end() :][:20]!r} is no statement", "Heidenhain's plain language", "", begin.end() + 1
         )
-    shown = " ".join(head[0].split()).replace(",", ".").replace("FN ", "FN").rstrip(": ")
-    if shown.startswith("CYCL DEF"):
-        shown = "CYCL DEF " + shown.removeprefix("CYCL DEF").replace(" ", "")
+    shown, special, has_words = _form(head[0])
     if len(text) > LONGEST_BLOCK:
         raise place.fail(f"a statement of {len(text)} characters", f"at most {LONGEST_BLOCK}")
     end, cycle = head.start() if shown == "M" else head.end(), shown.startswith("CYCL DEF") and "." not in shown
     rest, words, computed = text[end:], list[Word](), dict[int, str]()
-    special = _INCH if shown == "BEGIN PGM" else _NUMBER_BEHIND if _OLD.match(shown) else None
-    has_words = special is None and look_up(shown) is not None and not _OTHERWISE.match(shown)
     if special is not None and (number := special.search(text, end)):
         _add(words, computed, number[1] or "#", number[2].replace(",", "."), number.start() + 1, number[0].strip())
     if has_words:
@@ -115,17 +123,11 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
 
 def _words(words: list[Word], computed: dict[int, str], text: str, position: int, place: Place, head: str) -> None:
     """Add the words of a text from a position on."""
-    while position < len(text):
-        if text[position].isspace():
-            position += 1
-            continue
-        if text[position] == "(":  # a remark, as simulators have it
-            position = (text.find(")", position) + 1) or len(text)
-            continue
-        match = _WORD.match(text, position)
-        if match is None:
-            raise place.fail(f"{text[position : position + 12]!r} is no word of {head}", "", "", position + 1)
-        flag, key, value, parameter, given, axis, table, bare, quoted = match.groups()
+    for match in _WORD.finditer(text, position):
+        flag, key, value, parameter, given, axis, table, bare, quoted, wrong = match.groups()
+        column = match.start() + 1
+        if wrong is not None:
+            raise place.fail(f"{text[column - 1 : column + 11]!r} is no word of {head}", "", "", column)
         key = (
             "".join(flag.split())
             if flag
@@ -133,12 +135,11 @@ def _words(words: list[Word], computed: dict[int, str], text: str, position: int
         )
         written = "".join((value or given or bare or (table or "")[1:]).split()).replace(",", ".")
         if sum(map(str.isdigit, written)) > 2 * MOST_DIGITS:
-            raise place.fail(f"a number of {len(written)} characters", "", "", position + 1)
+            raise place.fail(f"a number of {len(written)} characters", "", "", column)
         if key == "M":
             key = f"M{written.lstrip('+0') or '0'}"
         if match.lastindex:  # else F, R or M alone, which changes nothing
-            _add(words, computed, key, written, position + 1, quoted if quoted is not None else match[0])
-        position = match.end()
+            _add(words, computed, key, written, column, quoted if quoted is not None else match[0])
 
 
 def _add(words: list[Word], computed: dict[int, str], key: str, written: str, column: int, text: str) -> None:

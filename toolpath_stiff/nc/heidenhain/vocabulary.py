@@ -4,6 +4,7 @@ The functions are in `contour`, `approach`, `coordinates`, `cycles`, `functions`
 FN). M functions that mean what they mean in G code are the one table's (`codes.registry`).
 """
 
+import re
 from functools import lru_cache
 
 from toolpath_stiff.nc.codes.code import Act, Code, Refused, holds_anyway
@@ -84,6 +85,8 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("|".join(f"CYCL DEF 17.{part}" for part in range(4)), cycles.define_older, "tapping, of older controls"),
     )),
     ("motion", _PATTERNS, (("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),)),
+    ("motion", _SPECIAL, (("CYCL DEF 300", functions.left_out, "300 to 399: the machine builder's, left out"),)),
+    ("motion", f"{_CYCLES}, Touch probe cycles", (("TCH PROBE", functions.left_out, "probing, left out"),)),
     ("dwell", _SPECIAL, (("CYCL DEF 9.1", functions.dwell, "dwell"),)),
     ("path control", _SPECIAL, (
         ("CYCL DEF 9.0|CYCL DEF 13.0|CYCL DEF 13.1|CYCL DEF 32.0|CYCL DEF 32.1|CYCL DEF 32.2|CYCL DEF 32.3", _LISTED,
@@ -111,7 +114,6 @@ STATEMENTS: dict[str, Code] = {
     for name in names.split("|")
 }
 OWN = {
-    "M13": "spindle on, coolant", "M14": "spindle on, reversed, coolant",
     "M89": "the cycle after each positioning", "M99": "the cycle here", "M91": "machine coordinates",
     "M92": "points of the machine builder", "M126": "rotary axes go the shorter way", "M127": "they go as programmed",
     "M128": "tool centre point control", "M129": "tool centre point control off", "M140": "retract along the tool",
@@ -125,7 +127,6 @@ _REFUSED = (
      "a tilted plane given otherwise", "PLANE SPATIAL", _PLANE),
     ("CYCL-DEF-204", "back boring", _BY_MOVES, _DRILLING),
     ("CYCL-DEF-208", "a helix whose way in the manual draws without numbers", _BY_MOVES, _DRILLING),
-    ("TCH-PROBE", "probing", "leave probing out", f"{_CYCLES}, Touch probe cycles"),
     ("SEL PATTERN CALL CYCL-CALL-PAT", "points of other files or patterns", "post the points one by one", _PATTERNS),
     ("FN17 FN26 FN27", "data of the control or of a table", "put the numbers into the program", _Q),
     ("SPL", "a spline", "post lines and arcs", PATHS),
@@ -137,9 +138,13 @@ REFUSED: dict[str, Refused] = {
 }
 
 
+_BUILDERS = re.compile(r"CYCL DEF 3\d\d")
+
+
 @lru_cache(256)
 def look_up(head: str) -> Code | None:
-    """The row of a statement's head; of Q parameters that of "Q"."""
+    """The row of a statement's head; of Q parameters that of "Q", of the machine builder's cycles that of 300."""
+    head = "TCH PROBE" if head.startswith("TCH PROBE") else "CYCL DEF 300" if _BUILDERS.fullmatch(head) else head
     return STATEMENTS.get("Q" if (head[0] == "Q" and head[1:2].isdigit()) or head[:2] in ("QL", "QR") else head)
 
 

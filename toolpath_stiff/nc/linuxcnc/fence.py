@@ -1,12 +1,14 @@
 """Programs that `rs274` is never given.
 
 LinuxCNC executes Python in comments (`;py,...`, `(py,...)`, `(pyrun,...)`), user M codes (M100 to M199) as executables,
-and subprograms of other files. A program with these is refused here, before anything is started. The copy that rs274
-reads has no comments at all, so the first would not run even if it passed.
+and subprograms of other files. A program with these is refused here, before anything is started; user M codes that
+stand plainly in their block are taken out of the copy, with a warning each. That copy has no comments at all, so
+Python would not run even if it passed.
 """
 
 import re
 from collections.abc import Iterable
+from dataclasses import replace
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.linuxcnc.inputs import NAMED, Line
@@ -20,6 +22,21 @@ M_WORD = re.compile(r"M(?!OD)([+-]?[0-9.]+)?", re.ASCII)
 SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
 M98 = re.compile(r"M[+]?0*98(?!\d)")
 NUMBER_ONLY = re.compile(r"O(\d+)$")
+
+
+USER_CODE = re.compile(r"M0*1\d\d(?![\d.])", re.ASCII)
+PARAMETER = re.compile(r"[PQ][+-]?(?:\d+\.?\d*|\.\d+|#+\d*)", re.ASCII)
+
+
+def without_user_codes(line: Line) -> Line:
+    """A line without its user M codes and their P and Q; beside a G code, whose these may be, such a line stays."""
+    codes, parameters = [*USER_CODE.finditer(line.plain)], [*PARAMETER.finditer(line.plain)]
+    if not codes or line.words.startswith("O") or (parameters and "G" in line.plain):
+        return line
+    taken = {place for match in (*codes, *parameters) for place in range(*match.span())}
+    kept = [place for place in range(len(line.words)) if place not in taken]
+    words, columns = "".join(line.words[place] for place in kept), [line.columns[place] for place in kept]
+    return replace(line, words=words, columns=columns, user_codes=tuple(match[0] for match in codes))
 
 
 def refuse_other_programs(lines: Iterable[Line], name: str) -> None:

@@ -50,6 +50,7 @@ class Line:
     words: str
     columns: Sequence[int] = ()
     optional: bool = False
+    user_codes: tuple[str, ...] = ()  # that were taken out of its words
 
     @cached_property
     def plain(self) -> str:

@@ -8,7 +8,7 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import LISTED
 from toolpath_stiff.nc.linuxcnc.canon import Follower
-from toolpath_stiff.nc.linuxcnc.fence import refuse_other_programs
+from toolpath_stiff.nc.linuxcnc.fence import refuse_other_programs, without_user_codes
 from toolpath_stiff.nc.linuxcnc.inputs import (
     Line,
     first_offset,
@@ -31,6 +31,7 @@ SETS_G54 = re.compile(r"L0*20?(?!\d).*P0*[01](?!\d)|P0*[01](?!\d).*L0*20?(?!\d)"
 G_OR_M_WORD = re.compile(r"([GM])([0-9]+\.?[0-9]*)")
 WAITS = re.compile(r"M0*66(?!\d)")
 WAITING = "M66 waits for an input that is not there; what depends on it may differ"
+USER = "{} runs a program of its machine's (M100 to M199): taken as nothing"
 NO_SHIFT = (0.0, 0.0, 0.0)
 
 
@@ -47,7 +48,7 @@ def read(request: Request) -> ReadProgram:
 
 def fenced(source: Sequence[str], name: str) -> list[Line]:
     """The lines of a program. Raises `InputError` for one that the interpreter is not started on."""
-    lines = split(source, name)
+    lines = [without_user_codes(line) for line in split(source, name)]
     refuse_other_programs(lines, name)
     return lines
 
@@ -89,6 +90,7 @@ class _Session:
             unsupported=tuple(self._unsupported()),
             warnings=(
                 *([ORIGIN_WINS] if source == "option" and given else ()),
+                *(Remark(USER.format(code), line.number) for line in self.lines for code in line.user_codes),
                 *(Remark(WAITING, line.number) for line in self.lines if WAITS.search(line.plain)),
             ),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program"),

@@ -6,9 +6,11 @@ that the caller names, and from nowhere else. Bounded: the blocks that run, and 
 """
 
 from bisect import bisect_right
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
@@ -20,11 +22,13 @@ from toolpath_stiff.nc.parametric.macro_calls import MACRO_CALLS, call_of
 from toolpath_stiff.nc.parametric.statements import Assignment, Statement, Steering, read_statement, worked_out
 from toolpath_stiff.nc.parametric.structure import Structure, structure_of
 from toolpath_stiff.nc.parametric.variables import Variables
-from toolpath_stiff.nc.program_run import HEAD, ProgramRun, Subprogram, Tally, beyond_the_end
+from toolpath_stiff.nc.program_run import HEAD, ProgramRun
 from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
 from toolpath_stiff.nc.words import Block, Word
 
+Step = Callable[[Any, int, Steering], int | None]  # of a run: its line, what it steers; where the run goes on
 SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
 
 
@@ -108,14 +112,14 @@ class ParametricRun(ProgramRun):
     def _begin(self, level: Subprogram, row: int, column: int) -> None:
         super()._begin(level, row, column)
         if level.arguments is not None:
-            self.variables.levels.append(dict(level.arguments.items()))
+            self.variables.levels.append({**level.arguments})
 
     def _leave(self, row: int) -> int:
         level, back = self._levels[-1], super()._leave(row)
         if level.arguments is not None:
             self.variables.levels.pop()
             if self._levels and self._levels[-1] is level:  # it runs again
-                self.variables.levels.append(dict(level.arguments.items()))
+                self.variables.levels.append({**level.arguments})
         return back
 
     def _target(self, row: int, call: Call) -> tuple[int, int]:
@@ -135,9 +139,9 @@ class ParametricRun(ProgramRun):
     def _steered(self, row: int) -> int | None:
         """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
         self._at = row
-        if any(row == first for first, *_ in self._files):  # the end of the file before it
+        if self._ends_before(row):
             return len(self.lines)
-        self._step(row)
+        self._count_block(row)
         statement = self._statement(row)
         block, steering = statement.block, statement.steering
         self.variables.line = block.line
@@ -150,9 +154,17 @@ class ParametricRun(ProgramRun):
             return None
         if row in self._structure.faults:
             raise self._structure.faults[row]
-        act = STEPS.get(steering.kind)
+        act = self._step(steering.kind)
         to = act(self, row, steering) if act else None
         return row + 1 if to is None else self._jump(row, to)
+
+    def _ends_before(self, row: int) -> bool:
+        """Whether a line is the first of a file: the one before it has ended there."""
+        return any(row == first for first, *_ in self._files)
+
+    def _step(self, kind: str) -> Step | None:
+        """What carries out a kind of block that steers."""
+        return STEPS.get(kind)
 
     def _jump(self, row: int, to: int) -> int:
         if to == row + 1:
@@ -326,7 +338,7 @@ class ParametricRun(ProgramRun):
         return beyond_the_end(what, row, len(rest))
 
 
-STEPS = {
+STEPS: dict[str, Step] = {
     "IF": ParametricRun._if, "ELSEIF": ParametricRun._else, "ELSE": ParametricRun._else,
     "WHILE": ParametricRun._while, "ENDWHILE": ParametricRun._back,
     "REPEAT": ParametricRun._repeat, "ENDREPEAT": ParametricRun._end_repeat,

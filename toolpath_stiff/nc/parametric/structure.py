@@ -10,11 +10,11 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.parametric.statements import Steering
 
 MACRO_LOOPS = ("LOOP", "WHILE LOOP")
-OPENS = ("SUB", "IF", "WHILE", "DO", "REPEAT", *MACRO_LOOPS)
+OPENS = ("SUB", "IF", "WHILE", "DO", "REPEAT", "FOR", "DO UNTIL", *MACRO_LOOPS)  # FOR and DO UNTIL: Siemens
 # What goes on with, or closes, one of these of the same label.
 BELONGS = {
     "ELSEIF": ("IF",), "ELSE": ("IF",), "ENDIF": ("IF",), "ENDSUB": ("SUB",), "ENDWHILE": ("WHILE",), "WHILE": ("DO",),
-    "ENDREPEAT": ("REPEAT",), "END": MACRO_LOOPS,
+    "ENDREPEAT": ("REPEAT",), "END": MACRO_LOOPS, "ENDFOR": ("FOR",), "ENDLOOP": ("LOOP",), "UNTIL": ("DO UNTIL",),
 }  # fmt: skip
 LEAVES = {"BREAK": ("WHILE", "DO"), "CONTINUE": ("WHILE", "DO")}  # LinuxCNC refuses them in a repeat
 
@@ -69,7 +69,7 @@ def structure_of(
                 labels.pop()
         elif loops:
             structure.start[row] = loops[-1]
-        elif kind in MACRO_LOOPS or (kind in OPENS and label not in labels[-1]):
+        elif kind in MACRO_LOOPS or (kind in OPENS and not (label and label in labels[-1])):
             opened.append((row, steering))
             labels[-1].add(label)
             if kind == "SUB":

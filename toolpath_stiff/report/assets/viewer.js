@@ -43,9 +43,9 @@ class Viewer extends Stage {
     const seen = (this.scene.outline?.() ?? cornersOf(this.box)).map((corner) => this.project(corner));
     const [[left, right], [top, bottom]] = [0, 1].map((k) => [Math.min(...seen.map((p) => p[k])),
       Math.max(...seen.map((p) => p[k]))]), wide = right - left, tall = bottom - top;
-    const beside = Math.min(this.scene.beside ?? 90, 0.45 * this.width);
-    this.zoom = Math.max(1e-6, Math.min((this.width - beside) / Math.max(wide, 1e-3), (this.height - (this.scene.frame === false
-      ? 24 : 70)) / Math.max(tall, 1e-3)));
+    const beside = Math.min(this.scene.beside ?? 90, 0.45 * this.width), above = this.scene.frame === false ? 24 : 70;
+    this.zoom = Math.max(1e-6, Math.min((this.width - beside) / Math.max(wide, 1e-3),
+      (this.height - above) / Math.max(tall, 1e-3)));
     this.cx = this.width / 2 - this.zoom * (left + right) / 2;
     this.cy = this.height / 2 - this.zoom * (top + bottom) / 2;
   }

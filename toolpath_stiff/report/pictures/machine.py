@@ -17,6 +17,7 @@ from toolpath_stiff.report.pictures.style import Look, new_figure, panel
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 STRUT, PLATFORM, TOOL, FRAME = BLUE, "#5b6675", "#c2410c", "#9aa4b1"
+COLOURS = {"tool": TOOL, "platform": PLATFORM, "work": FRAME, "base": FRAME}  # of bodies by name, others as struts
 LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
 
 
@@ -58,16 +59,16 @@ def _views_of_elements(machine: MachineTool, pose: FloatArray) -> Figure:
     beyond = "" if stand.reachable[0] else f": out of reach, {stand.describe(0)}"
     figure = new_figure(14.0, 7.4, machine.title, where + beyond)
     bodies = [(name, mm_from_m(points[0])) for name, points in machine.lines(stance)]
-    colours = dict(zip(dict(bodies), (STRUT, FRAME, PLATFORM, TOOL), strict=False))
     for k, (first, second, title) in enumerate(((0, 1, "from above"), (0, 2, "from the front"))):
         axes = panel(figure, 0.84 + 6.86 * k, 0.67, 5.88, 5.2)
         for name, points in bodies:
-            axes.plot(*points[:, [first, second]].T, "o-", color=colours.get(name, PLATFORM), lw=1.8, ms=5)
+            axes.plot(*points[:, [first, second]].T, "o-", color=COLOURS.get(name, STRUT), lw=1.8, ms=5)
             middle = points[:, [first, second]].mean(axis=0)
-            axes.annotate(name, tuple(middle), fontsize=9, color=colours.get(name, PLATFORM), bbox=LABEL)
+            axes.annotate(name, tuple(middle), fontsize=9, color=COLOURS.get(name, STRUT), bbox=LABEL)
         _finish(axes, mm_from_m(stance.position[0])[[first, second]])
         axes.set(title=title, xlabel=f"{'XYZ'[first]} mm", ylabel=f"{'XYZ'[second]} mm")
-    words = [f"{name} {values[0]:.1f}" for name, values in joint_columns(machine, stance.joints).items()]
+    columns = zip(machine.joint_names, joint_columns(machine, stance.joints).items(), strict=True)
+    words = [f"{name} {values[0]:.1f} {column.rpartition('_')[2]}" for name, (column, values) in columns]
     figure.text(0.97, 0.9, "; ".join(words), ha="right", size=9, color=PLATFORM)
     return figure
 

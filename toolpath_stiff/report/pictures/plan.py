@@ -1,8 +1,6 @@
-"""The picture of a plan: how far its rivals would be apart over the workspace, and the planned poses."""
+"""The picture of a plan: its poses, a panel a height."""
 
 from collections.abc import Sequence
-from itertools import product
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,14 +8,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.planning.gap_map import GapMap, gap_map, group_of, height_groups
 from toolpath_stiff.planning.plan import RivalPlan
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.visits import Visits
-from toolpath_stiff.report.colours import INK, NOWHERE, STIFFNESS
-from toolpath_stiff.report.pictures.style import Look, colour_scale, new_figure, panel
+from toolpath_stiff.report.colours import INK
+from toolpath_stiff.report.pictures.style import new_figure
 from toolpath_stiff.report.words import plain, shortened
-from toolpath_stiff.units import deg_from_rad, mm_from_m
+from toolpath_stiff.units import mm_from_m
 
 # Colours told apart by eyes that see no red or green (Okabe and Ito 2008), and shapes beside them.
 MARKS = (
@@ -31,6 +28,7 @@ MARKS = (
 )
 PANEL = 3.5  # inches a side
 MOST_ACROSS = 5  # panels in a row
+MOST_LEVELS = 8  # heights with a panel of their own; more are put together, neighbours with neighbours
 NARROWEST = 8.0  # inches, for the headings
 ROOM = 1.2  # half a panel, of the farthest pose: marks lean and have labels
 CLOSE = 0.06  # m between marks whose labels would cover each other
@@ -38,69 +36,49 @@ ARROW = 0.16  # of the panel's half width, for a tilt of 25 degrees
 
 
 def plan(of: Plan) -> Figure:
-    """The visits, and of a plan between rivals how well each place tells them apart."""
+    """The visits, a panel a height."""
     choice, name = of.choice, of.machine.name
     if isinstance(choice, RivalPlan):
-        gap = gap_map(of.machine, choice, of.effect_files)
-        title = f"What tells {gap.pair[0]} from {gap.pair[1]}"
-        note = f"machine {name}   ·   colour: gap of one pose with the reference tool, X, Y and Z read"
-        return visits_drawn(choice.visits, choice.chosen, choice.kinds, gap, (title, note))
-    clampings, readings = len(choice.visits), len(choice.visits.readings)
-    note = f"machine {name}   ·   {clampings} clampings, {readings} readings; lines: where spindles lean"
-    return visits_drawn(choice.visits, choice.chosen, choice.kinds, None, ("A first campaign", note))
+        first, second = (rival.name for rival in choice.rivals[:2])
+        title, what = f"What tells {first} from {second}", f"{len(choice.chosen)} poses"
+    else:
+        title, what = "A first campaign", f"{len(choice.visits)} clampings, {len(choice.visits.readings)} readings"
+    note = f"machine {name}   ·   {what}; lines: where spindles lean"
+    return visits_drawn(choice.visits, choice.chosen, choice.kinds, (title, note))
 
 
-def visits_drawn(
-    visits: Visits, chosen: Sequence[int], kinds: Sequence[str], gap: GapMap | None, heading: tuple[str, str]
-) -> Figure:
-    """A column a height; with a map one row for vertical and one for tilted poses.
+def visits_drawn(visits: Visits, chosen: Sequence[int], kinds: Sequence[str], heading: tuple[str, str]) -> Figure:
+    """A panel a height.
 
     Parameters
     ----------
     visits, chosen, kinds
         Planned visits in measuring order, and what each changes.
-    gap
-        The gap over the workspace; None: the poses alone.
     heading
         Title, and what it is about.
     """
     poses = visits.pose[list(chosen)]
-    groups = height_groups(poses[:, 2])
-    panel_of = group_of(poses[:, 2], groups)
-    tilted = poses[:, 3:5].any(axis=1)
-    kinds_of_panel = ("",) if gap is None else (", vertical", f", tilted {deg_from_rad(gap.max_tilt):.3g}°")
+    heights = np.round(poses[:, 2], 4)
+    groups = np.array_split(np.unique(heights), min(len(np.unique(heights)), MOST_LEVELS))
     across = -(-len(groups) // -(-len(groups) // MOST_ACROSS))  # as many as fit, the rows filled evenly
-    rows = -(-len(groups) // across) * len(kinds_of_panel)
-    right = 0.35 if gap is None else 1.2
-    width = max(across * PANEL + 0.75 + right, NARROWEST)
+    rows = -(-len(groups) // across)
+    width = max(across * PANEL + 1.1, NARROWEST)
     height = rows * (PANEL + 0.35) + 1.9
-    farthest = max(mm_from_m(float(np.abs(poses[:, :2]).max())), mm_from_m(gap.x[-1]) if gap is not None else 1.0)
+    farthest = max(mm_from_m(float(np.abs(poses[:, :2]).max())), 1.0)
     numbers = _numbers(visits, chosen)
     figure = new_figure(width, height, shortened(plain(heading[0]), 90), shortened(plain(heading[1]), 130), 0.75)
     grid = figure.add_gridspec(
-        rows, across, left=0.75 / width, right=1 - right / width, bottom=1.05 / height,
+        rows, across, left=0.75 / width, right=1 - 0.35 / width, bottom=1.05 / height,
         top=1 - 1.15 / height, wspace=0.12, hspace=0.2,
     )  # fmt: skip
-    highest = 1e-6 if gap is None else max(1e-6, float(np.nanmax([gap.vertical, gap.tilted])))
-    drawn: Any = None
-    for (which, group), (leaning, words) in product(enumerate(groups), enumerate(kinds_of_panel)):
-        row, column = which // across * len(kinds_of_panel) + leaning, which % across
-        axes = figure.add_subplot(grid[row, column])
-        if gap is not None:
-            axes.set_facecolor(NOWHERE)
-            values = (gap.vertical, gap.tilted)[leaning][which]
-            look: Look = {"cmap": STIFFNESS, "vmin": 0.0, "vmax": highest, "shading": "nearest"}
-            drawn = axes.pcolormesh(mm_from_m(gap.x), mm_from_m(gap.y), values, **look)
-        here = (panel_of == which) & ((tilted == bool(leaning)) | (gap is None))
-        _marks(axes, poses, kinds, numbers, np.flatnonzero(here), ROOM * farthest)
+    for which, group in enumerate(groups):
+        axes = figure.add_subplot(grid[which // across, which % across])
+        _marks(axes, poses, kinds, numbers, np.flatnonzero(np.isin(heights, group)), ROOM * farthest)
         low, high = (f"{mm_from_m(float(group[end])):.5g}" for end in (0, -1))
-        axes.set_title(f"z = {low}{'' if low == high else f' to {high}'} mm{words}", fontsize=10)
-        below = which + across >= len(groups) and leaning == len(kinds_of_panel) - 1
-        axes.set(xlabel="X mm" if below else "", ylabel="Y mm" if column == 0 else "")
-        axes.tick_params(labelleft=column == 0, labelbottom=below)
-    if drawn is not None:
-        bar = panel(figure, width - 0.95, 1.05, 0.18, height - 2.2)
-        colour_scale(drawn, bar, "gap at one pose, standard deviations", thousands=False)
+        axes.set_title(f"z = {low}{'' if low == high else f' to {high}'} mm", fontsize=10)
+        below, first = which + across >= len(groups), which % across == 0
+        axes.set(xlabel="X mm" if below else "", ylabel="Y mm" if first else "")
+        axes.tick_params(labelleft=first, labelbottom=below)
     _legend(figure, kinds)
     return figure
 

@@ -28,7 +28,7 @@ class FrameSway(Effect):
     name = "frame_sway"
     title = "the frame as a whole gives way"
     link = "frame"
-    every_kind = True
+    holds_for = "all"
     equation = "c += c_h (d_x^2 + d_y^2) + c_v d_z^2 + c_t ((p x d)_x^2 + (p x d)_y^2)"
     source = "springs in series, base axes"
     clause = "the frame as a whole gives way by about {sizes}"

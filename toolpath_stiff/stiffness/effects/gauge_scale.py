@@ -24,7 +24,7 @@ class GaugeScale(Effect):
     name = "gauge_scale"
     title = "a gauge's readings are off by a factor"
     link = "instrument"
-    every_kind = True
+    holds_for = "all"
     equation = "k_read = (1 + s) k, for one direction, one set-up, or both"
     source = "wrong range, unit or lever of a force gauge or indicator"
     parameters = (

@@ -21,7 +21,7 @@ class LoadCellCurvature(Effect):
     name = "load_cell_curvature"
     title = "the load cell is curved with load"
     link = "instrument"
-    every_kind = True
+    holds_for = "all"
     equation = "k_read = (1 + q F) k"
     source = "the first term of a load cell's deviation from its straight line, F_read = F + q F^2"
     needs = ("force_N",)

@@ -12,7 +12,7 @@ class SetupCompliance(Effect):
     name = "setup_compliance"
     title = "one set-up's riser or fixture gives way"
     link = "table"
-    every_kind = True
+    holds_for = "all"
     equation = "c += d^T diag(c_x, c_y, c_z) d where setup = s"
     source = "springs in series, base axes; the paper measured its upper plane on a riser (Figure 6)"
     needs = ("setup",)

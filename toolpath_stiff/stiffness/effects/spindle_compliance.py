@@ -22,7 +22,7 @@ class SpindleCompliance(Effect):
     name = "spindle_compliance"
     title = "spindle, holder and tool give way"
     link = "tool"
-    every_kind = True
+    holds_for = "all"
     equation = "c += (R^T d)^T diag(c_r, c_r, c_a) (R^T d)"
     source = "springs in series; the load's components in platform axes"
     clause = "spindle, holder and tool give way by about {sizes} the tool axis"

@@ -16,7 +16,7 @@ class StandCompliance(Effect):
     name = "stand_compliance"
     title = "the indicator's stand gives way"
     link = "instrument"
-    every_kind = True
+    holds_for = "all"
     equation = "1 / k_read = 1 / k + (c_h + c_t z^2) (d_x^2 + d_y^2) + c_v d_z^2"
     source = "springs in series, base axes; a stand that also takes the load"
     clause = "the stand of the indicator gives way by about {sizes}"

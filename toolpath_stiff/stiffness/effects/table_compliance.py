@@ -26,7 +26,7 @@ class TableCompliance(Effect):
     name = "table_compliance"
     title = "the table gives way under the work"
     link = "table"
-    every_kind = True
+    holds_for = "all"
     equation = "c += d^T diag(c_x, c_y, c_z) d + c_t ((p x d)_x^2 + (p x d)_y^2)"
     source = "springs in series, base axes"
     clause = "the table gives way by about {sizes}"

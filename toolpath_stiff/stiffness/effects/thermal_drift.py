@@ -14,7 +14,7 @@ class ThermalDrift(Effect):
     name = "thermal_drift"
     title = "the indicator drifts while it is read"
     link = "instrument"
-    every_kind = True
+    holds_for = "all"
     equation = "F / k_read = F / k + rate time"
     source = "growth of the loop between work and tip at a constant rate"
     needs = ("time_min",)

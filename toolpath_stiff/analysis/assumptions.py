@@ -1,0 +1,82 @@
+"""What an analysis assumed or recovered rather than read: the sentences of `summary.json`."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from toolpath_stiff.analysis.statistics import EvaluatedPath
+from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.nc.moves import ReadProgram
+from toolpath_stiff.poses import pose_in_mm
+from toolpath_stiff.stiffness.model import acting_effects, conditions_stated
+from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s
+
+
+def assumptions_of(analysis: EvaluatedPath, turned: str = "") -> list[str]:
+    """Everything that was assumed or recovered rather than published or given; `turned`: how the tool was turned."""
+    machine, model = analysis.machine, analysis.model
+    sentences = list(analysis.program.assumptions)
+    if words_turn_the_platform(analysis.program) and isinstance(machine, Hexapod):
+        sentences.append(
+            "A, B, C of the program are roll, pitch, yaw of the platform (see [kinematics] of controller files)"
+        )
+    if analysis.origin_source == "default":
+        sentences.append(
+            f"program zero (G54) sits at {pose_words(analysis.origin, 'g')} in machine coordinates, the machine's "
+            f"default; --origin puts it elsewhere"
+        )
+    for quantity, origin in machine.origins.items():
+        if origin != "published":
+            remark = machine.remarks.get(quantity)
+            sentences.append(f"machine {machine.name}: {quantity} {origin}" + (f": {remark}" if remark else ""))
+    secant = "; the stiffness is the secant one at this load" if model.load_dependent else ""
+    sentences += [
+        f"rapid moves take {mm_per_min_from_m_per_s(machine.rapid_feed):g} mm/min (time only)",
+        *conditions_stated(model),
+        f"a force of {analysis.force:g} N for deflections{secant}: these are along the load, under an assumed force, "
+        "not an error of the surface (--cut computes that)",
+    ]
+    if isinstance(machine, Hexapod):
+        law = machine.strut_law
+        low, high = sorted((mm_from_m(law.length_1), mm_from_m(law.length_2)))
+        range_of_law = f"the strut law is extrapolated outside {low:.1f} to {high:.1f} mm of strut length"
+        sentences.append("the stiffness of a strut is the same at every length" if law.constant else range_of_law)
+    else:
+        sentences += _of_elements(analysis, turned)
+    if analysis.parameter_band is not None:
+        whole = ", of struts, joints and what the model lacks, as `[uncertainty.errors]` of the machine file has them"
+        beside = whole if analysis.parameter_band.form.any() else " alone"
+        sentences.append(
+            f"the band of the stiffness holds the uncertainty of the fitted parameters{beside}, propagated linearly: "
+            f"{', '.join(analysis.parameter_band.names)}"
+        )
+    if not acting_effects(model) and isinstance(machine, Hexapod):
+        sentences.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
+    return sentences
+
+
+def _of_elements(analysis: EvaluatedPath, turned: str) -> list[str]:
+    """What is assumed of a machine of elements on a path."""
+    machine = analysis.machine
+    names = ", ".join(dict.fromkeys(element.name for element in machine.elements))
+    sentences = [f"what gives way is {names}; everything else is rigid"]
+    if analysis.at.configuration:
+        sentences.append(f"the configuration of the joints is kept over the program: {analysis.at.configuration}")
+    if turned:
+        sentences.append(turned)
+    elif len(machine.joint_names) > 5:
+        sentences.append("the tool's turn about its own axis is as programmed (C; 0 unless said) and not chosen")
+    if np.isnan(machine.reference_tool_length) and not np.isnan(analysis.samples.tool_length).all():
+        sentences.append("tools of the program are as long as the machine file's tool, which states no length")
+    return sentences
+
+
+def words_turn_the_platform(program: ReadProgram) -> bool:
+    """Whether rotary words were taken for the platform's own angles."""
+    return program.native and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())
+
+
+def pose_words(pose: Sequence[float], digits: str) -> str:
+    """A pose as a control shows it, angles only where there are some."""
+    words = [f"{axis}{value:{digits}}" for axis, value in zip("XYZABC", pose_in_mm(pose), strict=True)]
+    return " ".join(words if any(pose[3:]) else words[:3])

@@ -1,0 +1,182 @@
+r"""The height that a piece of the path leaves above a point, and the least over many pieces, on arrays or compiled.
+
+The surface that a piece leaves above a point is the lowest height of the cutter's envelope while its axis passes:
+z0 + m s + p(d(s)) least over s, where p is the profile of the cutter's end, d(s) the distance of the point from the
+axis. Level pieces have it at the nearest point of the path, others down the slope from there, where the normal of the
+envelope is square to the motion. On an arc these lengths are taken along the circle through the point.
+
+The formulas take arrays or numbers, and so the loops over them run where numba compiles them (`compiled`).
+"""
+
+import math
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
+
+CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
+NEWTON = 8  # steps: heights to 1e-9 m
+FLATTEST = 1e-6  # slope; the heights of less differ by less than a nanometre
+Index = tuple[IntArray, IntArray, IntArray, FloatArray]
+Grid = tuple[FloatArray, float, int]
+
+
+def foot(part: AnyArray, x: FloatArray, y: FloatArray, arc: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Place along the whole line or circle of a piece that is nearest to a point, distance from there, and one more.
+
+    This is the square of the unit of the place, m2, at the point; of lines 0.
+    """
+    dx, dy, extent = x - part["x"], y - part["y"], part["extent"]
+    if not arc:
+        return dx * part["cos"] + dy * part["sin"], np.abs(dx * part["sin"] - dy * part["cos"]), 0.0 * dx
+    angle = part["turn"] * (np.arctan2(dy, dx) - part["heading"])
+    along = (angle - 0.5 * extent + np.pi) % (2.0 * np.pi) - np.pi + 0.5 * extent
+    radius, spoke = part["radius"] + part["growth"] * within(along, extent), np.sqrt(dx * dx + dy * dy)
+    return along, np.abs(spoke - radius), np.maximum(spoke * radius, 1e-18)
+
+
+def within(along: FloatArray, extent: FloatArray) -> FloatArray:
+    """The place on a piece that is nearest to one along its whole line or circle."""
+    return np.minimum(np.maximum(along, 0.0), extent)
+
+
+def distance(beside: FloatArray, away: FloatArray, spoke: FloatArray, arc: bool) -> FloatArray:
+    """M from a point to the axis at a place so far `away` from the point's foot."""
+    across = 4.0 * spoke * np.sin(0.5 * away) ** 2 if arc else away**2
+    whole: FloatArray = np.sqrt(beside**2 + across)
+    return whole
+
+
+def rise(reach: FloatArray, flat: FloatArray, beside: FloatArray) -> FloatArray:
+    """M, height of the cutter's end above its tip at a distance from the axis of up to its radius."""
+    corner, inset = reach - flat, np.maximum(beside - flat, 0.0)
+    return corner - np.sqrt(np.maximum(corner * corner - inset * inset, 0.0))
+
+
+def down_slope(
+    slope: FloatArray, beside: FloatArray, reach: FloatArray, flat: FloatArray, bull: bool = True
+) -> FloatArray:
+    """M, how far down a slope (above 0) from the nearest point the envelope is lowest, `beside` at most the radius.
+
+    kappa, between axis and normal, solves (a + r sin kappa)^2 (1 - m^2 cot^2 kappa) = d^2: cos^2 of it by Newton's
+    rule, from a start that is right for a flat end and for a ball.
+    """
+    slope = np.maximum(slope, FLATTEST)
+    corner, room = reach - flat, np.maximum(1.0 - (beside / reach) ** 2, 0.0)
+    square = room / (room + slope * slope + (1.0 - room) * corner / reach)
+    for _ in range(NEWTON if bull else 0):
+        sine = np.sqrt(1.0 - square)
+        out, rest = flat + corner * sine, 1.0 - slope * slope * square / (1.0 - square)
+        change = out * corner / sine * rest + (out * slope / (1.0 - square)) ** 2
+        square = square + (out * out * rest - beside * beside) / change
+        square = np.minimum(np.maximum(square, 0.0), room / (room + slope * slope))
+    return slope * (flat + corner * np.sqrt(1.0 - square)) * np.sqrt(square / (1.0 - square))
+
+
+def height_above(
+    part: AnyArray, along: FloatArray, beside: FloatArray, spoke: FloatArray, arc: bool, sloped: bool, bull: bool = True
+) -> FloatArray:
+    """M, lowest height of the cutter's envelope above a point within its reach, whose foot this is."""
+    place = along
+    if sloped:
+        unit = np.sqrt(spoke) if arc else 1.0 + 0.0 * along
+        down = down_slope(np.abs(part["slope"]) / unit, beside, part["reach"], part["flat"], bull) / unit
+        if arc:
+            down = 2.0 * np.arcsin(np.minimum(0.5 * down, 1.0))  # along the circle, whose chord this is
+        place = along - np.sign(part["slope"]) * down
+    place = within(place, part["extent"])
+    from_axis = np.minimum(distance(beside, place - along, spoke, arc), part["reach"])
+    return part["z"] + part["slope"] * place + rise(part["reach"], part["flat"], from_axis)
+
+
+def bounds(
+    part: AnyArray, x: FloatArray, y: FloatArray, half: float, arc: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """M from a piece to the middle of a cell of diagonal 2 `half`; what it leaves there is between the others."""
+    along, beside, spoke = foot(part, x, y, arc)
+    place, reach, flat = within(along, part["extent"]), part["reach"], part["flat"]
+    far = distance(beside, place - along, spoke, arc)
+    below = part["z"] + np.minimum(part["slope"] * part["extent"], 0.0)
+    below += rise(reach, flat, np.minimum(np.maximum(far - half, 0.0), reach))
+    return far, below, part["z"] + part["slope"] * place + rise(reach, flat, np.minimum(far + half, reach))
+
+
+def bound_pairs(pieces: AnyArray, piece: IntArray, x: FloatArray, y: FloatArray, half: float, rows: FloatArray) -> None:
+    """Enter `bounds` of pairs of a piece and a cell as rows (3, k)."""
+    for e in range(len(piece)):
+        part = pieces[piece[e]]
+        rows[0, e], rows[1, e], rows[2, e] = bounds(part, x[e], y[e], half, part["turn"] != 0.0)
+
+
+def first_from(piece: IntArray, low: int, high: int, value: int) -> int:
+    """First of the entries low to high whose piece is no less than the value."""
+    while low < high:
+        middle = (low + high) // 2
+        if piece[middle] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+def lower(
+    pieces: AnyArray,
+    grid: Grid,
+    index: Index,
+    points: tuple[FloatArray, FloatArray],
+    window: tuple[IntArray, IntArray],
+    late: tuple[IntArray, float],
+    result: tuple[FloatArray, IntArray],
+) -> None:
+    """Lower the tops and set the owners of points in `result`, as `Workpiece.tops` has them."""
+    (corner, size, columns), (starts, piece, counts_from, below) = grid, index
+    (x, y), (slack_from, slack), (top, owner) = points, late, result
+    for i in range(len(x)):
+        row, column = math.floor((x[i] - corner[0]) / size), math.floor((y[i] - corner[1]) / size)
+        cell = row * columns + column
+        if row < 0 or column < 0 or column >= columns or cell + 1 >= len(starts):
+            continue
+        low, high = starts[cell], first_from(piece, starts[cell], starts[cell + 1], window[1][i])
+        if window[0][i] > 0:
+            low = first_from(piece, low, high, window[0][i])
+        elif high > low:
+            low = max(low, counts_from[high - 1])
+        best, last = float(math.inf), -1
+        for entry in range(high - 1, low - 1, -1):
+            if below[entry] >= best:
+                continue
+            part = pieces[piece[entry]]
+            arc, smaller = part["turn"] != 0.0, slack if piece[entry] >= slack_from[i] else 0.0
+            along, beside, spoke = foot(part, x[i], y[i], arc)
+            near = distance(beside, within(along, part["extent"]) - along, spoke, arc)
+            least: float = part["z"] + min(part["slope"] * part["extent"], 0.0) + smaller
+            if near > part["reach"] - smaller or least + rise(part["reach"], part["flat"], near) >= best:
+                continue
+            sloped, bull = part["slope"] != 0.0, 0.0 < part["flat"] < part["reach"]
+            height = float(height_above(part, along, beside, spoke, arc, sloped, bull)) + smaller
+            if height < best:
+                last = piece[entry] if height < best - CLEAR else last
+                best = height
+        if best <= top[i] + CLEAR:
+            owner[i] = last
+        top[i] = min(top[i], best)
+
+
+@cache
+def compiled() -> tuple[Callable[..., None], Callable[..., None]]:
+    """`bound_pairs` and `lower`, compiled; kept on disk where a folder can be written. numba takes half a second."""
+    import numba
+
+    for formula in (within, foot, distance, rise, down_slope, height_above, bounds, first_from):
+        numba.extending.register_jitable(formula)
+
+    def loop(function: Callable[..., None]) -> Callable[..., None]:
+        try:
+            quick: Callable[..., None] = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+        except RuntimeError:  # "no locator available"
+            quick = numba.njit(nogil=True, error_model="numpy")(function)
+        return quick
+
+    return loop(bound_pairs), loop(lower)

@@ -1,0 +1,199 @@
+"""Machines of LinuxCNC's kinematics modules besides genhexkins: pins of HAL files, limits and units of ini files.
+
+trivkins(9), 5axiskins(9), xyzac-trt-kins(9), xyzbc-trt-kins(9), genserkins(9), pumakins(9), pentakins(9) and
+lineardeltakins(9); their units are those of the machine, angles of genserkins' rows in rad, limits in degrees.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.unfilled import EXPERIENCE, JOINTS, SPINDLE, axis_row, carriages, file_text, section
+from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
+
+PIN = re.compile(r"(?m)^\s*setp\s+([\w-]+)\.(\S+?)\s*(?:=\s*|\s+)([^\s#]+)")
+RAIL = "# translation_nm_per_N = []  # radial, tangential, vertical (the drive)\n# rotation_nrad_per_Nm = []"
+TABLE = '# The files do not say which axes carry the work: an element with moves_with = ["-X"] does, of X'
+RADIANS = 2.0 * np.pi + 0.01
+
+
+@dataclass(frozen=True)
+class ControlFiles:
+    """What HAL and ini files of one machine say: pins of its kinematics in mm, limits by joint in mm or degrees.
+
+    `coordinates` are the letters of the joints, "" where nobody says.
+    """
+
+    file: str
+    module: str
+    scale: float
+    pins: dict[str, float]
+    limits: dict[int, FloatArray]
+    coordinates: str = ""
+
+    def pin(self, name: str, default: float | None = None) -> float:
+        """The value of a pin. Raises `InputError` where it must be set and is not."""
+        if name not in self.pins and default is None:
+            raise InputError(f"{self.module}.{name} is not set", expected=f"setp {self.module}.{name}", file=self.file)
+        return self.pins.get(name, default or 0.0)
+
+    def length(self, name: str, default: float | None = None) -> float:
+        """Mm of a pin."""
+        return self.pin(name, default) * self.scale
+
+    def bounds(self, joint: int, linear: bool) -> FloatArray | None:
+        """M or rad; None: nobody says."""
+        if joint not in self.limits:
+            return None
+        return m_from_mm(self.limits[joint] * self.scale) if linear else rad_from_deg(self.limits[joint])
+
+    def key(self, name: str, joint: int, linear: bool) -> str:
+        """A row of [limits]: a comment where nobody says."""
+        bounds = self.bounds(joint, linear)
+        unit, shop = ("mm", mm_from_m) if linear else ("deg", deg_from_rad)
+        return f"# {name}_{unit} = []" if bounds is None else section("", {f"{name}_{unit}": shop(bounds)})
+
+
+def control_files(hal: str, ini: str, module: str, scale: float, file: str) -> ControlFiles:
+    """From the texts of both. Raises `InputError` for a pin that is no number."""
+    pins = {}
+    for name, pin, value in PIN.findall(hal):
+        if name == module:
+            try:
+                pins[pin] = float(value)
+            except ValueError:
+                raise InputError(f"{module}.{pin} = {value!r}", expected="a number", file=file) from None
+    limits: dict[int, dict[str, float]] = {}
+    joint = -1
+    for line in ini.splitlines():
+        if heading := re.match(r"\s*\[(\w+)\]", line):
+            number = re.fullmatch(r"JOINT_(\d+)", heading[1])
+            joint = int(number[1]) if number else -1
+        elif joint >= 0 and (bound := re.match(r"\s*(MIN|MAX)_LIMIT\s*=\s*([-+.\deE]+)", line)):
+            limits.setdefault(joint, {})[bound[1]] = float(bound[2])
+    both = {n: np.array([ends["MIN"], ends["MAX"]]) for n, ends in limits.items() if len(ends) == 2}
+    letters = re.search(r"(?im)^\s*KINEMATICS\s*=.*coordinates\s*=\s*([A-Z]+)", ini)
+    letters = letters or re.search(r"(?m)^\s*COORDINATES\s*=\s*([A-Z ]+)", ini)
+    return ControlFiles(file, module, scale, pins, both, letters[1].replace(" ", "") if letters else "")
+
+
+def module_of(hal: str, ini: str) -> str:
+    """The kinematics module that the files load; "" where they load none that is known."""
+    named = re.search(r"(?m)^\s*KINEMATICS\s*=\s*([\w-]+)", ini)
+    words = [named[1]] if named else re.findall(r"(?m)^\s*loadrt\s+([\w-]+)", hal) + [m for m, _, _ in PIN.findall(hal)]
+    return next((word for word in words if word in (*KINDS, "genhexkins", "rotarydeltakins")), "")
+
+
+def machine_from_control(files: ControlFiles, name: str) -> tuple[str, list[str]]:
+    """A machine file and notes. Raises `InputError` for pins that are missing and modules without a kind."""
+    if files.module not in KINDS:
+        known = ", ".join(("genhexkins", *KINDS))
+        raise InputError(f"no machine of {files.module or 'a kinematics module'}", expected=known, file=files.file)
+    kind, parts = KINDS[files.module](files)
+    notes = [f"Made from {files.file}: {files.module}."]
+    if "# X_mm" in "".join(parts) or "# min_" in "".join(parts):
+        notes.append("Limits that no ini file gives are to be filled in.")
+    return file_text(name, kind, f"{files.module} pins of {files.file}", notes, parts), notes
+
+
+def _mill(files: ControlFiles) -> tuple[str, list[str]]:
+    letters = files.coordinates or "XYZ"
+    if left := set(letters) - set("XYZ"):
+        expected = "X, Y, Z; where rotary axes stand trivkins does not say"
+        raise InputError(f"trivkins with axis {min(left)}", expected=expected, file=files.file)
+    rows = [files.key(letter, letters.index(letter), linear=True) for letter in "XYZ" if letter in letters]
+    return "serial", ["\n".join(["[limits]", *rows]), f"{TABLE}\n{SPINDLE}"]
+
+
+def _trunnion(files: ControlFiles) -> tuple[str, list[str]]:
+    letter = files.module[3].upper()
+    keys = [f"{axis}-rot-point" for axis in "xyz"] + ["y-offset" if letter == "A" else "x-offset", "z-offset"]
+    trunnion = {f"{key.replace('-', '_')}_mm": files.length(key, 0.0) for key in keys}
+    if files.pins.get("tool-offset"):
+        raise InputError(f"{files.module}.tool-offset is not 0", expected="joints that place the tip", file=files.file)
+    letters = files.coordinates or f"XYZ{letter}C"
+    rows = [files.key(axis, letters.index(axis), axis in "XYZ") for axis in f"XYZ{letter}C" if axis in letters]
+    parts = [section("", {"convention": f"linuxcnc {files.module}"}), section("[trunnion]", trunnion)]
+    parts.append("\n".join(["[limits]", *rows]))
+    for axis in (letter, "C"):
+        keys_of = {"name": f"{axis} axis", "type": "spring", "side": "work", "centre": axis}
+        give = "# translation_nm_per_N = []\n# rotation_nrad_per_Nm = []"
+        parts.append(f"{section('[[element]]', keys_of)}\n{give}")
+    return "serial", [*parts, SPINDLE]
+
+
+def _head(files: ControlFiles) -> tuple[str, list[str]]:
+    pivot, axes = files.length("pivot-length"), np.eye(3)
+    letters = files.coordinates or "XYZBC"
+    rows = [(name, axes[i], [0.0] * 3) for i, name in enumerate("XYZ")]
+    rows += [("C", axes[2], [0.0, 0.0, pivot]), ("B", -axes[1], [0.0] * 3)]  # B is left-handed
+    parts = []
+    for name, axis, place in rows:
+        bounds = files.bounds(letters.index(name), name in "XYZ") if name in letters else None
+        parts.append(axis_row(name, name in "XYZ", {"xyz_mm": place, "axis": axis}, bounds))
+    tip = section("[tool]", {"tip_mm": [0.0, 0.0, -pivot]})
+    return "serial", [*parts, tip, *carriages([(row[0], "tool") for row in rows]), SPINDLE]
+
+
+def _rows(files: ControlFiles, rows: list[tuple[float, float, float]]) -> tuple[str, list[str]]:
+    """Modified DH rows of alpha in rad, a and d in mm."""
+    parts = []
+    for i, (alpha, a, d) in enumerate(rows):
+        if abs(alpha) > RADIANS:
+            raise InputError(f"{files.module}.ALPHA-{i} = {alpha:g}", expected="rad, not degrees", file=files.file)
+        keys = {"alpha_deg": deg_from_rad(alpha), "a_mm": a, "d_mm": d}
+        parts.append(axis_row(f"J{i + 1}", False, keys, files.bounds(i, linear=False)))
+    return "serial", [*parts, JOINTS, SPINDLE]
+
+
+def _genser(files: ControlFiles) -> tuple[str, list[str]]:
+    return _rows(files, [(files.pin(f"ALPHA-{i}"), files.length(f"A-{i}"), files.length(f"D-{i}")) for i in range(6)])
+
+
+def _puma(files: ControlFiles) -> tuple[str, list[str]]:
+    a2, a3, d3, d4, d6 = (files.length(name) for name in ("A2", "A3", "D3", "D4", "D6"))
+    square = 0.5 * np.pi
+    wrist = [(-square, a3, d4), (square, 0.0, 0.0), (-square, 0.0, d6)]
+    return _rows(files, [(0.0, 0.0, 0.0), (-square, 0.0, 0.0), (0.0, a2, d3), *wrist])
+
+
+def _penta(files: ControlFiles) -> tuple[str, list[str]]:
+    top: Document = {
+        "base_mm": np.array([[files.length(f"base.{i}.{axis}") for axis in "xyz"] for i in range(5)]),
+        "ring_radius_mm": [files.length(f"effector.{i}.r") for i in range(5)],
+        "ring_height_mm": [files.length(f"effector.{i}.z") for i in range(5)],
+    }
+    strut = f"[strut]\n# length_mm =\n# compliance_nm_per_N =  # with both joints, 10 to 30 ({EXPERIENCE})"
+    strut += "\n# slope_nm_per_N_per_m =\n# min_mm =\n# max_mm ="
+    if len(ends := np.array([files.bounds(i, linear=True) for i in range(5) if i in files.limits])):
+        travel = {"min_mm": mm_from_m(float(ends[:, 0].max())), "max_mm": mm_from_m(float(ends[:, 1].min()))}
+        strut = strut.replace("# min_mm =\n# max_mm =", section("", travel))
+    return "pentapod", [section("", top), strut, "[torsion]\n# strut =\n# EI_MNm2 =\n# hinge_nrad_per_Nm =", SPINDLE]
+
+
+def _delta(files: ControlFiles) -> tuple[str, list[str]]:
+    top = section("", {"rod_length_mm": files.length("L")})
+    top += f"\n# carriage_joint_radius_mm =  # less effector_joint_radius_mm: {files.length('R'):g}"
+    top += "\n# effector_joint_radius_mm =\n# rod_spacing_mm =\n# effector_joint_height_mm ="
+    limits = "\n".join(["[limits]", files.key("carriage", 0, linear=True)])
+    carriage = f"[carriage]\n# rail_radius_mm =\n# centre_height_mm =\n{RAIL}"
+    return "delta", [top, limits, "[rod]\n# compliance_nm_per_N =", carriage, SPINDLE]
+
+
+KINDS: dict[str, Callable[[ControlFiles], tuple[str, list[str]]]] = {
+    "trivkins": _mill,
+    "5axiskins": _head,
+    "xyzac-trt-kins": _trunnion,
+    "xyzbc-trt-kins": _trunnion,
+    "genserkins": _genser,
+    "pumakins": _puma,
+    "pentakins": _penta,
+    "lineardeltakins": _delta,
+}

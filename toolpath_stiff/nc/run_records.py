@@ -1,0 +1,58 @@
+"""What a run keeps of its calls, and of its errors and codes for a check."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.nc.moves import Remark
+from toolpath_stiff.nc.words import Block
+
+
+@dataclass
+class Subprogram:
+    """A subprogram that runs.
+
+    Attributes
+    ----------
+    name, first, back, again
+        Its name, first line (from 0), where to go on, and how often it runs again.
+    arguments
+        The local variables with which each of its runs begins; None: it has those of its caller.
+    modal
+        Whether G66 calls it.
+    stop
+        Of a repeated section the line after it; -1: it is a call.
+    """
+
+    name: str
+    first: int
+    back: int
+    again: int
+    arguments: Mapping[Any, float | None] | None = None
+    modal: bool = False
+    stop: int = -1
+
+
+@dataclass
+class Tally:
+    """What a check gathers while a program runs: its errors, and of each code its first place and how often it runs."""
+
+    errors: list[InputError] = field(default_factory=list)
+    first: dict[str, tuple[int, int]] = field(default_factory=dict)
+    count: Counter[str] = field(default_factory=Counter)
+
+    def add(self, block: Block) -> None:
+        """Count the codes of a block."""
+        for word in block.words:
+            if word.letter in "GM":
+                code = code_name(word.letter, word.value)
+                self.first.setdefault(code, (block.line, word.column))
+                self.count[code] += 1
+
+
+def beyond_the_end(what: str, row: int, lines: int) -> list[Remark]:
+    """The warning that lines follow what ends a program in line `row` (from 0), if any do."""
+    return [Remark(f"what follows {what} is not part of the program (lines: {lines})", row + 1)] if lines else []

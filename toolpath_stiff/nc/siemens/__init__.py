@@ -1,0 +1,1 @@
+"""Siemens' language (Sinumerik 840D, 828D): its words act on the one state of a control."""

@@ -1,0 +1,71 @@
+"""A block in Siemens' language: its words sorted, its codes in their order, then its move, then its cycles."""
+
+from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.nc.moves import Remark
+from toolpath_stiff.nc.run_records import Tally
+from toolpath_stiff.nc.siemens.cycles import repeated
+from toolpath_stiff.nc.siemens.motion import move, moves
+from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS
+from toolpath_stiff.nc.state import STEPS, CurrentBlock, State
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
+from toolpath_stiff.nc.words import AXES, Block
+
+SINGLE = ("motion", "distance", "plane", "cutter compensation", "work offset", "units", "feed mode")
+BETWEEN = frozenset((*SINGLE[:2], "F", "S", "look-ahead", "M coolant", "M stop"))  # the moves of a corner
+OTHER_NUMBERS = {"G4", "G25", "G26"}  # beside which F and S are none
+
+
+def sort_words(state: State, block: Block, tally: Tally | None) -> CurrentBlock:
+    """The words of a block by what they are; in a check they are counted. Raises `InputError` at a word."""
+    current = CurrentBlock(state.name, block)
+    numbers = {code_name("G", word.value) for word in block.words if word.letter == "G"}
+    acting = {"#": "T", '"': "T", "D": "D"} | ({} if numbers & OTHER_NUMBERS else {"F": "F", "S": "S"})
+    for word in block.words:
+        coded, letter = word.letter in ("G", "M"), word.letter
+        name = code_name(letter, word.value) if coded else acting.get(letter, letter)
+        if name in REFUSED:
+            raise current.fail(word, f"is {REFUSED[name].what}, which is not supported", hint=REFUSED[name].hint)
+        code = TABLE.get(name) if coded or letter in acting or len(name) > 1 else None
+        if code is None and coded:
+            current.refuse_if(letter == "G", word, "is not a G code that is known", hint="post it without it")
+            state.note(block.line, word, "an M code of one control, not acted upon")
+            state.warnings.append(Remark(f"what {word.text} does on its control is not known", block.line))
+        if code is not None:
+            other = current.groups.setdefault(code.group, name)
+            current.refuse_if(other != name and code.group in SINGLE, word, f"and {other} act alike", "one of them")
+            current.codes[name] = word
+            if code.listed:
+                state.note(block.line, word, code.listed)
+            if tally is not None and not coded and letter not in acting:
+                tally.first.setdefault(name, (block.line, word.column))
+                tally.count[name] += 1
+        if not coded and (code is None or letter in acting):
+            current.refuse_if(letter in current.values, word, "repeats a word of its block", "each word once")
+            largest = LARGEST_MM if letter.lstrip("I@") in AXES else LARGEST_WORD
+            current.refuse_if(abs(word.value) > largest, word, "is beyond 100 m, or any number of a control")
+            current.values[letter] = word
+    current.free = set() if numbers & {"G25", "G26"} else set(current.values)
+    return current
+
+
+def carry_out(state: State, block: CurrentBlock) -> None:
+    """The codes of a block in their order, its move, the cycle of MCALL, then its own cycle."""
+    plain, frames = state.plain, state.frames
+    codes = sorted((TABLE[name] for name in block.codes), key=lambda code: code.rank)
+    waits = plain.held is not None and any(code.group not in BETWEEN for code in codes)
+    block.refuse_if(waits, None, "stands between a corner (RND, CHF, CHR) and the move behind it", "the move")
+    before = frames.to_program(frames.position)
+    for code in codes:
+        if code.rank <= STEPS["motion"]:
+            code.act(state, block, code.name)
+    now = frames.to_program(frames.position)
+    plain.renumbered |= {axis for axis in range(6) if abs(now[axis] - before[axis]) > 1e-9}
+    if moves(state, block):
+        move(state, block)
+        repeated(state, block)
+    for code in codes:
+        if code.rank > STEPS["motion"]:
+            code.act(state, block, code.name)
+    for letter in sorted(block.free):
+        block.refuse_if(letter not in WORDS, letter, "is not used by any code of its block", hint="remove it")
+        state.note(block.line, block.values[letter], "how the control moves: the path is taken as programmed")

@@ -1,0 +1,185 @@
+"""Drilling cycles of Siemens' language (CYCLE81 to CYCLE89, CYCLE840), expanded to their moves; MCALL, HOLES1, HOLES2.
+
+SIEMENS, SINUMERIK 840D, Programming Guide Cycles (11/2002), "Drilling cycles", "Drilling patterns". Heights are mm of
+the tool axis, feeds mm/min, dwells s; a stroke without a feed is a rapid.
+"""
+
+import cmath
+import math
+from collections.abc import Iterator
+
+from toolpath_stiff.nc.geometry import PLANES
+from toolpath_stiff.nc.heidenhain.contour import check_known, go
+from toolpath_stiff.nc.heidenhain.cycles import Stroke, Values, plunge
+from toolpath_stiff.nc.heidenhain.points import in_plane, present
+from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
+from toolpath_stiff.nc.words import Word
+from toolpath_stiff.units import SECONDS_PER_DAY
+
+_HEIGHTS, _MODES = "RTP RFP SDIS DP DPR", "GMODE DMODE AMODE"
+_THREAD = f"AXN PITA TECHNO VARI DAM VRT PITM PTAB PTABA {_MODES}"
+SIGNATURES = {
+    "CYCLE81": f"{_HEIGHTS} DTB {_MODES}", "CYCLE82": f"{_HEIGHTS} DTB {_MODES}",
+    "CYCLE83": f"{_HEIGHTS} FDEP FDPR DAM DTB DTS FRF VARI AXN MDEP VRT DTD DIS1 {_MODES}",
+    "CYCLE84": f"{_HEIGHTS} DTB SDAC MPIT PIT POSS SST SST1 {_THREAD}",
+    "CYCLE840": f"{_HEIGHTS} DTB SDR SDAC ENC MPIT PIT {_THREAD.replace('VARI DAM VRT ', '')}",
+    "CYCLE85": f"{_HEIGHTS} DTB FFR RFF {_MODES}", "CYCLE86": f"{_HEIGHTS} DTB SDIR RPA RPO RPAP POSS {_MODES}",
+    "CYCLE87": f"{_HEIGHTS} SDIR", "CYCLE88": f"{_HEIGHTS} DTB SDIR", "CYCLE89": f"{_HEIGHTS} DTB {_MODES}",
+    "HOLES1": "SPCA SPCO STA1 FDIS DBH NUM VARI UMODE HIDE NSP DMODE",
+    "HOLES2": "CPA CPO RAD STA1 INDA NUM VARI UMODE HIDE NSP DMODE",
+    "CYCLE802": f"XA YA {' '.join(f'X{n} Y{n}' for n in range(9))} VARI UMODE DMODE",
+    "CYCLE800": "FR TC ST MODE X0 Y0 Z0 A B C X1 Y1 Z1 DIR FRI DMODE",
+    "WORKPIECE": "WP REF HOLD FORM MODE Z0 Z1 ZB X0 Y0 X1 Y1",
+}  # fmt: skip
+TAPS = ("CYCLE84", "CYCLE840")
+LENGTHS = frozenset((
+    "RTP", "RFP", "SDIS", "DP", "DPR", "FDEP", "FDPR", "DAM", "PIT", "MDEP", "VRT", "DIS1", "FFR", "RFF", "SPCA",
+    "SPCO", "FDIS", "DBH", "CPA", "CPO", "RAD",
+))  # fmt: skip
+# Pitches of coarse threads (ISO 261) by their size, mm.
+COARSE = {3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 8: 1.25, 10: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5, 22: 2.5,
+          24: 3.0, 27: 3.0, 30: 3.5, 33: 3.5, 36: 4.0, 39: 4.0, 42: 4.5, 45: 4.5, 48: 5.0}  # fmt: skip
+CHIP_BREAK_MM, AHEAD_MM, AHEAD_SHARE, MOST_AHEAD_MM = 1.0, 0.6, 1.0 / 50.0, 7.0  # of CYCLE83
+SHIFT = "the shift off the wall before the tool leaves the hole"
+
+
+def modal(state: State, block: CurrentBlock, code: str) -> None:
+    """MCALL: the cycle beside it after each block that moves; alone: none any more."""
+    state.plain.modal, state.plain.cycle = False, None
+
+
+def cycle(state: State, block: CurrentBlock, code: str) -> None:
+    """A drilling cycle, here or (behind MCALL) wherever a block moves to."""
+    scale = state.length_scale
+    values = {name: block.take(name) or 0.0 for name in SIGNATURES[code].split() if block.has(name)}
+    values = {name: value * (scale if name in LENGTHS else 1.0) for name, value in values.items()}
+    missing = next((name for name in ("RTP", "RFP") if name not in values), None)
+    block.refuse_if(missing, None, f"{code} without {missing}", SIGNATURES[code].replace(" ", ", "))
+    values |= {"number": float(code.removeprefix("CYCLE")), "TOP": values["RFP"] + abs(values.get("SDIS", 0.0))}
+    bottom = values["RFP"] - abs(values["DPR"]) if values.get("DPR") else values.get("DP")
+    if bottom is None or bottom >= values["RFP"]:
+        raise block.fail(None, f"{code} whose depth is not below its reference plane RFP", "DP or DPR")
+    values["DP"] = bottom
+    block.refuse_if(values["RTP"] < values["TOP"], None, f"{code}: RTP is below RFP and SDIS", "a higher RTP")
+    block.refuse_if(not 0.0 <= values.get("DTB", 0.0) <= SECONDS_PER_DAY, "DTB", "is no time in seconds", "0 or more")
+    shank = values.get("GMODE", 0.0) // 10 % 10
+    block.refuse_if(shank, "GMODE", "counts the depth from a diameter or the shank", "0: from the tip")
+    if code == "CYCLE83":
+        first = values["RFP"] - abs(values["FDPR"]) if values.get("FDPR") else values.get("FDEP", bottom)
+        block.refuse_if(not bottom <= first < values["RFP"], None, "CYCLE83 whose first depth does not fit", "FDPR")
+        block.refuse_if(values.get("DAM", 0.0) < 0.0, "DAM", "is a factor of the pecks", "0 or more")
+        least = min(values.get("MDEP") or values.get("DAM") or math.inf, values["RFP"] - first)
+        block.refuse_if((first - bottom) / least > MOST_STROKES, None, "CYCLE83 with too many strokes", "a larger FDPR")
+        other = values.get("AXN", 3.0) not in (0.0, 3.0)
+        block.refuse_if(other, "AXN", "is another axis than that of the tool", "none")
+        values |= {"FIRST": first, "LEAST": least}
+    if code in TAPS:
+        values["PIT"] = abs(values.get("PIT", 0.0)) or COARSE.get(round(abs(values.get("MPIT", 0.0))), 0.0)
+        block.refuse_if(values.get("PITA", 0.0) > 1.0, "PITA", "is a pitch in other units than mm", "0, 1")
+        block.refuse_if(not values["PIT"], None, f"{code} without a pitch", "PIT, or MPIT of 3 to 48")
+        block.refuse_if(values.get("VARI"), "VARI", "taps in pecks", "0")
+    for name in ("RPA", "RPO", "RPAP"):
+        if values.get(name):
+            state.note(block.line, block.values[name], SHIFT)
+    if "MCALL" in block.codes:
+        state.plain.modal, state.plain.cycle = True, (int(values["number"]), values)
+    else:
+        drill(state, block, values)
+
+
+def drill(state: State, block: CurrentBlock, values: Values) -> None:
+    """A cycle at the present point."""
+    plain = state.plain
+    waits = state.cutter is not None or plain.held is not None or plain.side
+    block.refuse_if(waits, None, "a cycle inside a contour with compensation or a corner", "G40 before it")
+    check_known(state, block, {PLANES[state.plane][2]: 0.0}, rapid=True)
+    block.refuse_if(plain.unknown, None, "a cycle where X or Y is not known", "X and Y before it")
+    plunge(state, block, strokes(values, state.feed, state.speed))
+
+
+def strokes(values: Values, feed: float | None, speed: float) -> Iterator[Stroke]:
+    """Heights of a hole one after another, each with its feed (0: there is none) and the dwell there.
+
+    Examples
+    --------
+    >>> hole = {"number": 81.0, "RTP": 10.0, "TOP": 2.0, "DP": -5.0}
+    >>> list(strokes(hole, 100.0, 0.0))
+    [(2.0, None, 0.0), (-5.0, 100.0, 0.0), (2.0, None, 0.0), (10.0, None, 0.0)]
+    """
+    number, top, bottom = int(values["number"]), values["TOP"], values["DP"]
+    down = feed or 0.0
+    out: float | None = None
+    if number in (84, 840):
+        speed = values.get("SST") or speed
+        down, out = values["PIT"] * speed, values["PIT"] * (values.get("SST1") or speed)
+    elif number == 85:
+        down = values.get("FFR") or down
+        out = values.get("RFF") or down
+    elif number == 89:
+        out = down
+    yield top, None, 0.0
+    if number == 83:
+        yield from _pecks(values, down)
+    else:
+        yield bottom, down, values.get("DTB", 0.0) if number != 81 else 0.0
+    yield top, out, 0.0
+    yield values["RTP"], None, 0.0
+
+
+def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
+    """CYCLE83: strokes that get shorter by DAM, of DAM at least, the last two alike; between them out, or 1 mm back."""
+    depth, bottom, less = values["FIRST"], values["DP"], values.get("DAM", 0.0)
+    stroke, rate = values["RFP"] - depth, feed * (values.get("FRF") or 1.0)
+    ahead = values.get("DIS1") or min(max(AHEAD_MM, AHEAD_SHARE * (values["RFP"] - bottom)), MOST_AHEAD_MM)
+    yield depth, rate, values.get("DTB", 0.0)
+    while depth > bottom + SAME_HEIGHT_MM:
+        if values.get("VARI"):
+            yield values["TOP"], None, values.get("DTS", 0.0)
+            yield min(depth + ahead, values["TOP"]), None, 0.0
+        else:
+            yield depth + (values.get("VRT") or CHIP_BREAK_MM), feed, 0.0
+        left = depth - bottom
+        if less:
+            stroke = max(stroke - less, values["LEAST"])
+            stroke = left / 2.0 if stroke < left < 2.0 * stroke and stroke <= less else stroke
+        depth -= min(stroke, left)
+        yield depth, feed, values.get("DTB", 0.0)
+
+
+def pattern(state: State, block: CurrentBlock, code: str) -> None:
+    """HOLES1: holes on a line, from its nearer end; HOLES2: on a circle; CYCLE802: at points. With MCALL's cycle."""
+    plain, (first, second, _) = state.plain, PLANES[state.plane]
+    given = {name for name in SIGNATURES[code].split() if block.has(name)}
+    values = {name: (block.take(name) or 0.0) * (state.length_scale if name in LENGTHS else 1.0) for name in given}
+    if plain.cycle is None:
+        raise block.fail(None, f"{code} without a cycle", "MCALL CYCLE81(...) before it")
+    number = values.get
+    count, start = round(number("NUM", 1.0)), math.radians(number("STA1", 0.0))
+    block.refuse_if(not 1 <= count <= 10_000, None, f"{code} with {count} holes", "1 or more")
+    if code == "CYCLE802":
+        steps = any({*f"{number(name, 0.0):.0f}"} != {"1"} for name in ("XA", "YA"))
+        block.refuse_if(steps, None, f"{code} with steps", "111111111: absolute points")
+        pairs = [(f"X{index}", f"Y{index}") for index in range(9)]
+        points = [complex(values[x], values[y]) * state.length_scale for x, y in pairs if {x, y} <= given]
+    elif code == "HOLES1":
+        along, base = cmath.rect(1.0, start), complex(number("SPCA", 0.0), number("SPCO", 0.0))
+        points = [base + (number("FDIS", 0.0) + index * number("DBH", 0.0)) * along for index in range(count)]
+        here = in_plane(state, present(state))
+        if abs(here - points[-1]) < abs(here - points[0]):
+            points.reverse()
+    else:
+        step = math.radians(number("INDA", 0.0) or 360.0 / count)
+        middle, radius = complex(number("CPA", 0.0), number("CPO", 0.0)), number("RAD", 0.0)
+        points = [middle + cmath.rect(radius, start + index * step) for index in range(count)]
+    kept = plain.cycle[1]
+    for point in points:
+        go(state, block, {first: point.real, second: point.imag}, rapid=True)
+        drill(state, block, kept)
+
+
+def repeated(state: State, block: CurrentBlock) -> None:
+    """The cycle of MCALL behind a block that moved."""
+    if state.plain.modal and state.plain.cycle is not None:
+        word = block.block.words[0] if block.block.words else Word("", 0.0, 1, "MCALL")
+        drill(state, CurrentBlock(block.name, type(block.block)(block.line, (word,))), state.plain.cycle[1])

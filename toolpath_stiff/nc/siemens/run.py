@@ -1,0 +1,346 @@
+"""Runs a program in Siemens' language: as parametric programs run, with Siemens' words, labels, loops and calls.
+
+SIEMENS, SINUMERIK 840D sl, Programming Manual Job Planning, "Flexible NC programming", "Program section repetition",
+"Subprogram technique". Plain blocks of G0 to G3 are executed many at a time, as those of G code.
+"""
+
+import math
+import re
+from itertools import zip_longest
+
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.heidenhain.statements import code_text
+from toolpath_stiff.nc.moves import Remark
+from toolpath_stiff.nc.parametric.expressions import Value as Number
+from toolpath_stiff.nc.parametric.run import ParametricRun, Step
+from toolpath_stiff.nc.parametric.statements import Statement, Steering
+from toolpath_stiff.nc.parametric.variables import Values
+from toolpath_stiff.nc.plain_lines import PlainRun
+from toolpath_stiff.nc.plain_words import PlainWords
+from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
+from toolpath_stiff.nc.siemens.blocks import carry_out, sort_words
+from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner, Value
+from toolpath_stiff.nc.siemens.vocabulary import meaning_of
+from toolpath_stiff.nc.siemens.words import read_words, steering_of
+from toolpath_stiff.nc.state import Flow, GoTo, Then
+from toolpath_stiff.nc.words import AXES, Block
+
+HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
+PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
+PLAIN = re.compile(r"\s*(?:N\d+\s*)?((?:[GXYZABCIJKFS][-+]?[\d.]+\s*)*)(?:;.*)?", re.ASCII | re.IGNORECASE)
+OFFSET = re.compile(r"\bG(?:5[4-7]|5(?:0[5-9]|[1-9]\d))(?!\d)")
+CHANGE = re.compile(r"(?<![A-Z\d])M0*6(?!\d)")
+IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
+TIMES = re.compile(r"P(?=\s*[=\d(])")
+PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)(?:\s*=\s*([^,)]+))?", re.ASCII)
+SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
+END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
+SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
+RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
+
+
+def _array(name: str) -> str:
+    """The name of the array that an element belongs to; of another variable none that there is."""
+    return name.partition("[")[0] + "[]" if "[" in name else ""
+
+
+class SiemensRun(ParametricRun):
+    """A run of a program in Siemens' language; parameters as of `ProgramRun`.
+
+    Subprograms are sections of the file (`%_N_NAME_SPF`), or files NAME.SPF in the folder of the controller.
+    """
+
+    def __init__(self, request: Request, tally: Tally | None = None) -> None:
+        super().__init__(request, tally)
+        self.lines = (*self.lines, END_OF_FILE)
+        self._texts: dict[str, str] = {}
+        self._whole: set[str] = set()  # variables of type INT
+        self._homes = False
+        self._lex()
+        plain, text = self.state.plain, "\n".join(map(code_text, self.lines))
+        plain.offsets_named, plain.changes_by_t = OFFSET.search(text) is not None, CHANGE.search(text) is None
+        self.state.motion = "G1"  # as a control starts
+
+    def _lex(self) -> None:
+        """Find programs and labels; plain blocks are left to the reader of plain lines."""
+        self._labels: dict[str, list[int]] = {}
+        self._subs: dict[str, int] = {}
+        self._begins: list[re.Match[str]] = []
+        texts, opened = list[str](), -1
+        for row, line in enumerate(self.lines):
+            code, plain = code_text(line), PLAIN.fullmatch(line)
+            begin, program = HEAD.match(code), PROGRAM.match(code)
+            assert begin is not None
+            self._begins.append(begin)
+            for label in (begin[5], begin[2] and f"N{begin[2]}", begin[3]):
+                self._labels.setdefault(label or "", []).append(row)
+            if program is not None:
+                self._subs.setdefault(program[1] or program[2], opened if program[2] and opened >= 0 else row)
+                opened = row
+            elif code.strip():
+                opened = -1
+            if re.search(r"\bCT\b", code) and texts:  # its direction is that of the block before
+                texts[-1] = "?"
+            texts.append(plain[1] if plain is not None and begin[3] is None else "?")
+        self._ends = {row for row in self._subs.values() if any(code_text(text).strip() for text in self.lines[:row])}
+        self._plain = self._lexer = PlainRun(self.state, texts, self.name)
+
+    @staticmethod
+    def meaning(code: str) -> str:
+        """What a code, or a word, is taken for."""
+        return meaning_of(code)
+
+    def _tally_plain(self, first: int, words: PlainWords) -> None:
+        super()._tally_plain(first, words)
+        self.state.plain.heading = None
+        if self.state.absolute:
+            self.state.plain.renumbered -= {axis for axis, letter in enumerate(AXES) if letter in words.values}
+
+    def _scanner(self, row: int, begin: int) -> SiemensScanner:
+        text = self._begins[row].string
+        columns, place = range(1, len(text) + 2), self._place(row)
+        return SiemensScanner(text, columns, place, "Siemens' language", False, begin, self._variable)
+
+    def _statement(self, row: int) -> Statement:
+        if row not in self._statements:
+            begin = self._begins[row]
+            slash = begin[1] or begin[4] or ""
+            block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
+            steering = None
+            if PROGRAM.match(begin.string) is None and begin.string.lstrip()[:1] != "%":
+                steering = steering_of(self._scanner(row, begin.end()), lambda place: self._at_place(row, place))
+            self._statements[row] = Statement(block, steering=steering)
+        return self._statements[row]
+
+    def _at_place(self, row: int, place: int) -> Number:
+        """The number of an expression in a line."""
+        return lambda _: self._scanner(row, place).real()
+
+    def _read(self, row: int) -> Block:
+        statement, code = self._statement(row), self._begins[row].string
+        line = row + 1 if row < self._main_lines else self._line_of_call()
+        if PROGRAM.match(code) is not None or code.lstrip()[:1] == "%":
+            return Block(line, ())
+        self._homes = IN_MACHINE.search(code) is not None
+        words = read_words(self._scanner(row, self._begins[row].end()), self._define)
+        return Block(line, tuple(words), statement.block.optional, switch=statement.block.switch)
+
+    # Variables
+
+    def _scope(self, name: str) -> tuple[Values, str]:
+        """Where a variable is kept, R parameters for all programs, and its name there."""
+        parameter = re.fullmatch(r"R\[?(\d+)\]?", name)
+        return (self.variables.common, f"R{parameter[1]}") if parameter else (self.variables.levels[-1], name)
+
+    def _variable(self, name: str, column: int) -> Value:
+        """The value of a variable; nan for a machine builder's in a move in machine coordinates."""
+        scope, name = self._scope(name)
+        value = scope.get(name, scope.get(_array(name)))
+        if name in self._texts:
+            return self._texts[name]
+        if name in SEARCHED:
+            self.state.assume(RUNS)
+            return False
+        if value is None or math.isnan(value):
+            reason = "a control keeps it from earlier programs, or its builder defines it"
+            if not self._homes or scope is self.variables.common:
+                problem = f"{name} is read before it is set: {reason}"
+                raise self._fail(self._at, problem, f"{name}=... before", column=column)
+            return math.nan
+        return value
+
+    def _define(self, name: str, value: Value, column: int, kind: str) -> None:
+        """Set a variable; `kind`: its type where it is declared."""
+        (scope, name), array = self._scope(name), _array(name)
+        if not (kind or scope is self.variables.common or scope.keys() & {name, array} or name in self._texts):
+            problem = f"{name} is no variable that is declared, and no address that is known"
+            raise self._fail(self._at, problem, f"DEF REAL {name}, R parameters", column=column)
+        if kind == "INT":
+            self._whole.add(name)
+        if isinstance(value, str):
+            self._texts[name] = value
+        elif isinstance(scope.get(name), bool):
+            scope[name] = bool(value)
+        else:
+            whole = bool({name, array} & self._whole) and math.isfinite(value)
+            scope[name] = float(math.floor(value + 0.5)) if whole else value
+
+    # Blocks
+
+    def _execute(self, block: Block) -> Then:
+        state, plain = self.state, self.state.plain
+        try:
+            current = sort_words(state, block, self.tally)
+            carry_out(state, current)
+        except InputError as error:
+            error.file, error.line, _ = self._place(self._at)
+            raise
+        slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
+        self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
+        called = any(level.stop < 0 for level in self._levels)
+        return Flow.RETURN if current.flow is Flow.END and called else current.flow
+
+    # Flow
+
+    def _ends_before(self, row: int) -> bool:
+        return False  # each file ends with a line of its own
+
+    def _step(self, kind: str) -> Step | None:
+        return SIEMENS_STEPS.get(kind) or super()._step(kind)
+
+    def _steered(self, row: int) -> int | None:
+        if row in self._ends:
+            return self._return(row, Flow.RETURN)
+        if self._levels and self._levels[-1].stop == row:
+            return self._leave(row)
+        return super()._steered(row)
+
+    def _return(self, row: int, flow: Flow | GoTo) -> int:
+        """M17, RET, the end of a program: back to the call, or the end of all."""
+        while self._levels and self._levels[-1].stop >= 0:
+            self._levels.pop()
+        return self._leave(row) if self._levels else len(self.lines)
+
+    def _to_label(self, row: int, way: str, label: str) -> int:
+        """The line of a label: ahead (GOTOF), behind (GOTOB), or first ahead (GOTO)."""
+        first = self._program_of(row)
+        stop = min((end for end in self._ends if end > first), default=len(self.lines))
+        rows = [place for place in self._labels.get(label, []) if first <= place < stop]
+        ahead, behind = [place for place in rows if place > row], [place for place in rows if place <= row][::-1]
+        places = ahead if way == "GOTOF" else behind if way == "GOTOB" else ahead + behind
+        if not places:
+            raise self._fail(row, f"{way} {label}: the program has no such label there", "LABEL: before a block")
+        to = places[0]
+        while self._levels and self._levels[-1].stop >= 0 and not self._levels[-1].first <= to < self._levels[-1].stop:
+            self._levels.pop()
+        return to
+
+    def _program_of(self, row: int) -> int:
+        return max((begin for begin in self._ends if begin <= row), default=0)
+
+    def _jump_to(self, row: int, steering: Steering) -> int | None:
+        way, label = steering.label.split()
+        if steering.values and not self._value(steering):
+            return None
+        if way == "GOTOC" and label not in self._labels:
+            return None
+        return self._to_label(row, way, label)
+
+    def _scanner_of(self, row: int, text: str) -> SiemensScanner:
+        """An expression that does not stand at its place."""
+        return SiemensScanner(text, [1] * (len(text) + 1), self._place(row), "", lookup=self._variable)
+
+    def _for(self, row: int, steering: Steering) -> int | None:
+        name, first, last = self._range(row)
+        self._define(name, first, steering.column, "")
+        return None if first <= last else self._structure.end[row] + 1
+
+    def _end_for(self, row: int, steering: Steering) -> int | None:
+        start = self._structure.start[row]
+        name, _, last = self._range(start)
+        value = self._variable(name, steering.column)
+        assert not isinstance(value, str)
+        again = value + 1.0 <= last
+        self._define(name, value + 1.0 if again else math.nan, steering.column, "")  # what it then holds is not said
+        return start + 1 if again else None
+
+    def _range(self, row: int) -> tuple[str, float, float]:
+        """FOR: its variable, first and last value."""
+        scanner = self._scanner(row, self._begins[row].end())
+        scanner.part(NAME)
+        name = scanner.part(NAME) + scanner.index()
+        scanner.refuse_if(not scanner.sign("="), "FOR without its first value", "FOR I=1 TO 5")
+        first = scanner.real()
+        scanner.refuse_if(scanner.part(NAME) != "TO", "FOR without TO", "FOR I=1 TO 5")
+        return name, first, scanner.real()
+
+    def _until(self, row: int, steering: Steering) -> int | None:
+        return None if self._value(steering) else self._structure.start[row] + 1
+
+    def _times(self, scanner: SiemensScanner) -> int:
+        """P behind a call, or of a repeat."""
+        if not scanner.part(TIMES):
+            return 1
+        scanner.sign("=")
+        value = scanner.real()
+        scanner.refuse_if(value != int(value) or not 0 <= value <= 9999, f"P{value:g} repeats", "0 to 9999")
+        return int(value)
+
+    def _section(self, row: int, steering: Steering) -> int | None:
+        """REPEAT, REPEATB: blocks from a label on run again."""
+        scanner = self._scanner(row, self._begins[row].end())
+        section = SECTION.match(scanner.text, scanner.position)
+        assert section is not None
+        scanner.position = section.end()
+        times = self._times(scanner)
+        scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind {steering.shown}", "REPEAT LABEL P=2")
+        if not times:
+            return None
+        first = self._to_label(
+            row, "GOTOB" if section[2] in self._labels and self._labels[section[2]][0] < row else "GOTOF", section[2]
+        )
+        stop = row if first < row else len(self.lines)
+        if section[3]:
+            stop = self._to_label(first, "GOTO", section[3]) + 1
+        elif section[1] == "REPEATB":
+            stop = first + 1
+        else:
+            stop = next((end for end in self._labels.get("ENDLABEL", []) if first < end < stop or first > row), stop)
+        self._begin(Subprogram(section[2], first, row + 1, times - 1, stop=stop), row, steering.column)
+        return first
+
+    def _call_sub(self, row: int, steering: Steering) -> int | None:
+        name, scanner = steering.label, self._scanner(row, self._begins[row].end())
+        scanner.part(NAME)
+        values = scanner.arguments() if scanner.sign("") and scanner.begins("(") else []
+        times = self._times(scanner)
+        scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind the call of {name}", "a block of its own")
+        if name not in self._subs:
+            self._load_sub(name)
+        if name not in self._subs:
+            problem = f"{name} is no word that is known, and no subprogram of the file or of a folder"
+            raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=steering.column)
+        first = self._subs[name]
+        level = Subprogram(name, first + 1, row + 1, times - 1, self._bound(row, first, values))
+        if not times:
+            return None
+        self._begin(level, row, steering.column)
+        return first + 1
+
+    def _bound(self, row: int, first: int, values: list[Value | None]) -> dict[str, float | None]:
+        """The parameters of PROC with the values of a call."""
+        heads = (PROGRAM.match(code_text(line)) for line in self.lines[first : first + 20])
+        parameters = PARAMETER.findall(next((head[3] for head in heads if head is not None and head[2]), ""))
+        if len(values) > len(parameters) or any(by for by, *_ in parameters):
+            problem = f"a call with {len(values)} values; PROC has {len(parameters)}, or one by reference (VAR)"
+            raise self._fail(row, problem, "values of REAL, INT, BOOL")
+        bound = dict[str, float | None]()
+        for (_, kind, name, default), value in zip_longest(parameters, values):
+            given = self._scanner_of(row, default or "0").result() if value is None else value
+            bound[name] = bool(given) if kind == "BOOL" else float(given)
+        return bound
+
+    def _load_sub(self, name: str) -> None:
+        """Read a subprogram's file from the folder, if it is there."""
+        files = sorted(self.folder.iterdir()) if self.folder is not None else []
+        fits = [file.name for file in files if file.suffix.upper() in SUFFIXES and file.stem.upper() == name]
+        if self._load(fits, (f"%_N_{name}_SPF",)) is not None:
+            self.lines = (*self.lines, END_OF_FILE)
+            self._structure_known = None
+            self._lex()
+
+    def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
+        if self.state.plain.held is not None:
+            raise self._fail(self._at, "the program ends before the move behind a corner (RND, CHF, CHR)", "the move")
+        stop = min((end for end in self._ends if end > row), default=self._main_lines)
+        texts = [code_text(line).strip() for line in self.lines[row + 1 : stop]]
+        rest = [text for text in texts if text not in ("", "%") and not text.startswith("GROUP_END")]
+        return beyond_the_end(what, row, len(rest)) if row < self._main_lines else []
+
+
+SIEMENS_STEPS: dict[str, Step] = {
+    "JUMP": SiemensRun._jump_to, "FOR": SiemensRun._for, "ENDFOR": SiemensRun._end_for,
+    "UNTIL": SiemensRun._until, "SECTION": SiemensRun._section, "CALL": SiemensRun._call_sub,
+    "ENDLOOP": SiemensRun._back, "RET": lambda run, row, steering: run._return(row, Flow.RETURN),
+}  # fmt: skip

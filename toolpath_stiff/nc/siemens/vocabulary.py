@@ -1,0 +1,193 @@
+"""The table of Siemens' words: name, function, meaning, source; what is listed, and what is refused, and why.
+
+Codes that mean what they mean in G code are those of the one table (`codes.registry`). The programming manuals meant
+are those of the SINUMERIK 840D sl (Fundamentals, Job Planning) and of the 840D (Cycles, 11/2002).
+"""
+
+from toolpath_stiff.nc.codes.code import Act, Code, Refused, holds_anyway
+from toolpath_stiff.nc.codes.feeds import time_word
+from toolpath_stiff.nc.codes.registry import CODES, code_meaning
+from toolpath_stiff.nc.moves import Remark
+from toolpath_stiff.nc.siemens import coordinates, cycles, tools
+from toolpath_stiff.nc.siemens.motion import SIDES
+from toolpath_stiff.nc.state import CurrentBlock, Flow, Group, State
+
+CONTROLS = ("siemens",)
+MANUAL = "SIEMENS, SINUMERIK 840D"
+BASICS, PLANNING, CYCLES = f"{MANUAL}, Fundamentals", f"{MANUAL}, Job Planning", f"{MANUAL}, Cycles"
+# Codes of the one table that mean the same here.
+SHARED = (
+    "G17", "G18", "G19", "G90", "G91", "G93", "G94", "G95", "G96", "G97", "M0", "M1", "M2", "M3", "M4", "M5", "M7",
+    "M8", "M9", "M19", "M30", "F", "S",
+)  # fmt: skip
+
+
+def mode(state: State, block: CurrentBlock, code: str) -> None:
+    """G0 to G3, CIP, CT: the motion that holds; SUPA: for its block. The block's own move comes last."""
+    if code in _MOTION:
+        state.motion = code
+
+
+def side(state: State, block: CurrentBlock, code: str) -> None:
+    """G40, G41, G42: from the next straight move in the plane on."""
+    plain, on = state.plain, state.cutter
+    same = SIDES[code] == ("R0" if on is None else "RL" if on.side > 0 else "RR")
+    other = on is not None and code != "G40" and not same
+    block.refuse_if(other, code, "while the tool is on the other side", "G40 before it")
+    block.refuse_if(plain.entry and code != "G40", code, f"under {plain.entry}", "NORM and G450")
+    plain.side = "" if same else code
+
+
+def entry(state: State, block: CurrentBlock, code: str) -> None:
+    """NORM, G450: how a compensated contour begins and goes round corners; KONT, G451 otherwise."""
+    state.plain.entry = "" if code in ("NORM", "G450") else code
+    block.refuse_if(state.cutter is not None and state.plain.entry, code, "while G41 or G42 is on", "NORM and G450")
+
+
+def dwell(state: State, block: CurrentBlock, code: str) -> None:
+    """G4 F: a pause in seconds; G4 S: in turns of the spindle."""
+    seconds, turns = (time_word(state, block, letter) for letter in "FS")
+    if turns is not None:
+        block.refuse_if(state.speed <= 0.0, "S", "counts turns of a spindle that stands", "S and M3 before it")
+        seconds = 60.0 * turns / state.speed
+    if seconds is None or not 0.0 <= seconds <= 86_400.0:
+        raise block.fail(code, "without its time", "G4 F1.5")
+    state.recorder.add_dwell(seconds)
+
+
+def fixed_point(state: State, block: CurrentBlock, code: str) -> None:
+    """G74, G75: to points that the machine has: left out, and where the tool then stands is not known."""
+    state.warnings.append(Remark(f"{code} goes to points of the machine: left out of the path", block.line))
+    state.plain.unknown |= {0, 1, 2}
+    block.free.clear()
+
+
+def back(state: State, block: CurrentBlock, code: str) -> None:
+    """M17: the end of a subprogram."""
+    block.flow = Flow.RETURN
+
+
+_MOTION = ("G0", "G1", "G2", "G3", "CIP", "CT", "ASPLINE", "CSPLINE")
+_FRAMES = f"{BASICS}, Coordinate transformations (frames)"
+_ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
+    ("motion", f"{BASICS}, Motion commands", (
+        ("G0", mode, "rapid"), ("G1", mode, "feed"), ("G2", mode, "clockwise arc"),
+        ("G3", mode, "counter-clockwise arc"), ("CIP", mode, "arc through a point"),
+        ("CT", mode, "arc that goes on smoothly"),
+    )),
+    ("motion", f"{PLANNING}, Spline interpolation", (("ASPLINE CSPLINE", mode, "spline, as chords of its points"),)),
+    ("non-modal", f"{BASICS}, Suppress frames", (("SUPA G53 G153", mode, "machine coordinates"),)),
+    ("non-modal", f"{BASICS}, Reference point, fixed point", (("G74 G75", fixed_point, "to points of the machine"),)),
+    ("polar", f"{BASICS}, Travel commands with polar coordinates", (("G110 G111 G112", coordinates.pole, "pole"),)),
+    ("work offset", f"{BASICS}, Settable zero offset", (
+        (" ".join(["G54 G55 G56 G57", *(f"G{n}" for n in range(505, 600))]), coordinates.offset, "settable offset"),
+        ("G500", coordinates.offset, "no settable offset"),
+    )),
+    ("units", f"{BASICS}, Inch or metric dimensions", (
+        ("G70 G700", coordinates.units, "inch"), ("G71 G710", coordinates.units, "mm"),
+    )),
+    ("cutter compensation", f"{BASICS}, Tool radius compensation", (
+        ("G40", side, "cutter compensation off"), ("G41", side, "cutter compensation, tool on the left"),
+        ("G42", side, "cutter compensation, tool on the right"),
+    )),
+    ("path control", f"{BASICS}, Tool radius compensation", (
+        ("NORM KONT G450 G451", entry, "how a compensated contour begins, and its outside corners"),
+    )),
+    ("T", f"{BASICS}, Tool change", (("T", tools.select, "tool"),)),
+    ("M tool change", f"{BASICS}, Tool change", (("M6", tools.change, "tool change"),)),
+    ("tool length", f"{BASICS}, Tool offsets", (("D", tools.edge, "cutting edge: length and radius"),)),
+    ("dwell", f"{BASICS}, Dwell time", (("G4", dwell, "dwell: F in seconds, S in turns"),)),
+    ("dynamic offset", _FRAMES, (
+        ("TRANS ATRANS", coordinates.frame, "shift"), ("ROT AROT", coordinates.frame, "rotation"),
+        ("SCALE ASCALE", coordinates.frame, "scale"), ("MIRROR AMIRROR", coordinates.frame, "mirror image"),
+    )),
+    ("dynamic offset", f"{CYCLES}, Swivelling", (("CYCLE800", coordinates.swivel, "swivelled plane"),)),
+    ("rotation", f"{PLANNING}, Transformations", (
+        ("TRAORI TRAFOOF", coordinates.transformation, "tool centre point control, on and off"),
+    )),
+    ("M subprogram", f"{PLANNING}, Subprogram technique", (("M17", back, "subprogram end"),)),
+    ("cycle return", f"{CYCLES}, Drilling patterns", (("MCALL", cycles.modal, "the cycle behind each move"),)),
+    ("corner", f"{CYCLES}, Drilling cycles", (
+        ("CYCLE81 CYCLE82", cycles.cycle, "drilling"), ("CYCLE83", cycles.cycle, "deep drilling"),
+        ("CYCLE84 CYCLE840", cycles.cycle, "tapping"), ("CYCLE85", cycles.cycle, "reaming"),
+        ("CYCLE86 CYCLE87 CYCLE88 CYCLE89", cycles.cycle, "boring"),
+    )),
+    ("corner", f"{CYCLES}, Drilling patterns", (
+        ("HOLES1 HOLES2 CYCLE802", cycles.pattern, "holes on a line, on a circle, at points"),
+    )),
+    ("corner", f"{MANUAL}, Operating, Blank input", (("WORKPIECE", tools.blank, "blank"),)),
+)  # fmt: skip
+LISTED = {
+    name: what
+    for what, names in {
+        "how the control plans ahead: the path is taken as programmed":
+            "G9 G60 G64 G601 G602 G603 G641 G642 G643 G644 G645 G62 G621 BRISK BRISKA SOFT SOFTA DRIVE FFWON FFWOF "
+            "COMPON COMPCURV COMPCAD COMPSURF COMPOF CYCLE832 DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC "
+            "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CFC CFCIN CFTCP FGROUP ORISON "
+            "ORISOF ORIWKS ORIMKS ORIRESET CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 HIGH_SPEED "
+            "ORIVECT ORIPLANE ORIAXES",
+        "message, stop of the look-ahead, display":
+            "MSG STOPRE GROUP_BEGIN GROUP_END GROUP_ADDEND DISPLOF DISPLON NEWCONF WRITE SETAL PARAM_END EXTERN WAITM "
+            "SETMS STOPREOF SAVE SBLOF SBLON ENDLABEL",
+        "limits of the working area and of the spindle": "G25 G26 WALIMON WALIMOF LIMS",
+        "none is on, since switching it on is refused": "DIAMOF PAROTOF TOROTOF TOFRAMEOF TCOABS TMOF CUTMOF G49",
+        "a tool length of the ISO dialect: D has it": "G43",
+        "a spindle or an axis that is told apart": "SPOS SPOSA SPCON SPCOF M70",
+    }.items()
+    for name in names.split()
+}  # fmt: skip
+WORDS = frozenset((
+    "ADIS", "ADISPOS", "SPOS", "SPOSA", "OVR", "OVRRAP", "FGREF", "CTOL", "OTOL", "ACC", "H", "FRC", "FL", "LIMS",
+    "DISC", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF",
+))  # fmt: skip
+_BY_MOVES = "post the moves of the cycle"
+REFUSED: dict[str, Refused] = {
+    name: Refused(name, what, hint, source)
+    for names, what, hint, source in (
+        ("POCKET1 POCKET2 POCKET3 POCKET4 SLOT1 SLOT2 LONGHOLE CYCLE71 CYCLE72 CYCLE73 CYCLE74 CYCLE75 CYCLE76 CYCLE77 "
+         "CYCLE61 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 CYCLE90 CYCLE60 CYCLE899 CYCLE801",
+         "a cycle whose path the manual draws without numbers", _BY_MOVES, f"{CYCLES}, Milling cycles"),
+        ("CYCLE92 CYCLE93 CYCLE94 CYCLE95 CYCLE96 CYCLE97 CYCLE98 CYCLE99 CYCLE930 CYCLE940 CYCLE951 CYCLE952 DIAMON "
+         "DIAM90 G33 G34 G35", "a code of lathes", "post it for a mill", f"{CYCLES}, Turning cycles"),
+        ("CYCLE971 CYCLE976 CYCLE977 CYCLE978 CYCLE979 CYCLE996 CYCLE998 CYCLE982 MEAS MEAW MEASA", "probing",
+         "leave probing out", f"{MANUAL}, Measuring cycles"),
+        ("BSPLINE POLY PW PO", "a spline of coefficients", "post lines and arcs", f"{PLANNING}, Spline interpolation"),
+        ("TRANSMIT TRACYL TRAANG TRACON TOFRAME TOROT PAROT TCARR TCOFR CUTMOD", "a transformation of the machine's",
+         "post X, Y, Z, A3, B3, C3 of the tool's tip", f"{PLANNING}, Transformations"),
+        ("G58 G59", "an offset axis by axis", "TRANS, ATRANS", _FRAMES),
+        ("G63 G331 G332", "tapping without a cycle", "CYCLE84", f"{BASICS}, Tapping"),
+        ("G140 G141 G142 G143 G147 G148 G247 G248 G340 G341 G347 G348", "smooth approach and retraction",
+         "post its moves", f"{BASICS}, Smooth approach and retraction"),
+        ("G291", "the ISO dialect", "read it as G code: --dialect fanuc", f"{MANUAL}, ISO Milling"),
+        ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
+        ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
+         f"{PLANNING}, Orientation"),
+        ("WHEN WHENEVER EVERY DO ID IDS CASE", "a synchronised action, or a choice", "IF with GOTOF", PLANNING),
+        ("EXTCALL PCALL CALL CALLPATH ISOCALL", "a call by path", "the subprogram's name, with --subprograms",
+         f"{PLANNING}, Subprogram technique"),
+    )
+    for name in names.split()
+}  # fmt: skip
+TABLE: dict[str, Code] = {
+    name: Code(name, group, act, meaning, source, CONTROLS)
+    for group, source, rows in _ROWS
+    for names, act, meaning in rows
+    for name in names.split()
+}
+TABLE |= {name: CODES[name] for name in SHARED}
+TABLE |= {
+    name: Code(name, "look-ahead", holds_anyway, what, BASICS, CONTROLS, listed=what) for name, what in LISTED.items()
+}
+
+
+def meaning_of(name: str) -> str:
+    """What a word is taken for.
+
+    Examples
+    --------
+    >>> meaning_of("CIP"), meaning_of("MSG")
+    ('arc through a point', 'message, stop of the look-ahead, display: not acted upon')
+    """
+    if name in TABLE:
+        return f"{TABLE[name].meaning}: not acted upon" if TABLE[name].listed else TABLE[name].meaning
+    return REFUSED[name].what if name in REFUSED else code_meaning(name)

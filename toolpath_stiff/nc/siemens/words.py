@@ -1,0 +1,140 @@
+"""The words of a block in Siemens' language, and what steers the run; values are worked out as they are read.
+
+SIEMENS, SINUMERIK 840D sl, Programming Manual Fundamentals, "Structure and contents of an NC program", "Non-modal
+absolute and incremental dimensions"; Job Planning, "Definition of user variables", "Control structures".
+"""
+
+import re
+from collections.abc import Callable
+
+from toolpath_stiff.nc.parametric.expressions import Value as Number
+from toolpath_stiff.nc.parametric.statements import Steering
+from toolpath_stiff.nc.siemens.cycles import SIGNATURES
+from toolpath_stiff.nc.siemens.expressions import BLANK, NAME, SiemensScanner, Value
+from toolpath_stiff.nc.siemens.motion import CORNERS, VECTOR
+from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS
+from toolpath_stiff.nc.words import AXES, Word
+
+PLAIN = re.compile(r"([A-Z]) ?([+-]?(?:\d++\.?+\d*+|\.\d++)(?:EX[+-]?\d++)?)(?!\s*=(?!=)|\[|_)", re.ASCII)
+LITERAL = re.compile(r"([A-Z]\w*)=([+-]?(?:\d++\.?+\d*+|\.\d++))(?=\s|$)", re.ASCII)
+DIMENSION = re.compile(r"(IC|ACP|ACN|AC|DC)(?=\s*\()")
+PREFIX = {"IC": "I", "AC": "@", "DC": "DC", "ACP": "ACP", "ACN": "ACN", "": ""}
+JUMP = re.compile(r"(GOTO[FBC]?)\s+([A-Z_]\w*|:?\d+)\s*$", re.ASCII)
+SECTION = re.compile(r"REPEATB?\s+(?!P\s*=)[A-Z_:]\w*", re.ASCII)
+TYPES: dict[str, Value] = {"REAL": 0.0, "INT": 0.0, "BOOL": False, "CHAR": "", "STRING": ""}
+ADDRESSES = {
+    *AXES, *VECTOR, *CORNERS, *WORDS, *"IJKFSTDMGH", "RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL", "FP",
+    "X1", "Y1", "Z1",
+}  # fmt: skip
+STEERING = ("ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "FOR", "IF", "WHILE", "UNTIL")
+OTHERWISE = {"T": "#", "RP": "PR", "AP": "PA", "CR": "R"}  # names that words then have
+SPINDLE = re.compile(r"([SM])1")  # of the master spindle
+Define = Callable[[str, Value, int, str], None]  # sets a variable: name, value, column, its type if it is declared
+
+
+def steering_of(scanner: SiemensScanner, evaluate: Callable[[int], Number]) -> Steering | None:
+    """What a block does to the flow; None for one that acts. `evaluate`: the value of what stands at a place."""
+    scanner.take(BLANK)
+    begin, column, plain = scanner.position, scanner.column, PLAIN.match(scanner.text, scanner.position)
+    name = scanner.take(NAME)
+    if not name or (plain and name[0] != "L") or name in ("DEF", "PROC"):
+        return None
+    jump, values = JUMP.search(scanner.text, begin), (evaluate(scanner.position),)
+    if jump is not None and (name == "IF" or name.startswith("GOTO")):
+        return Steering("JUMP", f"{jump[1]} {jump[2]}", jump[0], column, values if name == "IF" else ())
+    scanner.refuse_if(name.startswith("GOTO"), f"{scanner.text[begin:].strip()[:30]} names no label", "GOTOF LABEL")
+    if name in STEERING:
+        return Steering(name, "", name, column, values)
+    if name in ("REPEAT", "REPEATB"):
+        return Steering("SECTION" if SECTION.match(scanner.text, begin) else "DO UNTIL", "", name, column)
+    scanner.take(BLANK)
+    a_word = name in TABLE or name in REFUSED or name in ADDRESSES or scanner.begins("[", "=")
+    return None if a_word else Steering("CALL", name, name, column)
+
+
+def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
+    """The words of a block; variables are set on the way. Raises `InputError` with line and column."""
+    words = list[Word]()
+    while True:
+        scanner.take(BLANK)
+        if scanner.done:
+            return words
+        begin, column, plain = scanner.position, scanner.column, PLAIN.match(scanner.text, scanner.position)
+        if plain is not None:
+            scanner.position = plain.end()
+            letter = "#" if plain[1] == "T" else plain[1]
+            words.append(Word(letter, float(plain[2].replace("EX", "E")), column, plain[0]))
+            continue
+        literal = LITERAL.match(scanner.text, scanner.position)
+        if literal is not None and literal[1] in ADDRESSES:  # most of a program with tool vectors
+            scanner.position = literal.end()
+            words.append(Word(OTHERWISE.get(literal[1], literal[1]), float(literal[2]), column, literal[0]))
+            continue
+        name = scanner.take(NAME)
+        scanner.refuse_if(not name, f"{scanner.rest()} is no word", "words such as X10, X=R1, CR=5", column=column)
+        if name == "DEF":
+            _declare(scanner, define)
+            continue
+        index = scanner.index()
+        if scanner.begins("==") or not scanner.sign("="):
+            words += _named(scanner, name, column)
+            continue
+        spindle = SPINDLE.fullmatch(name)
+        name = spindle[1] if spindle else name
+        if name in REFUSED:
+            if scanner.result():  # a zero switches it off
+                words.append(Word(name, 0.0, column, name))
+        elif name in ADDRESSES:
+            words.append(_addressed(scanner, name, column, begin))
+        else:
+            define(name + index, scanner.result(), column, "")
+
+
+def _addressed(scanner: SiemensScanner, name: str, column: int, begin: int) -> Word:
+    """The word of an address with `=`: X=10, X=IC(5), T="MILL"."""
+    dimension = scanner.part(DIMENSION)
+    values = scanner.arguments() if dimension else [scanner.result()]
+    shown, value = scanner.text[begin : scanner.position], values[0] if len(values) == 1 else None
+    scanner.refuse_if(value is None, f"{shown} with no value, or several", "one", column=column)
+    if isinstance(value, str):
+        scanner.refuse_if(name != "T", f"{shown} is no number", "a number", column=column)
+        return Word('"', 0.0, column, value)
+    name = OTHERWISE.get(name, name)
+    letter = name if name in ("#", "PA", "PR") and dimension == "AC" else PREFIX[dimension] + name
+    return Word(letter, float(value or 0.0), column, shown)
+
+
+def _named(scanner: SiemensScanner, name: str, column: int) -> list[Word]:
+    """A word without a number, and the parameters in its brackets where these are known by name."""
+    scanner.take(BLANK)
+    words, begin = [Word(name, 0.0, column, name)], scanner.position
+    if name in SIGNATURES and scanner.begins("("):
+        names, values = SIGNATURES[name].split(), scanner.arguments()
+        for key, value in zip(names, values, strict=False):
+            if value is not None:
+                text = value if isinstance(value, str) else f"{key}={value:g}"
+                words.append(Word(key, 0.0 if isinstance(value, str) else float(value), column, text))
+        scanner.refuse_if(any(values[len(names) :]), f"{name} with {len(values)} parameters", f"{len(names)} of them")
+    elif scanner.begins("("):
+        depth = 0
+        while not scanner.done and (depth or scanner.position == begin):
+            quoted = scanner.text.find('"', scanner.position + 1) if scanner.begins('"') else -1
+            depth += scanner.begins("(") - scanner.begins(")")
+            scanner.position = max(quoted, scanner.position) + 1
+    return words
+
+
+def _declare(scanner: SiemensScanner, define: Define) -> None:
+    """DEF REAL A=5, B[10]: variables with their first values."""
+    kind = scanner.part(NAME)
+    scanner.refuse_if(kind not in TYPES, f"DEF {kind} is not supported", f"DEF {', DEF '.join(TYPES)}")
+    scanner.index()  # the length of a text
+    while True:
+        column, name = scanner.column, scanner.part(NAME)
+        scanner.refuse_if(not name, f"{scanner.rest()} is no name of a variable", "DEF REAL LENGTH=5", column=column)
+        array = bool(scanner.index())
+        given = scanner.result() if scanner.sign("=") else TYPES[kind]
+        scanner.refuse_if(array and given != TYPES[kind], f"{name} with first values", "its elements one by one")
+        define(name + "[]" * array, bool(given) if kind == "BOOL" else given, column, kind)
+        if not scanner.sign(","):
+            return

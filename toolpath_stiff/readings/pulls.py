@@ -1,0 +1,242 @@
+"""Pulls: displacements of a machine of elements under known forces, as vectors or along a dial; stiffnesses as well.
+
+A row is a pull: where the machine stands (pose of the tip, or values of its joints, or both, held against each other),
+the force on the tool (its vector, or the tension of a cable and the pulley that it runs to), what moved (components, or
+a dial's reading). All in base axes; where the force acts and what is read may lie off the tip, in tip axes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray, TextArray
+from toolpath_stiff.column_names import Mapped
+from toolpath_stiff.errors import InputErrors, MeasurementError
+from toolpath_stiff.machine.elements import LoadRows, Spring, Stance
+from toolpath_stiff.machine.model import MachineTool
+from toolpath_stiff.readings.mapping import mapped_table
+from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.readings.rows import ANGLES, COLUMNS, POSITION, number, optional_number, parsed_rows
+from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.tables import Columns, Table
+from toolpath_stiff.units import m_from_mm, m_from_um, mm_from_m, rad_from_deg
+
+FORCE, MOVED, DIAL = ("fx_N", "fy_N", "fz_N"), ("ux_um", "uy_um", "uz_um"), ("dial_x", "dial_y", "dial_z")
+TENSION, CABLE = "tension_N", ("cable_x_mm", "cable_y_mm", "cable_z_mm")
+PULL, TARGET = (tuple(f"{what}_d{axis}_mm" for axis in "xyz") for what in ("pull", "target"))
+SAME_PLACE = m_from_mm(1.0)  # by which a pose and the joints beside it may differ: both are rounded
+
+
+@dataclass(frozen=True)
+class Pulls(ArrayColumns):
+    """m readings of displacements. SI, base axes.
+
+    Attributes
+    ----------
+    stance
+        How the machine stands at each.
+    wrench
+        (m, 6) N and N m, force and its moment about the tip.
+    along
+        (m, 6) what a reading takes of the tip's twist: the unit vector, and its moment about the tip from the target.
+    value, sd
+        (m,) m; sd is nan where nobody says.
+    pose
+        (m,) number of the distinct pose.
+    file, line, component
+        (m,) where it was read; "x", "y", "z" or "dial".
+    """
+
+    stance: Stance
+    wrench: FloatArray
+    along: FloatArray
+    value: FloatArray
+    sd: FloatArray
+    pose: IntArray
+    file: TextArray
+    line: IntArray
+    component: TextArray
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+
+def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> Pulls:
+    """Pulls on a machine of elements, or its stiffnesses as pulls. Raises `InputError`, `InputErrors`."""
+    joints, rows = _joint_columns(machine), []
+    tables = pull_tables(files, machine, mapping)
+    if not tables:
+        return _of_stiffnesses(files, machine, mapping)
+    if len(tables) < len(files):
+        raise MeasurementError("pulls beside stiffnesses", hint="give one kind of files at a time")
+    for table in tables:
+        of_file, errors = parsed_rows(table, partial(_Pull.of, table.file, joints))
+        if errors:
+            raise InputErrors(errors)
+        rows += of_file
+    if not rows:
+        raise MeasurementError("no rows below the heading", file=tables[0].file)
+    return _of_rows(rows, machine)
+
+
+def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> list[Table]:
+    """The files that give forces as vectors or by cables, as tables; the others give stiffnesses along directions."""
+    further = (*FORCE, *MOVED, *DIAL, TENSION, *CABLE, *PULL, *TARGET, *_joint_columns(machine))
+    known = Columns((*COLUMNS.numbers, *further), COLUMNS.texts)
+    tables = [mapped_table(name, "measurements", known, mapping) for name in files]
+    return [table for table in tables if not {FORCE[0], TENSION}.isdisjoint(table.heading)]
+
+
+@dataclass(frozen=True)
+class _Pull:
+    """One row, SI; nan where a cell is empty or a column absent."""
+
+    pose: tuple[float, ...]
+    joints: tuple[float, ...]
+    force: tuple[float, ...]
+    tension: float
+    pulley: tuple[float, ...]
+    moved: tuple[tuple[str, tuple[float, ...], float], ...]
+    pull: tuple[float, ...]
+    target: tuple[float, ...]
+    sd: float
+    file: str
+    line: int
+
+    @classmethod
+    def of(cls, file: str, joints: Mapping[str, tuple[int, bool]], line: int, record: Mapping[str, str]) -> "_Pull":
+        """A row of a file. Raises `MeasurementError`."""
+
+        def mm(names: Sequence[str]) -> tuple[float, ...]:
+            return tuple(m_from_mm(number(record, name)) if record.get(name) else 0.0 for name in names)
+
+        values = [np.nan] * (1 + max(i for i, _ in joints.values()))
+        for name, (i, linear) in joints.items():
+            if record.get(name):
+                values[i] = m_from_mm(number(record, name)) if linear else rad_from_deg(number(record, name))
+        placed = all(record.get(name) for name in POSITION)
+        if not placed and np.isnan(values).any():
+            expected = f"{', '.join(POSITION)}; or {', '.join(joints)}"
+            raise MeasurementError("neither a pose nor all joints", expected=expected)
+        angles = tuple(rad_from_deg(number(record, name)) if record.get(name) else 0.0 for name in ANGLES)
+        tension = optional_number(record, TENSION)
+        force = tuple(number(record, name) for name in FORCE) if FORCE[0] in record else (np.nan,) * 3
+        if np.isnan(tension) == np.isnan(force[0]) or (not np.isnan(tension) and not record.get(CABLE[0])):
+            raise MeasurementError("no force", expected=f"{', '.join(FORCE)}; or {TENSION} and {', '.join(CABLE)}")
+        axes = zip("xyz", np.eye(3).tolist(), MOVED, strict=True)
+        moved = [(c, tuple(axis), m_from_um(number(record, name))) for c, axis, name in axes if record.get(name)]
+        if record.get("displacement_um") and record.get(DIAL[0]):
+            dial = np.array([number(record, name) for name in DIAL])
+            reading = m_from_um(float(record["displacement_um"]))
+            moved.append(("dial", tuple(dial / np.linalg.norm(dial)), reading))
+        if not moved:
+            expected = f"{', '.join(MOVED)}; or displacement_um along {', '.join(DIAL)}"
+            raise MeasurementError("nothing read", expected=expected)
+        pose = (*mm(POSITION), *angles) if placed else (np.nan,) * 6
+        pulley, sd = mm(CABLE), m_from_um(optional_number(record, "sd_um"))
+        return cls(pose, tuple(values), force, tension, pulley, tuple(moved), mm(PULL), mm(TARGET), sd, file, line)
+
+
+def _joint_columns(machine: MachineTool) -> dict[str, tuple[int, bool]]:
+    """Column -> number of the joint and whether it is linear: `joint_J1_deg`, also `joint_1_deg`."""
+    columns = {}
+    for i, (name, kind) in enumerate(zip(machine.joint_names, machine.joint_kinds, strict=True)):
+        unit = "mm" if kind == "linear" else "deg"
+        for word in (name.replace(" ", "_"), str(i + 1)):
+            columns[f"joint_{word}_{unit}"] = (i, kind == "linear")
+    return columns
+
+
+def _of_rows(rows: Sequence[_Pull], machine: MachineTool) -> Pulls:
+    """The machine stood at each row's pose or joints; a reading for each component that was read."""
+    pose, joints = np.array([row.pose for row in rows]), np.array([row.joints for row in rows])
+    stance = _stances(machine, pose, joints, rows)
+    turn = np.broadcast_to(np.eye(3) if stance.rotation is None else stance.rotation, (len(rows), 3, 3))
+    pull, target = (np.einsum("nij,nj->ni", turn, [getattr(row, name) for row in rows]) for name in ("pull", "target"))
+    cable = np.array([row.pulley for row in rows]) - stance.position - pull
+    by_cable = np.array([[row.tension] for row in rows]) * cable / np.linalg.norm(cable, axis=1, keepdims=True)
+    given = np.array([row.force for row in rows])
+    force = np.where(np.isnan(given), by_cable, given)
+    which = np.repeat(np.arange(len(rows)), [len(row.moved) for row in rows])
+    direction = np.array([axis for row in rows for _, axis, _ in row.moved])
+    distinct = np.unique(np.round(np.nan_to_num(np.hstack([stance.joints, stance.position]), nan=-1.0), 6), axis=0,
+                         return_inverse=True)[1].reshape(-1)  # fmt: skip
+    return Pulls(
+        stance=stance.take(which),
+        wrench=np.hstack([force, np.cross(pull, force)])[which],
+        along=np.hstack([direction, np.cross(target[which], direction)]),
+        value=np.array([value for row in rows for *_, value in row.moved]),
+        sd=np.array([row.sd for row in rows])[which],
+        pose=distinct[which],
+        file=np.array([row.file for row in rows])[which],
+        line=np.array([row.line for row in rows])[which],
+        component=np.array([name for row in rows for name, *_ in row.moved]),
+    )
+
+
+def _stances(machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: Sequence[_Pull]) -> Stance:
+    """At the joints where they are given, else at the pose. Raises `InputErrors` for rows that cannot be."""
+    by_joints, errors = ~np.isnan(joints).any(axis=1), []
+    position, rotation = pose[:, :3].copy(), rotation_matrices(pose[:, 3:])
+    if by_joints.any():
+        there, turn = machine.forward(joints[by_joints])
+        apart = np.linalg.norm(there - position[by_joints], axis=1)
+        for row, off in zip(np.flatnonzero(by_joints).tolist(), apart.tolist(), strict=True):
+            if not off > SAME_PLACE:
+                continue
+            text = f"pose and joints are {mm_from_m(off):.1f} mm apart"
+            errors.append(MeasurementError(text, file=rows[row].file, line=rows[row].line))
+        position[by_joints], rotation[by_joints] = there, turn
+    stances = [machine.solve(position, rotation, configuration=i) for i in range(len(machine.configurations))]
+    best = machine.solve(position, rotation)
+    chosen = best.configuration.copy()
+    for i, stance in enumerate(stances):
+        off = np.abs(np.exp(1j * stance.joints) - np.exp(1j * joints)).max(axis=1)
+        chosen[by_joints & (off < 1e-6)] = i
+    for row in np.flatnonzero(np.isnan(best.joints).any(axis=1)).tolist():
+        errors.append(MeasurementError("no joint values lead to the pose", file=rows[row].file, line=rows[row].line))
+    if errors:
+        raise InputErrors(errors)
+    order = np.argsort(np.concatenate([np.flatnonzero(chosen == i) for i in range(len(stances))]))
+    return _joined([stance.take(np.flatnonzero(chosen == i)) for i, stance in enumerate(stances)]).take(order)
+
+
+def _joined(parts: Sequence[Stance]) -> Stance:
+    """Stances one after the other, in whatever configuration."""
+
+    def whole(values: Sequence[FloatArray | None], *inner: int) -> FloatArray:
+        full = [np.eye(3) if value is None else value for value in values]
+        return np.concatenate([np.broadcast_to(v, (len(s), *inner)) for v, s in zip(full, parts, strict=True)])
+
+    joined: list[Spring | LoadRows] = []
+    for loads in zip(*(part.loads for part in parts), strict=True):
+        k = loads[0].compliance.shape[-1]
+        compliance = whole([load.compliance for load in loads], k)
+        springs = [load for load in loads if isinstance(load, Spring)]
+        if springs:
+            axes = whole([spring.axes for spring in springs], 3, 3)
+            joined.append(Spring(whole([spring.place for spring in springs], 3), axes, compliance))
+        else:
+            rows = [load.loads for load in loads if isinstance(load, LoadRows)]
+            joined.append(LoadRows(whole(rows, k, 6), compliance))
+    return Stance(
+        joints=np.concatenate([part.joints for part in parts]),
+        position=np.concatenate([part.position for part in parts]),
+        rotation=whole([part.rotation for part in parts], 3, 3),
+        work_axes=whole([part.work_axes for part in parts], 3, 3),
+        configuration=np.concatenate([part.configuration for part in parts]),
+        loads=tuple(joined),
+    )
+
+
+def _of_stiffnesses(files: Sequence[str], machine: MachineTool, mapping: Mapped) -> Pulls:
+    """Readings of force over displacement along a direction, as pulls by that force with a dial along it."""
+    data = read_measurements(files, machine, columns=mapping)
+    wrench, along = (np.hstack([part, np.zeros((len(data), 3))]) for part in (data.direction * data.force[:, None],
+                                                                             data.direction))  # fmt: skip
+    stance = machine.solve(data.position, data.rotation, data.tool_extension + machine.reference_tool_length)
+    value = data.force / data.stiffness
+    return Pulls(stance, wrench, along, value, value * data.sd / data.stiffness, data.poses[1], data.file, data.line,
+                 np.full(len(data), "dial"))  # fmt: skip
