@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import Document, certain, records, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
@@ -354,7 +354,8 @@ def _spoilt(before: Walls, after: Walls, moves: Moves) -> set[int]:
         # A line that now makes less of a wall than before may have lost the better part of it.
         whole = now[name] * now["length"] > (base + SAME) * was["length"]
         worse |= (now[name] - base > SAME) & whole
-    return set(np.unique(before.row[worse.any(axis=1)[wall[before.row]]]).tolist())
+    spoilt: BoolArray = np.asarray(worse.any(axis=1))[wall[before.row]]
+    return set(np.unique(before.row[spoilt]).tolist())
 
 
 def _lines(
