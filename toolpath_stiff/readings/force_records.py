@@ -37,8 +37,8 @@ FINER = 8  # times finer than the spectrum of the record its speed is looked for
 
 def read_records(
     file: str, columns: Mapped, flutes: int
-) -> Iterator[tuple[str, tuple[float, float, float], FloatArray]]:
-    """Name, settings (feed m per tooth, depth m, turns a second), and rows (m, 4) s and N of each record of a file.
+) -> Iterator[tuple[str, tuple[float, float, float], FloatArray, tuple[str, ...]]]:
+    """Name, settings (feed m per tooth, depth m, turns a second), rows (m, 4) s and N of each record; remarks of a file.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def read_records(
         turns_a_second = float(rate[rows[0]]) / s_from_min(1.0)
         per_tooth = float(fed[rows[0]]) / (s_from_min(1.0) * turns_a_second * flutes if feed == FEEDS[1] else 1.0)
         settings = (m_from_mm(per_tooth), m_from_mm(float(depth[rows[0]])), turns_a_second)
-        yield f"{file} {name}".strip(), settings, signal[rows]
+        yield f"{file} {name}".strip(), settings, signal[rows], table.remarks
 
 
 def mean_force(
@@ -104,7 +104,7 @@ def mean_force(
     heard = _heard_rate(time, known, rate, cutter.flutes)
     if abs(heard / rate - 1.0) > 0.01:
         heard_speed, stated = (f"{s_from_min(1.0) * value:.0f}" for value in (heard, rate))
-        remarks.append(f"{name}: the teeth pass at {heard_speed} turns a minute, not at {stated}")
+        remarks.append(f"the teeth pass at {heard_speed} turns a minute, not at {stated}")
     turn = np.floor(time * heard).astype(int)
     cutting, air = _cut_and_air(turn, known, int(np.ceil(cutter.radius / (feed * cutter.flutes))))
     if len(cutting) < LEAST_TURNS:
@@ -119,7 +119,7 @@ def mean_force(
         line = np.polynomial.polynomial.polyfit(time[silent], known[silent], order)
         zero = np.polynomial.polynomial.polyval(time, line).T
     else:
-        remarks.append(f"{name}: no air before or after the cut, the zero is as recorded")
+        remarks.append("no air before or after the cut, the zero is as recorded")
     full = (turn >= cutting[0]) & (turn <= cutting[-1])
     cleared = (known - zero)[full]
     waves = harmonics(time[full] * heard, cleared[:, side], cutter.flutes)

@@ -163,16 +163,18 @@ def fit_coefficients(
         A file cannot be read, there are too few feeds, or the signs of the axes cannot be right.
     """
     turned = _rotation(axes)
-    records, notes, settings, forces, waves = [], [], [], [], []
+    records, settings, forces, waves = [], [], [], []
+    noted: dict[str, list[str]] = {}  # remark -> records
     for file in files:
-        for name, setting, signal in read_records(file, columns, cutter.flutes):
+        for name, setting, signal, how in read_records(file, columns, cutter.flutes):
             mean, wave, remarks = mean_force(name, signal, setting[2], cutter, setting[0], turned[1][0])
             # A dynamometer reads what acts on the work.
             forces.append([-sign * mean[axis] for axis, sign in turned])
             waves.append(-turned[1][1] * wave)
             settings.append(setting)
             records.append(name)
-            notes += remarks
+            for remark in (*remarks, *how):
+                noted.setdefault(remark, []).append(name)
     feed, depth, _ = np.array(settings).reshape(-1, 3).T
     if len(np.unique(feed)) < 3:
         fault = f"slots at {len(np.unique(feed))} feeds"
@@ -199,8 +201,9 @@ def fit_coefficients(
     )
     fitted = np.where(np.isnan(force), np.nan, product(response, values[:, None])[..., 0])
     off = left_out(response, force, feed)
+    notes = tuple(f"{', '.join(names)}: {remark}" for remark, names in noted.items())
     columns_of_slots = (tuple(records), feed, depth, force, fitted, off, run_out)
-    return CoefficientFit(coefficients, determined, cutter, *columns_of_slots, tuple(notes), tuple(files))
+    return CoefficientFit(coefficients, determined, cutter, *columns_of_slots, notes, tuple(files))
 
 
 def _rotation(axes: str) -> list[tuple[int, float]]:
