@@ -38,7 +38,7 @@ FINER = 8  # times finer than the spectrum of the record its speed is looked for
 def read_records(
     file: str, columns: Mapped, flutes: int
 ) -> Iterator[tuple[str, tuple[float, float, float], FloatArray, tuple[str, ...]]]:
-    """Name, settings (feed m per tooth, depth m, turns a second), rows (m, 4) s and N of each record; remarks of a file.
+    """Name, settings (feed m per tooth, depth m, turns a second), rows (m, 4) s and N of each record; the remarks.
 
     Raises
     ------
