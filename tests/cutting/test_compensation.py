@@ -186,3 +186,22 @@ def test_result():
     assert document["walls"]["mean_before_um"] == pytest.approx(12.0)
     assert set(document["lines"][0]) == set(compensated.to_frame().columns)
     assert "which no shift removes" in str(compensated) and "floors are not compensated" in str(compensated)
+
+
+def test_where_every_shift_makes_walls_worse_elsewhere_nothing_is_shifted():
+    """Also where moves that made no wall before make one then: the search for what may be shifted ends."""
+    untouched, base = parse_program(POCKET, "pocket.nc"), cut_by(lambda x, y, off: 0.012 + 0.0 * x)
+
+    def evaluate(program):
+        cut = base(program)
+        same = len(program.moves) == len(untouched.moves) and np.allclose(program.moves.end, untouched.moves.end)
+        if not same:
+            swinging = np.where(np.arange(len(cut.samples)) % 2, 5e-5, -5e-5)  # no shift takes that out
+            cut.wall_mean[cut.made, 1] += swinging[cut.made]
+            cut.wall_mean[(cut.samples.motion != 0) & ~cut.made & (cut.samples.position[:, 2] < 0.0), 1] = 1e-5
+        return cut
+
+    compensated = compensate(evaluate)
+    assert not compensated.changed
+    assert compensated.rewritten.text.splitlines() == POCKET.splitlines()
+    assert all(compensated.lines["left_alone"])

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.forces import force_at, mean_force, peak_force
-from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.patches import Contact, Patches
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
 
 PI = np.pi
@@ -78,7 +78,7 @@ def sliced(cutter, values, feed, rise, patch, angle, taper=0.0, slices=4000):
     ],
 )
 def test_mean_forces_of_closed_forms(cutter, contact, newtons):
-    force = mean_force(contact, cutter, COEFFICIENTS, FEED, ON)[0]
+    force = mean_force(Contact(contact, cutter, COEFFICIENTS, FEED, ON))[0]
     assert tuple(float(f"{value:.6g}") for value in force) == newtons
 
 
@@ -86,7 +86,7 @@ def test_mean_of_a_slot_to_the_last_digits():
     """The textbook's sums (Altintas, Manufacturing Automation, 2.37) for a slot."""
     n, b, c, (t, r, a, te, re, ae) = 3, 0.003, 5e-5, VALUES
     expected = [-n * b * (r * c / 4 + re / PI), n * b * (t * c / 4 + te / PI), -n * b * (a * c / PI + ae / 2)]
-    assert mean_force(patch(b, 0.0, PI), FLAT, COEFFICIENTS, FEED, ON)[0] == pytest.approx(expected, rel=1e-12)
+    assert mean_force(Contact(patch(b, 0.0, PI), FLAT, COEFFICIENTS, FEED, ON))[0] == pytest.approx(expected, rel=1e-12)
 
 
 TAPERED = replace(COEFFICIENTS, taper=1e-6)
@@ -108,7 +108,7 @@ ANGLE = st.floats(0.0, 2 * PI)
 def test_any_cutter_is_the_sum_of_its_slices(cutter, flutes, helix, hand, run_out, arc, heights, angle, rise):
     cutter = replace(cutter, flutes=flutes, helix=helix, hand=hand, run_out=run_out, run_out_angle=0.7)
     contact = patch(sum(heights), min(arc), max(arc), heights[0])
-    force = force_at(contact, cutter, TAPERED, np.array([[5e-5, rise]]), ON, np.array([[angle]]))[0, 0]
+    force = force_at(Contact(contact, cutter, TAPERED, np.array([[5e-5, rise]]), ON), np.array([[angle]]))[0, 0]
     summed = sliced(cutter, VALUES, 5e-5, rise, contact, angle, 1e-6)
     # 4,000 slices miss an end of the arc by a part of a slice. Where the chip begins within a corner, or is thinner
     # than the taper near the tip, Gauss's rule misses it by a part of a node, with the force at the edge along it.
@@ -126,10 +126,10 @@ ECCENTRIC = replace(FLAT, run_out=6e-6, run_out_angle=0.4)
 def test_mean_and_peak_are_those_of_the_turn(cutter):
     contact = patch(0.0035, 0.3, 2.4)
     angles = np.linspace(0.0, 2 * PI, 2880, endpoint=False)[None]
-    force = force_at(contact, cutter, TAPERED, FEED, ON, angles)[0]
-    mean = mean_force(contact, cutter, TAPERED, FEED, ON)[0]
+    force = force_at(Contact(contact, cutter, TAPERED, FEED, ON), angles)[0]
+    mean = mean_force(Contact(contact, cutter, TAPERED, FEED, ON))[0]
     assert mean == pytest.approx(force.mean(axis=0), abs=2e-3 * np.ptp(force))
-    peak = peak_force(contact, cutter, TAPERED, FEED, ON)[0]
+    peak = peak_force(Contact(contact, cutter, TAPERED, FEED, ON))[0]
     largest = force[np.abs(force).argmax(axis=0), range(3)]
     assert peak == pytest.approx(largest, rel=0.02)
 
@@ -137,9 +137,11 @@ def test_mean_and_peak_are_those_of_the_turn(cutter):
 def test_run_out_moves_chips_from_flute_to_flute_but_removes_no_more():
     without_edge = replace(TAPERED, edge=np.zeros(3))
     contact, cutter = patch(0.003, 0.0, PI), replace(FLAT, run_out=2e-5, run_out_angle=1.0)
-    with_run_out, without = (mean_force(contact, tool, without_edge, FEED, ON) for tool in (cutter, FLAT))
+    with_run_out, without = (mean_force(Contact(contact, tool, without_edge, FEED, ON)) for tool in (cutter, FLAT))
     assert with_run_out == pytest.approx(without, rel=1e-12)  # what one flute leaves the next takes
-    with_run_out, without = (peak_force(contact, tool, without_edge, FEED, ON)[0, 1] for tool in (cutter, FLAT))
+    with_run_out, without = (
+        peak_force(Contact(contact, tool, without_edge, FEED, ON))[0, 1] for tool in (cutter, FLAT)
+    )
     assert with_run_out > 1.2 * without
 
 
@@ -151,13 +153,13 @@ def test_stations_do_not_touch_each_other():
     many = Patches(station, np.zeros(6000), rng.uniform(0.001, 0.004, 6000), entry, entry + rng.uniform(0.1, 4.0, 6000))
     feed = np.stack([rng.choice([0.0, 3e-5, 6e-5], 5000), np.zeros(5000)], axis=1)
     turning = rng.choice([1.0, -1.0], 5000)
-    means, peaks = (f(many, BULL, TAPERED, feed, turning) for f in (mean_force, peak_force))
+    means, peaks = (f(Contact(many, BULL, TAPERED, feed, turning)) for f in (mean_force, peak_force))
     for k in (0, 17, 2048, 4999):
         single = many.take(station == k)
         single = replace(single, station=np.zeros_like(single.station))
         for all_of_them, f in ((means, mean_force), (peaks, peak_force)):
             assert all_of_them[k] == pytest.approx(
-                f(single, BULL, TAPERED, feed[[k]], turning[[k]])[0], rel=1e-9, abs=1e-9
+                f(Contact(single, BULL, TAPERED, feed[[k]], turning[[k]]))[0], rel=1e-9, abs=1e-9
             )
     still = (feed[:, 0] == 0.0) | ~np.isin(np.arange(5000), station)
     assert not means[still].any()
@@ -180,11 +182,11 @@ def test_errors_at_heights(side, entry, leave, compliance, microns, mean):
     for height, expected in zip((0.25e-3, 1.25e-3, 2.25e-3, 2.75e-3), microns, strict=True):
         walls = np.full((1, 2, 2), np.nan)
         walls[0, side] = height
-        error, _, _ = wall_error(contact, FLAT, COEFFICIENTS, FEED, ON, compliance[None], walls)
+        error, _, _ = wall_error(Contact(contact, FLAT, COEFFICIENTS, FEED, ON), compliance[None], walls)
         assert 1e6 * error[0, side] == pytest.approx(np.full(HEIGHTS, expected), abs=1e-5)
         assert np.isnan(error[0, 1 - side]).all()
     walls[0, side] = 0.0, 0.003
-    error, deviation, force = wall_error(contact, FLAT, COEFFICIENTS, FEED, ON, compliance[None], walls)
+    error, deviation, force = wall_error(Contact(contact, FLAT, COEFFICIENTS, FEED, ON), compliance[None], walls)
     assert 1e6 * error[0, side] @ shares()[1] == pytest.approx(mean, abs=1e-5)
     outward = (-1.0, 1.0)[side]
     assert 1e6 * outward * (compliance @ force[0, side])[1] == pytest.approx(mean, abs=1e-5)
@@ -195,23 +197,24 @@ def test_a_spindle_that_turns_the_other_way_is_the_mirror_image():
     mirror = np.diag([1.0, -1.0, 1.0])
     walls, strip = np.array([[[0.0, 0.003], [0.001, 0.002]]]), np.array([[-0.004, 0.002]])
     for cutter in (FLAT, BULL, replace(FLAT, run_out=4e-6)):
-        other = replace(cutter, hand=-1)
-        contact, mirrored = patch(0.003, 0.2, 2.5), patch(0.003, PI - 2.5, PI - 0.2)
+        plain = Contact(patch(0.003, 0.2, 2.5), cutter, TAPERED, FEED, ON)
+        turned = Contact(patch(0.003, PI - 2.5, PI - 0.2), replace(cutter, hand=-1), TAPERED, FEED, -ON)
         for f in (mean_force, peak_force):
-            right, left = f(contact, cutter, TAPERED, FEED, ON), f(mirrored, other, TAPERED, FEED, -ON)
-            assert left @ mirror == pytest.approx(right, rel=1e-12)
-        turned = (mirrored, other, TAPERED, FEED, -ON, (mirror @ COUPLED @ mirror)[None])
-        error, _, _ = wall_error(contact, cutter, TAPERED, FEED, ON, COUPLED[None], walls)
-        assert wall_error(*turned, walls[:, ::-1])[0][:, ::-1] == pytest.approx(error, rel=1e-9)
-        floor, _ = floor_error(contact, cutter, TAPERED, FEED, ON, COUPLED[None], strip)
-        assert floor_error(*turned, -strip[:, ::-1])[0][:, ::-1] == pytest.approx(floor, rel=1e-9)
-    left_hand = mean_force(contact, replace(FLAT, hand=-1), COEFFICIENTS, FEED, ON)
-    assert left_hand == pytest.approx(mean_force(contact, FLAT, COEFFICIENTS, FEED, ON) * [1, 1, -1], rel=1e-12)
+            assert f(turned) @ mirror == pytest.approx(f(plain), rel=1e-12)
+        mirrored = turned, (mirror @ COUPLED @ mirror)[None]
+        error, _, _ = wall_error(plain, COUPLED[None], walls)
+        assert wall_error(*mirrored, walls[:, ::-1])[0][:, ::-1] == pytest.approx(error, rel=1e-9)
+        floor, _ = floor_error(plain, COUPLED[None], strip)
+        assert floor_error(*mirrored, -strip[:, ::-1])[0][:, ::-1] == pytest.approx(floor, rel=1e-9)
+    contact = patch(0.003, 0.2, 2.5)
+    tools = (FLAT, replace(FLAT, hand=-1))
+    right_hand, left_hand = (mean_force(Contact(contact, tool, COEFFICIENTS, FEED, ON)) for tool in tools)
+    assert left_hand == pytest.approx(right_hand * [1, 1, -1], rel=1e-12)
 
 
 def test_an_arc_across_the_left_is_mirrored_into_two():
     ramp = np.array([[5e-5, -2e-5]])
     across = np.array([0.0, 3 * PI - 3.8]), np.array([PI - 2.5, 2 * PI])
     image = Patches(np.array([0, 0]), np.zeros(2), np.full(2, 0.003), *across)
-    left = mean_force(patch(0.003, 2.5, 3.8), replace(BALL, hand=-1), COEFFICIENTS, ramp, -ON)
-    assert left * [1, -1, 1] == pytest.approx(mean_force(image, BALL, COEFFICIENTS, ramp, ON), rel=0.03)
+    left = mean_force(Contact(patch(0.003, 2.5, 3.8), replace(BALL, hand=-1), COEFFICIENTS, ramp, -ON))
+    assert left * [1, -1, 1] == pytest.approx(mean_force(Contact(image, BALL, COEFFICIENTS, ramp, ON)), rel=0.03)

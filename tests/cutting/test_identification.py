@@ -273,3 +273,4 @@ def test_files_as_instruments_write_them(tmp_path, instrument):
     fit = tps.forces(files, cut, columns=mapping)
     assert fit.coefficients.values == pytest.approx(first.coefficients.values, rel=2e-3)
     assert fit.force == pytest.approx(first.force, abs=0.05)
+    assert "above the heading are passed over" in " ".join(fit.notes)

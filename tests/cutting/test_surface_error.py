@@ -9,7 +9,7 @@ from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.engagement import engage
 from toolpath_stiff.cutting.final_surface import walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force
-from toolpath_stiff.cutting.patches import Patches, of_stations
+from toolpath_stiff.cutting.patches import Contact, Patches, of_stations
 from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import box_stock
 from toolpath_stiff.cutting.surface_error import STRIPS, floor_error, shares, wall_error
@@ -61,21 +61,21 @@ def test_surface_of_a_cutter_stepped_through_time(name):
     coefficients = np.array(mill.coefficients) * [1e6, 1e6, 1e6, 1e3, 1e3, 1e3]
     contact = Patches(np.array([0]), *(np.array([value]) for value in (0.0, depth / 1e3, start, start + arc)))
     known = Coefficients(coefficients[:3], coefficients[3:], np.zeros((6, 6)))
-    job = (contact, cutter, known, np.array([[mill.feed / 1e3, 0.0]]), np.ones(1))
+    job = Contact(contact, cutter, known, np.array([[mill.feed / 1e3, 0.0]]), np.ones(1))
     compliance = mill.compliance[None] / 1e3
     # What yields cuts a little otherwise than what is rigid.
-    assert mean_force(*job)[0] == pytest.approx(mill.force[-mill.steps :].mean(axis=0), rel=0.02, abs=3.5)
+    assert mean_force(job)[0] == pytest.approx(mill.force[-mill.steps :].mean(axis=0), rel=0.02, abs=3.5)
     aside = (np.arange(STRIPS) + 0.5) / STRIPS * 8.0 - 4.0
     strips = np.array([[-4.0, 4.0]])
     if mill.ball:
         aside = np.array([-1.5, -0.3, 1e-6, 0.8, 1.9])
         strips = np.stack([aside, aside], axis=1)
-    floors = [1e6 * floor_error(*job, compliance, strip[None] / 1e3)[0][0] for strip in strips]
+    floors = [1e6 * floor_error(job, compliance, strip[None] / 1e3)[0][0] for strip in strips]
     assert np.concatenate(floors) == pytest.approx(mill.below(aside), abs=FLOOR)
     for which in () if mill.ball else ("left", "right") if side == "both" else (side,):
         walls = np.full((1, 2, 2), np.nan)
         walls[0, int(which == "right")] = 0.0, depth / 1e3
-        error = 1e6 * wall_error(*job, compliance, walls)[0][0, int(which == "right")]
+        error = 1e6 * wall_error(job, compliance, walls)[0][0, int(which == "right")]
         simulated = mill.wall(which)
         assert error @ shares()[1] == pytest.approx(simulated.mean(), rel=MEAN[0], abs=MEAN[1])
         assert np.ptp(error) == pytest.approx(np.ptp(simulated), rel=RANGE[0], abs=RANGE[1])
@@ -123,7 +123,7 @@ def test_an_inner_corner_of_a_program():
     turned[:, 0, 1], turned[:, 1, 0], turned[:, 2, 2] = np.sin(heading), -np.sin(heading), 1.0
     compliance = turned @ (SLIM / 1e3) @ turned.swapaxes(1, 2)
     patches, feed = of_stations(engaged.patches, engaged.source), np.tile([[8e-5, 0.0]], (count, 1))
-    error, _, _ = wall_error(patches, cutter, known, feed, np.ones(count), compliance, walls)
+    error, _, _ = wall_error(Contact(patches, cutter, known, feed, np.ones(count)), compliance, walls)
     mean, spread = 1e6 * error[:, 1] @ shares()[1], 1e6 * np.ptp(error[:, 1], axis=1)
     x, y, _ = 1e3 * samples.position.T
     compared = 0

@@ -7,7 +7,6 @@ parameters have partly taken up, and what the model lacks.
 """
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,15 +16,13 @@ from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import Load, load_directions
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import Document
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.error_model import FEW, GEOMETRY, alike, coordinates
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
-from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
+from toolpath_stiff.stiffness.model import StiffnessModel, parameter_slopes
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
-STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
 BLOCK = 8192  # samples whose struts and joints are looked at at a time
 MOST_OF_MEAN = 400  # samples by which it is told how far what the model lacks averages out along a path
 
@@ -76,26 +73,13 @@ def parameter_band(
     model: StiffnessModel, samples: Samples, load: Load, force: float, stiffness: FloatArray
 ) -> ParameterBand | None:
     """The band of a path, given its stiffness (n,); None where the machine file states no uncertainty of what acts."""
+    path = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+    slopes_of = parameter_slopes(model, lambda moved: evaluate(moved, *path, load, force).stiffness, stiffness)
     uncertainty = model.given.uncertainty if model.given is not None else None
-    idle = {active.effect.name for active in model.instruments} | idle_effects(model).keys()
-    sd = {} if uncertainty is None else dict(zip(uncertainty.names, uncertainty.sd.tolist(), strict=True))
-    kept = [i for i, (name, size) in enumerate(sd.items()) if size > 0.0 and name.partition(".")[0] not in idle]
-    if uncertainty is None or not kept:
+    if uncertainty is None or not slopes_of:
         return None
-
-    def slope(name: str) -> FloatArray:
-        """(n,) N/m per standard deviation of one parameter, away from a bound that is near."""
-        for step in (STEP, -STEP):
-            with suppress(InputError):
-                moved = with_parameter_moved(model, name, step * sd[name])
-                path = (samples.position, samples.abc, samples.tangent, samples.tool_length)
-                return np.asarray((evaluate(moved, *path, load, force).stiffness - stiffness) / step)
-        raise InputError(
-            f"[uncertainty]: {name} has no room between its bounds for a standard deviation of {sd[name]:g}"
-        )
-
-    names = tuple(uncertainty.names[i] for i in kept)
-    slopes = np.stack([slope(name) for name in names], axis=1)
+    kept, names = [*slopes_of], tuple(uncertainty.names[i] for i in slopes_of)
+    slopes = np.stack([*slopes_of.values()], axis=1)
     place = coordinates(samples.position, samples.abc)
     if uncertainty.errors is None:
         values, vectors = np.linalg.eigh(uncertainty.correlation[np.ix_(kept, kept)])

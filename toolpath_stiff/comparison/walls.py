@@ -17,12 +17,11 @@ from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.cutting.compensation import places_beside
 from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.cutting.cutters import radii_of
-from toolpath_stiff.cutting.passes import profile_at
+from toolpath_stiff.cutting.passes import profile_at, walls_beside
 from toolpath_stiff.documents import certain, records, without_nan
-from toolpath_stiff.errors import InputErrors, MeasurementError
+from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.nc.moves import Moves
-from toolpath_stiff.readings.mapping import check_needed, mapped_table
-from toolpath_stiff.readings.rows import number
+from toolpath_stiff.readings.mapping import check_needed, mapped_table, number_columns
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.tables import Columns
 from toolpath_stiff.units import m_from_mm, m_from_um, mm_from_m, um_from_m
@@ -47,24 +46,14 @@ def read_walls(file: str, columns: Mapped = None) -> tuple[FloatArray, FloatArra
     """
     table = mapped_table(file, "measured walls", COLUMNS, columns)
     check_needed(table, (*POINT, *NORMAL), LAYOUT)
-    names = [name for name in COLUMNS.numbers if name in table.heading]
-    rows, errors = [], []
-    for line, cells in table.rows:
-        try:
-            record = table.record(cells)
-            rows.append([number(record, name) for name in names])
-            if not np.linalg.norm(rows[-1][3:6]) > 0.0:
-                raise MeasurementError("a normal of no length", expected="nx, ny, nz out of the part")
-        except MeasurementError as error:
-            errors.append(MeasurementError(error.found, expected=error.expected, file=table.file, line=line))
-    if errors:
-        raise InputErrors(errors)
-    values = np.array(rows, dtype=float).reshape(-1, len(names))
-    if not len(values):
+    if not table.rows:
         raise MeasurementError("no measured point", expected=LAYOUT, file=table.file)
-    normal = values[:, 3:6] / np.linalg.norm(values[:, 3:6], axis=1, keepdims=True)
-    deviation = m_from_um(values[:, 6]) if values.shape[1] > 6 else np.full(len(values), np.nan)
-    return m_from_mm(values[:, :3]), normal, deviation, table.notes
+    values = number_columns(table, COLUMNS.numbers)
+    normal, length = values[:, 3:6], np.linalg.norm(values[:, 3:6], axis=1, keepdims=True)
+    if not length.all():
+        line = table.rows[int(np.argmin(length))][0]
+        raise MeasurementError("a normal of no length", expected="nx, ny, nz out of the part", file=file, line=line)
+    return m_from_mm(values[:, :3]), normal / length, m_from_um(values[:, 6]), table.notes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,15 +148,12 @@ def compare_walls(
     `moves` are the program's, in whose coordinates the points are. Raises `MeasurementError` where none lies on a wall.
     """
     station, side = np.nonzero(np.isfinite(cut.wall_mean))
-    samples, sign = cut.samples.take(station), 1.0 - 2.0 * side
-    radius = radii_of(cut.cutters, samples.tool)
-    flat = samples.tangent[:, :2] / np.linalg.norm(samples.tangent[:, :2], axis=1, keepdims=True)
-    left = np.stack([-flat[:, 1], flat[:, 0]], axis=1)
-    surface, outward = samples.position[:, :2] + (sign * radius)[:, None] * left, -sign[:, None] * left
+    samples, radius = cut.samples.take(station), radii_of(cut.cutters, cut.samples.tool[station])
+    surface, into = walls_beside(cut.samples, cut.cutters, station, side)
     height = samples.position[:, 2, None] + cut.wall_heights[station, side] + np.array([-FARTHEST, FARTHEST])
     nearest = np.full(len(points), -1)
     for i, (point, towards) in enumerate(zip(points, normal, strict=True)):
-        beside = (outward @ towards[:2] > ALONG) & (height[:, 0] <= point[2]) & (point[2] <= height[:, 1])
+        beside = (into @ towards[:2] < -ALONG) & (height[:, 0] <= point[2]) & (point[2] <= height[:, 1])
         if beside.any():
             away = np.where(beside, np.linalg.norm(surface - point[:2], axis=1), np.inf)
             nearest[i] = int(np.argmin(away))
@@ -176,7 +162,7 @@ def compare_walls(
     last = np.searchsorted(cut.samples.move, row, side="right") - 1
     length = cut.samples.s[last] - cut.samples.s[first]
     _, aside = places_beside(moves, row, points, (samples.s[nearest] - cut.samples.s[first]) / length)
-    off = radius[nearest] - sign[nearest] * aside
+    off = radius[nearest] - (1.0 - 2.0 * side[nearest]) * aside
     on = (nearest >= 0) & (np.abs(off) <= FARTHEST)
     if not on.any():
         hint = "points are in program coordinates, mm, their normals point out of the part"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import Document, certain, records, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
@@ -290,7 +290,7 @@ def compensate_program(
         raise ProgramError("no pass makes a wall of the finished part", file=program.name)
     alone = {int(row): "a plunge, or an arc on edge" for row in np.unique(before.row[~movable_rows(moves)[before.row]])}
     alone |= _too_far(before)
-    changes, turn, finals = [_quantile(before.wanted)], 0, set(before.row.tolist())
+    changes, turn = [_quantile(before.wanted)], 0
     shifts = _shifts(before, before.wanted)
     while True:
         turn += 1
@@ -312,9 +312,9 @@ def compensate_program(
         spoilt = _spoilt(before, after, moves)
         if not spoilt or not side.courses:
             break
-        # A wall that was not shifted is spoilt by its neighbours: they stay too, or all do.
-        beside = {other for row in spoilt for other in (row - 1, row + 1)} & finals
-        alone |= dict.fromkeys(spoilt - alone.keys() or beside - alone.keys() or finals, WORSE)
+        # A wall that was not shifted is spoilt by others: the nearest that are shifted stay too, ever more of them.
+        away = {row: min(abs(row - other) for other in spoilt) for row in shifts.keys() - alone.keys()}
+        alone |= {row: WORSE for row, far in away.items() if far <= 2 * min(away.values())}
     shift = np.zeros(len(before_cut.samples))
     shift[np.isfinite(before_cut.wall_mean).any(axis=1)] = _intended(shifts, before)
     was, now = figures_of_walls(before, len(moves)), figures_of_walls(after, len(moves))
@@ -340,16 +340,22 @@ def _intended(shifts: Shifts, walls: Walls) -> FloatArray:
 
 
 def _spoilt(before: Walls, after: Walls, moves: Moves) -> set[int]:
-    """Rows of walls whose error grew, in its mean size or its rms; one that is new, against the worst there was.
+    """Rows of walls whose error grew, in its mean size or its rms, along the wall and summed up over its length.
 
-    A move is a wall; moves shorter than `SHORT` that follow each other, as chords do, are one together.
+    One that is new counts against the worst there was. A move is a wall; moves shorter than `SHORT` that follow each
+    other, as chords do, are one together.
     """
     short = move_lengths(moves) < SHORT
     wall = np.cumsum(np.where(short & np.roll(short, 1), 0, 1))
     was, now = (figures_of_walls(replace(walls, row=wall[walls.row]), int(wall[-1]) + 1) for walls in (before, after))
-    grown = [now[name] - np.where(was["length"] > 0.0, was[name], np.nanmax(was[name])) for name in ("size", "rms")]
-    worse = np.asarray((np.fmax(*grown) > SAME).any(axis=1))
-    return set(np.unique(before.row[worse[wall[before.row]]]).tolist())
+    worse, made = np.zeros(now["length"].shape, dtype=bool), was["length"] > 0.0
+    for name in ("size", "rms"):
+        base = np.where(made, was[name], np.nanmax(was[name]))
+        # A line that now makes less of a wall than before may have lost the better part of it.
+        whole = now[name] * now["length"] > (base + SAME) * was["length"]
+        worse |= (now[name] - base > SAME) & whole
+    spoilt: BoolArray = np.asarray(worse.any(axis=1))[wall[before.row]]
+    return set(np.unique(before.row[spoilt]).tolist())
 
 
 def _lines(

@@ -14,7 +14,7 @@ from toolpath_stiff.cutting.engagement import engage
 from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.passes import walls_of_all_passes
-from toolpath_stiff.cutting.patches import Patches, of_stations
+from toolpath_stiff.cutting.patches import Contact, Patches, of_stations
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
 from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import Stock
@@ -179,10 +179,13 @@ def evaluate_cut(
     cut.wall_profiles[made[:, :2]] = 0.0
     _note_engagement(cut, patches)
     cutting = np.unique(patches.station)
+    level = np.hypot(samples.tangent[:, 0], samples.tangent[:, 1])
+    feed = cut.feed_per_tooth[:, None] * np.stack([level, samples.tangent[:, 2]], axis=1)
     for number, cutter in cutters.items():
+        contact = Contact(patches, cutter, setup.coefficients, feed, np.sign(spindle))
         some = cutting[samples.tool[cutting] == number]
-        for start in range(0, len(some), BLOCK):
-            _evaluate(cut, model, origin, cutter, patches, spindle, strips, some[start : start + BLOCK])
+        for rows in (some[start : start + BLOCK] for start in range(0, len(some), BLOCK)):
+            _evaluate(cut, model, origin, contact.of(rows), strips, rows)
     for values in (cut.ap, cut.ae, cut.entry, cut.exit, cut.mean_force, cut.peak_force, cut.deflection, cut.wall_force):
         values[:] = values[source]
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation, cut.wall_profiles):
@@ -255,38 +258,26 @@ def _evaluate(
     cut: Cut,
     model: StiffnessModel,
     origin: Pose,
-    cutter: Cutter,
-    patches: Patches,
-    spindle: FloatArray,
+    contact: Contact,
     strips: FloatArray,
     rows: IntArray,
 ) -> None:
-    """Enter forces, deflections and errors of some samples (m,) that cut with one cutter, in their order.
-
-    `strips`: of floor (n, 2).
-    """
+    """Enter forces, deflections and errors of some samples (m,) with their contact; `strips`: of floor (n, 2)."""
     samples = cut.samples.take(rows)
-    kept = patches.take(slice(*np.searchsorted(patches.station, (rows[0], rows[-1] + 1))))
-    place = np.searchsorted(rows, kept.station).clip(max=len(rows) - 1)
-    kept = replace(kept, station=place).take(rows[place] == kept.station)
-    slope = np.hypot(samples.tangent[:, 0], samples.tangent[:, 1]), samples.tangent[:, 2]
-    feed = cut.feed_per_tooth[rows, None] * np.stack(slope, axis=1)
-    turning = np.sign(spindle[rows])
-    given = (kept, cutter, cut.coefficients, feed, turning)
-    mean = mean_force(*given)
-    cut.mean_force[rows], cut.peak_force[rows] = mean, peak_force(*given)
+    mean = mean_force(contact)
+    cut.mean_force[rows], cut.peak_force[rows] = mean, peak_force(contact)
     axes = station_axes(headings(samples), origin)
     machine = tip_compliances(model, samples, origin, axes, mean)
     whole = with_tools(machine, samples, cut.cutters)
     cut.deflection[rows] = product(whole, mean[:, :, None])[..., 0]
-    walls, of_walls, cut.wall_force[rows] = wall_error(*given, whole, cut.wall_heights[rows])
-    floors, of_floors = floor_error(*given, whole, strips[rows])
+    walls, of_walls, cut.wall_force[rows] = wall_error(contact, whole, cut.wall_heights[rows])
+    floors, of_floors = floor_error(contact, whole, strips[rows])
     cut.wall_profiles[rows] = walls
     _enter(cut, rows, slice(0, 2), walls @ shares()[1], walls)
     _enter(cut, rows, slice(2, 3), floors.mean(axis=1)[:, None], floors[:, None])
     # Of the machine as a share of the compliance that acts along the normal.
     compliance = whole[:, (1, 1, 2), (1, 1, 2)]
-    share = machine_deviation(model, samples, origin, axes, machine)[:, (0, 0, 1)] / compliance
+    share = machine_deviation(model, samples, origin, axes, mean, machine)[:, (0, 0, 1)] / compliance
     of_coefficients = np.concatenate([of_walls, of_floors[:, None]], axis=1)
     cut.deviation[rows] = np.hypot(of_coefficients, share * cut.errors[rows])
 

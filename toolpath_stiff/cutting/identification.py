@@ -9,21 +9,22 @@ from dataclasses import replace
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, product
-from toolpath_stiff.cutting.coefficients import TAPER, UNKNOWN
+from toolpath_stiff.cutting.coefficients import UNKNOWN, Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.forces import EACH, mean_forces_of_sets
-from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.patches import Contact, Patches
 from toolpath_stiff.errors import MeasurementError
 
 LEAST_SCATTER = 1e-6  # of the largest force: no dynamometer reads finer
-ONE = np.ones(1)
 SURE = 0.975  # quantile of Student's t: intervals of 95 %
+SOUGHT = Coefficients(np.zeros(3), np.zeros(3), np.zeros((6, 6)))  # of which the taper alone is known
 
 
-def slot_patches(depth: FloatArray) -> Patches:
-    """Slots (n,) of depths m."""
-    zero = np.zeros(len(depth))
-    return Patches(np.arange(len(depth)), zero, depth, zero, zero + np.pi)
+def slot(cutter: Cutter, feed: float, depth: float, coefficients: Coefficients = SOUGHT) -> Contact:
+    """The contact in a slot of a depth (m) at a feed (m per tooth)."""
+    one = np.ones(1)
+    patches = Patches(np.arange(1), 0.0 * one, depth * one, 0.0 * one, np.pi * one)
+    return Contact(patches, cutter, coefficients, np.array([[feed, 0.0]]), one)
 
 
 def slot_responses(cutter: Cutter, feed: FloatArray, depth: FloatArray, angle: FloatArray | None = None) -> FloatArray:
@@ -31,14 +32,10 @@ def slot_responses(cutter: Cutter, feed: FloatArray, depth: FloatArray, angle: F
 
     Run-out points to angles (n,) rad, as each record begins elsewhere in the turn; unless given, as the cutter says.
     """
-    across = np.stack([feed, np.zeros(len(feed))], axis=1)[:, None]
     angles = np.full(len(feed), cutter.run_out_angle) if angle is None else angle
-    return np.concatenate(
-        [
-            mean_forces_of_sets(slot_patches(row[None]), replace(cutter, run_out_angle=to), fed, ONE, TAPER, EACH)
-            for row, fed, to in zip(depth, across, angles.tolist(), strict=True)
-        ]
-    )
+    rows = zip(feed.tolist(), depth.tolist(), angles.tolist(), strict=True)
+    slots = [slot(replace(cutter, run_out_angle=to), fed, deep) for fed, deep, to in rows]
+    return np.concatenate([mean_forces_of_sets(contact, EACH) for contact in slots])
 
 
 def least_squares(response: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:

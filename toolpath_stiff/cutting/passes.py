@@ -49,9 +49,12 @@ def walls_of_all_passes(
         return values
     from scipy.spatial import cKDTree
 
-    tree = cKDTree(_places(samples, cutters, rows, sides, step))
-    places = _places(samples, cutters, owners, walls, step)
-    near: IntArray = np.asarray(tree.query(places, MOST_PASSES, distance_upper_bound=step)[1])
+    # Weighed so that walls with another normal are far.
+    earlier_walls, last_walls = (
+        np.concatenate([foot, ALIKE * step * into], axis=1)
+        for foot, into in (walls_beside(samples, cutters, *of) for of in ((rows, sides), (owners, walls)))
+    )
+    near: IntArray = np.asarray(cKDTree(earlier_walls).query(last_walls, MOST_PASSES, distance_upper_bound=step)[1])
     apart = 2.0 * max(cutter.radius for cutter in cutters.values())
     for column in near.T:
         known = np.flatnonzero(column < len(rows))
@@ -74,11 +77,10 @@ def profile_at(profiles: FloatArray, ranges: FloatArray, heights: FloatArray) ->
     return np.where(within, first + np.clip(part, 0.0, 1.0) * (second - first), np.nan)
 
 
-def _places(
-    samples: Samples, cutters: Mapping[int, Cutter], rows: IntArray, sides: IntArray, step: float
-) -> FloatArray:
-    """(m, 4) m, foot of the wall beside samples and its outward normal, weighed so that other walls are far."""
+def walls_beside(
+    samples: Samples, cutters: Mapping[int, Cutter], rows: IntArray, sides: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """(m, 2) m in plan, the foot of the wall beside samples (sides 0 left, 1 right), and its normal into the part."""
     along = samples.tangent[rows, :2] / np.linalg.norm(samples.tangent[rows, :2], axis=1)[:, None]
-    outward = np.stack([-along[:, 1], along[:, 0]], axis=1) * np.where(sides == 0, 1.0, -1.0)[:, None]
-    foot = samples.position[rows, :2] + radii_of(cutters, samples.tool[rows])[:, None] * outward
-    return np.concatenate([foot, ALIKE * step * outward], axis=1)
+    into = np.stack([-along[:, 1], along[:, 0]], axis=1) * np.where(sides == 0, 1.0, -1.0)[:, None]
+    return samples.position[rows, :2] + radii_of(cutters, samples.tool[rows])[:, None] * into, into

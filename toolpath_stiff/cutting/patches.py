@@ -1,10 +1,17 @@
 """Where a cutter touches the stock: rectangles on its envelope, height above the tip over the angle of the edge."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray
+from toolpath_stiff.cutting.coefficients import Coefficients
+from toolpath_stiff.cutting.cutters import Cutter
+
+BLOCK, ROUND_BLOCK = 2048, 128  # stations computed at once: their arrays stay in the processor's cache
+LEAST_LAG = 1e-3  # rad/m: straight flutes lag by this, some microradians over a cut, which spares the limit
+TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True)
@@ -37,3 +44,69 @@ def of_stations(patches: Patches, stations: IntArray) -> Patches:
     station = np.repeat(np.arange(len(stations)), last - first)
     rows = np.arange(len(station)) + np.repeat(last - np.cumsum(last - first), last - first)
     return replace(patches.take(rows), station=station)
+
+
+@dataclass(frozen=True)
+class Contact(ArrayColumns):
+    """How one cutter cuts at n stations: where it touches the stock, its feed, how it turns, what its edges are met by.
+
+    Attributes
+    ----------
+    patches
+        Counted among these stations.
+    cutter, coefficients
+        Of all of them.
+    feed
+        (n, 2) m per tooth: along x and along z, up positive.
+    turning
+        (n,) 1 where the spindle turns clockwise (M3), -1 (M4).
+    """
+
+    patches: Patches
+    cutter: Cutter
+    coefficients: Coefficients
+    feed: FloatArray
+    turning: FloatArray
+
+    @property
+    def lag(self) -> FloatArray:
+        """(n,) rad/m by which a flute lags per height above the tip, as seen clockwise; less than 0: it leads."""
+        angle = float(np.tan(self.cutter.helix)) / self.cutter.radius
+        return self.cutter.hand * max(angle, LEAST_LAG) * self.turning
+
+    def of(self, rows: IntArray) -> "Contact":
+        """Some of the stations, counted anew."""
+        return replace(self.take(rows), patches=of_stations(self.patches, rows))
+
+    def blocks(self) -> Iterator[tuple[slice, "Contact"]]:
+        """Slices of stations with what is theirs."""
+        size, count = ROUND_BLOCK if self.cutter.corner_radius else BLOCK, len(self.feed)
+        for start in range(0, count, size):
+            yield slice(start, start + size), self.of(np.arange(start, min(start + size, count)))
+
+    def seen_clockwise(self) -> "Contact":
+        """The same without stations that stand, those that turn the other way mirrored across the feed."""
+        patches = self.patches.take(self.feed[self.patches.station, 0] > 0.0)
+        other = self.turning[patches.station] < 0.0
+        if other.any():
+            width = patches.exit - patches.entry
+            entry = np.where(other, (np.pi - patches.exit) % TURN, patches.entry)
+            leave = entry + width
+            across = leave > TURN + 1e-12
+            first = replace(patches, entry=entry, exit=np.minimum(leave, TURN))
+            rest = replace(patches, entry=np.zeros_like(entry), exit=leave - TURN).take(across)
+            patches = Patches.joined([first, rest])
+            patches = patches.take(np.argsort(patches.station, kind="stable"))
+        return replace(self, patches=patches)
+
+    def above(self, height: float) -> Patches:
+        """What is above a height (m): along the cylinder."""
+        patches = self.patches
+        if not height:
+            return patches
+        return replace(patches, low=np.maximum(patches.low, height)).take(patches.high > height)
+
+    def below(self, height: float) -> Patches:
+        """What is below a height (m): round the corner."""
+        patches = self.patches
+        return replace(patches, high=np.minimum(patches.high, height)).take(patches.low < height)

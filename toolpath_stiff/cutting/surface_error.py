@@ -11,16 +11,13 @@ counts to the flute that stands out farthest, as where a tool is measured turnin
 that of the tip; the chip is not thinner for it.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, product
+from toolpath_stiff.arrays import FloatArray, product
 from toolpath_stiff.cutting.chips import flute_radii
 from toolpath_stiff.cutting.coefficients import Coefficients
-from toolpath_stiff.cutting.cutters import Cutter
-from toolpath_stiff.cutting.forces import EACH, TURN, blocks, forces_of_sets, lag_per_height
-from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.forces import EACH, forces_of_sets
+from toolpath_stiff.cutting.patches import TURN, Contact
 
 HEIGHTS = 9  # of a wall at which its error is computed, both ends among them
 STRIPS = 5  # of a floor
@@ -39,20 +36,14 @@ def shares() -> tuple[FloatArray, FloatArray]:
 
 
 def wall_error(
-    patches: Patches,
-    cutter: Cutter,
-    coefficients: Coefficients,
-    feed: FloatArray,
-    turning: FloatArray,
-    compliance: FloatArray,
-    walls: FloatArray,
+    contact: Contact, compliance: FloatArray, walls: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(n, 2, HEIGHTS) m, error of the walls to the left and right of n stations, from lower to upper end.
 
     Parameters
     ----------
-    patches, cutter, coefficients, feed, turning
-        As `forces.mean_force`.
+    contact
+        At the stations.
     compliance
         (n, 3, 3) m/N of tip and cutter in the station's frame.
     walls
@@ -64,37 +55,27 @@ def wall_error(
         Errors, nan where there is no wall; (n, 2) m, standard deviation of their mean over the height that comes from
         the coefficients; (n, 2, 3) N, force on the tool while the wall is made, mean over its height.
     """
-    error, deviation = np.full((len(feed), 2, HEIGHTS), np.nan), np.full((len(feed), 2), np.nan)
-    force = np.full((len(feed), 2, 3), np.nan)
+    error, deviation, force = (np.full((len(walls), 2, *shape), np.nan) for shape in ((HEIGHTS,), (), (3,)))
     nodes, weights = shares()
     for side, (angle, outward) in enumerate(((0.0, -1.0), (np.pi, 1.0))):
-        cut = np.asarray(np.isfinite(walls[:, side]).all(axis=1))
+        cut = np.flatnonzero(np.isfinite(walls[:, side]).all(axis=1))
         low, high = walls[cut, side, :, None].swapaxes(0, 1)
         heights = low + (high - low) * nodes
         normal = np.broadcast_to([0.0, outward, 0.0], (*heights.shape, 3))
-        pull = _pull(normal, compliance[cut], turning[cut])
-        tip = _tip_angle(cutter, np.full_like(heights, angle), heights, turning[cut])
-        chosen = (_of(patches, cut), cutter, coefficients, feed[cut], turning[cut])
-        error[cut, side], slope, acting = _errors(*chosen, tip, pull)
-        deviation[cut, side] = _deviation((slope * weights[:, None]).sum(axis=1), coefficients)
+        chosen = contact.of(cut)
+        tip = _tip_angle(chosen, np.full_like(heights, angle), heights)
+        error[cut, side], slope, acting = _errors(chosen, tip, _pull(chosen, normal, compliance[cut]))
+        deviation[cut, side] = _deviation((slope * weights[:, None]).sum(axis=1), contact.coefficients)
         force[cut, side] = (acting * weights[:, None]).sum(axis=1)
     return error, deviation, force
 
 
-def floor_error(
-    patches: Patches,
-    cutter: Cutter,
-    coefficients: Coefficients,
-    feed: FloatArray,
-    turning: FloatArray,
-    compliance: FloatArray,
-    strip: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
+def floor_error(contact: Contact, compliance: FloatArray, strip: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n, STRIPS) m, error of the surface below n stations, from right to left across each strip; of a ball (n, 1).
 
     Parameters
     ----------
-    patches, cutter, coefficients, feed, turning, compliance
+    contact, compliance
         As `wall_error`.
     strip
         (n, 2) m to the left of the tip between which what the cutter leaves stays; nan where nothing does. Within
@@ -105,74 +86,55 @@ def floor_error(
     tuple of FloatArray
         Errors, nan where no surface stays; (n,) m, standard deviation of their mean that comes from the coefficients.
     """
-    flat = cutter.radius - cutter.corner_radius
+    corner = contact.cutter.corner_radius
+    flat = contact.cutter.radius - corner
     count = STRIPS if flat > 0.0 else 1  # a scallop is narrow, and a ball passes each of its points once
-    error, deviation = np.full((len(feed), count), np.nan), np.full(len(feed), np.nan)
-    cut = np.asarray(np.isfinite(strip).all(axis=1))
+    error, deviation = np.full((len(strip), count), np.nan), np.full(len(strip), np.nan)
+    cut = np.flatnonzero(np.isfinite(strip).all(axis=1))
     right, left = strip[cut, :, None].swapaxes(0, 1)
     aside = right + (left - right) * (np.arange(count) + 0.5) / count
-    beyond = np.clip(np.abs(aside) - flat, 0.0, cutter.corner_radius)
-    out = beyond / (cutter.corner_radius or 1.0)  # sine of the angle between the tool and the surface's normal
-    along = np.sqrt(1.0 - out * out) / np.hypot(feed[cut, 0], feed[cut, 1])[:, None]
-    slope = feed[cut, :, None] * along[:, None]
+    beyond = np.clip(np.abs(aside) - flat, 0.0, corner)
+    out = beyond / (corner or 1.0)  # sine of the angle between the tool and the surface's normal
+    chosen = contact.of(cut)
+    along = np.sqrt(1.0 - out * out) / np.hypot(*chosen.feed.T)[:, None]
+    slope = chosen.feed[:, :, None] * along[:, None]
     normal = np.stack([-slope[:, 1], -np.sign(aside) * out, slope[:, 0]], axis=-1)  # square to a ramp's feed
-    pull = _pull(normal, compliance[cut], turning[cut])
+    pull = _pull(chosen, normal, compliance[cut])
     ahead = np.arccos(np.clip(aside / max(flat, 1e-9), -1.0, 1.0))  # beyond the flat end: beside the axis
-    height = cutter.corner_radius - np.sqrt(np.maximum(cutter.corner_radius**2 - beyond**2, 0.0))
-    chosen = (_of(patches, cut), cutter, coefficients, feed[cut], turning[cut])
-    passes = [
-        _errors(*chosen, _tip_angle(cutter, angle, height, turning[cut]), pull)
-        for angle in (ahead, TURN - ahead)[:count]
-    ]
-    error[cut], slopes, _ = _lowest(passes)
-    deviation[cut] = _deviation(slopes.mean(axis=1), coefficients)
+    height = corner - np.sqrt(np.maximum(corner**2 - beyond**2, 0.0))
+    angles = (ahead, TURN - ahead)[:count]
+    error[cut], slopes, _ = _lowest([_errors(chosen, _tip_angle(chosen, angle, height), pull) for angle in angles])
+    deviation[cut] = _deviation(slopes.mean(axis=1), contact.coefficients)
     return error, deviation
 
 
-def _of(patches: Patches, cut: BoolArray) -> Patches:
-    """Patches of some of the stations, counted among these."""
-    if cut.all():
-        return patches
-    kept = patches.take(cut[patches.station])
-    return replace(kept, station=(np.cumsum(cut) - 1)[kept.station])
-
-
-def _tip_angle(cutter: Cutter, angle: FloatArray, height: FloatArray, turning: FloatArray) -> FloatArray:
+def _tip_angle(contact: Contact, angle: FloatArray, height: FloatArray) -> FloatArray:
     """(n, h) rad of flute 0 at the tip when it passes angles (n, h) at heights (n, h), as `forces.force_at` counts."""
-    sense = turning[:, None]
-    return np.asarray(np.where(sense < 0.0, np.pi - angle, angle) + lag_per_height(cutter) * sense * height)
+    return np.where(contact.turning[:, None] < 0.0, np.pi - angle, angle) + contact.lag[:, None] * height
 
 
-def _pull(normal: FloatArray, compliance: FloatArray, turning: FloatArray) -> FloatArray:
+def _pull(contact: Contact, normal: FloatArray, compliance: FloatArray) -> FloatArray:
     """(n, h, 3) m/N of error per force as `forces.forces_of_sets` counts, by normals (n, h, 3)."""
     pull = product(normal, compliance)
-    pull[..., 1] *= turning[:, None]
+    pull[..., 1] *= contact.turning[:, None]
     return pull
 
 
-def _errors(
-    patches: Patches,
-    cutter: Cutter,
-    coefficients: Coefficients,
-    feed: FloatArray,
-    turning: FloatArray,
-    tip: FloatArray,
-    pull: FloatArray,
-) -> Passes:
+def _errors(contact: Contact, tip: FloatArray, pull: FloatArray) -> Passes:
     """The lowest of the flutes' passes."""
+    cutter = contact.cutter
     radii = flute_radii(cutter) if cutter.run_out else np.zeros(1)
     lowest = np.zeros(tip.shape), np.zeros((*tip.shape, 6)), np.zeros((*tip.shape, 3))
-    for block, part in blocks(patches, cutter, len(tip)):
+    for block, part in contact.blocks():
         passes: list[Passes] = []
         for flute, short in enumerate(radii.max() - radii):
-            angle = tip[block] + TURN * flute / cutter.flutes
-            response = forces_of_sets(part, cutter, feed[block], turning[block], angle, coefficients.taper, EACH)
+            response = forces_of_sets(part, tip[block] + TURN * flute / cutter.flutes, EACH)
             slope = product(pull[block][..., None, :], response)[..., 0, :]
-            force = product(response, coefficients.values[:, None])[..., 0]
+            force = product(response, contact.coefficients.values[:, None])[..., 0]
             passes.append(((pull[block] * force).sum(axis=-1) + short, slope, force))
         for whole, values in zip(lowest, _lowest(passes), strict=True):
             whole[block] = values
-    lowest[2][..., 1] *= turning[:, None]
+    lowest[2][..., 1] *= contact.turning[:, None]
     return lowest
 
 

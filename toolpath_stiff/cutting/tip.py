@@ -1,21 +1,17 @@
 """How far the tip gives way in the frame of a station: the machine with all its effects, and the tool's own beam."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray, product
 from toolpath_stiff.cutting.cutters import Cutter
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
-from toolpath_stiff.stiffness.model import StiffnessModel, idle_effects, with_parameter_moved
-
-STEP = 0.01  # of a standard deviation, for the slope by a parameter
+from toolpath_stiff.stiffness.model import StiffnessModel, parameter_slopes
 
 
 def station_axes(heading: FloatArray, origin: ArrayLike) -> FloatArray:
@@ -49,25 +45,21 @@ def with_tools(compliance: FloatArray, samples: Samples, cutters: Mapping[int, C
 
 
 def machine_deviation(
-    model: StiffnessModel, samples: Samples, origin: ArrayLike, axes: FloatArray, compliance: FloatArray
+    model: StiffnessModel, samples: Samples, origin: ArrayLike, axes: FloatArray, force: FloatArray, here: FloatArray
 ) -> FloatArray:
     """(n, 2) standard deviations of the machine's compliance across the feed and along the tool, m/N.
 
-    Linear, from the fitted parameters of the machine file (JCGM 100:2008, equation 13); 0 where it states none.
-    `compliance` (n, 3, 3) is that of `tip_compliances` without a force.
+    Linear, from the fitted parameters of the machine file (JCGM 100:2008, equation 13); 0 where it states none. `here`
+    (n, 3, 3) is that of `tip_compliances`, to which the other arguments belong.
     """
-    uncertainty = model.given.uncertainty if model.given is not None else None
-    idle = {active.effect.name for active in model.instruments} | idle_effects(model).keys()
-    variance = np.zeros((len(samples), 2))
-    if uncertainty is None:
-        return variance
-    slopes = np.zeros((len(uncertainty.names), len(samples), 2))
-    for i, (name, sd) in enumerate(zip(uncertainty.names, uncertainty.sd.tolist(), strict=True)):
-        for step in (STEP, -STEP) if sd > 0.0 and name.partition(".")[0] not in idle else ():
-            with suppress(InputError):  # beyond a bound
-                moved = with_parameter_moved(model, name, step * sd)
-                change = tip_compliances(moved, samples, origin, axes, np.ones((len(samples), 3))) - compliance
-                slopes[i] = change[:, (1, 2), (1, 2)] / step
-                break
-    variance = np.einsum("pna,pq,qna->na", slopes, uncertainty.correlation, slopes)
+
+    def compliance(moved: StiffnessModel) -> FloatArray:
+        return tip_compliances(moved, samples, origin, axes, force)
+
+    slopes = parameter_slopes(model, compliance, here)
+    uncertainty, kept = model.given.uncertainty if model.given is not None else None, [*slopes]
+    if uncertainty is None or not kept:
+        return np.zeros((len(samples), 2))
+    each = np.stack([slope[:, (1, 2), (1, 2)] for slope in slopes.values()])
+    variance = np.einsum("pna,pq,qna->na", each, uncertainty.correlation[np.ix_(kept, kept)], each)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))

@@ -4,8 +4,7 @@ kappa is the angle between the tool's axis and the normal of its envelope: 0 at 
 begins. The length of an edge is counted along the envelope, as along the cylinder by its height, where coefficients are
 identified. Engin, Altintas, International Journal of Machine Tools and Manufacture 41 (2001) 2195.
 
-Of n stations: patches below the corner's height, feed (n, 2) m per tooth along x and z, lag (n,) rad/m, less than 0 of
-what looks left-handed. Forces are those of k sets of coefficients, `values` (6, k), side by side.
+Contacts of n stations are as `seen_clockwise` gives them; forces those of k sets of coefficients, `values` (6, k).
 """
 
 from dataclasses import replace
@@ -14,86 +13,65 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.cutting.chips import flute_gaps, flute_laws
-from toolpath_stiff.cutting.cutters import Cutter
-from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.patches import TURN, Contact, Patches
 
 WIDEST = 0.4  # rad of kappa in a layer: three nodes give the sines in it to eight digits
 # Nodes and weights, shares of a layer.
 NODES = [(0.5 + 0.5 * node, 0.5 * weight) for node, weight in zip(*np.polynomial.legendre.leggauss(3), strict=True)]
 ANGLES = 8  # nodes of an arc: up to a half turn to nine digits
-TURN = 2.0 * np.pi
 
 
-def torus_mean(
-    patches: Patches, cutter: Cutter, feed: FloatArray, lag: FloatArray, taper: float, values: FloatArray
-) -> FloatArray:
+def torus_mean(contact: Contact, values: FloatArray) -> FloatArray:
     """(n, 3, k) forces, mean over a turn."""
-    layers = _layers(patches, cutter, feed)
+    layers, radius, taper = _layers(contact), contact.cutter.corner_radius, contact.coefficients.taper
     nodes, weights = np.polynomial.legendre.leggauss(ANGLES)
     layer, arc = np.repeat(np.arange(len(layers.low)), ANGLES), layers.exit - layers.entry
     across = _direction((layers.entry[:, None] + arc[:, None] * (0.5 + 0.5 * nodes)).ravel())
     share = ((layers.high - layers.low)[:, None] * 0.5 * arc[:, None] * weights / TURN).ravel()
     station = layers.station[layer]
-    motion = np.take(_motion(feed, lag), station, axis=1)
-    total = np.zeros((len(feed), 3, values.shape[1]))
+    motion = np.take(_motion(contact), station, axis=1)
+    total = np.zeros((len(contact.feed), 3, values.shape[1]))
     for node, weight in NODES:
         kappa = layers.low + node * (layers.high - layers.low)
         normal = np.take(_direction(kappa), layer, axis=1)
-        for gaps, flutes in flute_laws(cutter):
-            length = flutes * weight * cutter.corner_radius * share
+        for gaps, flutes in flute_laws(contact.cutter):
+            length = flutes * weight * radius * share
             force = _edge_forces(across, normal, length, motion, np.append(taper, gaps), values)
-            total += _summed(force, station, len(feed))
+            total += _summed(force, station, len(total))
     return total
 
 
-def torus_around(
-    patches: Patches,
-    cutter: Cutter,
-    feed: FloatArray,
-    lag: FloatArray,
-    taper: float,
-    values: FloatArray,
-    steps: int,
-) -> FloatArray:
+def torus_around(contact: Contact, values: FloatArray, steps: int) -> FloatArray:
     """(n, steps, 3, k) forces with flute 0 at even steps of a tooth's pitch; with run-out of a turn."""
-    layers = _layers(patches, cutter, feed)
-    laws = flute_laws(cutter)
-    step = TURN * len(laws) / cutter.flutes / steps
-    motion = _motion(feed, lag)
-    total = np.zeros((len(feed) * steps, 3, values.shape[1]))
+    layers, motion, count_of = _layers(contact), _motion(contact), len(contact.feed)
+    laws, radius, flutes = flute_laws(contact.cutter), contact.cutter.corner_radius, contact.cutter.flutes
+    step = TURN * len(laws) / flutes / steps
+    total = np.zeros((count_of * steps, 3, values.shape[1]))
     for node, weight in NODES:
         kappa = layers.low + node * (layers.high - layers.low)
         normal = _direction(kappa)
-        behind = lag[layers.station] * cutter.corner_radius * (1.0 - normal[1])
+        behind = contact.lag[layers.station] * radius * (1.0 - normal[1])
         for flute, (gaps, _) in enumerate(laws):
-            late = behind + TURN * flute / cutter.flutes
+            late = behind + TURN * flute / flutes
             first = np.ceil((layers.entry + late) / step).astype(np.int64)
             count = np.floor((layers.exit + late) / step).astype(np.int64) - first + 1
             layer, place = _repeated(np.maximum(count, 0))
             place += first[layer]
             phi, station = place * step - late[layer], layers.station[layer]
-            length = weight * cutter.corner_radius * (layers.high - layers.low)[layer]
-            given = (np.take(normal, layer, axis=1), length, np.take(motion, station, axis=1), np.append(taper, gaps))
+            length = weight * radius * (layers.high - layers.low)[layer]
+            law = np.append(contact.coefficients.taper, gaps)
+            given = (np.take(normal, layer, axis=1), length, np.take(motion, station, axis=1), law)
             force = _edge_forces(_direction(phi), *given, values)
             total += _summed(force, station * steps + place % steps, len(total))
-    return total.reshape(len(feed), steps, *total.shape[1:])
+    return total.reshape(count_of, steps, *total.shape[1:])
 
 
-def torus_forces(
-    patches: Patches,
-    cutter: Cutter,
-    feed: FloatArray,
-    lag: FloatArray,
-    angle: FloatArray,
-    taper: float,
-    values: FloatArray,
-) -> FloatArray:
+def torus_forces(contact: Contact, angle: FloatArray, values: FloatArray) -> FloatArray:
     """(n, a, 3, k) forces with flute 0 at angles (n, a); all flutes."""
-    layers = _layers(patches, cutter, feed)
-    slope, radius, count = lag[layers.station][:, None], cutter.corner_radius, angle.shape[1]
+    layers, motion, cutter = _layers(contact), _motion(contact), contact.cutter
+    slope, radius, count = contact.lag[layers.station][:, None], cutter.corner_radius, angle.shape[1]
     low, high = (radius * (1.0 - np.cos(kappa))[:, None] for kappa in (layers.low, layers.high))
     entry, leave = layers.entry[:, None], layers.exit[:, None]
-    motion = _motion(feed, lag)
     largest = np.where(slope > 0.0, low, high)  # the height where the angle of the edge is largest
     total = np.zeros((angle.size, 3, values.shape[1]))
     for flute, gaps in enumerate(flute_gaps(cutter)):
@@ -109,20 +87,21 @@ def torus_forces(
                 kappa = ends[0] + node * (ends[1] - ends[0])
                 normal, length = _direction(kappa), weight * radius * (ends[1] - ends[0])
                 phi = tip[layer, column] - slope[layer, 0] * radius * (1.0 - normal[1])
-                force = _edge_forces(
-                    _direction(phi), normal, length, np.take(motion, station, axis=1), np.append(taper, gaps), values
-                )
+                law = np.append(contact.coefficients.taper, gaps)
+                force = _edge_forces(_direction(phi), normal, length, np.take(motion, station, axis=1), law, values)
                 total += _summed(force, station * count + column, len(total))
     return total.reshape(*angle.shape, *total.shape[1:])
 
 
-def _layers(patches: Patches, cutter: Cutter, feed: FloatArray) -> Patches:
-    """The patches in layers of kappa, which their `low` and `high` are; on the level an edge cuts only ahead."""
-    first, last = (np.arccos(1.0 - height / cutter.corner_radius) for height in (patches.low, patches.high))
+def _layers(contact: Contact) -> Patches:
+    """The patches round the corner in layers of kappa, their `low` and `high`; on the level an edge cuts only ahead."""
+    radius = contact.cutter.corner_radius
+    patches = contact.below(radius)
+    first, last = (np.arccos(1.0 - height / radius) for height in (patches.low, patches.high))
     count = np.ceil((last - first) / WIDEST).astype(np.int64)
     row, place = _repeated(count)
     width = (last - first)[row] / count[row]
-    end = np.where(feed[patches.station, 1] == 0.0, np.pi, TURN)
+    end = np.where(contact.feed[patches.station, 1] == 0.0, np.pi, TURN)
     ahead = replace(patches, entry=np.minimum(patches.entry, end), exit=np.minimum(patches.exit, end)).take(row)
     return replace(ahead, low=first[row] + place * width, high=first[row] + (place + 1) * width)
 
@@ -170,9 +149,9 @@ def _direction(angle: FloatArray) -> FloatArray:
     return np.stack([np.sin(angle), np.cos(angle)])
 
 
-def _motion(feed: FloatArray, lag: FloatArray) -> FloatArray:
+def _motion(contact: Contact) -> FloatArray:
     """(3, n) of `_edge_forces`."""
-    return np.stack([feed[:, 0], feed[:, 1], np.sign(lag)])
+    return np.stack([*contact.feed.T, np.sign(contact.lag)])
 
 
 def _summed(forces: FloatArray, place: IntArray, count: int) -> FloatArray:

@@ -15,8 +15,8 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.errors import MeasurementError
-from toolpath_stiff.readings.mapping import check_needed, mapped_table
-from toolpath_stiff.tables import Columns, Table
+from toolpath_stiff.readings.mapping import check_needed, mapped_table, number_columns
+from toolpath_stiff.tables import Columns
 from toolpath_stiff.units import m_from_mm, s_from_min
 
 FORCES = ("fx_N", "fy_N", "fz_N")
@@ -37,8 +37,8 @@ FINER = 8  # times finer than the spectrum of the record its speed is looked for
 
 def read_records(
     file: str, columns: Mapped, flutes: int
-) -> Iterator[tuple[str, tuple[float, float, float], FloatArray]]:
-    """Name, settings (feed m per tooth, depth m, turns a second), and rows (m, 4) s and N of each record of a file.
+) -> Iterator[tuple[str, tuple[float, float, float], FloatArray, tuple[str, ...]]]:
+    """Name, settings (feed m per tooth, depth m, turns a second), rows (m, 4) s and N of each record; the remarks.
 
     Raises
     ------
@@ -49,12 +49,12 @@ def read_records(
     feed = next((name for name in FEEDS if name in table.heading), FEEDS[0])
     clock = RATE if RATE in table.heading else "time_s"
     check_needed(table, (clock, "fy_N", "spindle_rpm", "depth_mm", feed), LAYOUT)
-    cells = [table.record(row) for _, row in table.rows]
-    names, lines = np.array([row.get("record", "") for row in cells]), np.array([line for line, _ in table.rows])
-    signal = np.stack([_numbers(table, cells, name) for name in (clock, *FORCES)], axis=1)
+    names = np.array([table.record(row).get("record", "") for _, row in table.rows])
+    lines = np.array([line for line, _ in table.rows])
+    numbers = number_columns(table, (clock, *FORCES, "spindle_rpm", "depth_mm", feed))
+    signal, (rate, depth, fed) = numbers[:, :4], numbers[:, 4:].T
     if clock == RATE:
         signal[:, 0] = np.arange(len(signal)) / signal[:, 0]
-    rate, depth, fed = (_numbers(table, cells, name) for name in ("spindle_rpm", "depth_mm", feed))
     for name in dict.fromkeys(names.tolist()):
         rows = np.flatnonzero(names == name)
         for setting, column in (("spindle_rpm", rate), ("depth_mm", depth), (feed, fed)):
@@ -72,24 +72,7 @@ def read_records(
         turns_a_second = float(rate[rows[0]]) / s_from_min(1.0)
         per_tooth = float(fed[rows[0]]) / (s_from_min(1.0) * turns_a_second * flutes if feed == FEEDS[1] else 1.0)
         settings = (m_from_mm(per_tooth), m_from_mm(float(depth[rows[0]])), turns_a_second)
-        yield f"{file} {name}".strip(), settings, signal[rows]
-
-
-def _numbers(table: Table, cells: list[dict[str, str]], name: str) -> FloatArray:
-    """A column; nan where the table has none. Raises `InputError`."""
-    if name not in table.heading:
-        return np.full(len(cells), np.nan)
-    numbers = np.empty(len(cells))
-    for place, row in enumerate(cells):
-        try:
-            numbers[place] = float(row[name])
-        except ValueError:
-            numbers[place] = np.nan
-    if not np.isfinite(numbers).all():
-        place = int(np.argmin(np.isfinite(numbers)))
-        mistake, line = f"{name} = {cells[place][name]!r}", table.rows[place][0]
-        raise MeasurementError(mistake, expected="a finite number", file=table.file, line=line)
-    return numbers
+        yield f"{file} {name}".strip(), settings, signal[rows], table.remarks
 
 
 def mean_force(
@@ -121,7 +104,7 @@ def mean_force(
     heard = _heard_rate(time, known, rate, cutter.flutes)
     if abs(heard / rate - 1.0) > 0.01:
         heard_speed, stated = (f"{s_from_min(1.0) * value:.0f}" for value in (heard, rate))
-        remarks.append(f"{name}: the teeth pass at {heard_speed} turns a minute, not at {stated}")
+        remarks.append(f"the teeth pass at {heard_speed} turns a minute, not at {stated}")
     turn = np.floor(time * heard).astype(int)
     cutting, air = _cut_and_air(turn, known, int(np.ceil(cutter.radius / (feed * cutter.flutes))))
     if len(cutting) < LEAST_TURNS:
@@ -136,7 +119,7 @@ def mean_force(
         line = np.polynomial.polynomial.polyfit(time[silent], known[silent], order)
         zero = np.polynomial.polynomial.polyval(time, line).T
     else:
-        remarks.append(f"{name}: no air before or after the cut, the zero is as recorded")
+        remarks.append("no air before or after the cut, the zero is as recorded")
     full = (turn >= cutting[0]) & (turn <= cutting[-1])
     cleared = (known - zero)[full]
     waves = harmonics(time[full] * heard, cleared[:, side], cutter.flutes)

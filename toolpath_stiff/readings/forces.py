@@ -12,8 +12,9 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, product
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.cutting.coefficients import SHOWN, SYMBOLS, Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
-from toolpath_stiff.cutting.forces import TURN, force_at
-from toolpath_stiff.cutting.identification import SURE, least_squares, left_out, slot_patches, slot_responses
+from toolpath_stiff.cutting.forces import force_at
+from toolpath_stiff.cutting.identification import SURE, least_squares, left_out, slot, slot_responses
+from toolpath_stiff.cutting.patches import TURN
 from toolpath_stiff.documents import Document, json_number, records, without_nan
 from toolpath_stiff.errors import InputError, MeasurementError
 from toolpath_stiff.readings.force_records import ComplexArray, harmonics, mean_force, read_records
@@ -162,16 +163,18 @@ def fit_coefficients(
         A file cannot be read, there are too few feeds, or the signs of the axes cannot be right.
     """
     turned = _rotation(axes)
-    records, notes, settings, forces, waves = [], [], [], [], []
+    records, settings, forces, waves = [], [], [], []
+    noted: dict[str, list[str]] = {}  # remark -> records
     for file in files:
-        for name, setting, signal in read_records(file, columns, cutter.flutes):
+        for name, setting, signal, how in read_records(file, columns, cutter.flutes):
             mean, wave, remarks = mean_force(name, signal, setting[2], cutter, setting[0], turned[1][0])
             # A dynamometer reads what acts on the work.
             forces.append([-sign * mean[axis] for axis, sign in turned])
             waves.append(-turned[1][1] * wave)
             settings.append(setting)
             records.append(name)
-            notes += remarks
+            for remark in (*remarks, *how):
+                noted.setdefault(remark, []).append(name)
     feed, depth, _ = np.array(settings).reshape(-1, 3).T
     if len(np.unique(feed)) < 3:
         fault = f"slots at {len(np.unique(feed))} feeds"
@@ -198,8 +201,9 @@ def fit_coefficients(
     )
     fitted = np.where(np.isnan(force), np.nan, product(response, values[:, None])[..., 0])
     off = left_out(response, force, feed)
+    notes = tuple(f"{', '.join(names)}: {remark}" for remark, names in noted.items())
     columns_of_slots = (tuple(records), feed, depth, force, fitted, off, run_out)
-    return CoefficientFit(coefficients, determined, cutter, *columns_of_slots, tuple(notes), tuple(files))
+    return CoefficientFit(coefficients, determined, cutter, *columns_of_slots, notes, tuple(files))
 
 
 def _rotation(axes: str) -> list[tuple[int, float]]:
@@ -228,11 +232,10 @@ def _run_out(
 ) -> tuple[float, float]:
     """M and rad, the run-out that makes the force across the feed come back once a turn (`harmonics`) as it does."""
     turns = (np.arange(BINS) + 0.5) / BINS
-    slot, across = slot_patches(np.array([depth])), np.array([[feed, 0.0]])
     run_out, angle = PROBE, 0.0
     for _ in range(ROUNDS):  # teeth that lose contact make it bend
         tried = replace(cutter, run_out=run_out, run_out_angle=angle)
-        force = force_at(slot, tried, coefficients, across, np.ones(1), TURN * turns[None])[0, :, 1]
+        force = force_at(slot(tried, feed, depth, coefficients), TURN * turns[None])[0, :, 1]
         once, tooth = wave / harmonics(turns, force, cutter.flutes)
         run_out = min(max(run_out * float(np.abs(once)), NONE), feed)
         # What passes once a tooth tells where in its turn the record begins.

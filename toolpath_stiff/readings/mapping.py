@@ -7,10 +7,14 @@ is one text for all rows. `FILE.columns.toml` beside a file holds the same, as `
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_names import UNITS, Mapped, columns_option, heading_key, parted, same_quantity
 from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.tables import Columns, Source, Table, read_table
@@ -109,6 +113,21 @@ def _with_dates(table: Table, form: str) -> Table:
             raise MeasurementError(f"date {cells[place]!r}", expected=f"one as {form}", file=table.file, line=line)
         rows.append((line, tuple(iso)))
     return replace(table, rows=tuple(rows), remarks=(*table.remarks, f"dates are written {form}"))
+
+
+def number_columns(table: Table, names: Sequence[str]) -> FloatArray:
+    """(rows, names) the numbers of columns; nan where the table has none. Raises `InputError` for what is none."""
+    places = [(place, name) for place, name in enumerate(names) if name in table.heading]
+    values = np.full((len(table.rows), len(names)), np.nan)
+    for row, (line, cells) in enumerate(table.rows):
+        record = table.record(cells)
+        for place, name in places:
+            with suppress(ValueError):
+                values[row, place] = float(record[name])
+            if not np.isfinite(values[row, place]):
+                fault = f"{name} = {record[name]!r}"
+                raise MeasurementError(fault, expected="a finite number", file=table.file, line=line)
+    return values
 
 
 def check_needed(table: Table, needed: Sequence[str], layouts: str) -> None:

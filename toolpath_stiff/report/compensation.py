@@ -2,7 +2,7 @@
 
 from toolpath_stiff.cutting.compensation import Compensation
 from toolpath_stiff.report.tables import ShownTable
-from toolpath_stiff.report.words import counted
+from toolpath_stiff.report.words import counted, figure
 
 MOST_LINES = 12
 COLUMNS = {
@@ -16,7 +16,7 @@ def text(compensation: Compensation) -> str:
     walls, frame = compensation.walls, compensation.lines
     rows = range(len(frame["line"]))
     worst = sorted(rows, key=lambda row: -frame["peak_before_um"][row])[:MOST_LINES]
-    cells = [[_cell(frame[name][row]) for name in COLUMNS.values()] for row in worst]
+    cells = [[figure(frame[name][row]) for name in COLUMNS.values()] for row in worst]
     alone = {(frame["line"][row], frame["left_alone"][row]): None for row in rows if frame["left_alone"][row]}
     return "\n".join(
         [
@@ -34,10 +34,6 @@ def text(compensation: Compensation) -> str:
             *(f"note: {note}" for note in compensation.notes),
         ]
     )
-
-
-def _cell(value: object) -> str:
-    return f"{value:.2f}" if isinstance(value, float) else str(value)
 
 
 DATA = {"compensation.json": Compensation.to_json}

@@ -30,7 +30,8 @@ def text(fit: CoefficientFit) -> str:
     if fit.cutter.flutes > 1:
         low, high = (um_from_m(float(end)) for end in (fit.run_out.min(), fit.run_out.max()))
         lines += [f"  run-out, by what differs from tooth to tooth: {low:.1f} to {high:.1f} um"]
-    return "\n".join([*lines, "", "  the records do not tell", *(f"    {sentence}" for sentence in fit.silent)])
+    lines += ["", "  the records do not tell", *(f"    {sentence}" for sentence in fit.silent)]
+    return "\n".join([*lines, *(f"note: {note}" for note in fit.notes)])
 
 
 def _largest(forces: FloatArray) -> str:

@@ -5,8 +5,8 @@ from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray, IntArray, product
 from toolpath_stiff.cutting.cut import Cut
-from toolpath_stiff.cutting.cutters import radii_of
 from toolpath_stiff.cutting.final_surface import finished_surface
+from toolpath_stiff.cutting.passes import walls_beside
 from toolpath_stiff.rotations import rotation_matrices
 
 Quads = tuple[FloatArray, FloatArray, IntArray]
@@ -60,14 +60,9 @@ def _walls(cut: Cut, side: int, most: int) -> Quads:
 
 def _foot_and_top(cut: Cut, side: int, rows: IntArray) -> tuple[FloatArray, FloatArray]:
     """(k, 3) m, lowest and highest point of the wall beside some samples."""
-    samples, radius = cut.samples, radii_of(cut.cutters, cut.samples.tool[rows])
-    along = samples.tangent[rows, :2] / np.linalg.norm(samples.tangent[rows, :2], axis=1)[:, None]
-    points = samples.position[rows].copy()
-    points[:, :2] += ((1.0, -1.0)[side] * radius)[:, None] * np.stack([-along[:, 1], along[:, 0]], axis=1)
-    low, high = points, points.copy()
-    low[:, 2] += cut.wall_heights[rows, side, 0]
-    high[:, 2] += cut.wall_heights[rows, side, 1]
-    return low, high
+    foot, _ = walls_beside(cut.samples, cut.cutters, rows, np.full(len(rows), side))
+    heights = cut.samples.position[rows, 2] + cut.wall_heights[rows, side].T
+    return np.column_stack([foot, heights[0]]), np.column_stack([foot, heights[1]])
 
 
 def _floors(cut: Cut, most: int) -> Quads:

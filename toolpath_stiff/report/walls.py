@@ -3,6 +3,7 @@
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.comparison.walls import WallComparison
 from toolpath_stiff.report.tables import ShownTable
+from toolpath_stiff.report.words import figure
 
 COLUMNS = {
     "line": "line", "side": "side", ">points": "points", ">measured um": "measured_um", ">foretold": "foretold_um",
@@ -15,7 +16,8 @@ def text(comparison: WallComparison) -> str:
     """What was measured and foretold together, each line with its verdict, notes; for the terminal."""
     document, (factor, spread) = comparison.to_dict(), comparison.factor
     rows = sorted(document["lines"], key=lambda row: -abs(row["residual_um"]))
-    cells = [[_cell(row[name]) for name in COLUMNS.values()] for row in rows]
+    rows = [{**row, "fails": VERDICT[row["fails"]]} for row in rows]
+    cells = [[figure(row[name]) for name in COLUMNS.values()] for row in rows]
     others = f"; {comparison.others} lie on no final wall" if comparison.others else ""
     return "\n".join(
         [
@@ -30,13 +32,9 @@ def text(comparison: WallComparison) -> str:
     )
 
 
-def _cell(value: object) -> str:
-    return VERDICT[value] if isinstance(value, bool) else f"{value:.2f}" if isinstance(value, float) else str(value)
-
-
 def _residuals(comparison: WallComparison) -> str:
     frame = comparison.to_frame()
-    return csv_text([*frame.columns], ([_cell(value) for value in row] for row in frame.itertuples(index=False)))
+    return csv_text([*frame.columns], ([figure(value) for value in row] for row in frame.itertuples(index=False)))
 
 
 DATA = {"compare.json": WallComparison.to_json, "residuals.csv": _residuals}

@@ -31,6 +31,11 @@ def significant(value: float | None, digits: int = 3) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
+def figure(value: object) -> str:
+    """A cell of a table of micrometres: a float with two decimals."""
+    return f"{value:.2f}" if isinstance(value, float) else str(value)
+
+
 def percent(value: float | None, digits: int = 1) -> str:
     """A figure that is in per cent already."""
     return "-" if value is None else f"{value:.{digits}f} %"

@@ -6,7 +6,8 @@ every result says so in the same words.
 """
 
 import shlex
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
+STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
 WORDS = {
     "temperature_C": "the temperature, which nobody gives (--temperature)",
     "time_min": "the time since an indicator was zeroed, which no program has",
@@ -293,6 +295,29 @@ def effects_elsewhere(model: StiffnessModel) -> dict[str, str]:
 def idle_effects(model: StiffnessModel) -> dict[str, str]:
     """All effects that add nothing to a program run under the model's conditions -> why, the end of a sentence."""
     return waiting_effects(model) | effects_elsewhere(model)
+
+
+def parameter_slopes(
+    model: StiffnessModel, quantity: Callable[[StiffnessModel], FloatArray], here: FloatArray
+) -> dict[int, FloatArray]:
+    """Row in the machine file's uncertainty -> slope of a quantity, of each fitted parameter that acts.
+
+    A slope is the change from `here` for a standard deviation of the parameter, away from a bound that is near.
+    """
+    uncertainty, slopes = model.given.uncertainty if model.given is not None else None, dict[int, FloatArray]()
+    idle = {active.effect.name for active in model.instruments} | idle_effects(model).keys()
+    sds = zip(uncertainty.names, uncertainty.sd.tolist(), strict=True) if uncertainty is not None else ()
+    for row, (name, sd) in enumerate(sds):
+        if sd <= 0.0 or name.partition(".")[0] in idle:
+            continue
+        for step in (STEP, -STEP):
+            with suppress(InputError):
+                slopes[row] = (quantity(with_parameter_moved(model, name, step * sd)) - here) / step
+                break
+        if row not in slopes:
+            room = f"no room between its bounds for a standard deviation of {sd:g}"
+            raise InputError(f"[uncertainty]: {name} has {room}")
+    return slopes
 
 
 def acting_effects(model: StiffnessModel) -> tuple[ActiveEffect, ...]:
