@@ -245,5 +245,5 @@ def test_bounds_of_a_placement_count_from_where_the_work_stands() -> None:
 
 def test_a_program_that_turns_the_work_is_not_turned_by_a_search() -> None:
     program = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z0\nG1 X10 A-20 F500\nM2", name="tilted.nc")
-    with pytest.raises(tps.InputError, match="turns axes of machine mill5.*--rotate 0"):
+    with pytest.raises(tps.InputError, match=r"turns axes of machine mill5.*--rotate 0"):
         tps.place(program, file("mill5"))

@@ -13,7 +13,8 @@ from toolpath_stiff.rig.case import clamp_of, draw_case, effects_of_layout, make
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import Nuisances, disturb_readings
-from toolpath_stiff.rig.nominal import load_nominal, reachable
+from toolpath_stiff.rig.kinematics import reachable
+from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
 from toolpath_stiff.rig.sizes import whitened_length
 

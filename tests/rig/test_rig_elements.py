@@ -20,7 +20,8 @@ from toolpath_stiff.rig.effects import at_strength, draw_shape, with_effect
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.fem_path import pulled, reference_rows
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
-from toolpath_stiff.rig.nominal import load_nominal, rotations
+from toolpath_stiff.rig.kinematics import rotations
+from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.sizes import Scale
 
 NIST = load_nominal("nist")

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.nominal import commanded_lengths, load_nominal, rotations, true_poses
+from toolpath_stiff.rig.kinematics import commanded_lengths, rotations, true_poses
+from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.unknown import Unknown
 

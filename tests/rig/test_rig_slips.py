@@ -9,7 +9,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.case import draw_case, rows_of
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import Nuisances
-from toolpath_stiff.rig.nominal import reachable
+from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.slips import SLIPS, slipped_case, with_slip, with_stated_noise
 
 CASE = draw_case(5, "tilted", "none")

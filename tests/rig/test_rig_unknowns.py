@@ -13,7 +13,7 @@ from toolpath_stiff.rig.case import BLIND, draw_case, make_case
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import score, seal, unseal
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.nominal import commanded_lengths, rotations
+from toolpath_stiff.rig.kinematics import commanded_lengths, rotations
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.unknown import LINKS, VARIABLES, Unknown
 from toolpath_stiff.rig.unknown_struts import SOUND_BAR

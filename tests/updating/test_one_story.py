@@ -239,7 +239,6 @@ def ambiguous(**chances: float) -> SimpleNamespace:
         best=names[0],
         nuisances=[],
         unexcluded=(),
-        entries=tuple((name,) for name in names),
     )
 
 

@@ -27,8 +27,8 @@ from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.visits import possible_visits
 from toolpath_stiff.report.plan import text
+from toolpath_stiff.rig.kinematics import reachable as rig_reachable
 from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.rig.nominal import reachable as rig_reachable
 
 
 def menu(**changes) -> Menu:

@@ -23,8 +23,8 @@ from toolpath_stiff.planning.plan import plan_measurements
 from toolpath_stiff.planning.result import plan_csv, plan_rows
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import exercise as rig
+from toolpath_stiff.rig.kinematics import reachable as rig_reachable
 from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.rig.nominal import reachable as rig_reachable
 from toolpath_stiff.stiffness.catalogue import known_effects
 
 MACHINES = ("nist", "genhexkins", "nategh_agheli")

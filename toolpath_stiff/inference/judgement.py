@@ -37,6 +37,7 @@ from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fair_forms import fair_rivals
 from toolpath_stiff.inference.fits import refine, with_given_law
+from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.noise import Noise
@@ -44,7 +45,7 @@ from toolpath_stiff.inference.nuisances import findings, fitted_nuisances
 from toolpath_stiff.inference.rivals import INSTRUMENT, entries, left_out_of, lowers_error, rivals_of, rivals_of_law
 from toolpath_stiff.inference.several import search_pairs, search_triples
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
-from toolpath_stiff.inference.votes import Votes, closest, outvoted, votes
+from toolpath_stiff.inference.votes import Votes, closest, outvoted
 from toolpath_stiff.stiffness.contract import Effect
 
 NONE = "none"

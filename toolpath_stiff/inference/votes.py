@@ -1,12 +1,4 @@
-"""How readings vote between explanations, pose after pose: a name needs more than a probability.
-
-A probability holds the price of an explanation's parameters (Occam's factor). Of two explanations that foretell the
-readings equally well it prefers the one with fewer, and so names a part for its bookkeeping. So each pose is foretold
-from those before it (Dawid 1984, Present position and potential developments: the prequential approach): sizes and law
-as fitted, at a price of 1 each (Akaike 1973); what struts, joints, links and clampings have in common known from the
-poses before, under the scatter that is assumed of them: an explanation that needs a joint five standard deviations off
-pays for it. (Were each pose left out and foretold from all others, it would not.) The log densities add up to that of
-all readings; their differences between two explanations are the votes, and independent but for the fits.
+"""What votes of poses between two explanations (`foretold`) amount to: beyond chance or not, in words and as data.
 
 A rival is outvoted where the sum of them is
 
@@ -14,7 +6,7 @@ A rival is outvoted where the sum of them is
   error of their sum (Sivula, Magnusson, Matamoros and Vehtari 2020, Uncertainty in Bayesian leave-one-out
   cross-validation based model comparison, arXiv 2008.10296);
 - above 0 in all but `CHANCE` of the draws of a Bayesian bootstrap over the poses (Rubin 1981), which unlike a standard
-  error sees where one pose carries it all; or more than `SURE`.
+  error sees where one pose carries it all; or still more than `SMALL` without the pose that says most.
 """
 
 from collections.abc import Mapping
@@ -23,8 +15,6 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document, json_number
-from toolpath_stiff.inference.covariances import Covariance, Groups
-from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 
 SMALL = 4.0
 CHANCE = 0.05  # one-sided
@@ -32,42 +22,6 @@ DRAWS = 2000
 CERTAIN = 4  # decimals of a vote on which all processors agree
 FEWEST_POSES = 6  # below, no spread over poses can be told
 Votes = Mapping[str, FloatArray]  # rival -> (poses,) log predictive density of the explanation above the rival's
-
-
-def votes(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, FloatArray]:
-    """Votes for an explanation against each rival, the closest rival first.
-
-    Readings that either of the two takes for wild scatter widely for both.
-    """
-    scatter, points = problem.scatter, Groups.by(problem.predictor.data.point)
-    against = {}
-    for name, rival in rivals.items():
-        rows = np.array(sorted({*fit.scatter.wild, *rival.scatter.wild}), dtype=np.int64)
-        covariance = scatter.covariance.widened(rows, scatter.widening[rows])
-        squares = _squares_by_point(np.stack([fit.residual, rival.residual]), covariance, points)
-        gain = 0.5 * (squares[1] - squares[0]) + (_price(rival) - _price(fit)) / points.count
-        # Rounded: which of two rivals that do the same is the closer would be the processor's.
-        against[name] = np.round(gain, CERTAIN) + 0.0
-    return closest(against)
-
-
-def _price(fit: Fit) -> float:
-    """1 for each fitted size and constant of the law (Akaike 1973), and the law's distance from the machine file."""
-    return len(fit.free) + (2.0 + 0.5 * float(fit.law @ fit.law) / LAW_PRIOR**2 if fit.law_free else 0.0)
-
-
-def _squares_by_point(residuals: FloatArray, covariance: Covariance, points: Groups) -> FloatArray:
-    """(k, points) weighted squares that each point adds to those before it, of residuals (k, n).
-
-    Of r^T V^-1 r = r^T C^-1 r - h^T (1 + S C^-1 S^T)^-1 h, h = S C^-1 r (`covariances`), each sum up to a point.
-    """
-    rows, count = np.concatenate([covariance.shared, residuals]), len(covariance.shared)
-    solved = covariance.blocks.times(rows)
-    products = np.cumsum([solved[:, out] @ rows[:, out].T for out in points.members()], axis=0)
-    known, pull = np.eye(count) + products[:, :count, :count], products[:, :count, count:]
-    foretold = (pull * np.linalg.solve(known, pull)).sum(axis=1)
-    whole = np.diagonal(products[:, count:, count:], axis1=1, axis2=2) - foretold
-    return np.asarray(np.diff(whole, axis=0, prepend=0.0).T)
 
 
 def closest(*ballots: Votes) -> dict[str, FloatArray]:

@@ -10,7 +10,8 @@ from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.rig.nominal import Nominal, reachable
+from toolpath_stiff.rig.kinematics import reachable
+from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 Table = dict[str, Any]

@@ -28,8 +28,9 @@ from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.fem import FemMachine
 from toolpath_stiff.rig.fem_faults import FAULTS, faults
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
+from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
-from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal, reachable
+from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal
 from toolpath_stiff.rig.robot import FAULTS as ROBOT_FAULTS
 from toolpath_stiff.rig.robot import robot_case
 from toolpath_stiff.rig.unknown import Unknown

@@ -20,7 +20,8 @@ from toolpath_stiff.rig.beams import NODE, STEEL, arm
 from toolpath_stiff.rig.fem_parts import frame_corners, mean_radius, table_top
 from toolpath_stiff.rig.fem_path import reference_rows
 from toolpath_stiff.rig.hidden import HERTZ_LOAD, HiddenMachine, readings, strut_stiffness, true_geometry
-from toolpath_stiff.rig.nominal import Nominal, commanded_lengths, parse_nominal, rotations
+from toolpath_stiff.rig.kinematics import commanded_lengths, rotations
+from toolpath_stiff.rig.nominal import Nominal, parse_nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.unknown import CommandedRows, opened
 

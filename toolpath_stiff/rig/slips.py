@@ -16,7 +16,8 @@ from toolpath_stiff.rig.campaigns import POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
 from toolpath_stiff.rig.draws import Shape
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
-from toolpath_stiff.rig.nominal import Nominal, reachable
+from toolpath_stiff.rig.kinematics import reachable
+from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.sizes import Scale
 from toolpath_stiff.units import MM_PER_INCH
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.draws import Draw, Shape
-from toolpath_stiff.rig.nominal import Nominal, neutral_directions
+from toolpath_stiff.rig.kinematics import neutral_directions
+from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import Geometry, Links
 

@@ -7,7 +7,7 @@ from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.draws import Shape, drawn, side, signed, uniform, whole
-from toolpath_stiff.rig.nominal import rotations
+from toolpath_stiff.rig.kinematics import rotations
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import Links
 from toolpath_stiff.rig.unknown import REACH, SOFT, CommandedRows, Kind, Unknown, X, Y, Z, beyond, kind, opened
