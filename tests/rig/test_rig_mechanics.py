@@ -9,8 +9,9 @@ from importlib import resources
 import numpy as np
 import pytest
 
+from toolpath_stiff.rig.closure import true_poses
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
-from toolpath_stiff.rig.kinematics import commanded_lengths, rotations, true_poses
+from toolpath_stiff.rig.kinematics import commanded_lengths, rotations
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.unknown import Unknown

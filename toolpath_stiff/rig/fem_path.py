@@ -6,9 +6,10 @@ from numpy.random import Generator
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.rig.campaigns import POSE
+from toolpath_stiff.rig.closure import ClosureError
 from toolpath_stiff.rig.fem_parts import mean_radius
 from toolpath_stiff.rig.hidden import HiddenMachine, true_geometry
-from toolpath_stiff.rig.kinematics import ClosureError, commanded_lengths, reachable, rotations
+from toolpath_stiff.rig.kinematics import commanded_lengths, reachable, rotations
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.rig.kinematics import commanded_lengths, platform_points, rotations, true_poses
+from toolpath_stiff.rig.closure import true_poses
+from toolpath_stiff.rig.kinematics import commanded_lengths, platform_points, rotations
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import End, Geometry, Links, solved

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.rig.closure import ClosureError
 from toolpath_stiff.rig.draws import Shape
 from toolpath_stiff.rig.effects import at_strength, draw_shape, with_effect
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
-from toolpath_stiff.rig.kinematics import ClosureError
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.unknowns import UNKNOWNS

@@ -1,0 +1,51 @@
+"""Where the platform really stands when the control, with the nominal geometry, commands a pose."""
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+
+
+class ClosureError(RuntimeError):
+    """Struts of the commanded lengths carry the true platform nowhere near the commanded pose."""
+
+
+def true_poses(
+    lengths: FloatArray, frame: FloatArray, platform: FloatArray, tips: FloatArray, turned: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Poses (n, 3), (n, 3, 3) of the platform at which the true joints have the commanded strut lengths (n, 6).
+
+    Newton's method on the six closure equations, from the commanded pose; `platform` (6, 3) m counts from the origin
+    of the platform frame. Joint errors are millimetres, so three or four steps reach rounding.
+
+    Raises
+    ------
+    ClosureError
+        The true machine cannot take a pose: struts of these lengths carry no platform near it.
+    """
+    position, orientation = tips.copy(), turned.copy()
+    for _ in range(20):
+        arms = np.einsum("nij,kj->nki", orientation, platform)
+        strut = position[:, None, :] + arms - frame
+        reached = np.linalg.norm(strut, axis=2)
+        gap = lengths - reached
+        if np.abs(gap).max() < 1e-13:
+            return position, orientation
+        unit = strut / reached[:, :, None]
+        step = np.linalg.solve(np.concatenate([unit, np.cross(arms, unit)], axis=2), gap[:, :, None])[:, :, 0]
+        position = position + step[:, :3]
+        orientation = _turn(step[:, 3:]) @ orientation
+        if np.abs(step).max() < 1e-12:
+            return position, orientation
+    raise ClosureError("the closure equations of the platform did not converge")
+
+
+def _turn(vector: FloatArray) -> FloatArray:
+    """(n, 3, 3) rotation matrices of rotation vectors (n, 3) (Rodrigues)."""
+    angle = np.linalg.norm(vector, axis=1)
+    x, y, z = vector.T
+    zero = np.zeros_like(x)
+    skew = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], 1)
+    # sin(t)/t and (1 - cos t)/t^2 through sinc, which is safe at 0.
+    first = np.sinc(angle / np.pi)[:, None, None]
+    second = 0.5 * np.sinc(angle / (2.0 * np.pi))[:, None, None] ** 2
+    return np.asarray(np.eye(3) + first * skew + second * (skew @ skew))
