@@ -31,7 +31,7 @@ def as_g_code(lines: Sequence[str]) -> list[str]:
     Examples
     --------
     >>> as_g_code(("L X+1 Y+0 F100", "", "L IX+1 FMAX", "L X2", "L Y1 FMAX", "L Z5 M5"))
-    ['?', '', '?', 'G1X2', '?', '?']
+    ['?', '', '?', 'G1 X2', '?', '?']
     """
     texts, follows, inch = list[str](), False, in_inches(lines)
     for line in reversed(lines):
