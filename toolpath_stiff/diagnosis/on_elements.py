@@ -199,7 +199,7 @@ def _noise(model: PullModel, relative: float | None) -> tuple[FloatArray, str, b
             ", sd_um where a row has it" if stated.any() else ""
         )
         return np.where(stated, pulls.sd, relative * size), words, True
-    columns = np.concatenate([row[3] for row in model.candidates()], axis=1)
+    columns = np.concatenate([row[-1] for row in model.candidates()], axis=1)
     _, left = non_negative(columns / size[:, None], (pulls.value - model.predicted) / size)
     share = max(np.sqrt(left / max(len(size) - np.linalg.matrix_rank(columns), 1)), 1e-4)
     return share * size, f"estimated, {100 * share:.2g} % of the size of each displacement (say --noise)", False

@@ -8,6 +8,7 @@ where nothing is missing.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
 
 ALIKE = 10.0  # chi-square: an explanation that leaves no more than this beside the best cannot be told from it
 GAIN = 16.0  # chi-square that a name must gain over no effect, with some thirty candidates: under 1 in 500 by chance
+SHAPES = 10  # values of a parameter that shapes an effect
 WRONG = 1e-3  # probability of so large a misfit, below which something else is missing
 
 
@@ -80,8 +82,11 @@ class PullModel:
                 columns.append(part[:, 5])
         return names, np.stack(columns, axis=1) if columns else np.empty((len(self.pulls), 0))
 
-    def candidates(self) -> list[tuple[str, str, list[str], FloatArray]]:
-        """Effect, element, parameters and (m, k) columns per SI unit of each, of what changes anything."""
+    def candidates(self) -> list[tuple[str, str, dict[str, float], list[str], FloatArray]]:
+        """Effect, element, what is held, parameters and (m, k) columns per SI unit of each, of what changes anything.
+
+        A parameter that changes nothing by itself shapes what others do: held at values over its typical range.
+        """
         rows = []
         for name, effect in effects_of_elements().items():
             real = [p for p in effect.parameters if not p.discrete]
@@ -94,9 +99,17 @@ class PullModel:
                     continue  # of a joint that turns, what joints do; of others all that they give
                 none = {p.name: p.neutral * p.si for p in real}
                 units = [none | {p.name: 0.5 if p.name == "factor" else 1.0} for p in real]
-                columns = [self.column_of(ActiveEffect(effect, on | values)) for values in units]
-                rows.append((name, element, [p.name for p in real], np.stack(columns, axis=1)))
-        return [row for row in rows if (np.abs(row[3]).max(axis=0) > 0.0).any()]
+                alone = [self.column_of(ActiveEffect(effect, on | values)).any() for values in units]
+                sized, shapes = (
+                    [p.name for p, acts in zip(real, alone, strict=True) if acts == of] for of in (True, False)
+                )
+                tried = [p.si * np.geomspace(*p.typical, SHAPES) for p in real if p.name in shapes]
+                for held in product(*tried) if sized else ():
+                    fixed = dict(zip(shapes, map(float, held), strict=True))
+                    with_shape = [values | fixed for values, acts in zip(units, alone, strict=True) if acts]
+                    columns = [self.column_of(ActiveEffect(effect, on | values)) for values in with_shape]
+                    rows.append((name, element, fixed, sized, np.stack(columns, axis=1)))
+        return rows
 
     def _turns(self, name: str) -> bool:
         return any(e.name == name and e.link == "joints" and e.directions == SIX for e in self.machine.elements)
@@ -111,11 +124,13 @@ def whitening(model: PullModel, sd: FloatArray, spread: float) -> FloatArray:
 def explanations(model: PullModel, white: FloatArray) -> tuple[float, list[Explanation]]:
     """Chi-square without any effect; each candidate fitted alone, that with the least misfit first."""
     rest = white @ (model.pulls.value - model.predicted)
-    fitted = []
-    for effect, element, names, columns in model.candidates():
+    best: dict[tuple[str, str], Explanation] = {}
+    for effect, element, held, names, columns in model.candidates():
         size, left = non_negative(white @ columns, rest)
-        fitted.append(Explanation(effect, element, dict(zip(names, size.tolist(), strict=True)), left, columns))
-    return float(rest @ rest), sorted(fitted, key=lambda row: row.chi_square)
+        if (effect, element) not in best or left < best[effect, element].chi_square:
+            sizes = held | dict(zip(names, size.tolist(), strict=True))
+            best[effect, element] = Explanation(effect, element, sizes, left, columns)
+    return float(rest @ rest), sorted(best.values(), key=lambda row: row.chi_square)
 
 
 def non_negative(columns: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
