@@ -252,7 +252,6 @@ def update(
     auto: Annotated[bool, Option("--auto")] = False,
     force: Annotated[bool, Option("--force")] = False,
     believe: Annotated[str | None, Option("--believe", choices=(MACHINE, INSTRUMENT))] = None,
-    objective: Annotated[str, Option("--objective", choices=("likelihood", "mean-error"))] = "likelihood",
     machine_file: str | Path = "machine.toml",
     columns: Mapped = None,
     noise_percent: NoisePercent = None,
@@ -279,8 +278,6 @@ def update(
         --replace.
     believe
         Machine or instrument: take for its what an error of the other would show as well; else it is refused.
-    objective
-        Mean-error: the strut law alone, as the paper fitted it.
     machine_file
         Name that the new machine file is to have, for the record.
     columns
@@ -306,7 +303,7 @@ def update(
     task = UpdateTask(
         question.hexapod("update"), question.readings, [add] if isinstance(add, str) else list(add),
         strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe,
-        objective=objective, files=question.request.data, machine_file=str(machine_file), request=question.request,
+        files=question.request.data, machine_file=str(machine_file), request=question.request,
         progress=teller(progress), **question.common,
     )  # fmt: skip
     return replace(update_machine(task), inputs=question.inputs, opened=question.on.carrying)
