@@ -101,10 +101,20 @@ def test_table_1_bears_no_effect(tmp_path, capsys):
     assert {one["effect"] for one in told["rejected"]} >= {"joint_moment_stiffness"}
 
 
+def test_the_papers_own_estimation(tmp_path, capsys):
+    arguments = ["update", "nist-table1", "--strut-law", "--objective", "mean-error", "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    assert "46.30 N/um" in capsys.readouterr().out
+    told = json.loads((tmp_path / "update.json").read_text())
+    assert told["search"]["agreeing"] == len(told["search"]["end_errors_percent"])
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         ((), "nothing to update"),
+        (("--strut-law", "--objective", "mean-error", "--auto"), "mean-error"),
+        (("--objective", "mean-error"), "--strut-law"),
         (("--add", "weak_strutt"), "weak_strut"),
         (("--auto", "--seed", "-1"), "seed -1"),
     ],

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from toolpath_stiff.correction.mean_error import update_by_mean_error
+from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.readings.measurements import read_measurements
@@ -55,3 +57,18 @@ def test_figure_3(table_1):
     assert np.ptp(refitted) < 0.005
     # Softer bars, stiffer struts.
     assert (np.diff(laws, axis=0) < 1e-3).all()
+
+
+def test_update_repeats_it(table_1):
+    found = update_by_mean_error(
+        UpdateTask(table_1.machine, table_1.data, strut_law=True, objective=MEAN_ERROR, seed=1)
+    )
+    assert [100.0 * step.error for step in found.steps] == pytest.approx([9.62, 9.42], abs=5e-3)
+    assert found.search["agreeing"] == len(found.search["end_errors_percent"]) == 6
+    # Fitted to the points themselves, the law does worse at points that it has not seen.
+    assert found.last.held.mean_error > found.last.error
+    machine = found.fitted({"command": "", "data_sha256": ""})
+    reached = np.array([machine.strut_law.stiffness_1, machine.strut_law.stiffness_2]) / 1e6
+    assert reached == pytest.approx(search(table_1)[0], rel=1e-5)
+    # The printed constants lie well within what 14 points can tell.
+    assert (np.abs(PRINTED - reached) < 2.5 * machine.uncertainty.sd).all()

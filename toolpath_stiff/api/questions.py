@@ -16,7 +16,7 @@ from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.compare import compare as compare_readings
 from toolpath_stiff.correction.draft import EffectDraft, draft
 from toolpath_stiff.correction.result import Update
-from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, UpdateTask
+from toolpath_stiff.correction.task import INSTRUMENT, LIKELIHOOD, MACHINE, MEAN_ERROR, UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
@@ -252,6 +252,7 @@ def update(
     auto: Annotated[bool, Option("--auto")] = False,
     force: Annotated[bool, Option("--force")] = False,
     believe: Annotated[str | None, Option("--believe", choices=(MACHINE, INSTRUMENT))] = None,
+    objective: Annotated[str, Option("--objective", choices=(LIKELIHOOD, MEAN_ERROR))] = LIKELIHOOD,
     machine_file: str | Path = "machine.toml",
     columns: Mapped = None,
     noise_percent: NoisePercent = None,
@@ -278,6 +279,8 @@ def update(
         --replace.
     believe
         Machine or instrument: take for its what an error of the other would show as well; else it is refused.
+    objective
+        Mean-error: the strut law alone, as the paper fitted it.
     machine_file
         Name that the new machine file is to have, for the record.
     columns
@@ -303,7 +306,7 @@ def update(
     task = UpdateTask(
         question.hexapod("update"), question.readings, [add] if isinstance(add, str) else list(add),
         strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe,
-        files=question.request.data, machine_file=str(machine_file), request=question.request,
+        objective=objective, files=question.request.data, machine_file=str(machine_file), request=question.request,
         progress=teller(progress), **question.common,
     )  # fmt: skip
     return replace(update_machine(task), inputs=question.inputs, opened=question.on.carrying)

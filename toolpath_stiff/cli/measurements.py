@@ -109,6 +109,7 @@ def update(
       tps update measurements.csv --add joint_compliance -o fitted.toml
       tps update measurements.csv --add weak_strut:strut=3 --keep-strut-law
       tps update measurements.csv --auto
+      tps update nist-table1 --strut-law --objective mean-error     the paper's own estimation
 
     An effect that the data do not support is refused, with the reason, unless --force is given; the exit code is 0 all
     the same. Files written to --out: update.json, residuals.csv, machine.toml (unless refused or -o names another

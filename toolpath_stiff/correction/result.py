@@ -63,6 +63,8 @@ class Update(FolderResult):
         How effects stand whose form was read off these readings; None where there are none.
     as_built
         The machine with struts and joints where they most likely are, which is the last step; None where they stay.
+    search
+        Of the paper's own estimation: how its searches ended; empty otherwise.
     provenance
         Where the fitted values come from, for the record.
     next
@@ -79,8 +81,8 @@ class Update(FolderResult):
     >>> update = tps.update("nist-table1", "nist", strut_law=True, noise_percent=5, force=True)
     >>> update
     <Update: forced, mean error 9.62 to 9.62 %>
-    >>> update.accepted
-    True
+    >>> update.accepted, update.to_dict()["objective"]
+    (True, 'likelihood')
     >>> update.to_frame()["mean_abs_error_percent"].round(2).tolist()
     [9.62, 9.62]
     >>> print(update.machine_text().splitlines()[0][:24])
@@ -106,6 +108,7 @@ class Update(FolderResult):
     turned_down: tuple[Support, ...] = ()
     drawn: Drawn | None = None
     as_built: Hexapod | None = None
+    search: Document = field(default_factory=dict)
     provenance: Document = field(default_factory=dict)
     next: Sequence[str] = ()
     inputs: tuple[str, ...] = ()
@@ -211,11 +214,14 @@ class Update(FolderResult):
     @property
     def widening(self) -> float:
         """Factor on standard deviations: how much wider the residuals are than the noise model says, at least 1."""
-        return float(np.sqrt(dispersion(self.known)))
+        # A bootstrap over points has the residuals' own width already.
+        return 1.0 if self.search else float(np.sqrt(dispersion(self.known)))
 
     @cached_property
     def errors(self) -> ErrorModel | None:
         """How far the last model may be off at a pose; None where too little was measured to tell."""
+        if self.search:
+            return None
         given = self.model.fit if self.kept_law else None
         data, moved = self.task.problem.predictor.data, self.as_built is not None
         return error_model(self.known, data, self.noise, given, moved=moved)
@@ -283,6 +289,7 @@ class Update(FolderResult):
             "verdict": self.verdict,
             "text": self.text,
             "question": self.question,
+            "objective": task.objective,
             "baseline": steps[0],
             "strut_law_refitted": rounded_errors(self.refitted.residual),
             "steps": steps,
@@ -311,6 +318,7 @@ class Update(FolderResult):
             "provenance": dict(self.provenance),
             "seed": task.seed,
             "next": list(self.next),
+            **({"search": self.search} if self.search else {}),
         }
 
     @property
@@ -346,7 +354,7 @@ class Update(FolderResult):
     def _errors(self) -> str:
         """Mean error of every step; of a law that is kept also what refitting it would leave."""
         steps = [(step.name.replace("+ ", "with ", 1), 100.0 * step.error) for step in self.steps]
-        kept = self.refitted not in self.steps
+        kept = self.refitted not in self.steps and not self.search
         law = [(f"({LAW_REFITTED} alone)", 100.0 * self.refitted.error)] if kept else []
         return errors_text(steps[0][1], None, [*law, *steps[1:]])
 
@@ -358,6 +366,12 @@ class Update(FolderResult):
             "as given, nothing is fitted, so leaving points out changes nothing: where the machine file's figures were "
             "fitted to these readings, its error at left-out points looks better than it is",
         ]
+        if self.search:
+            return [
+                *sentences,
+                "smallest mean |modelled - measured| / measured, as the paper counts it; standard deviations by a "
+                "bootstrap over the measuring points",
+            ]
         sentences.append(
             f"an effect is kept if the error at left-out points falls by more than {NEEDED:g} standard error, no "
             "parameter ends at its bound, and its gain in likelihood, the strut law refitted with and without it, is "

@@ -14,6 +14,7 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings
 
 MACHINE, INSTRUMENT = "machine", "instrument"
+LIKELIHOOD, MEAN_ERROR = "likelihood", "mean-error"
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,8 @@ class UpdateTask:
         Keep what the data do not support, or readings hardly of this machine; never what fits worse than `machine`.
     believe
         Where machine and instrument would show the same, which of them it is taken for; None: it is refused.
+    objective
+        `LIKELIHOOD`; or `MEAN_ERROR`, the paper's own estimation, of the strut law alone.
     noise, strut_spread, effect_files, seed, progress
         As in `diagnose`.
     files
@@ -54,6 +57,7 @@ class UpdateTask:
     auto: bool = False
     force: bool = False
     believe: str | None = None
+    objective: str = LIKELIHOOD
     noise: float | tuple[float, float] | None = None
     strut_spread: float = STRUT_SPREAD
     effect_files: Sequence[str | Path] = ()

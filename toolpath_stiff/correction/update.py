@@ -26,9 +26,10 @@ import numpy as np
 from toolpath_stiff.correction.additions import parse_addition
 from toolpath_stiff.correction.as_built import as_built
 from toolpath_stiff.correction.machines import data_hash, fitted_machine
+from toolpath_stiff.correction.mean_error import update_by_mean_error
 from toolpath_stiff.correction.result import NEEDED, Update
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
-from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, UpdateTask
+from toolpath_stiff.correction.task import INSTRUMENT, LIKELIHOOD, MACHINE, UpdateTask
 from toolpath_stiff.diagnosis.diagnose import check_measured
 from toolpath_stiff.diagnosis.examination import percent_of
 from toolpath_stiff.documents import json_number
@@ -75,13 +76,14 @@ def update(task: UpdateTask) -> Update:
     task = replace(task, files=tuple(task.files) or tuple(dict.fromkeys(task.data.file.tolist())))
     effect_files = tuple(map(str, task.effect_files))
     request = task.request or Asked(tuple(task.files), task.machine.name, effect_files, task.noise, task.strut_spread)
-    result = build_ladder(task)
-    if result.accepted and not result.question and (built := as_built(task, result.last)):
+    result = build_ladder(task) if task.objective == LIKELIHOOD else update_by_mean_error(task)
+    if result.accepted and not (result.question or result.search) and (built := as_built(task, result.last)):
         result = replace(result, as_built=built[0], steps=(*result.steps, built[1]))
     # Where its results go does not matter to the command that repeats the fit.
     words = options(
         add=list(task.add), strut_law=task.strut_law, keep_strut_law=task.keep_strut_law, auto=task.auto,
-        force=task.force, believe=task.believe, seed=task.seed or None,
+        force=task.force, believe=task.believe, objective=task.objective if result.search else None,
+        seed=task.seed or None,
     )  # fmt: skip
     # No date: the same data and command give the same bytes.
     provenance = {
