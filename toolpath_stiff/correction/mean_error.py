@@ -79,10 +79,7 @@ def _searched(problem: Problem, start: FloatArray, weight: FloatArray, fine: flo
     free = 1 if problem.predictor.machine.strut_law.constant else 2
     options = {"xatol": fine, "fatol": 1e-3 * fine, "initial_simplex": start[:free] + 0.05 * np.eye(free + 1, free, -1)}
 
-    def both(law: FloatArray) -> FloatArray:
-        return np.resize(law, 2)
+    def error(law: FloatArray) -> float:
+        return _error(problem, np.resize(law, 2), weight)
 
-    found = minimize(
-        lambda law: _error(problem, both(law), weight), start[:free], method="Nelder-Mead", options=options
-    )
-    return both(np.asarray(found.x))
+    return np.resize(minimize(error, start[:free], method="Nelder-Mead", options=options).x, 2)
