@@ -278,13 +278,11 @@ def _arcs(
     padded = np.pad(inside, ((0, 0), (1, 1)))
     row, start = np.nonzero(padded[:, 1:-1] & ~padded[:, :-2])
     stop = np.nonzero(padded[:, 1:-1] & ~padded[:, 2:])[1]
-    points = ring.shape[1]
-    ends = []
-    for out, within in ((start - 1, start), (stop + 1, stop)):
-        bracket = np.stack([ring[row, np.clip(out, 0, points - 1)], ring[row, within]])
-        ends.append(_ends(work, stations[row], radius[row], height[row], bracket, halvings))
-    wide = ends[1] - ends[0] > NARROW
-    row, entry, exit_ = row[wide], ends[0][wide], ends[1][wide]
+    both, out, within = np.append(row, row), np.append(start - 1, stop + 1), np.append(start, stop)
+    bracket = np.stack([ring[both, np.clip(out, 0, ring.shape[1] - 1)], ring[both, within]])
+    entry, exit_ = np.split(_ends(work, stations[both], radius[both], height[both], bracket, halvings), 2)
+    wide = exit_ - entry > NARROW
+    row, entry, exit_ = row[wide], entry[wide], exit_[wide]
     # Behind the left side: an arc across 0 is two.
     across = np.flatnonzero(entry < 0.0)
     row = np.concatenate([row, row[across]])
