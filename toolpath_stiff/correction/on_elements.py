@@ -38,6 +38,8 @@ from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.votes import outvoted
+from toolpath_stiff.machine.model import MachineTool
+from toolpath_stiff.readings.pulls import Pulls
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.sizes import joined
 
@@ -46,6 +48,8 @@ from toolpath_stiff.stiffness.sizes import joined
 class PullTask(UpdateTask):
     """Pulls in place of stiffnesses; `strut_law` asks for the torsions of the joints."""
 
+    machine: MachineTool  # type: ignore[assignment]
+    data: Pulls  # type: ignore[assignment]
     pulls: PullProblem | None = None
 
     @cached_property

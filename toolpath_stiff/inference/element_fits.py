@@ -5,7 +5,7 @@ A reading is y = sum_r c_r (s_r w)(s_r t) + noise, s_r the loads of the elements
 pull's displacement. What is left is chi-square where nothing is missing.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -33,6 +33,7 @@ from toolpath_stiff.units import deg_from_rad
 NONE, JOINTS = "none", "joints refitted"
 ALIKE = 10.0  # chi-square: an explanation that leaves no more than this beside the best cannot be told from it
 GAIN = 16.0  # chi-square that a name must gain over no effect, with some thirty candidates: under 1 in 500 by chance
+PRICE = 4.0  # chi-square that a further parameter must gain (one degree of freedom: 5 % by chance)
 WRONG = 1e-3  # probability of so large a misfit, below which something else is missing
 LEAST = 1e-4  # relative sd of a reading: nobody measures better
 FOLLOWS = 0.5  # correlation of measured with modelled components, joints refitted, below which it is another machine's
@@ -146,11 +147,18 @@ class PullProblem(Problem):
         return float(100.0 * np.sqrt(((residual * self.pulls.size) ** 2).sum() / (self.pulls.value**2).sum()))
 
 
+def _says_more(fit: Fit, other: Fit, behind: Mapping[str, float]) -> bool:
+    """Whether an explanation has more parameters than another one of the same element, and gains too little by them."""
+    element, same = (dict(each.candidates[-1].choice).get(ELEMENT) for each in (fit, other))
+    more = len(fit.parts) - len(other.parts)
+    return element is not None and element == same and behind[label_of(other)] - behind[label_of(fit)] < PRICE * more
+
+
 def question(problem: PullProblem) -> str:
     """Whether these are pulls of this machine, as it is described, with the reason to ask; "" where there is none."""
     pulls, best = problem.pulls, problem.joints_fitted if problem.torsions else problem.none
     modelled = pulls.value - best.residual * pulls.size
-    alike = float((pulls.value @ modelled) / max(np.linalg.norm(pulls.value) * np.linalg.norm(modelled), 1e-300))
+    alike = float((pulls.value @ modelled) / np.maximum(np.linalg.norm(pulls.value) * np.linalg.norm(modelled), 1e-300))
     if alike >= FOLLOWS:
         return ""
     text = f"Are these pulls of this machine? Measured and modelled components correlate by {alike:.2f} only."
@@ -167,8 +175,8 @@ def question(problem: PullProblem) -> str:
         return text
     a, b, c = deg_from_rad(roll_pitch_yaw(turn.T[None])[0]).round(0) + 0.0
     return (
-        f"{text} Turned they would by {turned:.2f}: is the sensor in other axes? Roll, pitch, yaw of about {a:g}, {b:g}, "
-        f"{c:g} degrees (columns {', '.join(MOVED_AXES)})."
+        f"{text} Turned they would by {turned:.2f}: is the sensor in other axes? Roll, pitch, yaw of about {a:g}, "
+        f"{b:g}, {c:g} degrees (columns {', '.join(MOVED_AXES)})."
     )
 
 
@@ -229,6 +237,9 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
     ballots = votes(problem, best, {label_of(fit): fit for fit in (base, *fits[1:])})
     alike = [fit for fit in fits if behind[label_of(fit)] < ALIKE]
     standing = [fit for fit in fits[1:] if fit not in alike and not outvoted(ballots[label_of(fit)])]
+    alike, standing = (
+        [fit for fit in some if not any(_says_more(fit, other, behind) for other in alike)] for some in (alike, standing)
+    )
     if not explained or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
         return "ambiguous", [*alike, *standing]
     return "identified", alike

@@ -139,7 +139,7 @@ def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = No
         *MOVED_AXES,
         *_joint_columns(machine),
     )
-    known = Columns((*COLUMNS.numbers, *further), COLUMNS.texts)
+    known = Columns((*COLUMNS.numbers, *further, *_joint_columns(machine)), COLUMNS.texts)
     tables = [mapped_table(name, "measurements", known, mapping) for name in files]
     return [table for table in tables if not {FORCE[0], TENSION}.isdisjoint(table.heading)]
 
@@ -260,7 +260,7 @@ def _stances(machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: S
     for i, stance in enumerate(stances):
         off = np.abs(np.exp(1j * stance.joints) - np.exp(1j * joints)).max(axis=1)
         chosen[by_joints & (off < 1e-6)] = i
-    # Poses alone: the configuration of the rows with joints, else that in which most poses lie farthest from the limits.
+    # Poses alone: the configuration of rows with joints, else that in which most poses lie farthest from the limits.
     known = np.bincount(chosen[by_joints], minlength=len(stances))
     room = [joint_margin(stance.joints.T, machine.joint_limits)[~by_joints] for stance in stances]
     kept = max(range(len(stances)), key=lambda i: (known[i], (room[i] >= 0.0).sum(), room[i].min(initial=np.inf)))

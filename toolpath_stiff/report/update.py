@@ -124,6 +124,7 @@ def _fitted(update: Update) -> ShownTable:
 
 
 def support_table(update: Update) -> ShownTable:
+    """What speaks for and against each effect."""
     rows = [
         (
             support.effect,
