@@ -95,8 +95,7 @@ class Session:
         """What the analysis of the program hangs on."""
         state = self.case.state
         fitted = bool(state.on) and self.is_fitted  # a fit knows how well it knows: its machine has a band
-        on = state.judged if state.on else (state.machine, state.effects)
-        return (on, str(state.on), fitted, self.program_key, state.origin, state.require, state.cut)
+        return (self.key("place"), fitted, state.origin, state.require, state.cut)
 
     @property
     def program_key(self) -> tuple[str, str]:
@@ -128,7 +127,10 @@ class Session:
 
     def trial(self) -> tps.PlacementTrial:
         """The program that can be put anywhere."""
-        return self.once("trial", self.key("place"), lambda: tps.try_placement(self.case.program, self.machine))
+        case = self.case
+        return self.once(
+            "trial", self.key("place"), lambda: tps.try_placement(case.program, case.machine_with(case.state.on))
+        )
 
     def readings(self) -> Mapping[str, list[Any]]:
         """All readings of the case, those set aside too, as columns."""
@@ -176,7 +178,8 @@ class Session:
         """What the state holds of that on which this kind of result hangs."""
         state = self.case.state
         if kind in ("place", "set_up"):
-            return (state.machine, state.effects, self.program_key, state.origin if kind == "set_up" else ())
+            on = state.judged if state.on else (state.machine, state.effects)
+            return (on, str(state.on), self.program_key, state.origin if kind == "set_up" else ())
         return self.path_key if kind in OF_PATH else state.judged
 
     def queue(self, kind: str, **given: Any) -> None:

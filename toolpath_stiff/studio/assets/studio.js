@@ -289,13 +289,13 @@ $("tabs").addEventListener("keydown", (e) => {
   if (e.key === "Home" || e.key === "End") { e.preventDefault(); open(names.at(e.key === "Home" ? 0 : -1)); }
 });
 function draw() {
-  scene.state = state;
+  scene.take(state, state.effects.filter((one) => one.on).map((one) => ({ link: one.link,
+    name: one.on.strut ? `strut ${one.on.strut}` : one.on.element })));
   const r = state.readings, v = state.verdict;
   scene.deviation = r?.deviation ?? [];
   const sizes = scene.deviation.filter((d) => d !== null).map(Math.abs).sort((a, b) => a - b);
   if (!scene.scaled && sizes.length) { scene.scale = Math.max(5,
     5 * Math.ceil(sizes[Math.floor(0.95 * sizes.length)] / 5)); scene.scaled = true; }
-  scene.lit = state.effects.filter((one) => one.on).map((one) => ({ link: one.link, number: one.on.strut }));
   if (scene.selected >= (r?.line.length ?? 0)) scene.selected = -1;
   if (scene.selected < 0 && here < 0) scene.pose = [...state.machine.origin];
   if (!pending) act.origin = [...(state.program?.origin ?? state.machine.origin)];
