@@ -11,6 +11,9 @@ function turnOf([, , , a, b, c]) {
 }
 const moved = (pose, turn, point) => turn.map((row, i) => pose[i] + dot3(row, point));
 const centreOf = (points) => points[0].map((_, i) => points.reduce((sum, p) => sum + p[i], 0) / points.length);
+// [low, high] of X, Y and Z.
+const endsOf = (points) => [0, 1, 2].map((k) => [Math.min(...points.map((p) => p[k])),
+  Math.max(...points.map((p) => p[k]))]);
 const lit = (all, link, name) => all.some((one) => one.link === link && (!one.name || !name || one.name === name));
 // Points in their order about their middle, counterclockwise seen along the third column of a turn.
 function byAngle(points, turn = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) {
@@ -96,6 +99,7 @@ class MachineBody {
     const half = work ? 1.1 * Math.max(x[1] - x[0], y[1] - y[0]) : 0.22 * size, low = z[0] - (work ? 0.012 * size : 0);
     const about = (ends) => [-half, half].map((v) => (ends[0] + ends[1]) / 2 + v);
     const below = close || !hangs ? low - 0.04 * size : Math.min(floor, low - 0.05 * size);
+    if (this.slides) return items;
     items.push({ ...block(view, [about(x), about(y), [below, low]], colour("table", "", pale)), depth: -1e9 });
     if (work) items.push({ ...block(view, [...[x, y].map(([a, b]) => [a - 0.01 * size, b + 0.01 * size]),
       [low, Math.max(z[0], low) + 1e-3]], mix(ink.curve, ink.panel, 0.75)), depth: -9e8 });

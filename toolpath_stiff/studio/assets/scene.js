@@ -13,12 +13,14 @@ class MachineScene {
     this.focus = "work";
     this.frame = false;
     this.beside = 30;
+    this.room = [56, 16];
     this.showReach = true;
     this.selected = -1;   // reading
     this.paths = [];
     this.scale = 10;      // per cent at full colour
     this.pose = [0, 0, 0, 0, 0, 0];
   }
+  get iso() { return this.body?.hangs ? [-5, 26] : VIEWS.iso; }
   take(state, lit) {
     this.state = state;
     this.body = Object.assign(new MachineBody(state.machine.scene), { lit });
@@ -33,7 +35,7 @@ class MachineScene {
   box() {
     if (!this.state) return [[-1, 1], [-1, 1], [-1, 1]];
     const points = this.outline(), work = this.work();
-    if (points) return [0, 1, 2].map((k) => [Math.min(...points.map((p) => p[k])), Math.max(...points.map((p) => p[k]))]);
+    if (points) return endsOf(points);
     const room = 0.35 * Math.max(...work.map(([low, high]) => high - low));
     return work.map(([low, high]) => [low - room, high + room]);
   }
