@@ -66,9 +66,11 @@ def machine(session: Session) -> Document:
     return {
         "title": model.title,
         "effects": on.effects,
-        "scene": session.once("scene", (key, state.data, id(analysis)), lambda: machine_scene(model, poses())),
+        "scene": {
+            **session.once("scene", (key, state.data, id(analysis)), lambda: machine_scene(model, poses())),
+            "reach": session.once("reach", key, lambda: reach_boundary(model)),
+        },
         "origin": list(on.origin_mm_deg),
-        "reach": session.once("reach", key, lambda: reach_boundary(model)),
     }
 
 

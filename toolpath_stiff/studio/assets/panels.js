@@ -261,7 +261,7 @@ function programPanel(state, act) {
 function placementPanel(state, act) {
   const p = state.placement;
   if (!p) return [h("h2", {}, "Placement"), h("p", {}, "Open a program first.")];
-  const at = act.origin, ends = endsOf(state.machine.reach.flat());
+  const at = act.origin, ends = endsOf(state.machine.scene.reach.flat());
   const rows = [...["X", "Y", "Z"].map((name, k) => [name, k, ...ends[k].map(Math.round)]), ["C", 5, -180, 360]];
   return [
     h("h2", {}, "Where the work sits"),
@@ -339,8 +339,8 @@ function outline(reach, z) {
   return found;
 }
 function dragMap(state, act) {
-  const reach = outline(state.machine.reach, act.origin[2]), path = state.program?.path;
-  const [[left, right], [near, far]] = endsOf(state.machine.reach.flat()), pen = (right - left) / 300;
+  const reach = outline(state.machine.scene.reach, act.origin[2]), path = state.program?.path;
+  const [[left, right], [near, far]] = endsOf(state.machine.scene.reach.flat()), pen = (right - left) / 300;
   const points = [];
   if (path) {
     const from = state.program.origin, c = Math.cos(-from[5] * Math.PI / 180), s = Math.sin(-from[5] * Math.PI / 180);
