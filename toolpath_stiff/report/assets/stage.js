@@ -82,20 +82,6 @@ function watchTheme(changed) {
   addEventListener("beforeprint", again(true));
   addEventListener("afterprint", again(false));
 }
-const SVG = new Set(["svg", "path", "circle", "line", "text", "g", "polyline", "polygon", "title", "rect"]);
-// An element with attributes, listeners (on...) and children; text is never taken for HTML.
-function h(tag, attributes = {}, ...children) {
-  const element = SVG.has(tag) ? document.createElementNS("http://www.w3.org/2000/svg", tag)
-    : document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (value === null || value === undefined || value === false) continue;
-    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (name === "value" || name === "checked" || name === "disabled") element[name] = value;
-    else element.setAttribute(name, value === true ? "" : value);
-  }
-  element.append(...children.flat(9).filter((c) => c !== null && c !== undefined && c !== false));
-  return element;
-}
 // The class of a value on a scale of so many colours.
 const classAt = (v, [low, high], count) =>
   Math.max(0, Math.min(count - 1, Math.floor((v - low) / (high - low || 1) * count)));
