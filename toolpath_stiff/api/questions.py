@@ -105,7 +105,9 @@ class Question:
         assert self.data is not None
         noise = None if self.request.noise is None else float(np.hypot.reduce(np.atleast_1d(self.request.noise)))
         spread = float(self.common["strut_spread"])
-        return diagnose_elements(self.on.running(), self.data.files, self.data.columns, noise, spread)
+        return diagnose_elements(
+            self.on.running(), self.data.files, self.data.columns, noise, spread, tuple(map(str, self.on.effect_files))
+        )
 
     def diagnosed(self, tell: Callable[[str], None], *words: str, inputs: Iterable[str] = ()) -> Diagnosis:
         """A diagnosis of the readings; `words` are further ones of the command that gives it."""

@@ -221,7 +221,7 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
 
 def _cuts(work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray, height: FloatArray) -> BoolArray:
     """Whether material stands above points of the envelope."""
-    top, bottom = heights_around(work, stations, radius, angle)
+    top, bottom = heights_around(work, stations, radius, angle, height + TOUCH, height)
     return np.asarray((top > height) & (bottom < height))
 
 
@@ -234,7 +234,8 @@ def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatAr
         rings = reached[rows, None, None] * np.linspace(0.0, 1.0, COARSE + 1)[1:, None]
         heights = span - span * np.cos(rings)
         radius = some["flat"][:, None, None] + span * np.sin(rings) - TOUCH
-        top = heights_around(work, some, radius, np.pi * SIDES[None, None, ::4])[0]
+        ceiling = np.concatenate([heights[:, 1:], heights[:, -1:]], axis=1)  # of the next ring, whose inner one this is
+        top = heights_around(work, some, radius, np.pi * SIDES[None, None, ::4], ceiling)[0]
         inner = np.concatenate([top[:, :1], top[:, :-1]], axis=1)
         highest = np.clip(np.minimum(np.maximum(top, inner), heights).max(axis=(1, 2)), 0.0, corner[rows])
         reached[rows] = np.arccos(1.0 - highest / corner[rows])

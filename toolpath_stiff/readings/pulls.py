@@ -5,9 +5,10 @@ the force on the tool (its vector, or the tension of a cable and the pulley that
 a dial's reading). All in base axes; where the force acts and what is read may lie off the tip, in tip axes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,15 +18,17 @@ from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.machine.elements import LoadRows, Spring, Stance
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.readings.mapping import mapped_table
-from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.readings.measurements import lacking_columns, read_measurements
 from toolpath_stiff.readings.rows import ANGLES, COLUMNS, POSITION, number, optional_number, parsed_rows
 from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, mm_from_m, rad_from_deg
 
 FORCE, MOVED, DIAL = ("fx_N", "fy_N", "fz_N"), ("ux_um", "uy_um", "uz_um"), ("dial_x", "dial_y", "dial_z")
 TENSION, CABLE = "tension_N", ("cable_x_mm", "cable_y_mm", "cable_z_mm")
 PULL, TARGET = (tuple(f"{what}_d{axis}_mm" for axis in "xyz") for what in ("pull", "target"))
+SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
 SAME_PLACE = m_from_mm(1.0)  # by which a pose and the joints beside it may differ: both are rounded
 
 
@@ -59,8 +62,25 @@ class Pulls(ArrayColumns):
     line: IntArray
     component: TextArray
 
+    missing: ClassVar[tuple[str, ...]] = ("setup", "time_min", "temperature_C", "tool_extension_mm", "sd_N_per_mm")
+
     def __len__(self) -> int:
         return len(self.value)
+
+    @cached_property
+    def size(self) -> FloatArray:
+        """(m,) m, length of the displacement that each reading is a component of."""
+        pull = np.unique(np.char.add(self.file, self.line.astype(str)), return_inverse=True)[1].reshape(-1)
+        return np.asarray(np.maximum(np.sqrt(np.bincount(pull, self.value**2)), SMALLEST)[pull])
+
+    @property
+    def setup(self) -> TextArray:
+        """(m,) no set-up is named."""
+        return np.full(len(self), "")
+
+    def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
+        """Effects that pulls cannot test -> the columns that they lack."""
+        return lacking_columns(effects, self.missing)
 
 
 def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> Pulls:

@@ -33,8 +33,7 @@ function gaugeOf(state) {
 // Effects.
 function effectsPanel(state, act) {
   if (!state.effects.length) return h("p", {}, "All effects of the catalogue are in the machine.");
-  const sets = state.verdict?.confounding.sets ?? [], done = new Set(), rows = [];
-  const folded = [];
+  const sets = state.verdict?.entries ?? [], done = new Set(), rows = [], folded = [];
   for (const effect of state.effects) {
     if (done.has(effect.name)) continue;
     const set = sets.find((names) => names.includes(effect.name)) ?? [effect.name];
