@@ -82,17 +82,22 @@ class Workpiece:
         window: tuple[IntArray, IntArray],
         slack_from: IntArray | None = None,
         slack: float = 0.0,
+        ceiling: FloatArray | float = np.inf,
+        enough: FloatArray | float = -np.inf,
     ) -> tuple[FloatArray, IntArray]:
         """(n,) m, height of what some pieces leave at points, and (n,) the last piece that left it; -1: the stock.
 
         The pieces are first <= piece < last of `window`, (n,) each. Of those from `slack_from` (n,) on the cutter is
-        taken for smaller and higher by `slack`, m.
+        taken for smaller and higher by `slack`, m. A `ceiling` (n,) stands for what is higher; where the height is below
+        `enough` (n,) it may be any that is. Owners are those of all heights without them.
         """
-        top, owner = self.stock.tops(x, y), np.full(len(x), -1)
+        top, owner = np.minimum(self.stock.tops(x, y), ceiling), np.full(len(x), -1)
         late = np.full(len(x), len(self.pieces)) if slack_from is None else slack_from
         if self.quick:
             grid = self.corner, self.size, self.columns
-            compiled()[1](self.pieces, grid, self.index, (x, y), window, (late, slack), (top, owner))
+            compiled()[1](
+                self.pieces, grid, self.index, (x, y), window, (late, slack), (top, owner), np.full(len(x), enough)
+            )
             return top, owner
         low, high = self._entries(x, y, window)
         counts = high - low
