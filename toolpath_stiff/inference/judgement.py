@@ -167,7 +167,7 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     probability, form = weigh(problem, noise, candidates, gates)
     doubtful = question(problem.predictor)
     verdict, explanations = ("unexplained", ()) if doubtful else decide(gates, probability)
-    verdict, explanations, ballots = put_to_vote(problem, candidates, gates, verdict, explanations)
+    verdict, explanations, ballots = put_to_vote(problem, noise, candidates, gates, (verdict, explanations))
     doubt, factor = ("", 1.0) if doubtful else noise_doubt(problem, noise, gates.base, verdict, seed)
     described = None
     if verdict == "identified":
@@ -408,19 +408,20 @@ def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str
 
 
 def put_to_vote(
-    problem: Problem, candidates: Candidates, gates: Gates, verdict: str, explanations: tuple[str, ...]
+    problem: Problem, noise: Noise, candidates: Candidates, gates: Gates, decided: tuple[str, tuple[str, ...]]
 ) -> tuple[str, tuple[str, ...], Votes]:
-    """Verdict and explanations after the votes of the readings, and the votes for the first explanation.
+    """Verdict and explanations (as `decided`) after the votes of the readings, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer. A name that has not outvoted every rival of another part is
     one of several; the closest of these stand beside it, and what a strut law that had to move may stand for. A model
     that passes is not the only explanation where its nuisances have taken up more than they may, or where more may be
-    left than an adequate one leaves.
+    left than an adequate one leaves; what a guessed noise would hide is told instead.
     """
+    verdict, explanations = decided
     base, data, ballots = candidates.base, problem.predictor.data, dict[str, FloatArray]()
     fits = {NONE: base} | {family.name: best for family, best in candidates.offered} | gates.fits
     if verdict == "adequate":
-        likely = explanations if _may_leave(problem, candidates) > LEFT else ()
+        likely = explanations if not noise.guess and _may_leave(problem, candidates) > LEFT else ()
         standing = [NONE, *(name for name in TAKEN_UP if name in fits), *likely]
     elif verdict in ("identified", "ambiguous"):
         before = left_out_of(base, data)
