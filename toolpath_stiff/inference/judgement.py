@@ -127,11 +127,6 @@ class Judgement:
     votes: Votes = field(default_factory=dict)
 
     @property
-    def explained(self) -> bool:
-        """Whether an explanation stands, the model alone among them."""
-        return self.verdict != "unexplained"
-
-    @property
     def plausible(self) -> tuple[str, ...]:
         """Names of the effects in `explanations`, each once."""
         return tuple(dict.fromkeys(name for explanation in self.explanations for name in explanation.split(" + ")))
