@@ -256,7 +256,10 @@ class Update(FolderResult):
             f"Command: {self.provenance['command']}\n"
             f"SHA-256 of the data: {self.provenance['data_sha256']}\n"
         )
-        return machine_toml(self._written(), heading)
+        return self._text_of(self._written(), heading)
+
+    def _text_of(self, machine: Any, heading: str) -> str:
+        return machine_toml(machine, heading)
 
     def save_machine(self, file: str | Path) -> Path:
         """Write the new machine file, whole or not at all."""
@@ -345,10 +348,20 @@ class Update(FolderResult):
             return f"{doubt}Added by force, although the data do not support it{reason}. {unconfirmed}{errors}"
         if not last.fit.names:
             return f"Strut law refitted; no effect added. {errors}"
-        cause = joined(last.fit.findings)
+        cause = self.cause
         word = "added" if self.described is None else "added as described, not as identified"
         law = f"The strut law stays as given: {'; '.join(self.kept_law.reasons)}. " if self.kept_law else ""
-        return f"{cause[:1].upper()}{cause[1:]} ({joined(last.fit.names)} {word}). {law}{unconfirmed}{errors}"
+        return f"{cause[:1].upper()}{cause[1:]} ({joined(self.added)} {word}). {law}{unconfirmed}{errors}"
+
+    @property
+    def cause(self) -> str:
+        """What was fitted, in words."""
+        return joined(self.steps[-1].fit.findings)
+
+    @property
+    def added(self) -> Sequence[str]:
+        """Names of what was added."""
+        return self.steps[-1].fit.names
 
     @property
     def _errors(self) -> str:

@@ -2,13 +2,15 @@
 
 import json
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.documents import Document
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m
 
@@ -86,6 +88,35 @@ def machine_toml(machine: Hexapod, preamble: str = "") -> str:
         remark = {"remark": machine.remarks[name]} if name in machine.remarks else {}
         origin = {"origin": machine.origins.get(name, "assumed"), **remark}
         lines += ["", f"# {heading}", f"[{name}]", *_rows({**values, **origin})]
+    return "\n".join([*lines, *fitted_lines(machine), ""])
+
+
+TORSION = re.compile(r"(?m)^([ \t]*torsion_nrad_per_Nm[ \t]*=[ \t]*)(\[[^\]]*\]|[^#\n]*)")
+FITTED = "# Effects, and what was fitted to measurements, follow; they are written anew by `tps update`."
+
+
+def elements_toml(machine: MachineTool, torsions: Sequence[float], preamble: str = "") -> str:
+    """The text of a machine of elements with the torsions of its joints (none: the file's), effects and uncertainty.
+
+    Torsions in nrad/(N m), in the order of the joints. Raises `InputError` where the file does not hold them once.
+    """
+    text = machine.text
+    if torsions:
+        text, count = TORSION.subn(rf"\g<1>[{', '.join(f'{value:.5g}' for value in torsions)}]", text)
+        if count != 1:
+            found = f"machine {machine.name} states torsion_nrad_per_Nm {count} times"
+            raise InputError(found, expected="once, for all joints", hint="write one [[element]] of type joint")
+    heads = re.split(r"(?m)^(?=\[)", text)
+    kept = [part for part in heads if not re.match(r"\[\[?(effect|instrument|uncertainty)\b", part)]
+    head = [f"# {line}".rstrip() for line in preamble.splitlines()]
+    return "\n".join(
+        [*head, "".join(kept).rstrip().removesuffix(FITTED).rstrip(), "", FITTED, *fitted_lines(machine), ""]
+    )
+
+
+def fitted_lines(machine: MachineTool) -> list[str]:
+    """Lines of effects, instruments, and what is known of fitted parameters."""
+    lines: list[str] = []
     for kind, entries in (("effect", machine.effects), ("instrument", machine.instruments)):
         for entry in entries:
             lines += ["", f"[[{kind}]]", *_rows({"name": entry.name, **entry.parameters})]
@@ -103,7 +134,7 @@ def machine_toml(machine: Hexapod, preamble: str = "") -> str:
                 "places_mm_deg": np.round(np.hstack([mm_from_m(position), deg_from_rad(angles)]), 6),
             }
             lines += ["", f"# {HEADINGS['uncertainty.errors']}", "[uncertainty.errors]", *_rows(written)]
-    return "\n".join([*lines, ""])
+    return lines
 
 
 def _rows(values: Document) -> list[str]:

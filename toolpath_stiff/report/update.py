@@ -47,7 +47,7 @@ def page(update: Update, drawn: Mapping[str, bytes]) -> str:
         *QUESTIONS,
         ("Errors by direction", _by_direction(update), f"Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."),
         ("What was fitted", _fitted(update)),
-        ("Do the data support it?", _support(update)),
+        ("Do the data support it?", support_table(update)),
         ("What to do next", hints(update.next)),
         ("Where it comes from", record),
         ("Assumptions", [*document["assumptions"], *document["notes"]]),
@@ -121,7 +121,8 @@ def _fitted(update: Update) -> ShownTable:
     return ShownTable(("effect", "parameter", ">value", ">95 % interval, or sd"), rows)
 
 
-def _support(update: Update) -> ShownTable:
+def support_table(update: Update) -> ShownTable:
+    """What speaks for and against each effect."""
     rows = [
         (
             support.effect,
