@@ -96,9 +96,8 @@ def error_model(
     typical = np.array([*(float((part**2).sum(axis=1).mean()) for part in here), near]) * [1.0, unknown, 1.0]
     factor = _coverage_factor(weights, sizes**2 @ typical)
     scatter, of_geometry, form = (factor * np.sqrt(weights @ sizes**2)).tolist()
-    far = form**2 * max(float(np.concatenate(away).mean()), near) + of_geometry**2 * further * float(
-        (here[1] ** 2).sum(axis=1).mean()
-    )
+    apart = float((here[1] ** 2).sum(axis=1).mean())
+    far = form**2 * max(float(np.concatenate(away).mean()), near) + of_geometry**2 * further * apart
     of_geometry *= float(np.sqrt(unknown))
     either = np.zeros((len(own), 0)) if given is None else _apart(fit, given)[:, None] * np.sqrt(0.5)
     return ErrorModel(
