@@ -14,6 +14,7 @@ from toolpath_stiff.cutting.cutters import Cutter, radii_of
 from toolpath_stiff.cutting.surface_error import HEIGHTS, shares
 from toolpath_stiff.path.sampling import Samples
 
+BLOCK = 16_384  # walls at a time
 MOST_PASSES = 8  # places of earlier passes beside one of the last that are looked at
 ALIKE = 10.0  # steps along the wall that a turn of its normal by a radian counts
 SAME = 1e-7  # m, ranges of height closer than this are one
@@ -38,31 +39,37 @@ def walls_of_all_passes(
     profiles
         (n, 2, HEIGHTS) m, errors of what each pass makes, from its lower to its upper end.
     """
-    nodes = shares()[0]
-    heights = own[..., :1] + (own[..., 1:] - own[..., :1]) * nodes
     owners, walls = np.nonzero(np.isfinite(own).all(axis=2))
-    values = np.full((*own.shape[:2], HEIGHTS), np.nan)
-    values[owners, walls] = profile_at(profiles[owners, walls], made[owners, walls], heights[owners, walls])
+    values = np.full_like(profiles, np.nan)
     shared = np.isfinite(made).all(axis=2) & ~(np.abs(made - own).max(axis=2) <= SAME)
     rows, sides = np.nonzero(shared)
-    if not len(rows) or not len(owners):
-        return values
-    from scipy.spatial import cKDTree
-
-    # Weighed so that walls with another normal are far.
-    earlier_walls, last_walls = (
-        np.concatenate([foot, ALIKE * step * into], axis=1)
-        for foot, into in (walls_beside(samples, cutters, *of) for of in ((rows, sides), (owners, walls)))
-    )
-    near: IntArray = np.asarray(cKDTree(earlier_walls).query(last_walls, MOST_PASSES, distance_upper_bound=step)[1])
     apart = 2.0 * max(cutter.radius for cutter in cutters.values())
-    for column in near.T:
-        known = np.flatnonzero(column < len(rows))
-        known = known[samples.s[owners[known]] - samples.s[rows[column[known]]] > apart]
-        last, wall, earlier, side = owners[known], walls[known], rows[column[known]], sides[column[known]]
-        climb = samples.position[last, 2] - samples.position[earlier, 2]
-        left = profile_at(profiles[earlier, side], made[earlier, side], heights[last, wall] + climb[:, None])
-        values[last, wall] = np.fmin(values[last, wall], left)
+
+    def places(rows: IntArray, sides: IntArray) -> FloatArray:
+        foot, into = walls_beside(samples, cutters, rows, sides)
+        return np.concatenate([foot, ALIKE * step * into], axis=1)  # walls with another normal are far
+
+    tree = None
+    if len(rows) and len(owners):
+        from scipy.spatial import cKDTree
+
+        tree = cKDTree(places(rows, sides))
+    for begin in range(0, len(owners), BLOCK):
+        last, wall = owners[begin : begin + BLOCK], walls[begin : begin + BLOCK]
+        low, high = own[last, wall, :, None].swapaxes(0, 1)
+        heights = low + (high - low) * shares()[0]
+        left = profile_at(profiles[last, wall], made[last, wall], heights)
+        near: IntArray = np.zeros((len(last), 0), dtype=np.int64)
+        if tree is not None:
+            near = np.asarray(tree.query(places(last, wall), MOST_PASSES, distance_upper_bound=step)[1])
+        for column in near.T:
+            known = np.flatnonzero(column < len(rows))
+            known = known[samples.s[last[known]] - samples.s[rows[column[known]]] > apart]
+            earlier, side = rows[column[known]], sides[column[known]]
+            climb = samples.position[last[known], 2] - samples.position[earlier, 2]
+            other = profile_at(profiles[earlier, side], made[earlier, side], heights[known] + climb[:, None])
+            left[known] = np.fmin(left[known], other)
+        values[last, wall] = left
     return values
 
 
