@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter, radii_of
 from toolpath_stiff.cutting.surface_error import HEIGHTS, shares
 from toolpath_stiff.path.sampling import Samples
@@ -25,9 +25,9 @@ def walls_of_all_passes(
     cutters: Mapping[int, Cutter],
     made: FloatArray,
     own: FloatArray,
-    profiles: FloatArray,
+    profiles: AnyArray,
     step: float,
-) -> FloatArray:
+) -> AnyArray:
     """(n, 2, HEIGHTS) m, errors of the walls that stay, from the lower to the upper end of each; nan: no wall.
 
     Parameters
@@ -73,7 +73,7 @@ def walls_of_all_passes(
     return values
 
 
-def profile_at(profiles: FloatArray, ranges: FloatArray, heights: FloatArray) -> FloatArray:
+def profile_at(profiles: AnyArray, ranges: FloatArray, heights: FloatArray) -> FloatArray:
     """(m, h) errors at heights (m, h), from profiles (m, HEIGHTS) over ranges (m, 2); nan beyond."""
     nodes, low, span = shares()[0], ranges[:, :1], np.maximum(ranges[:, 1:] - ranges[:, :1], SAME)
     share = (heights - low) / span
