@@ -285,14 +285,15 @@ def _evaluate(
 
 def _with_walls_of_all_passes(cut: Cut, own: FloatArray, step: float) -> Cut:
     """The cut with each wall at the pass that owns it; `own` as `Cut.wall_heights`."""
-    values = walls_of_all_passes(cut.samples, cut.cutters, cut.wall_heights, own, cut.wall_profiles, step)
+    walls_of_all_passes(cut.samples, cut.cutters, cut.wall_heights, own, cut.wall_profiles, step)
+    values = cut.wall_profiles
     before, deviation = np.abs(cut.wall_mean), cut.deviation[:, :2].copy()
     share = deviation / np.where(before > 0.0, before, np.nan)  # the coefficients scatter all errors alike
     usual = float(np.median(share[np.isfinite(share)])) if np.isfinite(share).any() else 0.0
     _enter(cut, np.arange(len(own)), slice(0, 2), values @ shares()[1], values)
     after = np.abs(cut.wall_mean)
     cut.deviation[:, :2] = after * np.where(before > OTHER * after, share, usual)
-    return replace(cut, wall_heights=own, wall_profiles=values)
+    return replace(cut, wall_heights=own)
 
 
 def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: FloatArray) -> None:

@@ -27,8 +27,8 @@ def walls_of_all_passes(
     own: FloatArray,
     profiles: AnyArray,
     step: float,
-) -> AnyArray:
-    """(n, 2, HEIGHTS) m, errors of the walls that stay, from the lower to the upper end of each; nan: no wall.
+) -> None:
+    """Make profiles of what each pass makes those of the walls that stay, from the lower to the upper end; nan: no wall.
 
     Parameters
     ----------
@@ -40,21 +40,24 @@ def walls_of_all_passes(
         (n, 2, HEIGHTS) m, errors of what each pass makes, from its lower to its upper end.
     """
     owners, walls = np.nonzero(np.isfinite(own).all(axis=2))
-    values = np.full_like(profiles, np.nan)
     shared = np.isfinite(made).all(axis=2) & ~(np.abs(made - own).max(axis=2) <= SAME)
     rows, sides = np.nonzero(shared)
     apart = 2.0 * max(cutter.radius for cutter in cutters.values())
 
     def places(rows: IntArray, sides: IntArray) -> FloatArray:
-        foot, into = walls_beside(samples, cutters, rows, sides)
-        return np.concatenate([foot, ALIKE * step * into], axis=1)  # walls with another normal are far
+        parts = [np.empty((0, 4))]
+        for begin in range(0, len(rows), BLOCK):
+            foot, into = walls_beside(samples, cutters, rows[begin : begin + BLOCK], sides[begin : begin + BLOCK])
+            parts.append(np.concatenate([foot, ALIKE * step * into], axis=1))  # walls with another normal are far
+        return np.concatenate(parts)
 
     tree = None
     if len(rows) and len(owners):
         from scipy.spatial import cKDTree
 
         tree = cKDTree(places(rows, sides))
-    for begin in range(0, len(owners), BLOCK):
+    # The last first: of earlier passes counts what they made, not what of it stays.
+    for begin in range((len(owners) - 1) // BLOCK * BLOCK, -1, -BLOCK):
         last, wall = owners[begin : begin + BLOCK], walls[begin : begin + BLOCK]
         low, high = own[last, wall, :, None].swapaxes(0, 1)
         heights = low + (high - low) * shares()[0]
@@ -69,8 +72,8 @@ def walls_of_all_passes(
             climb = samples.position[last[known], 2] - samples.position[earlier, 2]
             other = profile_at(profiles[earlier, side], made[earlier, side], heights[known] + climb[:, None])
             left[known] = np.fmin(left[known], other)
-        values[last, wall] = left
-    return values
+        profiles[last, wall] = left
+    profiles[~np.isfinite(own).all(axis=2)] = np.nan
 
 
 def profile_at(profiles: AnyArray, ranges: FloatArray, heights: FloatArray) -> FloatArray:
