@@ -182,7 +182,7 @@ REFUSALS = {
     "L X+10\nRND R2": ("stands between a corner", 5),
     "RND R2\nL X+1": ("without a contour element", 3),
     "APPR CT X+0 Y+10 CCA90 R+10 RL\nL Z+1": ("no direction in the plane", 4),
-    "L X-20\nAPPR CT X+0 Y+10 CCA90 R+4 RL\nL Y+50": ("inside arc", 4),
+    "L X-20\nAPPR LCT X+0 Y+10 R30 RL\nL Y+50": ("holds the point", 4),
     "CYCL DEF 10.1 ROT+10\nCYCL DEF 7.1 X+5\nL X+1": ("order decides", 5),
     "CYCL DEF 8.1 X\nCYCL DEF 10.1 ROT+10\nL X+1": ("order decides", 5),
     "L X+1\nCYCL DEF 7.1 #3": ("another datum than before", 4),

@@ -12,7 +12,6 @@ from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.documents import DIGITS, Document, json_number
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import Component
-from toolpath_stiff.inference.confounding import Confounding
 from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.errors import AS_GIVEN, error_figures
@@ -126,8 +125,8 @@ class Examination:
         The machine file as it stands; its strut law refitted; effect or "a + b" -> final fit of all that were offered.
     held_out_base, held_out
         Errors at left-out points.
-    confounding, detectable
-        What these data cannot tell apart, and what they would have shown.
+    detectable
+        What these data would have shown.
     names, seed, line, asked, inputs
         For the record, and for the commands that go on from here: names of the measurement files, the command; files
         that were read.
@@ -161,7 +160,6 @@ class Examination:
     fits: dict[str, Fit]
     held_out_base: HeldOut
     held_out: dict[str, HeldOut]
-    confounding: Confounding
     detectable: tuple[Detectable, ...]
     names: tuple[str, ...]
     seed: int

@@ -29,9 +29,8 @@ from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
 from toolpath_stiff.inference.votes import CHANCE, SMALL, outvoted, vote_words
-from toolpath_stiff.planning.plan import INDICATORS, telling
+from toolpath_stiff.planning.plan import INDICATORS, reading_words, telling
 from toolpath_stiff.portrait.words import alike_text
-from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
 
@@ -207,7 +206,7 @@ def _not_told_apart(diagnosis: Examination) -> list[str]:
     rivals = [(name, votes) for name, votes in diagnosis.main.votes.items() if not outvoted(votes) and name != NONE]
     reasons = [f"{vote_words(*rival)} (log probability): not beyond chance" for rival in rivals[:MOST_BESIDE]]
     effects = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
-    reasons += [f"{would_tell(effect)} would tell {effect.name}" for effect in effects]
+    reasons += [f"{reading_words(telling(effect))} would tell {effect.name}" for effect in effects]
     if NONE in diagnosis.plausible:
         reasons.append("chance alone is not excluded either")
     for effect in effects:
@@ -299,9 +298,3 @@ def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
     tells = " or ".join(place for place in places if place != "none")
     words = f"{joined(effects)}: the readings neither show nor exclude {'it' if len(unexcluded) == 1 else 'them'}"
     return f"{words}; an indicator {tells} would tell" if tells else words
-
-
-def would_tell(effect: Effect) -> str:
-    """Where an indicator would show an effect, or what else to measure."""
-    place = telling(effect)
-    return place.removeprefix("none: ") if place.startswith("none: ") else f"an indicator {place}"

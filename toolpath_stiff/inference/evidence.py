@@ -10,13 +10,13 @@ chapters 27 and 28). An effect of several parameters is tried with each subset o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.inference.candidates import Candidate, CandidateTable, Component
 from toolpath_stiff.inference.covariances import Precision
 from toolpath_stiff.inference.least_squares import NormalEquations, gauss_newton, scaled_inverse
@@ -24,6 +24,7 @@ from toolpath_stiff.inference.noise import Noise, Scatter, covariance
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.size_priors import Sight, SizePrior, log_comparable
 from toolpath_stiff.stiffness.active import ActiveEffect
+from toolpath_stiff.stiffness.contract import Effect
 
 LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
 
@@ -194,6 +195,21 @@ class Problem:
         `jacobian` (n, 2 + p) of ln k to the strut law and p sizes.
         """
         return self.scatter.precision.beside(jacobian.T, law_prior(jacobian.shape[1]))
+
+    @property
+    def point(self) -> TextArray:
+        """(n,) label of each reading's point: what is left out together."""
+        return self.predictor.data.point
+
+    def residual(self, law: FloatArray, effects: Sequence[ActiveEffect]) -> FloatArray:
+        """(n,) ln measured - ln modelled."""
+        return np.asarray(self.observed - self.predictor.log_stiffness(law, effects))
+
+    def law_columns(self, residual: FloatArray, law: FloatArray, effects: Iterable[Effect]) -> list[FloatArray]:
+        """(n,) d ln k to each of the law's logarithms, where these follow from the struts' forces; else none."""
+        if not (np.isfinite(residual).all() and self.predictor.struts_carry_all(effects)):
+            return []
+        return list(self.predictor.law_columns(self.observed - residual, law).T)
 
     def _prior(self, table: CandidateTable, j: int) -> SizePrior:
         """Prior of a component's size, worked out once."""

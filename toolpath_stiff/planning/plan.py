@@ -54,8 +54,8 @@ INDICATORS = {
     "struts": "along a strut, from end to end",
     "frame": "between a frame vertex and the floor",
     "table": "between the table and the floor",
-    "geometry": "none: measure the length or radius itself",
-    "instrument": "none: compare the gauge with a second one, and watch the indicator without load",
+    "geometry": "none: the length or radius measured by itself",
+    "instrument": "none: a second gauge beside this one, and an indicator watched without load",
 }
 
 

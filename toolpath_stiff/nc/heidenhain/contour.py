@@ -106,8 +106,7 @@ def go(
     if plain.held is not None:
         _cut_corner(state, block, (begin, end, center, turn), there, rapid)
     ahead = end - begin if center is None else turn * 1j * (end - center)
-    flat = abs(ahead) > 0.0 and not there.keys() - {first, second}
-    plain.heading, plain.fast = (ahead if flat else None), rapid
+    plain.heading, plain.fast = ahead or None, rapid
     if plain.to_corner:
         block.refuse_if(rapid or turns > 1 or there.keys() - {first, second}, None, *_NO_CORNER)
         plain.held = (block, (begin, end, center, turn), state.feed)

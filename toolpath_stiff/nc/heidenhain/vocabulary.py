@@ -45,8 +45,9 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("LN", functions.vectors, "straight, with a tool axis"),
     )),
     ("motion", _APPROACH, (
-        ("APPR LT|APPR LN|APPR CT|APPR LCT", approach.approach, "approach of a contour"),
-        ("DEP LT|DEP LN|DEP CT|DEP LCT", approach.depart, "departure from a contour"),
+        ("APPR LT|APPR LN|APPR CT|APPR LCT|APPR PLT|APPR PLN|APPR PCT|APPR PLCT", approach.approach,
+         "approach of a contour"),
+        ("DEP LT|DEP LN|DEP CT|DEP LCT|DEP PLCT", approach.depart, "departure from a contour"),
     )),
     ("M tool change", _TOOLS, (
         ("TOOL CALL", tools.tool_call, "tool, tool axis, speed, feed"),
@@ -121,8 +122,6 @@ OWN = {
 _BY_MOVES = "post the moves of the cycle"
 _REFUSED = (
     ("FL FLT FC FCT FPOL FSELECT FCTP FLP", "free contour programming (FK)", "post lines and arcs", f"{MANUAL}, FK"),
-    ("APPR-PLT APPR-PLN APPR-PCT APPR-PLCT DEP-PLCT",
-     "an approach in polar coordinates", "APPR and DEP with X and Y", _APPROACH),
     ("PLANE-PROJECTED PLANE-EULER PLANE-VECTOR PLANE-POINTS PLANE-RELATIV PLANE-RELATIVE PLANE-AXIAL",
      "a tilted plane given otherwise", "PLANE SPATIAL", _PLANE),
     ("CYCL-DEF-204", "back boring", _BY_MOVES, _DRILLING),
