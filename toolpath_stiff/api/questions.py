@@ -17,7 +17,7 @@ from toolpath_stiff.comparison.compare import compare as compare_readings
 from toolpath_stiff.correction.draft import EffectDraft, draft
 from toolpath_stiff.correction.on_elements import PullTask, build_pull_ladder
 from toolpath_stiff.correction.result import Update
-from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, MEAN_ERROR, UpdateTask
+from toolpath_stiff.correction.task import INSTRUMENT, LIKELIHOOD, MACHINE, MEAN_ERROR, UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
@@ -260,7 +260,7 @@ def update(
     auto: Annotated[bool, Option("--auto")] = False,
     force: Annotated[bool, Option("--force")] = False,
     believe: Annotated[str | None, Option("--believe", choices=(MACHINE, INSTRUMENT))] = None,
-    objective: Annotated[str, Option("--objective", choices=("likelihood", "mean-error"))] = "likelihood",
+    objective: Annotated[str, Option("--objective", choices=(LIKELIHOOD, MEAN_ERROR))] = LIKELIHOOD,
     machine_file: str | Path = "machine.toml",
     columns: Mapped = None,
     noise_percent: NoisePercent = None,

@@ -15,8 +15,6 @@ An effect is supported if
   that remains, so that data which no effect explains do not lend every effect significance.
 
 Of several effects each is judged beside the others.
-
-The paper's own estimation (`--objective mean-error`) is a ladder of one step, the strut law of smallest mean error.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -27,10 +25,11 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.correction.additions import parse_addition
+from toolpath_stiff.correction.as_built import as_built
 from toolpath_stiff.correction.machines import data_hash, fitted_machine
+from toolpath_stiff.correction.mean_error import update_by_mean_error
 from toolpath_stiff.correction.result import NEEDED, Update
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
-from toolpath_stiff.correction.strut_law import leave_points_out, minimise_mean_error, resampled_covariance
 from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, MEAN_ERROR, UpdateTask
 from toolpath_stiff.diagnosis.diagnose import check_measured
 from toolpath_stiff.diagnosis.examination import percent_of
@@ -45,7 +44,7 @@ from toolpath_stiff.inference.fits import add_effect, base_fit, baseline, with_g
 from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import Family, score_families, signatures, tables_of
-from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
+from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.rivals import rivals_of_law
 from toolpath_stiff.inference.votes import outvoted, standard_error
@@ -80,19 +79,14 @@ def update(task: UpdateTask, build: Callable[[Any], Update] | None = None) -> Up
     task = replace(task, files=tuple(task.files) or tuple(dict.fromkeys(task.data.file.tolist())))
     effect_files = tuple(map(str, task.effect_files))
     request = task.request or Asked(tuple(task.files), task.machine.name, effect_files, task.noise, task.strut_spread)
-    if task.objective == MEAN_ERROR:
-        if task.add or task.auto or not task.strut_law:
-            raise InputError(
-                "--objective mean-error is the paper's own estimation, of the strut law alone",
-                expected="--strut-law, without --add and --auto",
-            )
-        result = update_by_mean_error(replace(task, data=task.data.of_tip))
-    else:
-        result = (build or build_ladder)(task)
+    result = update_by_mean_error(task) if task.objective == MEAN_ERROR else (build or build_ladder)(task)
+    of_struts = build is None and result.accepted and not (result.question or result.search)
+    if of_struts and (built := as_built(task, result.last)):
+        result = replace(result, as_built=built[0], steps=(*result.steps, built[1]))
     # Where its results go does not matter to the command that repeats the fit.
     words = options(
         add=list(task.add), strut_law=task.strut_law, keep_strut_law=task.keep_strut_law, auto=task.auto,
-        force=task.force, believe=task.believe, objective=task.objective if task.objective == MEAN_ERROR else None,
+        force=task.force, believe=task.believe, objective=task.objective if result.search else None,
         seed=task.seed or None,
     )  # fmt: skip
     # No date: the same data and command give the same bytes.
@@ -344,23 +338,3 @@ def next_effect(
         if tried[-1].supported:
             return step, tried
     return None, tried
-
-
-def update_by_mean_error(task: UpdateTask) -> Update:
-    """The strut law with the smallest mean error, its errors at left-out points and its uncertainty.
-
-    Noise is for the noise floor only: the objective does not know of it. Raises `InputError` as `minimise_mean_error`.
-    """
-    predictor, data = task.problem.predictor, task.data
-    task.progress("searching from several starts")
-    search = minimise_mean_error(predictor, task.seed)
-    (as_given, law_refitted), law = baseline(task.problem), search.law
-    task.progress("leaving points out, drawing points anew")
-    modelled = predictor.log_stiffness(law)
-    last = Fit(
-        (), (), (), law, task.problem.observed - modelled, predictor.law_columns(modelled, law),
-        resampled_covariance(predictor, law, task.seed), task.problem.scatter,
-    )  # fmt: skip
-    left_out = HeldOut(leave_points_out(predictor, law), np.zeros((0, 2)), data.point)
-    steps = LadderStep.of(AS_GIVEN, as_given, data), LadderStep.of("strut law by mean error", last, data, left_out)
-    return Update(task, steps, LadderStep.of(LAW_REFITTED, law_refitted, data), search=search)

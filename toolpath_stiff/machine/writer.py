@@ -28,6 +28,8 @@ HEADINGS = {
     "# linear between. Outside it is extrapolated along the end segments, and every result says how often.",
     "strut_law, constant": "Stiffness of a strut in N/um, the same at every length.",
     "platform": "Stiffness in N/m of each of the 19 bars that stand for platform, spindle and tool; inf is rigid.",
+    "as_built": "By how much struts are stiffer than their law, and joints off their places, unknown to the control:\n"
+    "# the likeliest by the readings, given how far struts and joints of such machines are off.",
     "limits.strut_length": "Travel of the struts, between the joint centres, in mm.",
     "limits.joint_angle": "Largest swing of the joints in degrees from the direction that each strut has at the\n"
     "# neutral pose (x, y, z in mm, roll, pitch, yaw in degrees); inf is no limit.",
@@ -71,6 +73,10 @@ def machine_toml(machine: Hexapod, preamble: str = "") -> str:
             **{key: value for key, value in conditions.items() if value is not None},
         },
     }
+    if machine.as_built is not None:
+        frame, platform = mm_from_m(machine.as_built[6:]).round(6).reshape(2, 6, 3)
+        struts = (100.0 * np.expm1(machine.as_built[:6])).round(6)
+        sections["as_built"] = {"struts_percent": struts, "frame_joints_mm": frame, "platform_joints_mm": platform}
     if np.isfinite(limits.workspace).all():
         low, high = mm_from_m(limits.workspace)
         sections["limits.workspace"] = {"min_mm": low, "max_mm": high}

@@ -67,11 +67,9 @@ def _headline(update: Update) -> str:
 
 
 def _figures(update: Update) -> list[tuple[str, str]]:
-    last, by_likelihood = update.steps[-1], update.task.objective == "likelihood"
-    figures = [(_percent(update.steps[0].error), "mean error as given")]
-    if by_likelihood:
-        figures.append((_percent(update.refitted.error), "mean error, strut law refitted"))
-    if last.fit.names or not by_likelihood:
+    last, figures = update.steps[-1], [(_percent(update.steps[0].error), "mean error as given")]
+    figures.append((_percent(update.refitted.error), "mean error, strut law refitted"))
+    if last.fit.names or update.search:
         figures.append((_percent(last.error), f"mean error {last.title}" if last.fit.names else last.name))
     figures.append((_percent(last.held.mean_error), "the same at left-out points"))
     figures.append((percent(update.noise.floor_percent, 2), "would be left by scatter alone"))

@@ -25,6 +25,7 @@ from toolpath_stiff.machine.limits import solved
 from toolpath_stiff.machine.model import EffectEntry, Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.active import ActiveEffect, read_parameters
+from toolpath_stiff.stiffness.as_built import as_built
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import ELEMENT, SETUP, Conditions, LoadPath
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
@@ -127,6 +128,7 @@ def build_model(
     actives = [_activate(machine, kind, entry, files) for kind, entries in kinds for entry in entries]
     if isinstance(machine, Hexapod) and np.isfinite(machine.platform_bar_stiffness):
         actives.insert(0, ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness}))
+    actives += [as_built(machine.as_built)] if isinstance(machine, Hexapod) and machine.as_built is not None else []
     actives += extra
     keys = [(active.effect.name, active.values.get(ELEMENT)) for active in actives]  # each once, or once an element
     beside = "elements" if isinstance(machine, Hexapod) else "hexapods"
