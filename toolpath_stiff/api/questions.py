@@ -408,7 +408,8 @@ def plan(
     data, machine
         The machine; measurements, or the files that hold them; None before the first campaign.
     between
-        Effects to tell apart, on elements "joint_torsion:joint 2", or "none"; unless given, what a diagnosis of the data leaves standing.
+        Effects to tell apart, on elements "joint_torsion:joint 2", or "none"; unless given, what a diagnosis of the
+        data leaves standing.
     n
         Poses; unless given 6, or 24 of a first campaign.
     radius_mm
