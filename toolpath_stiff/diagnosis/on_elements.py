@@ -13,7 +13,6 @@ from toolpath_stiff.arrays import AnyArray, FloatArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.element_fits import (
-    NONE,
     PullProblem,
     chi_square,
     explanations,

@@ -88,9 +88,7 @@ class PullProblem(Problem):
     def noise_of(self, relative: FloatArray, spread: float = 0.0, origin: str = "") -> None:
         """Scatter of readings by (m,) of their sizes, of elements by a relative `spread` of what each gives."""
         own, every = np.maximum(relative, LEAST), np.arange(len(relative))
-        self.noise = Noise(
-            "stated", own, 0.0, spread, 0.0, OUTLIERS, OUTLIER_WIDTH, STATED_FREEDOM, origin, rest=0.0
-        )
+        self.noise = Noise("stated", own, 0.0, spread, 0.0, OUTLIERS, OUTLIER_WIDTH, STATED_FREEDOM, origin, rest=0.0)
         shared = spread * self.by_element / self.pulls.size[:, None]
         self.scatter = Scatter.of(self.noise, Covariance(own**2, Groups(every), 0.0, np.ascontiguousarray(shared.T)))
 
