@@ -127,8 +127,8 @@ def evaluate(
     if not isinstance(model.machine, Hexapod):
         return _by_elements(model, (position, abc, tangent), tool_length, load, force, progress)
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    corners = _corners(position, abc, lengths)
-    route = core.choose_route(model, n - int(np.count_nonzero(corners)))
+    corner = corners(position, abc, lengths)
+    route = core.choose_route(model, n - int(np.count_nonzero(corner)))
     stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(model.machine))
     substituted, extrapolated = np.zeros((2, n), dtype=bool)
     result = Evaluation(np.empty(n), substituted, np.empty((n, 6)), extrapolated, stand)
@@ -137,9 +137,9 @@ def evaluate(
         for tool, some in core.rows_of_tools(lengths[block]):
             rows = block[some]
             if route != "exact" and load.kind != "softest":
-                last = corners[rows] & (rows < block[-1])
+                last = corner[rows] & (rows < block[-1])
                 first = rows[~np.append(False, last[:-1])]
-                ends = (first, first + corners[first] * (first < block[-1])) if last.any() else (first,)
+                ends = (first, first + corner[first] * (first < block[-1])) if last.any() else (first,)
                 loads, left = [tangent[part] for part in ends], []
                 fast = _by_closed_form(model, load, loads, _poses(position, abc, tool, first), route)
                 for part, (evaluated, sure) in zip(ends, fast, strict=True):
@@ -158,14 +158,14 @@ def _poses(position: FloatArray, abc: FloatArray, tool: float, rows: IntArray) -
     return position[rows], rotation_matrices(angles) if angles.any() else None, tool
 
 
-def _corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolArray:
+def corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolArray:
     """(n,) where a move ends and the next one starts in the row after: one pose, two tangents. None where few are."""
-    corners = np.zeros(len(position), dtype=bool)
-    corners[:-1] = True
+    corner = np.zeros(len(position), dtype=bool)
+    corner[:-1] = True
     for values in (*position.T, *abc.T, np.nan_to_num(lengths, nan=-1.0)):
-        corners[:-1] &= values[1:] == values[:-1]
-    corners[1:] &= ~corners[:-1]  # of more than two rows alike the others are poses of their own
-    return corners if np.count_nonzero(corners) > FEW_CORNERS * len(corners) else np.zeros_like(corners)
+        corner[:-1] &= values[1:] == values[:-1]
+    corner[1:] &= ~corner[:-1]  # of more than two rows alike the others are poses of their own
+    return corner if np.count_nonzero(corner) > FEW_CORNERS * len(corner) else np.zeros_like(corner)
 
 
 def _by_closed_form(

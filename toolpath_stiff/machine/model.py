@@ -395,6 +395,9 @@ class Hexapod(MachineTool):
         Stiffness of a strut over its length.
     platform_bar_stiffness
         N/m of each bar of the platform truss; inf: rigid.
+    as_built
+        (42,) by how much it is off all this, unknown to the control: ln of each strut's stiffness over the law's, then
+        m of the frame joints' coordinates and of the platform joints'; None: not at all.
     """
 
     kind: ClassVar[str] = "hexapod"
@@ -404,6 +407,7 @@ class Hexapod(MachineTool):
     platform_joints: FloatArray
     strut_law: StrutLaw
     platform_bar_stiffness: float = np.inf
+    as_built: FloatArray | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:
