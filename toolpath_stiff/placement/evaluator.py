@@ -13,10 +13,17 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from toolpath_stiff.analysis.evaluation import MOST_TRIED, WorkPoses, corners, evaluate, evaluate_stance
+from toolpath_stiff.analysis.evaluation import (
+    WorkPoses,
+    corners,
+    evaluate,
+    kept_configurations,
+    poses_taken,
+    stiffness_within,
+    tried_rows,
+)
 from toolpath_stiff.analysis.loads import Load, geometric_directions
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, product
-from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Extremes, reach
 from toolpath_stiff.machine.model import NO_END, Hexapod, as_hexapod
@@ -211,35 +218,28 @@ class Evaluator:
         machine, (k, n) = self.model.machine, position.shape[1:]
         stiffness, margin = np.full((k, n), np.nan), np.empty((k, n))
 
-        def poses(columns: FloatArray, where: tuple[IntArray, IntArray]) -> FloatArray:
-            return np.ascontiguousarray(columns[:, where[0]][:, :, where[1]]).reshape(len(columns), -1)
+        def placed(rows: IntArray, samples: IntArray) -> tuple[WorkPoses, FloatArray]:
+            tip, towards, turns = (
+                None if columns is None else columns[:, rows][:, :, samples].reshape(len(columns), -1)
+                for columns in (position, motion, rotation)
+            )
+            assert tip is not None and towards is not None
+            return (tip.T, _matrices(turns), towards.T), np.tile(self.path.tool_length[samples], len(rows))
 
-        def stand(rows: IntArray, samples: IntArray, configuration: int | None) -> tuple[Stance, WorkPoses]:
-            where = (rows, samples)
-            turns = None if rotation is None else _matrices(poses(rotation, where))
-            tip, towards = poses(position, where).T, poses(motion, where).T
-            tools = np.tile(self.path.tool_length[samples], len(rows))
-            return machine.solve(tip, turns, tools, configuration), (tip, turns, towards)
-
-        every, chosen = np.arange(k), np.zeros(k, dtype=np.int64)
-        if (count := len(machine.configurations)) > 1:
-            few = np.unique(np.linspace(0, n - 1, MOST_TRIED).round().astype(np.int64))
-            tried = (stand(every, few, i) for i in range(count))
-            margins = [
-                reach(machine, in_work[0], stance).margin.reshape(k, -1).min(axis=1) for stance, in_work in tried
-            ]
-            chosen = np.argmax(margins, axis=0)
+        chosen = np.zeros(k, dtype=np.int64)
+        if len(machine.configurations) > 1:
+            (tip, turns, _), tools = placed(np.arange(k), tried_rows(n))
+            chosen = kept_configurations(machine, tip, turns, tools, k)
         for configuration in np.unique(chosen).tolist():
             rows = np.flatnonzero(chosen == configuration)
-            stance, in_work = stand(rows, np.arange(n), configuration)
+            in_work, tools = placed(rows, np.arange(n))
+            stance = machine.solve(*in_work[:2], tools, configuration)
             margin[rows] = reach(machine, in_work[0], stance).margin.reshape(-1, n)
             possible = margin[rows][:, self.cuts].min(axis=1, initial=np.inf) >= 0.0
             wanted = np.flatnonzero(np.logical_and.outer(possible, self.path.headline).ravel())
             if len(wanted):
-                tip, turns, towards = in_work
-                some = tip[wanted], None if turns is None else turns[wanted], towards[wanted]
-                values = np.full(len(rows) * n, np.nan)
-                values[wanted] = evaluate_stance(self.model, stance.take(wanted), some, self.load, self.force).stiffness
+                some, values = poses_taken(in_work, wanted), np.full(len(rows) * n, np.nan)
+                values[wanted] = stiffness_within(self.model, stance.take(wanted), some, self.load, self.force)[0]
                 stiffness[rows] = values.reshape(-1, n)
         return stiffness, margin
 

@@ -107,7 +107,7 @@ def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
     return render(
         "place.html",
         styles=["viewer.css", "place.css"],
-        scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
+        scripts=["stage.js", "elements.js", "viewer.js", "solids.js", "machine.js", "profile.js", "place.js"],
         data=data,
         title=f"Placements of {placed.best.program.name}",
         about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",

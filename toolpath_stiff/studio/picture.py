@@ -13,6 +13,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.poses import pose_in_mm, pose_in_si
+from toolpath_stiff.readings.measurements import reading_columns
 from toolpath_stiff.report.scene import machine_scene, reach_boundary
 from toolpath_stiff.studio.session import Session
 
@@ -66,9 +67,11 @@ def machine(session: Session) -> Document:
     return {
         "title": model.title,
         "effects": on.effects,
-        "scene": session.once("scene", (key, state.data, id(analysis)), lambda: machine_scene(model, poses())),
+        "scene": {
+            **session.once("scene", (key, state.data, id(analysis)), lambda: machine_scene(model, poses())),
+            "reach": session.once("reach", key, lambda: reach_boundary(model)),
+        },
         "origin": list(on.origin_mm_deg),
-        "reach": session.once("reach", key, lambda: reach_boundary(model)),
     }
 
 
@@ -162,8 +165,8 @@ def _setups(session: Session) -> list[str]:
     """Names of set-ups in the readings, in their order."""
 
     def make() -> list[str]:
-        frame = session.case.data.to_frame(session.machine)
-        return sorted(set(frame["setup"]) - {""}) if "setup" in frame else []
+        columns = reading_columns(session.case.data.on(session.machine))
+        return sorted({*columns.get("setup", ())} - {""})
 
     return session.once("setups", session.case.state.judged, make) if session.case.state.data else []
 

@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, TypeVar
 
+import numpy as np
+
 import toolpath_stiff as tps
 from toolpath_stiff.case.case import Case
 from toolpath_stiff.case.state import Step, call
 from toolpath_stiff.documents import Document
+from toolpath_stiff.readings.measurements import reading_columns
 from toolpath_stiff.studio.work import Job, Reply
 
 READING = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz", "stiffness_N_per_mm", "force_N")
@@ -138,9 +141,9 @@ class Session:
 
         def make() -> Mapping[str, list[Any]]:
             names = {self.case.path(name): name for name in state.data}
-            frame = tps.Measurements(list(names)).to_frame(self.machine).round(4)
-            columns = {name: frame[name].tolist() for name in ("line", "point", *READING)}
-            return {"file": frame["file"].map(names).tolist(), **columns}
+            read = reading_columns(tps.Measurements(list(names)).on(self.machine))
+            numbers = {name: np.round(read[name], 4).tolist() for name in ("line", *READING)}
+            return {"file": [names[file] for file in read["file"]], **numbers}
 
         return self.once("readings", (state.machine, state.data), make)
 

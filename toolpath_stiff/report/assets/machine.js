@@ -11,6 +11,9 @@ function turnOf([, , , a, b, c]) {
 }
 const moved = (pose, turn, point) => turn.map((row, i) => pose[i] + dot3(row, point));
 const centreOf = (points) => points[0].map((_, i) => points.reduce((sum, p) => sum + p[i], 0) / points.length);
+// [low, high] of X, Y and Z.
+const endsOf = (points) => [0, 1, 2].map((k) => [Math.min(...points.map((p) => p[k])),
+  Math.max(...points.map((p) => p[k]))]);
 const lit = (all, link, name) => all.some((one) => one.link === link && (!one.name || !name || one.name === name));
 // Points in their order about their middle, counterclockwise seen along the third column of a turn.
 function byAngle(points, turn = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) {
@@ -30,6 +33,22 @@ class MachineBody {
     const points = this.hangs ? this.feet : bodies.flatMap((body) => body.points), middle = centreOf(points);
     // mm, by which what no file says is drawn: how thick struts, joints, platform and spindle are.
     this.size = points.reduce((sum, p) => sum + Math.hypot(...minus(p, middle)), 0) / points.length;
+    this.iso = this.hangs ? [-5, 26] : VIEWS.iso;  // a leg does not stand before the work
+    this.floor = Math.min(...(this.hangs ? data.reach?.flat() ?? [points[0]] : this.feet).map((p) => p[2]));
+  }
+  // What a view of the whole machine is fitted to: a ring and a ball do not reach the corners of their box.
+  outline(pose) {
+    const feet = this.feet.map(([x, y]) => [x, y, this.floor - 0.1 * this.size]), points = this.at(pose).flatMap((body) => body.points);
+    return [...(this.hangs ? this.data.reach.flat() : []), ...points, ...feet];
+  }
+  drawReach(g, view) {
+    const rows = this.data.reach, line = (points, close) => { trace(g, points.map((p) => view.project(p)), close);
+      stroke(g, ink.line, 1); };
+    if (!this.hangs) return;  // in a hollow space rays from its middle say little
+    g.globalAlpha = 0.9;
+    rows.slice(1, -1).forEach((row) => line(row, true));
+    for (let k = 0; k < rows[0].length; k += 3) line(rows.map((row) => row[k]), false);
+    g.globalAlpha = 1;
   }
   // The bodies at a pose: name, link, points.
   at(pose) {
@@ -92,10 +111,11 @@ class MachineBody {
     if (!hangs && !this.slides) tube(this.feet[0].map((v, i) => v - (i === 2 ? 0.1 * size : 0)), this.feet[0], 0.2, stand);
     if (hangs && !close) for (const p of ring) tube(p, [p[0], p[1], floor], 0.016, stand);
     // The table, which all else stands on, and the part.
-    const [x, y, z] = work ?? [0, 1, 2].map((k) => (k === 2 ? [floor, floor] : [pose[k], pose[k]]));
+    const [x, y, z] = work ?? [...(this.data.reach?.[0][0] ?? pose).slice(0, 2), floor].map((v) => [v, v]);
     const half = work ? 1.1 * Math.max(x[1] - x[0], y[1] - y[0]) : 0.22 * size, low = z[0] - (work ? 0.012 * size : 0);
     const about = (ends) => [-half, half].map((v) => (ends[0] + ends[1]) / 2 + v);
     const below = close || !hangs ? low - 0.04 * size : Math.min(floor, low - 0.05 * size);
+    if (this.slides || !work && !hangs) return items;
     items.push({ ...block(view, [about(x), about(y), [below, low]], colour("table", "", pale)), depth: -1e9 });
     if (work) items.push({ ...block(view, [...[x, y].map(([a, b]) => [a - 0.01 * size, b + 0.01 * size]),
       [low, Math.max(z[0], low) + 1e-3]], mix(ink.curve, ink.panel, 0.75)), depth: -9e8 });

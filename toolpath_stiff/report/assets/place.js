@@ -1,30 +1,21 @@
 // Placements: where the work sits, and what that brings.
 const d = JSON.parse(document.getElementById("data").textContent), $ = (id) => document.getElementById(id);
 const coloursNow = () => (theme.dark ? d.colours_dark : d.colours), CLASSES = d.colours.length;
-function make(parent, name, attributes, text) {
-  const node = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const k in attributes) node.setAttribute(k, attributes[k]);
-  if (text !== undefined) node.textContent = text;
-  return parent.appendChild(node);
-}
 // The front is as wide as its element, so that letters keep their size.
 const widthOf = (svg) => Math.max(280, svg.clientWidth || 400);
-// Placing: p' = o + Q p, Q = Rz(C) Ry(B) Rx(A).
-function turnOf(row) {
-  const [a, b, c] = [row.a_deg, row.b_deg, row.rotation_deg].map((v) => v * Math.PI / 180), [sa, ca, sb, cb, sc, cc] =
-    [a, b, c].flatMap((v) => [Math.sin(v), Math.cos(v)]);
-  return [[cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa], [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca
-    - cc * sa], [-sb, cb * sa, cb * ca]];
-}
-const times = (q, p) => q.map((r) => r[0] * p[0] + r[1] * p[1] + r[2] * p[2]);
-// Where the path and program zero are, the program's axes there, and the tool's direction where it leans.
+// Where the path and program zero are (p' = o + Q p), the program's axes there, the tool's direction where it leans.
 function placed(row, stiffness) {
-  const q = turnOf(row), zero = [row.x_mm, row.y_mm, row.z_mm], points = d.position.map((p) => times(q, p)
-    .map((v, i) => v + zero[i]));
-  const leans = d.axis !== null || row.a_deg !== 0 || row.b_deg !== 0;
-  const tools = leans ? d.position.map((_, i) => times(q, d.axis ? d.axis[i] : [0, 0, 1])) : null;
-  return { row, zero, stiffness, xyz: [0, 1, 2].map((k) => Float32Array.from(points, (p) => p[k])), axes: [0, 1, 2]
-    .map((k) => q.map((r) => r[k])), tools };
+  const zero = [row.x_mm, row.y_mm, row.z_mm], q = turnOf([...zero, row.a_deg, row.b_deg, row.rotation_deg]);
+  const points = d.position.map((p) => moved(zero, q, p)), leans = d.axis !== null || row.a_deg !== 0 || row.b_deg !== 0;
+  const tools = leans ? d.position.map((_, i) => moved([0, 0, 0], q, d.axis ? d.axis[i] : [0, 0, 1])) : null;
+  const xyz = [0, 1, 2].map((k) => Float32Array.from(points, (p) => p[k]));
+  return { row, zero, stiffness, points, xyz, axes: [0, 1, 2].map((k) => q.map((r) => r[k])), tools };
+}
+// The machine with its tip at a point of the path.
+const body = new MachineBody(d.machine);
+function poseOf({ points, tools }, i) {
+  const [x, y, z] = tools?.[i] ?? [0, 0, 1];
+  return [...points[i], ...[-Math.asin(y), Math.atan2(x, z), 0].map((v) => v * 180 / Math.PI)];
 }
 let chosen = d.recommended;
 const places = d.front.map((row, i) => placed(row, d.stiffness[i]));
@@ -60,7 +51,9 @@ function sceneOf(placeNow) {
     paths: [path],
     path,
     heavy: false,
+    beside: 40,
     box: () => boxOf(placeNow()),
+    outline: () => (zoomed() === "path" ? placeNow().points : null),
     take() {
       const place = placeNow();
       path.move(place.xyz);
@@ -69,6 +62,9 @@ function sceneOf(placeNow) {
     },
     draw(g, viewer) {
       const place = placeNow(), reach = Math.max(...viewer.box.map(([low, high]) => high - low));
+      const close = zoomed() === "path";
+      paint(g, viewer, body.items(viewer, poseOf(place, Math.max(here, 0)), { work: around(place), close,
+        floor: viewer.box[2][0] }), close);
       if (bounded && zoomed() === "workspace") viewer.edges(g, workspace, ink.muted, 1, [6, 4]);
       for (const { name, box } of d.keepouts) this.keepOut(g, viewer, name, [0, 1, 2]
         .map((k) => [box[0][k], box[1][k]]));
@@ -116,13 +112,12 @@ const span = (values) => { const a = Math.min(...values), b = Math.max(...values
 const meanSpan = span(rowsShown.map((r) => r.mean_N_per_mm)), rangeSpan = span(rowsShown.map((r) => r.range_N_per_mm));
 function grid(svg, { values, digits }, vertical, map, a, b) {
   for (const v of values) {
-    make(svg, "line", vertical ? { x1: map(v), x2: map(v), y1: a, y2: b, class: "grid" } : { x1: a, x2: b, y1: map(v),
-      y2: map(v), class: "grid" });
-    make(svg, "text", vertical ? { x: map(v), y: b + 16, "text-anchor": "middle" } : { x: a - 6, y: map(v) + 4,
-      "text-anchor": "end" }, group(v, digits));
+    const [x, y] = [map(v), b + 16];
+    svg.append(h("line", vertical ? { x1: x, x2: x, y1: a, y2: b, class: "grid" } : { x1: a, x2: b, y1: x, y2: x,
+      class: "grid" }), h("text", vertical ? { x, y, "text-anchor": "middle" } : { x: a - 6, y: x + 4,
+      "text-anchor": "end" }, group(v, digits)));
   }
 }
-const title = (node, text) => make(node, "title", {}, text);
 const weakest = rowsShown.map((r) => r.min_N_per_mm), weakEnds = [Math.min(...weakest), Math.max(...weakest)];
 const weakColour = (v) => coloursNow()[classAt(v, weakEnds, CLASSES)];
 const nameOf = (row, i) =>
@@ -137,20 +132,17 @@ function drawFront() {
   front.replaceChildren(); front.setAttribute("viewBox", `0 0 ${W} ${H}`); front.setAttribute("height", H);
   grid(front, ticks(...meanSpan, W > 340 ? 5 : 3), true, X, T, H - B); grid(front, ticks(...rangeSpan, 4), false, Y, L,
     W - R);
-  make(front, "text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" },
-    "mean stiffness, N/mm (more is better)");
-  make(front, "text", { x: 4, y: 14 }, "range, N/mm (less is better)");
-  if (d.before) title(make(front, "rect", { x: X(d.before.mean_N_per_mm) - 6, y: Y(d.before.range_N_per_mm) - 6,
-    width: 12, height: 12, fill: weakColour(d.before.min_N_per_mm), stroke: "currentColor", "stroke-width": 2 }),
-    "present placement, weakest " + group(d.before.min_N_per_mm) + " N/mm");
-  dots = d.front.map((row, i) => {
-    const dot = make(front, "circle", { cx: X(row.mean_N_per_mm), cy: Y(row.range_N_per_mm), r: 5, class: "dot",
-      fill: weakColour(row.min_N_per_mm), role: "radio", "aria-label": nameOf(row, i) });
-    title(dot, nameOf(row, i)); dot.addEventListener("click", () => choose(i, true)); return dot;
-  });
-  const best = d.front[d.recommended];
-  make(front, "text", { x: X(best.mean_N_per_mm), y: Y(best.range_N_per_mm) - 8, "text-anchor": "middle",
-    class: "star" }, "\u2605");
+  dots = d.front.map((row, i) => h("circle", { cx: X(row.mean_N_per_mm), cy: Y(row.range_N_per_mm), r: 5, class: "dot",
+    fill: weakColour(row.min_N_per_mm), role: "radio", "aria-label": nameOf(row, i), onclick: () => choose(i, true) },
+    h("title", {}, nameOf(row, i))));
+  const best = d.front[d.recommended], now = d.before;
+  front.append(h("text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" },
+    "mean stiffness, N/mm (more is better)"), h("text", { x: 4, y: 14 }, "range, N/mm (less is better)"),
+    now ? h("rect", { x: X(now.mean_N_per_mm) - 6, y: Y(now.range_N_per_mm) - 6, width: 12, height: 12,
+      fill: weakColour(now.min_N_per_mm), stroke: "currentColor", "stroke-width": 2 },
+      h("title", {}, `present placement, weakest ${group(now.min_N_per_mm)} N/mm`)) : "", ...dots,
+    h("text", { x: X(best.mean_N_per_mm), y: Y(best.range_N_per_mm) - 8, "text-anchor": "middle", class: "star" },
+      "\u2605"));
   markChosen(); if (focused) dots[chosen].focus();
 }
 function markChosen() {
@@ -208,17 +200,11 @@ function drawFacts(row) {
     figure("b_deg", 3)]);
   if (row.extrapolated_share !== undefined) rows.push(["strut law extrapolated, % of samples", columns
     .map((r) => group(100 * r.extrapolated_share, 1))]);
-  table.replaceChildren();
-  const line = (parent, name, cells, tag) => { const tr = parent.appendChild(document.createElement("tr"));
-    const th = tr.appendChild(document.createElement("th")); th.textContent = name; th.scope = "row";
-    for (const c of cells) tr.appendChild(document.createElement(tag)).textContent = c; return tr; };
-  line(table.createTHead(), "", d.before ? ["shown", "present"] : ["shown"], "th");
-  const body = table.createTBody(); for (const [name, cells] of rows) line(body, name, cells, "td");
-  const origin = document.createElement("code"), last = body.appendChild(document.createElement("tr")).appendChild(
-    document.createElement("th"));
-  last.colSpan = columns.length + 1; origin.textContent = "--origin " + [row.x_mm, row.y_mm, row.z_mm, row.a_deg,
-    row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6)).join(",");
-    last.appendChild(origin);
+  const line = (name, cells, tag) => h("tr", {}, h("th", { scope: "row" }, name), cells.map((cell) => h(tag, {}, cell)));
+  const origin = [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6));
+  table.replaceChildren(h("thead", {}, line("", d.before ? ["shown", "present"] : ["shown"], "th")), h("tbody", {},
+    rows.map(([name, cells]) => line(name, cells, "td")), h("tr", {}, h("th", { colspan: columns.length + 1 },
+    h("code", {}, `--origin ${origin.join(",")}`)))));
 }
 // What is pointed at, in both drawings and the profile.
 function point(i, stage) {
@@ -232,7 +218,8 @@ function point(i, stage) {
     if (stage !== profile) lines.push(place.xyz.map((axis, k) => `${"XYZ"[k]}${axis[i].toFixed(2)}`).join(" "));
     stage.tell(stage === profile ? profile.at(rowOf.get(i)) : stage.scene.path.at(i), lines);
   }
-  for (const one of [...views, profile]) one.drawOverlay();
+  for (const view of views) view.redraw();
+  profile.drawOverlay();
 }
 const step = (by) => point(Math.max(0, Math.min(n - 1, here + by)), profile);
 // Choosing.
@@ -281,8 +268,6 @@ const chosenView = viewerOf("chosen", () => places[chosen]), beforeView = before
 const views = [chosenView, ...(beforeView ? [beforeView] : [])];
 const profile = new Profile($("profile"), model, { point: (row) => point(rows[row], profile), step });
 for (const stage of [...views, profile]) stage.resize();
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click",
-  () => { for (const view of views) view.turnTo(button.dataset.view); });
 for (const radio of document.querySelectorAll("input[name=zoom]")) radio.addEventListener("change", refit);
 addEventListener("hashchange", fromAddress);
 addEventListener("resize", drawFront);

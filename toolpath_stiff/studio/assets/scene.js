@@ -13,16 +13,17 @@ class MachineScene {
     this.focus = "work";
     this.frame = false;
     this.beside = 30;
+    this.room = [56, 16];
     this.showReach = true;
     this.selected = -1;   // reading
     this.paths = [];
     this.scale = 10;      // per cent at full colour
     this.pose = [0, 0, 0, 0, 0, 0];
   }
+  get iso() { return this.body?.iso; }
   take(state, lit) {
     this.state = state;
     this.body = Object.assign(new MachineBody(state.machine.scene), { lit });
-    this.floor = Math.min(...(this.body.hangs ? state.machine.reach.flat() : this.body.feet).map((p) => p[2]));
   }
   // [low, high] of X, Y and Z of the cuts; null without a program.
   work() {
@@ -33,37 +34,22 @@ class MachineScene {
   box() {
     if (!this.state) return [[-1, 1], [-1, 1], [-1, 1]];
     const points = this.outline(), work = this.work();
-    if (points) return [0, 1, 2].map((k) => [Math.min(...points.map((p) => p[k])), Math.max(...points.map((p) => p[k]))]);
+    if (points) return endsOf(points);
     const room = 0.35 * Math.max(...work.map(([low, high]) => high - low));
     return work.map(([low, high]) => [low - room, high + room]);
   }
-  // What the view is fitted to: a ring and a ball do not reach the corners of their box.
   outline() {
     if (!this.state || this.focus === "part" && this.paths[0]) return null;
-    const reach = this.state.machine.reach.flat(), { body, floor } = this;
-    if (this.focus === "work" && body.hangs) return reach;
-    const points = body.at(this.pose).flatMap((one) => one.points);
-    return [...(body.hangs ? reach : []), ...points, ...body.feet.map(([x, y]) => [x, y, floor])];
+    const { body } = this;
+    return this.focus === "work" && body.hangs ? body.data.reach.flat() : body.outline(this.pose);
   }
   draw(g, view) {
     if (!this.state) return;
     this.spots = [];
-    if (this.focus !== "part" && this.body.hangs) this.drawReach(g, view);
-    const close = this.focus === "part" || this.focus === "work" && this.body.hangs, machine = this.body.items(view, this.pose, { work: this.work(), close,
-      floor: this.floor });
+    if (this.focus !== "part" && this.showReach) this.body.drawReach(g, view);
+    const close = this.focus === "part" || this.focus === "work" && this.body.hangs;
+    const machine = this.body.items(view, this.pose, { work: this.work(), close, floor: this.body.floor });
     paint(g, view, [...machine, ...this.dots(view), this.pathItem(view)].filter(Boolean), close);
-  }
-  polyline(g, view, points, colour, width, close = false) {
-    trace(g, points.map((p) => view.project(p)), close);
-    stroke(g, colour, width);
-  }
-  drawReach(g, view) {
-    if (!this.showReach) return;
-    const rows = this.state.machine.reach, colour = ink.line;
-    g.globalAlpha = 0.9;
-    rows.slice(1, -1).forEach((row) => this.polyline(g, view, row, colour, 1, true));
-    for (let k = 0; k < rows[0].length; k += 3) this.polyline(g, view, rows.map((row) => row[k]), colour, 1);
-    g.globalAlpha = 1;
   }
   pathItem(view) {
     const path = this.paths[0];
@@ -74,7 +60,10 @@ class MachineScene {
       colours.forEach((colour, i) => path.stroke(g, i, colour, 2.4));
       path.stroke(g, colours.length + 1, ink.plunge, 1.6);
       path.stroke(g, colours.length + 2, ink.bad, 3);
-      for (const run of this.shifted?.runs ?? []) this.polyline(g, view, run, ink.second, 1.6);
+      for (const run of this.shifted?.runs ?? []) {
+        trace(g, run.map((p) => view.project(p)), false);
+        stroke(g, ink.second, 1.6);
+      }
     } };
   }
   // A dot a reading, larger where the error is; its bar lies along the load.

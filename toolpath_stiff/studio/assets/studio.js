@@ -253,7 +253,7 @@ function drawLegend() {
     `softer -${scene.scale} %`,
     h("span", { class: "ramp",
     style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }),
-    `+${scene.scale} % stiffer than modelled`));
+    `+${scene.scale} % stiffer`));
   if (state.program?.path) { const [unit, digits] = layer(); parts.push(h("div", {},
     `path ${group(scene.ends[0], digits)}`, h("span", { class: "ramp", style: `background:${ramp(coloursNow())}` }),
     `${group(scene.ends[1], digits)} ${unit}`)); }
@@ -288,7 +288,16 @@ $("tabs").addEventListener("keydown", (e) => {
   if (by) { e.preventDefault(); open(names[(names.indexOf(panel) + by + names.length) % names.length]); }
   if (e.key === "Home" || e.key === "End") { e.preventDefault(); open(names.at(e.key === "Home" ? 0 : -1)); }
 });
+// While a finger or the mouse holds something of the panel, it is not drawn anew.
+let held = false, late = false;
+$("panel").addEventListener("pointerdown", () => { held = true; });
+for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => {
+  held = false;
+  if (late) draw();
+});
 function draw() {
+  late = held;
+  if (held) return;
   scene.take(state, state.effects.filter((one) => one.on).map((one) => ({ link: one.link,
     name: one.on.strut ? `strut ${one.on.strut}` : one.on.element })));
   const r = state.readings, v = state.verdict;
@@ -306,8 +315,9 @@ function draw() {
   document.title = `${state.case}: toolpath_stiff studio`;
   const waiting = r && !v ? "Judging the readings" : r ? "" : "What does the machine do, and does the model say so?";
   $("sentence").classList.toggle("waiting", Boolean(waiting));
-  $("sentence").replaceChildren(...(waiting ? [waiting] : [`${v.sentence}.`,
-    h("small", {}, v.text.slice(v.sentence.length + 2))]));
+  const [, said, name] = v?.sentence.match(/^(.*) \(([^()]*)\)$/) ?? [0, v?.sentence, ""];
+  $("sentence").replaceChildren(...(waiting ? [waiting] : [`${said}.`,
+    h("small", {}, `${name ? `${name}. ` : ""}${v.text.slice(v.sentence.length + 2)}`)]));
   $("gauge").replaceChildren(gaugeOf(state));
   if ($("undo")) $("undo").disabled = !state.history[1];
   scene.paths = [];
@@ -316,7 +326,7 @@ function draw() {
   drawProfile();
   drawLegend();
   drawPanel();
-  if (view.width) { if (!scene.fitted) { scene.fitted = true; view.fit(); } view.redraw(); }
+  if (view.width) { if (!scene.fitted) { scene.fitted = true; view.turnTo("iso"); } view.redraw(); }
 }
 let began = { of: "", at: 0, done: 0 };  // the work that runs, when it was first seen, how far it was then
 function drawJob(job) {
@@ -345,15 +355,14 @@ async function refresh() {
   await asking;
 }
 // Controls.
-for (const one of document.querySelectorAll("[data-view]")) one.addEventListener("click",
-  () => view.turnTo(one.dataset.view));
 for (const one of document.querySelectorAll("[data-focus]")) one.addEventListener("click", () => {
   scene.focus = one.dataset.focus;
   for (const other of document.querySelectorAll("[data-focus]")) other.setAttribute("aria-pressed",
     String(other === one));
   view.turnTo("fit");
 });
-$("show-reach").addEventListener("change", (e) => { scene.showReach = e.target.checked; view.redraw(); });
+$("show-reach").addEventListener("click", (e) => { scene.showReach = !scene.showReach;
+  e.target.setAttribute("aria-pressed", String(scene.showReach)); view.redraw(); });
 $("scrub").addEventListener("input", (e) => goTo(Number(e.target.value)));
 $("play").addEventListener("click", () => {
   if (playing) cancelAnimationFrame(playing);
