@@ -53,7 +53,6 @@ class Profile extends Stage {
         g.setLineDash([2, 2]);
         this.curve(g, model.s, beside.k, beside.colour);
         g.setLineDash([]);
-        this.drawBeyond(g, beside, top, bottom);
       }
       for (const { s, k, colour } of model.curves()) this.curve(g, s, k, colour);
       for (const i of model.rings?.() ?? []) mark(g, ...this.at(i), 5, ink.ink, 1.6);
@@ -78,24 +77,6 @@ class Profile extends Stage {
     const pad = Math.max((high - low) * 0.1, high * 0.002);
     this.low = low - pad;
     this.high = high + pad;
-  }
-  // An arrow wherever what stands beside leaves the axis.
-  drawBeyond(g, { k, colour }, top, bottom) {
-    const { s } = this.model;
-    g.fillStyle = colour;
-    const side = (i) => i < s.length && s[i] <= this.to ? (k[i] > this.high) - (k[i] < this.low) : 0;
-    for (let i = rowAt(s, this.from); i < s.length && s[i] <= this.to; i++) {
-      const which = side(i), start = i;
-      if (which === 0) continue;
-      while (side(i + 1) === which) i++;
-      const x = (this.x(s[start]) + this.x(s[i])) / 2;
-      const [tip, tail] = which > 0 ? [top + 1, top + 9] : [bottom - 1, bottom - 9];
-      g.beginPath();
-      g.moveTo(x, tip);
-      g.lineTo(x - 4, tail);
-      g.lineTo(x + 4, tail);
-      g.fill();
-    }
   }
   shade(g, holds, colour, top, bottom) {
     const { s } = this.model;
