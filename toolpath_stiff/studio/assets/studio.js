@@ -320,7 +320,8 @@ function draw() {
   if (!scene.scaled && sizes.length) { scene.scale = Math.max(5,
     5 * Math.ceil(sizes[Math.floor(0.95 * sizes.length)] / 5)); scene.scaled = true; }
   if (scene.selected >= (r?.line.length ?? 0)) scene.selected = -1;
-  if (scene.selected < 0 && here < 0) scene.pose = [...state.machine.origin];
+  const rest = (state.program?.origin ?? state.machine.origin).slice(0, 3);
+  if (scene.selected < 0 && here < 0) scene.pose = [...rest, 0, 0, 0];
   if (!pending) act.origin = [...(state.program?.origin ?? state.machine.origin)];
   $("title").textContent = state.case;
   $("machine-name").textContent =
