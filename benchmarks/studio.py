@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from benchmarks.diagnosis_size import campaign
+from benchmarks.diagnosis_cases import campaign
 from benchmarks.pages import bar, table, write_page
 
 ANSWER_BAR, FRAME_BAR = 100.0, 50.0  # ms, medians

@@ -111,8 +111,8 @@ def evaluate(
     if not isinstance(model.machine, Hexapod):
         return _by_elements(model, (position, abc, tangent), tool_length, load, force, progress)
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    corners = _corners(position, abc, lengths)
-    route = core.choose_route(model, n - int(np.count_nonzero(corners)))
+    corner = corners(position, abc, lengths)
+    route = core.choose_route(model, n - int(np.count_nonzero(corner)))
     stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(model.machine))
     substituted, extrapolated = np.zeros((2, n), dtype=bool)
     result = Evaluation(np.empty(n), substituted, np.empty((n, 6)), extrapolated, stand)
@@ -121,9 +121,9 @@ def evaluate(
         for tool, some in core.rows_of_tools(lengths[block]):
             rows = block[some]
             if route != "exact" and load.kind != "softest":
-                last = corners[rows] & (rows < block[-1])
+                last = corner[rows] & (rows < block[-1])
                 first = rows[~np.append(False, last[:-1])]
-                ends = (first, first + corners[first] * (first < block[-1])) if last.any() else (first,)
+                ends = (first, first + corner[first] * (first < block[-1])) if last.any() else (first,)
                 loads, left = [tangent[part] for part in ends], []
                 fast = _by_closed_form(model, load, loads, _poses(position, abc, tool, first), route)
                 for part, (evaluated, sure) in zip(ends, fast, strict=True):
@@ -142,14 +142,14 @@ def _poses(position: FloatArray, abc: FloatArray, tool: float, rows: IntArray) -
     return position[rows], rotation_matrices(angles) if angles.any() else None, tool
 
 
-def _corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolArray:
+def corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolArray:
     """(n,) where a move ends and the next one starts in the row after: one pose, two tangents. None where few are."""
-    corners = np.zeros(len(position), dtype=bool)
-    corners[:-1] = True
+    corner = np.zeros(len(position), dtype=bool)
+    corner[:-1] = True
     for values in (*position.T, *abc.T, np.nan_to_num(lengths, nan=-1.0)):
-        corners[:-1] &= values[1:] == values[:-1]
-    corners[1:] &= ~corners[:-1]  # of more than two rows alike the others are poses of their own
-    return corners if np.count_nonzero(corners) > FEW_CORNERS * len(corners) else np.zeros_like(corners)
+        corner[:-1] &= values[1:] == values[:-1]
+    corner[1:] &= ~corner[:-1]  # of more than two rows alike the others are poses of their own
+    return corner if np.count_nonzero(corner) > FEW_CORNERS * len(corner) else np.zeros_like(corner)
 
 
 def _by_closed_form(
@@ -257,7 +257,10 @@ def _by_elements(
     machine, n = model.machine, len(position)
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
     follows = bool(tangent.any())
-    kept = kept_configuration(machine, position, abc, lengths) if follows else None
+    kept = None
+    if follows and n and len(machine.configurations) > 1:
+        few = tried_rows(n)
+        kept = int(kept_configurations(machine, position[few], rotation_matrices(abc[few]), lengths[few])[0])
     stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(machine))
     substituted, extrapolated = np.zeros((2, n), dtype=bool)
     joints, name = np.empty((n, len(machine.joint_names))), "" if kept is None else machine.configurations[kept]
@@ -277,27 +280,49 @@ def _by_elements(
     return result
 
 
-def kept_configuration(machine: MachineTool, position: FloatArray, abc: FloatArray, lengths: FloatArray) -> int | None:
-    """The configuration whose smallest margin over n poses is the largest; None where there is no choice."""
-    if len(machine.configurations) < 2 or not len(position):
-        return None
-    few = np.unique(np.linspace(0, len(position) - 1, MOST_TRIED).round().astype(np.int64))
-    turn = rotation_matrices(abc[few])
-    stances = (machine.solve(position[few], turn, lengths[few], i) for i in range(len(machine.configurations)))
-    return int(np.argmax([reach(machine, position[few], stance).margin.min() for stance in stances]))
+def tried_rows(count: int) -> IntArray:
+    """The poses of a path of so many at which configurations are tried."""
+    return np.unique(np.linspace(0, count - 1, MOST_TRIED).round().astype(np.int64))
+
+
+def kept_configurations(
+    machine: MachineTool, position: FloatArray, rotation: FloatArray | None, lengths: FloatArray, paths: int = 1
+) -> IntArray:
+    """(paths,) the configuration whose smallest margin is the largest; of poses of paths, one after the other."""
+    stances = machine.stances(position, rotation, lengths)
+    margins = [reach(machine, position, stance).margin.reshape(paths, -1).min(axis=1) for stance in stances]
+    return np.argmax(margins, axis=0)
 
 
 def evaluate_stance(
     model: StiffnessModel, stance: Stance, in_work: WorkPoses, load: Load, force: float = defaults.FORCE
 ) -> Evaluation:
     """A machine of elements where it stands; tip, tool axes and tangent in work axes."""
+    n, stand = len(stance), reach(model.machine, in_work[0], stance)
+    stiffness, substituted = np.full(n, np.nan), np.zeros(n, dtype=bool)
+    if len(rows := np.flatnonzero(stand.reachable)):
+        part, some = (stance, in_work) if len(rows) == n else (stance.take(rows), poses_taken(in_work, rows))
+        stiffness[rows], substituted[rows] = stiffness_within(model, part, some, load, force)
+    return Evaluation(stiffness, substituted, stance.joints, np.zeros(n, dtype=bool), stand)
+
+
+def poses_taken(in_work: WorkPoses, rows: IntArray) -> WorkPoses:
+    """Some of the poses."""
+    position, rotation, tangent = in_work
+    return position[rows], None if rotation is None else rotation[rows], tangent[rows]
+
+
+def stiffness_within(
+    model: StiffnessModel, stance: Stance, in_work: WorkPoses, load: Load, force: float
+) -> tuple[FloatArray, BoolArray]:
+    """(n,) N/m along the load and where the softest direction stands in, at poses within reach; as there."""
     position, _, tangent = in_work
-    n, stand = len(stance), reach(model.machine, position, stance)
-    along, substituted = np.full(n, np.nan), np.zeros(n, dtype=bool)
+    n = len(stance)
+    along, substituted = np.empty(n), np.zeros(n, dtype=bool)
     direction, known = geometric_directions(load, *in_work)
     if stance.work_axes is not None and load.kind in OF_THE_WORK:
         direction = np.einsum("nij,nj->ni", stance.work_axes, direction)
-    for rows in (np.flatnonzero(stand.reachable & known), np.flatnonzero(stand.reachable & ~known)):
+    for rows in (np.flatnonzero(known), np.flatnonzero(~known)):
         if not len(rows):
             continue
         part = stance if len(rows) == n else stance.take(rows)
@@ -308,5 +333,5 @@ def evaluate_stance(
             towards, substituted[rows] = load_directions(load, compliance, *some)
         along[rows] = element_sum.compliance_along(model, path, towards)
     stiffness = 1.0 / along
-    _refuse_no_number(model, position, stand.reachable & ~((stiffness > 0.0) & (stiffness < np.inf)))
-    return Evaluation(stiffness, substituted, stance.joints, np.zeros(n, dtype=bool), stand)
+    _refuse_no_number(model, position, ~((stiffness > 0.0) & (stiffness < np.inf)))
+    return stiffness, substituted

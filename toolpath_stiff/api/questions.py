@@ -15,15 +15,17 @@ from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.compare import compare as compare_readings
 from toolpath_stiff.correction.draft import EffectDraft, draft
+from toolpath_stiff.correction.on_elements import PullTask, build_pull_ladder
 from toolpath_stiff.correction.result import Update
-from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, UpdateTask
+from toolpath_stiff.correction.task import INSTRUMENT, LIKELIHOOD, MACHINE, MEAN_ERROR, UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
-from toolpath_stiff.diagnosis.on_elements import ElementDiagnosis, diagnose_elements
+from toolpath_stiff.diagnosis.on_elements import ElementDiagnosis, diagnose_elements, pull_problem
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
+from toolpath_stiff.inference.element_fits import PullProblem
 from toolpath_stiff.machine.model import Hexapod, as_hexapod
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, finite_number, names, numbers, words_of
@@ -100,14 +102,16 @@ class Question:
             return False
         return bool(pull_tables(self.data.files, self.model, self.data.columns))
 
-    def of_elements(self) -> ElementDiagnosis:
-        """A diagnosis of pulls, or stiffnesses, on a machine of elements."""
+    def pulls(self) -> tuple[PullProblem, bool]:
+        """Pulls, or stiffnesses, on a machine of elements, and whether somebody states their scatter."""
         assert self.data is not None
         noise = None if self.request.noise is None else float(np.hypot.reduce(np.atleast_1d(self.request.noise)))
-        spread = float(self.common["strut_spread"])
-        return diagnose_elements(
-            self.on.running(), self.data.files, self.data.columns, noise, spread, tuple(map(str, self.on.effect_files))
-        )
+        spread, files = float(self.common["strut_spread"]), tuple(map(str, self.on.effect_files))
+        return pull_problem(self.on.running(), self.data.files, self.data.columns, noise, spread, files)
+
+    def of_elements(self) -> ElementDiagnosis:
+        """A diagnosis of these."""
+        return replace(diagnose_elements(*self.pulls()), inputs=self.inputs)
 
     def diagnosed(self, tell: Callable[[str], None], *words: str, inputs: Iterable[str] = ()) -> Diagnosis:
         """A diagnosis of the readings; `words` are further ones of the command that gives it."""
@@ -251,10 +255,11 @@ def update(
     add: Annotated[str | Iterable[str], Option("--add", "EFFECT[:KEY=VALUE,..]", count="append")] = (),
     strut_law: Annotated[bool, Option("--strut-law")] = False,
     keep_strut_law: Annotated[bool, Option("--keep-strut-law", instead_of="strut_law")] = False,
+    joints: Annotated[bool, Option("--joints")] = False,
     auto: Annotated[bool, Option("--auto")] = False,
     force: Annotated[bool, Option("--force")] = False,
     believe: Annotated[str | None, Option("--believe", choices=(MACHINE, INSTRUMENT))] = None,
-    objective: Annotated[str, Option("--objective", choices=("likelihood", "mean-error"))] = "likelihood",
+    objective: Annotated[str, Option("--objective", choices=(LIKELIHOOD, MEAN_ERROR))] = LIKELIHOOD,
     machine_file: str | Path = "machine.toml",
     columns: Mapped = None,
     noise_percent: NoisePercent = None,
@@ -269,11 +274,13 @@ def update(
     data, machine
         The machine; measurements, or the files that hold them.
     add
-        Effects to add: "weak_strut", or with what they act on, "weak_strut:strut=3".
+        Effects to add: "weak_strut", or with what they act on, "weak_strut:strut=3", "joint_torsion:element=joint 3".
     strut_law
         Write the refitted strut law even without an effect, if the data support it.
     keep_strut_law
         Keep the strut law as given; else it is refitted along with every effect, and written if the data support it.
+    joints
+        Of a machine of elements: refit the torsions of all joints that turn, in place of the file's.
     auto
         Add effects as long as the error at left-out points falls and the data support it.
     force
@@ -305,13 +312,22 @@ def update(
     ['as given', 'strut law refitted']
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
-    task = UpdateTask(
-        question.hexapod("update"), question.readings, [add] if isinstance(add, str) else list(add),
-        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe,
-        objective=objective, files=question.request.data, machine_file=str(machine_file), request=question.request,
-        progress=teller(progress), **question.common,
-    )  # fmt: skip
-    return replace(update_machine(task), inputs=question.inputs, opened=question.on.carrying)
+    options: dict[str, Any] = {
+        "add": [add] if isinstance(add, str) else list(add), "keep_strut_law": keep_strut_law, "auto": auto,
+        "force": force, "believe": believe, "objective": objective, "files": question.request.data,
+        "machine_file": str(machine_file), "request": question.request, "progress": teller(progress), **question.common,
+    }  # fmt: skip
+    if isinstance(question.model, Hexapod):
+        if joints:
+            raise InputError("--joints is of machines of elements", hint="a hexapod's struts: --strut-law")
+        result = update_machine(UpdateTask(question.model, question.readings, strut_law=strut_law, **options))
+    else:
+        if strut_law or keep_strut_law or objective == MEAN_ERROR:
+            raise InputError(f"machine {question.model.name} has no strut law", hint="--joints refits its joints")
+        problem, _ = question.pulls()
+        task = PullTask(question.model, problem.pulls, strut_law=joints, pulls=problem, **options)
+        result = update_machine(task, build_pull_ladder)
+    return replace(result, inputs=question.inputs, opened=question.on.carrying)
 
 
 @checked

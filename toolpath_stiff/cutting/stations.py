@@ -115,9 +115,10 @@ def heights_around(
     `ceiling` (m above the tip) and `enough` as of `Workpiece.tops`.
     """
     x, y = points_around(stations, radius, angle)
-    shape = np.broadcast_shapes(radius.shape, angle.shape)
-    piece, recent, z = (np.repeat(stations[name], len(x) // max(len(stations), 1)) for name in ("piece", "recent", "z"))
-    limits = (z + np.broadcast_to(height, shape).ravel() for height in (ceiling, enough))
+    whole = np.zeros(np.broadcast_shapes(radius.shape, angle.shape))
+    z = stations["z"].reshape((-1,) + (1,) * (whole.ndim - 1))
+    limits = ((whole + (z + height)).ravel() for height in (ceiling, enough))
+    piece, recent = (np.repeat(stations[name], len(x) // max(len(stations), 1)) for name in ("piece", "recent"))
     window = np.zeros(len(x), dtype=np.int64), piece
-    top = work.tops(x, y, window, recent, SLACK, *limits)[0] - z
-    return top.reshape(shape), (work.stock.bottoms(x, y) - z).reshape(shape)
+    top = work.tops(x, y, window, recent, SLACK, *limits)[0]
+    return top.reshape(whole.shape) - z, work.stock.bottoms(x, y).reshape(whole.shape) - z

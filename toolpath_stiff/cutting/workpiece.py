@@ -95,7 +95,9 @@ class Workpiece:
         late = np.full(len(x), len(self.pieces)) if slack_from is None else slack_from
         if self.quick:
             grid = self.corner, self.size, self.columns
-            compiled()[1](self.pieces, grid, self.index, (x, y), window, (late, slack), (top, owner), np.full(len(x), enough))
+            compiled()[1](
+                self.pieces, grid, self.index, (x, y), window, (late, slack), (top, owner), np.full(len(x), enough)
+            )
             return top, owner
         low, high = self._entries(x, y, window)
         counts = high - low

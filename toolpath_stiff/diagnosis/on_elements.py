@@ -13,11 +13,11 @@ from toolpath_stiff.arrays import AnyArray, FloatArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.element_fits import (
-    NONE,
     PullProblem,
     chi_square,
     explanations,
     label_of,
+    question,
     share_left,
     verdict_of,
 )
@@ -77,7 +77,7 @@ class ElementDiagnosis(FolderResult):
     @cached_property
     def joints(self) -> Fit | None:
         """The torsions of all joints that turn fitted in place of the file's; None without such joints."""
-        return self.problem.joints_fitted() if self.problem.torsions else None
+        return self.problem.joints_fitted if self.problem.torsions else None
 
     @cached_property
     def left_out(self) -> FloatArray:
@@ -101,6 +101,7 @@ class ElementDiagnosis(FolderResult):
             "noise": problem.noise.origin,
             "outlying_rows": self.wild,
             "verdict": self.verdict,
+            "question": question(problem),
             "plausible": self.labels,
             "findings": [finding for fit in self.plausible for finding in fit.findings],
             "chi_square_as_given": chi_square(problem.none),
@@ -189,16 +190,8 @@ def pull_problem(
     return problem, noise is not None or bool(stated.all())
 
 
-def diagnose_elements(
-    model: StiffnessModel,
-    files: Sequence[str],
-    mapping: Mapped = None,
-    noise: float | None = None,
-    spread: float = 0.0,
-    effect_files: Sequence[str] = (),
-) -> ElementDiagnosis:
-    """The verdict; arguments and errors as of `pull_problem`."""
-    problem, known = pull_problem(model, files, mapping, noise, spread, effect_files)
+def diagnose_elements(problem: PullProblem, known: bool) -> ElementDiagnosis:
+    """The verdict on pulls; `known`: whether somebody states how they scatter."""
     ranked = explanations(problem, problem.none)
     verdict, plausible = verdict_of(problem, problem.none, ranked, known)
-    return ElementDiagnosis(problem, verdict, plausible, ranked, tuple(files))
+    return ElementDiagnosis(problem, verdict, plausible, ranked)

@@ -5,7 +5,7 @@ A reading is y = sum_r c_r (s_r w)(s_r t) + noise, s_r the loads of the elements
 pull's displacement. What is left is chi-square where nothing is missing.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -22,17 +22,21 @@ from toolpath_stiff.inference.noise import STATED_FREEDOM, Noise, Scatter
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS
 from toolpath_stiff.inference.votes import outvoted
 from toolpath_stiff.machine.elements import SIX
-from toolpath_stiff.readings.pulls import Pulls
+from toolpath_stiff.readings.pulls import MOVED_AXES, Pulls
+from toolpath_stiff.rotations import roll_pitch_yaw
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import ELEMENT, Effect
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
+from toolpath_stiff.units import deg_from_rad
 
-NONE = "none"
+NONE, JOINTS = "none", "joints refitted"
 ALIKE = 10.0  # chi-square: an explanation that leaves no more than this beside the best cannot be told from it
 GAIN = 16.0  # chi-square that a name must gain over no effect, with some thirty candidates: under 1 in 500 by chance
+PRICE = 4.0  # chi-square that a further parameter must gain (one degree of freedom: 5 % by chance)
 WRONG = 1e-3  # probability of so large a misfit, below which something else is missing
 LEAST = 1e-4  # relative sd of a reading: nobody measures better
+FOLLOWS = 0.5  # correlation of measured with modelled components, joints refitted, below which it is another machine's
 INVISIBLE = 1e-6  # of the readings' size: what a candidate of its largest usual size must change at least
 NO_LAW = np.zeros(2)
 
@@ -60,7 +64,7 @@ class PullProblem(Problem):
     @property
     def point(self) -> TextArray:
         """(m,) the pose of each reading."""
-        return self.pulls.pose.astype(str)
+        return self.pulls.point
 
     def with_effects(self, effects: Sequence[ActiveEffect], moved: FloatArray) -> FloatArray:
         """(m,) m that the readings show: what moved, what effects add, and what instruments make of it."""
@@ -88,9 +92,7 @@ class PullProblem(Problem):
     def noise_of(self, relative: FloatArray, spread: float = 0.0, origin: str = "") -> None:
         """Scatter of readings by (m,) of their sizes, of elements by a relative `spread` of what each gives."""
         own, every = np.maximum(relative, LEAST), np.arange(len(relative))
-        self.noise = Noise(
-            "stated", own, 0.0, spread, 0.0, OUTLIERS, OUTLIER_WIDTH, STATED_FREEDOM, origin, rest=0.0
-        )
+        self.noise = Noise("stated", own, 0.0, spread, 0.0, OUTLIERS, OUTLIER_WIDTH, STATED_FREEDOM, origin, rest=0.0)
         shared = spread * self.by_element / self.pulls.size[:, None]
         self.scatter = Scatter.of(self.noise, Covariance(own**2, Groups(every), 0.0, np.ascontiguousarray(shared.T)))
 
@@ -111,6 +113,7 @@ class PullProblem(Problem):
                 found[element.name] = Candidate(effect, ((ELEMENT, element.name),), (component,)), stated
         return found
 
+    @cached_property
     def joints_fitted(self) -> Fit:
         """The torsions of all joints that turn fitted in place of the file's."""
         candidates = [candidate for candidate, _ in self.torsions.values()]
@@ -142,6 +145,39 @@ class PullProblem(Problem):
     def error_percent(self, residual: FloatArray) -> float:
         """Root mean square of (m,) residuals in m, of that of the readings, all components together."""
         return float(100.0 * np.sqrt(((residual * self.pulls.size) ** 2).sum() / (self.pulls.value**2).sum()))
+
+
+def _says_more(fit: Fit, other: Fit, behind: Mapping[str, float]) -> bool:
+    """Whether an explanation has more parameters than another one of the same element, and gains too little by them."""
+    element, same = (dict(each.candidates[-1].choice).get(ELEMENT) for each in (fit, other))
+    more = len(fit.parts) - len(other.parts)
+    return element is not None and element == same and behind[label_of(other)] - behind[label_of(fit)] < PRICE * more
+
+
+def question(problem: PullProblem) -> str:
+    """Whether these are pulls of this machine, as it is described, with the reason to ask; "" where there is none."""
+    pulls, best = problem.pulls, problem.joints_fitted if problem.torsions else problem.none
+    modelled = pulls.value - best.residual * pulls.size
+    alike = float((pulls.value @ modelled) / np.maximum(np.linalg.norm(pulls.value) * np.linalg.norm(modelled), 1e-300))
+    if alike >= FOLLOWS:
+        return ""
+    text = f"Are these pulls of this machine? Measured and modelled components correlate by {alike:.2f} only."
+    # Were the sensor's axes turned: the turn that brings it nearest to the model as given (Kabsch 1976, Acta
+    # Crystallographica A32, 922).
+    rows = np.unique(np.char.add(pulls.file, pulls.line.astype(str)), return_inverse=True)[1].reshape(-1)
+    read, said = np.zeros((2, rows.max() + 1, 3))
+    np.add.at(read, rows, pulls.value[:, None] * pulls.direction)
+    np.add.at(said, rows, problem.predicted[:, None] * pulls.direction)
+    left, _, right = np.linalg.svd(read.T @ said)
+    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    turned = float((read @ turn * said).sum() / max(np.linalg.norm(read) * np.linalg.norm(said), 1e-300))
+    if turned < FOLLOWS:
+        return text
+    a, b, c = deg_from_rad(roll_pitch_yaw(turn.T[None])[0]).round(0) + 0.0
+    return (
+        f"{text} Turned they would by {turned:.2f}: is the sensor in other axes? Roll, pitch, yaw of about {a:g}, "
+        f"{b:g}, {c:g} degrees (columns {', '.join(MOVED_AXES)})."
+    )
 
 
 def label_of(fit: Fit) -> str:
@@ -186,17 +222,24 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
     """
     from scipy.stats import chi2
 
+    if question(problem):
+        return "unexplained", []
     count, best = len(base.residual), fits[0] if fits else base
     gain = 2.0 * (best.log_posterior - base.log_posterior)
     if gain < GAIN and chi2.sf(chi_square(base), count) > WRONG:
         return "adequate", []
     explained = chi2.sf(chi_square(best), max(count - len(best.free), 1)) >= WRONG and gain >= GAIN
+    if explained and problem.torsions:  # no name where all joints together say far more
+        explained = not outvoted(-votes(problem, best, {JOINTS: problem.joints_fitted})[JOINTS])
     if not explained and known:
         return "unexplained", []
     behind = {label_of(fit): 2.0 * (best.log_posterior - fit.log_posterior) for fit in fits}
     ballots = votes(problem, best, {label_of(fit): fit for fit in (base, *fits[1:])})
     alike = [fit for fit in fits if behind[label_of(fit)] < ALIKE]
     standing = [fit for fit in fits[1:] if fit not in alike and not outvoted(ballots[label_of(fit)])]
+    alike, standing = (
+        [fit for fit in some if not any(_says_more(fit, other, behind) for other in alike)] for some in (alike, standing)
+    )
     if not explained or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
         return "ambiguous", [*alike, *standing]
     return "identified", alike

@@ -46,11 +46,14 @@ TAILS = 4.0  # degrees of freedom of the expected scatter
 ROUNDING, BISECTIONS = 1e-12, 25
 
 
-def error_model(fit: Fit, data: Readings, noise: Noise, given: Fit | None = None) -> ErrorModel | None:
+def error_model(
+    fit: Fit, data: Readings, noise: Noise, given: Fit | None = None, *, moved: bool = False
+) -> ErrorModel | None:
     """The errors of a fit to n readings; None where too few poses were measured to tell.
 
     Its loadings are those of law and free sizes, in units of the fit. `given`: the same effects beside the machine
-    file's law, if that is what is written: either may be right.
+    file's law, if that is what is written: either may be right. `moved`: struts and joints stand where the readings
+    have them, and are off by what is left.
     """
     place = coordinates(data.position, data.angles)
     places = np.unique(place, axis=0)
@@ -70,11 +73,15 @@ def error_model(fit: Fit, data: Readings, noise: Noise, given: Fit | None = None
     beyond = np.log(SCATTERS) / np.sqrt(0.5 / noise.freedom)
     expected = (1.0 + beyond**2 / TAILS) ** (-0.5 * (TAILS + 1.0))
     prior = expected[:, None, None] * np.array([*GEOMETRIES.values()])[:, None] * _expected_forms(fit)
-    log_weights, away = np.log(prior.ravel()), list[FloatArray]()
+    log_weights, away, taken = np.log(prior.ravel()), list[FloatArray](), np.zeros((2, 2))
+    known = shared[:, rows] if moved else shared[:0, rows]
     for out in regions(place[rows], data.point[rows]):
-        left = _left_out(out, jacobian, assumed, fit.law_free)
+        left, foretold = _left_out(out, jacobian, assumed, fit.law_free, known)
         log_weights += _log_likelihoods(left @ residual, [left @ part @ left.T for part in parts], sizes**2)
         away.append(np.diag(left @ parts[2] @ left.T))
+        taken += _by_scatter_and_geometry(left, out, parts), _by_scatter_and_geometry(left + foretold, out, parts)
+    # Of the geometry what is left unknown, with the scatter that its offsets have taken up.
+    unknown = (taken[0].sum() - taken[1, 0]) / taken[1, 1] if taken[1, 1] > 0.0 else 1.0
     weights = np.exp(log_weights - log_weights.max())
     weights /= weights.sum()
 
@@ -83,11 +90,12 @@ def error_model(fit: Fit, data: Readings, noise: Noise, given: Fit | None = None
     taken_up += common * covariance.groups.sums(by_reading)[:, covariance.groups.of]
     own, geometry = _root(taken_up @ by_reading.T), by_reading @ shared.T
     left = np.eye(len(rows)) - jacobian @ _estimator(jacobian, assumed, fit.law_free)
+    left -= known.T @ np.linalg.solve(assumed, known.T).T @ left
     near = float(np.diag(left @ parts[2] @ left.T).mean())
     here = [fit.jacobian @ own, shared.T - fit.jacobian @ geometry]
-    typical = np.array([*(float((part**2).sum(axis=1).mean()) for part in here), near])
+    typical = np.array([*(float((part**2).sum(axis=1).mean()) for part in here), near]) * [1.0, unknown, 1.0]
     factor = _coverage_factor(weights, sizes**2 @ typical)
-    scatter, of_geometry, form = (factor * np.sqrt(weights @ sizes**2)).tolist()
+    scatter, of_geometry, form = (factor * np.sqrt(weights @ sizes**2 * [1.0, unknown, 1.0])).tolist()
     either = np.zeros((len(own), 0)) if given is None else _apart(fit, given)[:, None] * np.sqrt(0.5)
     return ErrorModel(
         np.concatenate([either, scatter * own, of_geometry * geometry], axis=1),
@@ -136,12 +144,29 @@ def _estimator(jacobian: FloatArray, covariance: FloatArray, law_free: bool) -> 
     return np.asarray(scaled_inverse(information) @ weighted)
 
 
-def _left_out(out: IntArray, jacobian: FloatArray, assumed: FloatArray, law_free: bool) -> FloatArray:
-    """(m, n) matrix by which readings make the errors of m that are left out of the fit."""
+def _left_out(
+    out: IntArray, jacobian: FloatArray, assumed: FloatArray, law_free: bool, known: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(m, n) each: matrices by which readings make the errors of m that are left out, and what `known` foretells.
+
+    `known` (k, n): by how much offsets, of which the readings that stay tell, change each reading.
+    """
     kept = np.delete(np.arange(len(jacobian)), out)
-    left = np.eye(len(jacobian))[out]
-    left[:, kept] = -jacobian[out] @ _estimator(jacobian[kept], assumed[np.ix_(kept, kept)], law_free)
-    return left
+    left, foretold = np.eye(len(jacobian))[out], np.zeros((len(out), len(jacobian)))
+    covariance = assumed[np.ix_(kept, kept)]
+    estimator = _estimator(jacobian[kept], covariance, law_free)
+    left[:, kept] = -jacobian[out] @ estimator
+    if len(known):
+        by_others = np.linalg.solve(covariance, known[:, kept].T).T
+        foretold[:, kept] = known[:, out].T @ (by_others - by_others @ jacobian[kept] @ estimator)
+    return left - foretold, foretold
+
+
+def _by_scatter_and_geometry(left: FloatArray, out: IntArray, parts: Sequence[FloatArray]) -> FloatArray:
+    """(2,) squares of the errors of left-out stiffnesses, their own readings' scatter set aside."""
+    pulled = left.copy()
+    pulled[:, out] = 0.0
+    return np.array([float(((m @ part) * m).sum()) for m, part in ((pulled, parts[0]), (left, parts[1]))])
 
 
 def _log_likelihoods(error: FloatArray, parts: Sequence[FloatArray], squares: FloatArray) -> FloatArray:

@@ -156,7 +156,7 @@ def fit_effects(
 
 
 # Shares of the largest usual size to start from: at zero itself some effects have no slope to follow, and from far
-# away others (a platform's bars) have only a slope outwards.
+# away others (a platform's bars) have only a slope outwards. What instruments show is all but straight in their sizes.
 STARTS = (0.03, 0.5)
 ROUNDS = 5  # searches for wild readings
 BEHIND = 30.0  # of log posterior: further behind, no reading taken for wild makes up for it
@@ -192,7 +192,7 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
     together = (*before.candidates, candidate)
     free = tuple(range(sum(len(c.components) for c in together)))
     seen: list[FloatArray] = []
-    for share in STARTS:
+    for share in STARTS[: 1 if candidate.effect.is_instrument else None]:
         start = np.array([_start(component, share) for component in candidate.components])
         fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
         x = np.concatenate([fit.law, *fit.sizes])

@@ -20,7 +20,7 @@ from toolpath_stiff.machine.elements import beam_axes
 from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections, read_rows, read_sections
 from toolpath_stiff.machine.serial import Serial
-from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
+from toolpath_stiff.machine.serial_elements import ELEMENT, MASS, read_bodies, read_masses
 from toolpath_stiff.machine.words import LETTERS
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
@@ -59,6 +59,7 @@ SCHEMA = {
     "setup": SETUP,
     "axis[]": AXIS,
     "element[]": ELEMENT,
+    "mass[]": MASS,
     "pose[]": {},
 }
 SECTIONS_BESIDE = [name for name in SCHEMA if name]
@@ -81,6 +82,7 @@ def read(toml: MachineToml) -> Serial:
         rows, names, convention = _rows_of_mill(toml, values), ["X", "Y", "Z", "A", "B", "C"], MODIFIED
     tool, work, tip, table = _of_rows(toml, rows, values, convention)
     bodies = read_bodies(toml, (tool, work), (tip, table))
+    masses = read_masses(toml, (tool, work), (tip, table))
     if not any(bodies):
         raise InputError("no [[element]]: nothing gives way", expected="springs, joints or beams", file=toml.file)
     common = common_fields(toml, values)
@@ -94,6 +96,8 @@ def read(toml: MachineToml) -> Serial:
         work=table,
         tool_bodies=bodies[0],
         work_bodies=bodies[1],
+        tool_masses=masses[0],
+        work_masses=masses[1],
         least={name: v for name, v in values.get("singularity", {}).items() if isinstance(v, float)},
     )
     _check_solvable(toml, machine)

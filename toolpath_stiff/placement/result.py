@@ -286,7 +286,7 @@ class Placement(FolderResult):
         """The reason why the program could not be written for the placement, "" unless that is so."""
         return "" if self.written is None else self.written.refused
 
-    @property
+    @cached_property
     def offsets(self) -> OffsetBlocks:
         """Offsets to key in at the control."""
         return offset_blocks(self.best.program, self.best.origin)

@@ -2,7 +2,8 @@
 
 A row is a pull: where the machine stands (pose of the tip, or values of its joints, or both, held against each other),
 the force on the tool (its vector, or the tension of a cable and the pulley that it runs to), what moved (components, or
-a dial's reading). All in base axes; where the force acts and what is read may lie off the tip, in tip axes.
+a dial's reading). All in base axes, components also in axes turned against these (roll, pitch, yaw); where the force
+acts and what is read may lie off the tip, in tip axes.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,10 +13,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray, TextArray
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.machine.elements import LoadRows, Spring, Stance
+from toolpath_stiff.machine.joint_values import joint_margin
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measurements import lacking_columns, read_measurements
@@ -28,6 +30,8 @@ from toolpath_stiff.units import m_from_mm, m_from_um, mm_from_m, rad_from_deg
 FORCE, MOVED, DIAL = ("fx_N", "fy_N", "fz_N"), ("ux_um", "uy_um", "uz_um"), ("dial_x", "dial_y", "dial_z")
 TENSION, CABLE = "tension_N", ("cable_x_mm", "cable_y_mm", "cable_z_mm")
 PULL, TARGET = (tuple(f"{what}_d{axis}_mm" for axis in "xyz") for what in ("pull", "target"))
+FORCE_AXES, MOVED_AXES = (tuple(f"{what}_axes_{axis}_deg" for axis in "abc") for what in ("force", "sensor"))
+NOT_READ = ("nan", "n/a", "na", "-")  # cells that say so, as empty ones do
 SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
 SAME_PLACE = m_from_mm(1.0)  # by which a pose and the joints beside it may differ: both are rounded
 
@@ -78,6 +82,26 @@ class Pulls(ArrayColumns):
         """(m,) no set-up is named."""
         return np.full(len(self), "")
 
+    @property
+    def point(self) -> TextArray:
+        """(m,) label of the pose."""
+        return self.pose.astype(str)
+
+    @property
+    def tip(self) -> BoolArray:
+        """(m,) every reading is of the tip."""
+        return np.ones(len(self), dtype=bool)
+
+    @property
+    def of_tip(self) -> "Pulls":
+        """All of them."""
+        return self
+
+    @property
+    def direction(self) -> FloatArray:
+        """(m, 3) along which each was read."""
+        return self.along[:, :3]
+
     def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
         """Effects that pulls cannot test -> the columns that they lack."""
         return lacking_columns(effects, self.missing)
@@ -103,8 +127,19 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
 
 def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> list[Table]:
     """The files that give forces as vectors or by cables, as tables; the others give stiffnesses along directions."""
-    further = (*FORCE, *MOVED, *DIAL, TENSION, *CABLE, *PULL, *TARGET, *_joint_columns(machine))
-    known = Columns((*COLUMNS.numbers, *further), COLUMNS.texts)
+    further = (
+        *FORCE,
+        *MOVED,
+        *DIAL,
+        TENSION,
+        *CABLE,
+        *PULL,
+        *TARGET,
+        *FORCE_AXES,
+        *MOVED_AXES,
+        *_joint_columns(machine),
+    )
+    known = Columns((*COLUMNS.numbers, *further, *_joint_columns(machine)), COLUMNS.texts)
     tables = [mapped_table(name, "measurements", known, mapping) for name in files]
     return [table for table in tables if not {FORCE[0], TENSION}.isdisjoint(table.heading)]
 
@@ -128,6 +163,7 @@ class _Pull:
     @classmethod
     def of(cls, file: str, joints: Mapping[str, tuple[int, bool]], line: int, record: Mapping[str, str]) -> "_Pull":
         """A row of a file. Raises `MeasurementError`."""
+        record = {name: "" if cell.strip().lower() in NOT_READ else cell for name, cell in record.items()}
 
         def mm(names: Sequence[str]) -> tuple[float, ...]:
             return tuple(m_from_mm(number(record, name)) if record.get(name) else 0.0 for name in names)
@@ -142,10 +178,13 @@ class _Pull:
             raise MeasurementError("neither a pose nor all joints", expected=expected)
         angles = tuple(rad_from_deg(number(record, name)) if record.get(name) else 0.0 for name in ANGLES)
         tension = optional_number(record, TENSION)
-        force = tuple(number(record, name) for name in FORCE) if FORCE[0] in record else (np.nan,) * 3
+        by_vector = FORCE[0] in record and not (record.get(TENSION) and not any(record[name] for name in FORCE))
+        force = (
+            tuple(_turn(record, FORCE_AXES) @ [number(record, name) for name in FORCE]) if by_vector else (np.nan,) * 3
+        )
         if np.isnan(tension) == np.isnan(force[0]) or (not np.isnan(tension) and not record.get(CABLE[0])):
             raise MeasurementError("no force", expected=f"{', '.join(FORCE)}; or {TENSION} and {', '.join(CABLE)}")
-        axes = zip("xyz", np.eye(3).tolist(), MOVED, strict=True)
+        axes = zip("xyz", _turn(record, MOVED_AXES).T.tolist(), MOVED, strict=True)
         moved = [(c, tuple(axis), m_from_um(number(record, name))) for c, axis, name in axes if record.get(name)]
         if record.get("displacement_um") and record.get(DIAL[0]):
             dial = np.array([number(record, name) for name in DIAL])
@@ -157,6 +196,12 @@ class _Pull:
         pose = (*mm(POSITION), *angles) if placed else (np.nan,) * 6
         pulley, sd = mm(CABLE), m_from_um(optional_number(record, "sd_um"))
         return cls(pose, tuple(values), force, tension, pulley, tuple(moved), mm(PULL), mm(TARGET), sd, file, line)
+
+
+def _turn(record: Mapping[str, str], names: Sequence[str]) -> FloatArray:
+    """(3, 3) axes in which components are given, as columns in base axes."""
+    angles = [rad_from_deg(number(record, name)) if record.get(name) else 0.0 for name in names]
+    return np.asarray(rotation_matrices(np.array(angles)))
 
 
 def _joint_columns(machine: MachineTool) -> dict[str, tuple[int, bool]]:
@@ -215,6 +260,11 @@ def _stances(machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: S
     for i, stance in enumerate(stances):
         off = np.abs(np.exp(1j * stance.joints) - np.exp(1j * joints)).max(axis=1)
         chosen[by_joints & (off < 1e-6)] = i
+    # Poses alone: the configuration of rows with joints, else that in which most poses lie farthest from the limits.
+    known = np.bincount(chosen[by_joints], minlength=len(stances))
+    room = [joint_margin(stance.joints.T, machine.joint_limits)[~by_joints] for stance in stances]
+    kept = max(range(len(stances)), key=lambda i: (known[i], (room[i] >= 0.0).sum(), room[i].min(initial=np.inf)))
+    chosen[~by_joints & ~np.isnan(stances[kept].joints).any(axis=1)] = kept
     for row in np.flatnonzero(np.isnan(best.joints).any(axis=1)).tolist():
         errors.append(MeasurementError("no joint values lead to the pose", file=rows[row].file, line=rows[row].line))
     if errors:

@@ -1,8 +1,9 @@
 """A diagnosis of a machine of elements in words, and its files."""
 
 from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.correction.on_elements import ElementUpdate
 from toolpath_stiff.diagnosis.on_elements import NRAD, ElementDiagnosis
-from toolpath_stiff.inference.element_fits import chi_square, label_of
+from toolpath_stiff.inference.element_fits import chi_square, label_of, question
 from toolpath_stiff.report.tables import ShownTable
 
 MOST = 8  # explanations on the terminal
@@ -16,6 +17,7 @@ def text(result: ElementDiagnosis) -> str:
         f"{count} readings at {poses} poses; noise: {problem.noise.origin}",
         f"error as given {result.error_as_given:.1f} % of the displacements (rms), chi-square "
         f"{chi_square(problem.none):.0f} of {count} readings",
+        *filter(None, [question(problem)]),
         *(f"  {finding}" for fit in result.plausible for finding in fit.findings),
         *([f"taken for wild: {', '.join(result.wild)}"] if result.wild else []),
     ]
@@ -31,7 +33,7 @@ def text(result: ElementDiagnosis) -> str:
     return "\n".join(lines)
 
 
-def residuals_csv(result: ElementDiagnosis) -> str:
+def residuals_csv(result: ElementDiagnosis | ElementUpdate) -> str:
     """`residuals.csv`: one row a reading."""
     columns = result.columns()
     return csv_text(list(columns), zip(*(list(column) for column in columns.values()), strict=True))

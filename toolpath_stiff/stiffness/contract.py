@@ -190,6 +190,11 @@ class LoadPath(ArrayColumns):
         assert isinstance(self.stance, Stance)
         return np.zeros((len(self), sum(load.compliance.shape[-1] for load in self.stance.loads)))
 
+    def weight_loads(self) -> FloatArray:
+        """(n, r) loads of the elements under the machine's own weight; 0 where its file has no masses."""
+        assert isinstance(self.stance, Stance)
+        return self.machine_tool.weight_loads(self.stance)
+
     @property
     def machine(self) -> Hexapod:
         """The machine of six struts. Raises `InputError` of another kind."""

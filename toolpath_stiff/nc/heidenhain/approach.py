@@ -116,9 +116,7 @@ def depart(state: State, block: CurrentBlock, code: str) -> None:
     if plain.heading is None:
         raise block.fail(None, "without a contour element in the plane before it", "L, C, CR or CT before it")
     heading, cutter, to_point = plain.heading / abs(plain.heading), state.cutter, code.endswith("LCT")
-    block.refuse_if(
-        cutter is None and code != "DEP LT", None, "without RL or RR, which give its side", "L statements"
-    )
+    block.refuse_if(cutter is None and code != "DEP LT", None, "without RL or RR, which give its side", "L statements")
     there = _point(state, block, code)
     block.refuse_if(feed(state, block), "FMAX", "on the way off a contour", "F with a number")
     block.take("R0")
