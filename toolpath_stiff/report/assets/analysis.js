@@ -209,7 +209,6 @@ const model = {
     { holds: (i) => cutting(i) && kind[i] & OUT, colour: ink["bad-soft"] },
   ],
   rings: () => data.weakest,
-  tools: data.tools,
   operations: { count: operations.length, range: operationRange, name: operationName, chosen: () => chosenOperation },
   marked() {
     if (!chosenLine || !firstOf.has(chosenLine)) return null;

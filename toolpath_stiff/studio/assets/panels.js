@@ -413,9 +413,7 @@ function exercisePanel(state, act) {
 function historyPanel(state, act) {
   const copy = (text) => button("copy", (e) => { navigator.clipboard?.writeText(text); e.target.textContent = "copied";
     }, { "aria-label": `copy ${text.slice(0, 40)}` });
-  // broken between words alone
-  const words = (text) => text.split(" ").flatMap((word, k) => [k ? " " : "", h("span", {}, word)]);
-  const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, words(text)), copy(text)) : null);
+  const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, text), copy(text)) : null);
   const step = (one) => h("div", { class: "step" }, h("b", {}, one.stops > 1 ? `${one.text} (${one.stops} stops)`
     : one.text), line(one.command), line(one.python));
   return [h("h2", {}, "What was done"), h("p", { class: "muted" },
