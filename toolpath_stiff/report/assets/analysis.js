@@ -113,7 +113,7 @@ function step(by) {
 // The path in 3-D.
 const body = new MachineBody(data.scene), machineBox = document.getElementById("machine");
 const scene = {
-  beside: 40,
+  beside: 90,
   paths: [path],
   heavy: n > 20000,
   // The box of the cuts: of all, or of the operation that is looked at.
