@@ -177,8 +177,7 @@ class Problem:
         self.base_compliance = np.exp(-predictor.log_stiffness())
         self.rest = self.base_compliance - predictor.strut_part()
         self.prior = cache(self._prior)
-        jacobian = self.law_jacobian(np.zeros(2), self.base_compliance)
-        self.sight = Sight(self.base_compliance, self.projected(jacobian))
+        self.sight = Sight(self.base_compliance, self.projected(predictor.law_columns(-np.log(self.base_compliance))))
 
     @classmethod
     def of(cls, predictor: Predictor, noise: Noise) -> Problem:
@@ -218,10 +217,6 @@ class Problem:
     def _held(self, compliance: FloatArray) -> FloatArray:
         """(..., n) with the machine file's own effects; above a tenth of the base model's."""
         return np.maximum(compliance + self.rest, 0.1 * self.base_compliance)
-
-    def law_jacobian(self, law: FloatArray, compliance: FloatArray) -> FloatArray:
-        """(n, 2) of ln k."""
-        return np.asarray((-self.predictor.strut_part_and_slopes(law)[1] / compliance).T)
 
     def score_base(self) -> Fit:
         """The model without any further effect."""
