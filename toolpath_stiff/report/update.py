@@ -109,12 +109,12 @@ def _fitted(update: Update) -> ShownTable:
     rows = [
         (
             "strut law",
-            "at every length" if end.length_mm is None else f"at {end.length_mm:.1f} mm",
-            f"{end.stiffness:.2f} N/um",
-            f"sd {end.sd:.2g} N/um",
+            "at every length" if end["length_mm"] is None else f"at {end['length_mm']:.1f} mm",
+            f"{end['stiffness']:.2f} N/um",
+            f"sd {end['sd']:.2g} N/um",
         )
         for end in step.law_ends(update.task.machine.strut_law, update.widening)
-        if end.sd is not None
+        if end["sd"] is not None
     ]
     for effect, entry in step.sizes(update.widening).items():
         for key, value in entry.items():
