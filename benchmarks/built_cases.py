@@ -25,7 +25,7 @@ from toolpath_stiff.rig.nominal import load_nominal
 GROUPS = ("sound", "single", "pair", "outside")
 BUILT = ("fem", "springs")
 POSES = (12, 28)  # fewest and most of a campaign
-PAIR_SIZES = (0.10, 0.05)  # rms change of ln k of the two, as in `benchmarks.several`
+PAIR_SIZES = (0.10, 0.05)  # rms change of ln k of the two
 SERIES = {"joints", "struts", "one strut"}  # all in series along a strut: the tip cannot tell them apart
 WORTH_A_LAW = 1.0  # points of mean error from which on the law of an adequate model is refitted
 PLANNED = 6  # visits of a plan

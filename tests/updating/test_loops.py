@@ -7,7 +7,6 @@ import pytest
 
 from tests.stiffness.cases import nist
 from toolpath_stiff.comparison.compare import compare
-from toolpath_stiff.correction.result import residuals_csv
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import diagnose
@@ -17,6 +16,7 @@ from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.result import plan
 from toolpath_stiff.readings.measurements import measured_path, model_stiffness, read_measurements
 from toolpath_stiff.report.compare import text
+from toolpath_stiff.report.update import residuals_csv
 from toolpath_stiff.rig.case import draw_case
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import HiddenMachine

@@ -20,7 +20,7 @@ from tests.updating.cases import VERDICTS as CASES
 from tests.updating.cases import campaign, diagnosed, examined, table_1
 from toolpath_stiff.comparison.compare import Comparison, compare
 from toolpath_stiff.correction import update as ladder
-from toolpath_stiff.correction.result import Update, residuals_csv
+from toolpath_stiff.correction.result import Update
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.diagnosis import words as verdict_words
@@ -38,6 +38,7 @@ from toolpath_stiff.report import update as update_report
 from toolpath_stiff.report.compare import page as compare_html
 from toolpath_stiff.report.diagnose import page as diagnose_html
 from toolpath_stiff.report.explanations import headline
+from toolpath_stiff.report.update import residuals_csv
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import Effect, Parameter
 

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from benchmarks.random_visits import random_visits
 from tests.stiffness.cases import nist
 from tests.updating.planning import READING_SD, active, rival, rivals, table_1_design
 from toolpath_stiff.errors import InputError
@@ -231,6 +230,15 @@ def test_a_plan_that_gains_nothing_says_so_first() -> None:
     assert text(whole).startswith(first) and not whole.to_dict()["worth_measuring"]
     worth = plan_for("spindle_compliance", "table_compliance")
     assert worth.gains and "is expected to rise" in worth.sentences[0]
+
+
+def random_visits(plan, n, seed):
+    """As many visits to different places drawn from the same menu."""
+    free, rng, drawn = np.ones(len(plan.visits), dtype=bool), np.random.default_rng(seed), []
+    while len(drawn) < n and free.any():
+        drawn.append(int(rng.choice(np.flatnonzero(free))))
+        free &= ~plan.visits.same_place(drawn[-1])
+    return drawn
 
 
 def test_a_plan_beats_visits_drawn_at_random():

@@ -11,7 +11,6 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.correction.additions import parse_addition
-from toolpath_stiff.correction.result import residuals_csv
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.errors import InputError
@@ -19,6 +18,7 @@ from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import parse_machine
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.report.update import residuals_csv
 
 MEAN_OVER_SD = np.sqrt(2.0 / np.pi)
 PROVENANCE = {"data": ["a.csv"], "data_sha256": "0" * 64, "command": "tps update a.csv"}

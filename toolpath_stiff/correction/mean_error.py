@@ -51,7 +51,7 @@ def update_by_mean_error(task: UpdateTask) -> Update:
     for out in (task.data.point == label for label in labels if len(labels) > 2):
         others = _searched(problem, law, (~out).astype(float), ROUGH)
         left_out[out] = (problem.observed - problem.predictor.log_stiffness(others))[out]
-    which = np.searchsorted(labels, task.data.point)
+    which, rng = np.searchsorted(labels, task.data.point), np.random.default_rng(task.seed)
     counts = [np.bincount(rng.integers(len(labels), size=len(labels)), minlength=len(labels)) for _ in range(RESAMPLES)]
     spread = np.cov(np.array([_searched(problem, law, count[which].astype(float), ROUGH) for count in counts]).T)
     columns = problem.predictor.law_columns(problem.observed - residual, law)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.correction.machines import fitted_machine
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.task import UpdateTask
@@ -22,7 +21,7 @@ from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.error_model import error_model
-from toolpath_stiff.inference.errors import LAW_REFITTED, deviation_percent, errors_text
+from toolpath_stiff.inference.errors import LAW_REFITTED, errors_text
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
@@ -32,7 +31,7 @@ from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.portrait.portrait import LACKING
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.sizes import joined
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import mm_from_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -396,28 +395,3 @@ class Update(FolderResult):
                 "last model are that much wider"
             )
         return sentences
-
-
-def residuals_csv(update: Update) -> str:
-    """One row a reading of the tip: measured, modelled as given and after, deviations, that with its point left out."""
-    data, given, last = update.task.data.of_tip, update.steps[0], update.last
-    wild = np.isin(np.flatnonzero(update.task.data.tip), last.fit.scatter.wild)
-    head = [
-        "file", "line", "point", "setup", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx",
-        "dy", "dz", "measured_N_per_mm", "as_given_N_per_mm", "after_N_per_mm", "as_given_deviation_percent",
-        "after_deviation_percent", "left_out_deviation_percent", "wild",
-    ]  # fmt: skip
-    poses = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles), data.direction], axis=1) + 0.0
-    residuals = np.stack([given.residual, last.residual, last.held.residual], axis=1)
-    measured = n_per_mm_from_n_per_m(data.stiffness)
-    stiffnesses = np.column_stack([measured, measured[:, None] * np.exp(-residuals[:, :2])])
-    errors = deviation_percent(residuals) + 0.0
-    rows = [
-        [
-            data.file[i], data.line[i], data.point[i], data.setup[i], last.along[i],
-            *(f"{value:.6g}" for value in poses[i]), *(f"{value:.1f}" for value in stiffnesses[i]),
-            *("" if np.isnan(error) else f"{error:.3f}" for error in errors[i]), int(wild[i]),
-        ]
-        for i in range(len(data))
-    ]  # fmt: skip
-    return csv_text(head, rows)

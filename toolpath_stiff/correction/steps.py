@@ -21,15 +21,6 @@ from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 
 @dataclass(frozen=True)
-class LawEnd:
-    """The strut law at one length, N/um; of a constant law at every length, which is None then."""
-
-    length_mm: float | None
-    stiffness: float | None
-    sd: float | None
-
-
-@dataclass(frozen=True)
 class LadderStep:
     """One rung of the ladder: its fit to all readings, its errors over those of the tip.
 
@@ -82,19 +73,19 @@ class LadderStep:
             for name in np.unique(self.along).tolist()
         }
 
-    def law_ends(self, given: StrutLaw, widening: float) -> list[LawEnd]:
-        """The strut law at its lengths; no standard deviations where it was kept."""
+    def law_ends(self, given: StrutLaw, widening: float) -> list[Document]:
+        """The strut law at its lengths, N/um; a constant law's length and deviations of a law that was kept: None."""
         law = scaled_law(given, self.fit.law)
         count = len(law.parameters)  # of a constant law one, which belongs to no length
         deviations = widening * np.sqrt(np.maximum(np.diag(self.fit.covariance)[:count], 0.0))
         lengths_mm = [None] if law.constant else [float(mm_from_m(x)) for x in (law.length_1, law.length_2)]
         stiffnesses = [n_per_um_from_n_per_m(stiffness) for stiffness in (law.stiffness_1, law.stiffness_2)[:count]]
         return [
-            LawEnd(
-                length and json_number(length, 7),
-                json_number(k),
-                json_number(k * float(sd), 3) if self.fit.law_free else None,
-            )
+            {
+                "length_mm": length and json_number(length, 7),
+                "stiffness": json_number(k),
+                "sd": json_number(k * float(sd), 3) if self.fit.law_free else None,
+            }
             for length, k, sd in zip(lengths_mm, stiffnesses, deviations, strict=True)
         ]
 
@@ -116,7 +107,7 @@ class LadderStep:
             "findings": list(self.fit.findings),
             **held_errors(self.held),
             "by_direction": self.by_direction,
-            "strut_law_N_per_um": to_dict(self.law_ends(given, widening)),
+            "strut_law_N_per_um": self.law_ends(given, widening),
             "parameters": to_dict(self.sizes(widening)),
             "outliers": len(self.fit.scatter.wild),
         }

@@ -2,9 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-from toolpath_stiff.inference.candidates import candidates_of, testable_effects
+import numpy as np
+
+from toolpath_stiff.inference.candidates import CandidateTable, testable_effects
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect
+from toolpath_stiff.inference.hypotheses import tables_of
 from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.votes import SMALL
 from toolpath_stiff.stiffness.contract import SETUP, Effect
@@ -43,8 +46,17 @@ def rivals_of_law(problem: Problem, given: Fit, machine: Sequence[str] = ()) -> 
     cell that reads too little by it.
     """
     effects = [e for e in testable_effects(problem.predictor)[0] if e.link == INSTRUMENT or e.name in machine]
-    wanted = {e.name: candidates_of(e, problem.predictor.data) for e in effects if e.name not in given.names}
-    return {name: add_effect(problem, given, candidates, law_free=False) for name, candidates in wanted.items()}
+    tables = {e.name: tables_of(problem, e) for e in effects if e.name not in given.names}
+    gains = {name: [_gain(problem, given, table) for table in some] for name, some in tables.items()}
+    likely = {name: some[int(np.argmax(gains[name]))].candidate for name, some in tables.items() if some}
+    return {name: add_effect(problem, given, [candidate], law_free=False) for name, candidate in likely.items()}
+
+
+def _gain(problem: Problem, fit: Fit, table: CandidateTable) -> float:
+    """Twice the log likelihood that a small size of a candidate gains beside a fit, linearised."""
+    columns = -table.columns.T / problem.base_compliance
+    pull = fit.scatter.precision.times(columns)
+    return float(pull @ fit.residual @ np.linalg.pinv(pull @ columns.T, hermitian=True) @ pull @ fit.residual)
 
 
 def place_of(effect: Effect) -> str:

@@ -4,16 +4,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import Variable, directions, planes
 from toolpath_stiff.comparison.summary import ComparisonSummary, GroupErrors
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.loops import loops_section, loops_text
 from toolpath_stiff.report.pages import Section, page_of, readings_head
+from toolpath_stiff.report.residuals import residual_rows
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
@@ -223,27 +223,15 @@ def residuals_csv(comparison: Comparison) -> str:
     """One row a reading: measured, modelled, deviation, scatter, every variable that residuals were held against."""
     data = comparison.data
     further = [variable for variable in comparison.numbers if variable.name not in ("x", "y", "height", "order")]
-    head = [
-        "file", "line", "point", "setup", "clamp", "plane", "direction", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg",
-        "c_deg", "dx", "dy", "dz", "measured_N_per_mm", "modelled_N_per_mm", "deviation_percent", "scatter_percent",
-        *map(_with_unit, further),
-    ]  # fmt: skip
-    along, where = directions(data), planes(data)
-    rows = []
-    for i in range(len(data)):
-        pose = [*mm_from_m(data.position[i]), *deg_from_rad(data.angles[i]), *data.direction[i]]
-        measured = float(n_per_mm_from_n_per_m(data.stiffness[i]))
-        modelled = float(n_per_mm_from_n_per_m(np.exp(comparison.log_model[i])))
-        rows.append(
-            [
-                data.file[i], data.line[i], data.point[i], data.setup[i], data.clamp[i], where[i], along[i],
-                *(f"{value + 0.0:.6g}" for value in pose),
-                f"{measured:.1f}", f"{modelled:.1f}", f"{float(deviation_percent(comparison.residual[i])):.3f}",
-                f"{100.0 * comparison.scatter[i]:.3f}",
-                *("" if np.isnan(variable.values[i]) else f"{variable.values[i]:.6g}" for variable in further),
-            ]
-        )  # fmt: skip
-    return csv_text(head, rows)
+    names = {"setup": data.setup, "clamp": data.clamp, "plane": planes(data), "direction": directions(data)}
+    figures = {
+        "measured_N_per_mm": (n_per_mm_from_n_per_m(data.stiffness), ".1f"),
+        "modelled_N_per_mm": (n_per_mm_from_n_per_m(np.exp(comparison.log_model)), ".1f"),
+        "deviation_percent": (deviation_percent(comparison.residual), ".3f"),
+        "scatter_percent": (100.0 * comparison.scatter, ".3f"),
+        **{_with_unit(variable): (variable.values, ".6g") for variable in further},
+    }
+    return residual_rows(data, names, figures)
 
 
 DATA = {"compare.json": Comparison.to_json, "residuals.csv": residuals_csv}

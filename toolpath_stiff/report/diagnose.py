@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 from markupsafe import Markup
 
-from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.diagnosis.examination import percent_of
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why
@@ -17,9 +16,10 @@ from toolpath_stiff.portrait.words import portrait_text, term_words
 from toolpath_stiff.report import explanations as words
 from toolpath_stiff.report.loops import loops_section
 from toolpath_stiff.report.pages import Head, Part, Section, hints, markup, page_of
+from toolpath_stiff.report.residuals import residual_rows
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, significant
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 text = words.text  # what a terminal shows
 PAGE = "report.html"
@@ -215,25 +215,15 @@ def _noise(diagnosis: Diagnosis) -> list[Part]:
 
 def residuals_csv(diagnosis: Diagnosis) -> str:
     """One row a reading: measured, modelled as given, with the law refitted, with the best explanation."""
-    data, residuals = diagnosis.data, (diagnosis.as_given.residual, diagnosis.base.residual, diagnosis.after)
-    models = ("as_given", "law_refitted", "after")
-    head = [
-        "file", "line", "point", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz",
-        "stiffness_N_per_mm", *(f"{name}_N_per_mm" for name in models),
-        *(f"{name}_deviation_percent" for name in models),
-    ]  # fmt: skip
-    measured = n_per_mm_from_n_per_m(data.stiffness)
-    places = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles), data.direction], axis=1)
-    modelled = np.stack([measured, *(measured * np.exp(-residual) for residual in residuals)], axis=1)
-    deviations = np.stack([deviation_percent(residual) for residual in residuals], axis=1)
-    rows = [
-        [
-            str(data.file[i]), int(data.line[i]), str(data.point[i]), *(f"{value:.6g}" for value in places[i]),
-            *(f"{value:.1f}" for value in modelled[i]), *(f"{value:.3f}" for value in deviations[i]),
-        ]
-        for i in range(len(data))
-    ]  # fmt: skip
-    return csv_text(head, rows)
+    measured = n_per_mm_from_n_per_m(diagnosis.data.stiffness)
+    steps = (diagnosis.as_given.residual, diagnosis.base.residual, diagnosis.after)
+    residuals = dict(zip(("as_given", "law_refitted", "after"), steps, strict=True))
+    figures = {
+        "stiffness_N_per_mm": (measured, ".1f"),
+        **{f"{name}_N_per_mm": (measured * np.exp(-residual), ".1f") for name, residual in residuals.items()},
+        **{f"{name}_deviation_percent": (deviation_percent(r), ".3f") for name, r in residuals.items()},
+    }
+    return residual_rows(diagnosis.data, {}, figures)
 
 
 DATA = {"diagnose.json": Diagnosis.to_json, "residuals.csv": residuals_csv}

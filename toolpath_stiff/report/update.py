@@ -3,13 +3,18 @@
 from collections.abc import Mapping
 from textwrap import fill
 
-from toolpath_stiff.correction.result import FORCED, NOTHING, REFUSED, UPDATED, Update, residuals_csv
+import numpy as np
+
+from toolpath_stiff.correction.result import FORCED, NOTHING, REFUSED, UPDATED, Update
 from toolpath_stiff.correction.steps import LadderStep
 from toolpath_stiff.diagnosis.examination import FittedSize, percent_of
 from toolpath_stiff.documents import number
+from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.pages import Section, hints, page_of, readings_head
+from toolpath_stiff.report.residuals import residual_rows
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, WIDTH, counted, machine_text, percent, plain
+from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 VERDICTS = {
     UPDATED: "The machine is updated",
@@ -104,12 +109,12 @@ def _fitted(update: Update) -> ShownTable:
     rows = [
         (
             "strut law",
-            "at every length" if end.length_mm is None else f"at {end.length_mm:.1f} mm",
-            f"{end.stiffness:.2f} N/um",
-            f"sd {end.sd:.2g} N/um",
+            "at every length" if end["length_mm"] is None else f"at {end['length_mm']:.1f} mm",
+            f"{end['stiffness']:.2f} N/um",
+            f"sd {end['sd']:.2g} N/um",
         )
         for end in step.law_ends(update.task.machine.strut_law, update.widening)
-        if end.sd is not None
+        if end["sd"] is not None
     ]
     for effect, entry in step.sizes(update.widening).items():
         for key, value in entry.items():
@@ -135,6 +140,23 @@ def support_table(update: Update) -> ShownTable:
     ]
     head = ("effect", "supported", ">fall at left-out points", ">gain in twice the log likelihood")
     return ShownTable((*head, "what is against it"), rows)
+
+
+def residuals_csv(update: Update) -> str:
+    """One row a reading of the tip: measured, modelled as given and after, deviations, that with its point left out."""
+    data, given, last = update.task.data.of_tip, update.steps[0].residual, update.last
+    measured = n_per_mm_from_n_per_m(data.stiffness)
+    wild = np.isin(np.flatnonzero(update.task.data.tip), last.fit.scatter.wild)
+    figures = {
+        "measured_N_per_mm": (measured, ".1f"),
+        "as_given_N_per_mm": (measured * np.exp(-given), ".1f"),
+        "after_N_per_mm": (measured * np.exp(-last.residual), ".1f"),
+        "as_given_deviation_percent": (deviation_percent(given), ".3f"),
+        "after_deviation_percent": (deviation_percent(last.residual), ".3f"),
+        "left_out_deviation_percent": (deviation_percent(last.held.residual), ".3f"),
+        "wild": (wild.astype(float), ".0f"),
+    }
+    return residual_rows(data, {"setup": data.setup, "direction": last.along}, figures)
 
 
 def _ladder(update: Update) -> ShownTable:
