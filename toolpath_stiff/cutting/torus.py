@@ -41,31 +41,6 @@ def torus_mean(contact: Contact, values: FloatArray) -> FloatArray:
     return total
 
 
-def torus_around(contact: Contact, values: FloatArray, steps: int) -> FloatArray:
-    """(n, steps, 3, k) forces with flute 0 at even steps of a tooth's pitch; with run-out of a turn."""
-    layers, motion, count_of = _layers(contact), _motion(contact), len(contact.feed)
-    laws, radius, flutes = flute_laws(contact.cutter), contact.cutter.corner_radius, contact.cutter.flutes
-    step = TURN * len(laws) / flutes / steps
-    total = np.zeros((count_of * steps, 3, values.shape[1]))
-    for node, weight in NODES:
-        kappa = layers.low + node * (layers.high - layers.low)
-        normal = _direction(kappa)
-        behind = contact.lag[layers.station] * radius * (1.0 - normal[1])
-        for flute, (gaps, _) in enumerate(laws):
-            late = behind + TURN * flute / flutes
-            first = np.ceil((layers.entry + late) / step).astype(np.int64)
-            count = np.floor((layers.exit + late) / step).astype(np.int64) - first + 1
-            layer, place = _repeated(np.maximum(count, 0))
-            place += first[layer]
-            phi, station = place * step - late[layer], layers.station[layer]
-            length = weight * radius * (layers.high - layers.low)[layer]
-            law = np.append(contact.coefficients.taper, gaps)
-            given = (np.take(normal, layer, axis=1), length, np.take(motion, station, axis=1), law)
-            force = _edge_forces(_direction(phi), *given, values)
-            total += _summed(force, station * steps + place % steps, len(total))
-    return total.reshape(count_of, steps, *total.shape[1:])
-
-
 def torus_forces(contact: Contact, angle: FloatArray, values: FloatArray) -> FloatArray:
     """(n, a, 3, k) forces with flute 0 at angles (n, a); all flutes."""
     layers, motion, cutter = _layers(contact), _motion(contact), contact.cutter

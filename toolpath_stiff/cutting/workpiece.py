@@ -90,8 +90,8 @@ class Workpiece:
         """(n,) m, height of what some pieces leave at points, and (n,) the last piece that left it; -1: the stock.
 
         The pieces are first <= piece < last of `window`, (n,) each. Of those from `slack_from` (n,) on the cutter is
-        taken for smaller and higher by `slack`, m. A `ceiling` (n,) stands for what is higher; where the height is below
-        `enough` (n,) it may be any that is. Owners are those of all heights without them.
+        taken for smaller and higher by `slack`, m. A `ceiling` (n,) stands for what is higher; a height below `enough`
+        (n,) may be any that is. Owners are right without them.
         """
         top, owner = np.minimum(self.stock.tops(x, y), ceiling), np.full(len(x), -1)
         late = np.full(len(x), len(self.pieces)) if slack_from is None else slack_from
