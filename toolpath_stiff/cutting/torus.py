@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray, numbered
 from toolpath_stiff.cutting.chips import flute_gaps, flute_laws
 from toolpath_stiff.cutting.patches import TURN, Contact, Patches
 
@@ -74,17 +74,11 @@ def _layers(contact: Contact) -> Patches:
     patches = contact.below(radius)
     first, last = (np.arccos(1.0 - height / radius) for height in (patches.low, patches.high))
     count = np.ceil((last - first) / WIDEST).astype(np.int64)
-    row, place = _repeated(count)
+    row, place = numbered(count)
     width = (last - first)[row] / count[row]
     end = np.where(contact.feed[patches.station, 1] == 0.0, np.pi, TURN)
     ahead = replace(patches, entry=np.minimum(patches.entry, end), exit=np.minimum(patches.exit, end)).take(row)
     return replace(ahead, low=first[row] + place * width, high=first[row] + (place + 1) * width)
-
-
-def _repeated(count: IntArray) -> tuple[IntArray, IntArray]:
-    """Each place as many times as counted, and 0, 1 ... within it."""
-    place = np.repeat(np.arange(len(count)), count)
-    return place, np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
 
 
 def _edge_forces(

@@ -14,8 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from toolpath_stiff.cutting.cells import cells_of_boxes, portions
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered, portions
+from toolpath_stiff.cutting.cells import PORTION, cells_of_boxes
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import (
     CLEAR,
@@ -103,11 +103,11 @@ class Workpiece:
             return top, owner
         low, high = self._entries(x, y, window)
         counts = high - low
-        for rows in portions(counts):
+        for rows in portions(counts, PORTION):
             some = counts[rows]
-            point = np.repeat(np.arange(rows.start, rows.stop), some)
-            entry = np.arange(len(point)) + np.repeat(low[rows] - np.cumsum(some) + some, some)
-            piece = self.index[1][entry]
+            point, place = numbered(some)
+            point += rows.start
+            piece = self.index[1][low[point] + place]
             smaller = np.where(piece >= late[point], slack, 0.0)
             height = _heights(np.take(self.pieces, piece), x[point], y[point], smaller)
             hit = np.flatnonzero(some)
