@@ -142,12 +142,9 @@ def _shifts(walls: Walls, shift: FloatArray) -> dict[int, tuple[FloatArray, Floa
 
 def _too_far(walls: Walls) -> dict[int, str]:
     """Rows whose shift is beyond the limit, with the reason."""
-    rows, which = np.unique(walls.row, return_inverse=True)
-    most, width = np.zeros(len(rows)), np.zeros(len(rows))
-    np.maximum.at(most, which, np.abs(walls.wanted))
-    np.maximum.at(width, which, walls.width)
-    reasons = {}
-    for row, shift, ae in zip(rows.tolist(), um_from_m(most), um_from_m(width), strict=True):
+    reasons, wanted = {}, np.abs(walls.wanted)
+    for row, some in _by_row(walls):
+        shift, ae = um_from_m(float(wanted[some].max())), um_from_m(float(walls.width[some].max()))
         limit = min(um_from_m(LARGEST), ae / 2.0)
         if shift > limit:
             what = "the limit" if limit < ae / 2.0 else "half of the width of cut"

@@ -36,17 +36,14 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
         "a corner with the next block (,R ,C)": bool(letters & set(CORNERS)),
         "a block with a slash in its middle": block.rest is not None,
     }
-    stays = {
-        "cutter compensation (G41, G42)": source.cutter is not None,
-        "polar words (G16)": source.polar is not None,
-    }
-    for what, holds in refused.items() if controls.courses is not None else (refused | stays).items():
+    turned = {"cutter compensation (G41, G42)": source.cutter, "polar words (G16)": source.polar}
+    stays = next((what for what, state in turned.items() if state is not None), "")
+    refused[stays] = bool(stays) and controls.courses is None
+    for what, holds in refused.items():
         controls.refuse_if(holds, f"{what} cannot be rewritten", "post the moves of the tool centre, one a block")
-    if any(stays.values()):
-        goes_on = finish(source, current) is Flow.NEXT
-        reason = next(what for what, holds in stays.items() if holds)
-        controls.fixed |= dict.fromkeys(range(first, len(source.recorder.recent)), reason)
-        lines = [controls.emit()]
+    if stays:
+        goes_on, lines = finish(source, current) is Flow.NEXT, [controls.emit()]
+        controls.fixed |= dict.fromkeys(range(first, len(source.recorder.recent)), stays)
         controls.check(first, first_out, pieces=False)
         return lines, goes_on
     controls.axes = [letter for letter in AXES if current.has(letter)]
