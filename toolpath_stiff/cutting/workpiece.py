@@ -31,7 +31,7 @@ from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.sweeps import PIECE, sweeps_of
 from toolpath_stiff.nc.moves import Moves
 
-CELL = 0.25  # radii of the smallest cutter, size of a cell of the index
+CELL = 0.33  # radii of the smallest cutter, size of a cell of the index
 MANY = 500  # pieces from where on it pays to import numba: half a second
 STAGE = 8192  # pieces
 BEFORE = 1024  # pieces: between a station of the stage before and the first of a stage are fewer
