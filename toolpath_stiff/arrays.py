@@ -1,6 +1,6 @@
 """Types of arrays, each once. They say the kind of number; the shapes stand in the docstrings."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
@@ -23,6 +23,22 @@ def product(left: FloatArray, right: FloatArray) -> FloatArray:
     for i in range(1, left.shape[-1]):
         total += left[..., :, i, None] * right[..., None, i, :]
     return np.asarray(total)
+
+
+def numbered(counts: IntArray) -> tuple[IntArray, IntArray]:
+    """(k,) each row as many times as it counts, and (k,) 0, 1 ... within it."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def portions(counts: IntArray, most: int) -> Iterator[slice]:
+    """Slices of rows with so many entries each: at least a row, and no more entries than `most`."""
+    ends = np.cumsum(counts)
+    first, before = 0, 0
+    while first < len(ends):
+        end = max(int(np.searchsorted(ends, before + most, side="right")), first + 1)
+        yield slice(first, end)
+        first, before = end, int(ends[end - 1])
 
 
 @dataclass(frozen=True)

@@ -171,3 +171,24 @@ def test_a_contour_of_chords_is_walls_as_arcs_are():
     compensated = tps.compensate(tps.Program.from_text(text, name="part.nc"), cut=setup(10, 30), step_mm=STEP)
     assert compensated.walls["left_percent"] < 20.0
     assert sum(map(bool, compensated.lines["left_alone"])) < 5
+
+
+COMPENSATED = "G0 X60 Y44 Z5\nG1 Z-4 F500\nG42.1 D10 X52 Y19 F900\nX-52\nG40 X-60 Y44\nG0 Z5\n"
+CYCLE = "G0 X0 Y0 Z5\nG81 X5 Y5 Z-3 R2 F200\nX-5\nG80\n"
+
+
+def test_what_the_shift_does_not_belong_to_stays_as_it_stands():
+    """A wall under cutter compensation stays with the reason, holes too; the other is shifted."""
+    head, first = HEAD.replace("T1", "(a comment) T1"), wall(0.5, 4, True, 10)
+    text = f"{head}{first}{COMPENSATED}{CYCLE}M2\n"
+    program = tps.Program.from_text(text, name="part.nc", dialect="linuxcnc")
+    compensated = tps.compensate(program, cut=setup(10, 30), step_mm=STEP)
+    old, new = text.splitlines(), compensated.rewritten.text.splitlines()
+    start = len(f"{head}{first}".splitlines())
+    assert new[-(len(old) - start) :] == old[start:] and new[:3] == old[:3] and new[3:] != old[3:]
+    reasons = dict(zip(compensated.lines["line"], compensated.lines["left_alone"], strict=True))
+    assert "G41, G42" in reasons[start + 4] and not reasons[7]
+    left = dict(zip(compensated.lines["line"], compensated.lines["size_after_um"], strict=True))
+    program = tps.Program.from_text(f"{head}{COMPENSATED}M2\n", dialect="linuxcnc")
+    alone = tps.compensate(program, cut=setup(10, 30), step_mm=STEP)
+    assert not alone.changed and left[start + 4] == pytest.approx(alone.lines["size_before_um"][0], rel=1e-6)

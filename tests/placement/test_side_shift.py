@@ -35,7 +35,7 @@ def shift(text: str, shifts: dict[int, object], origin=HERE):
             values = np.repeat(values, 2) if len(values) == 1 else values
             knots[row] = (np.linspace(0.0, 1.0, len(values)), values)
     side = SideShift(program.moves, knots)
-    written, rows = shift_program(program, origin, side.courses)
+    written, rows, _ = shift_program(program, origin, side.courses)
     again = parse_program(written.text)
     assert len(rows) == len(again.moves)
     return written, again, rows, side

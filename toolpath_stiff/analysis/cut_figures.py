@@ -86,8 +86,7 @@ def _errors(mean: FloatArray, low: FloatArray, high: FloatArray, weight: FloatAr
 
 def _worst(path: EvaluatedPath, cut: Cut, sign: float) -> list[Document]:
     """The surfaces that stand out farthest (sign 1) or are cut deepest (-1), each of another line."""
-    low, high = cut.lowest, cut.highest
-    size = np.where(np.isfinite(cut.errors), high if sign > 0.0 else -low, -np.inf)
+    size = np.where(np.isfinite(cut.errors), cut.highest if sign > 0.0 else -cut.lowest, -np.inf)
     size[cut.samples.weight <= 0.0] = -np.inf
     rows, worst = largest_of(cut.samples.line, size)
     chosen = np.argsort(-worst, kind="stable")[:PLACES]
@@ -109,7 +108,6 @@ def largest_of(group: IntArray, values: FloatArray) -> tuple[IntArray, FloatArra
 
 def surface_at(path: EvaluatedPath, cut: Cut, row: int, surface: int) -> Document:
     """One surface of one sample: where it is, what its error is."""
-    low, high = cut.lowest, cut.highest
     line, position = int(cut.samples.line[row]), mm_from_m(path.samples.position[row]).tolist()
     source = path.program.source
     return {
@@ -119,16 +117,15 @@ def surface_at(path: EvaluatedPath, cut: Cut, row: int, surface: int) -> Documen
         "surface": SURFACES[surface],
         **{f"{axis}_mm": value for axis, value in zip("xyz", position, strict=True)},
         "mean_um": um_from_m(float(cut.errors[row, surface])),
-        "least_um": um_from_m(float(low[row, surface])),
-        "most_um": um_from_m(float(high[row, surface])),
+        "least_um": um_from_m(float(cut.lowest[row, surface])),
+        "most_um": um_from_m(float(cut.highest[row, surface])),
         "sd_um": um_from_m(float(cut.deviation[row, surface])),
     }
 
 
 def lines_beyond(cut: Cut, tolerance: float) -> list[tuple[int, float]]:
     """(line, error of the largest size in um) of lines whose surface leaves +-tolerance (m) anywhere, worst first."""
-    low, high = cut.lowest, cut.highest
-    error = np.where(-low > high, low, high)
+    error = np.where(-cut.lowest > cut.highest, cut.lowest, cut.highest)
     made = np.isfinite(error) & (cut.samples.weight > 0.0)[:, None]
     places, worst = largest_of(cut.samples.line, np.where(made, np.abs(error), -np.inf))
     beyond = np.flatnonzero(worst > tolerance)
@@ -139,7 +136,7 @@ def lines_beyond(cut: Cut, tolerance: float) -> list[tuple[int, float]]:
 
 def cut_columns(path: EvaluatedPath, cut: Cut, rows: slice = slice(None)) -> dict[str, AnyArray]:
     """Column of `cut.csv` -> values in the shop's units, for some rows."""
-    samples, low, high = path.samples, cut.lowest, cut.highest
+    samples = path.samples
     columns: dict[str, AnyArray] = {
         "line": samples.line[rows],
         "tool": samples.tool[rows],
@@ -154,7 +151,7 @@ def cut_columns(path: EvaluatedPath, cut: Cut, rows: slice = slice(None)) -> dic
         columns |= {f"{name}_f{axis}_N": getattr(cut, f"{name}_force")[rows, i] for i, axis in enumerate("xyz")}
     columns |= {f"deflection_{axis}_um": um_from_m(cut.deflection[rows, i]) for i, axis in enumerate("xyz")}
     for i, name in enumerate(SURFACES):
-        parts = (("mean", cut.errors), ("least", low), ("most", high), ("sd", cut.deviation))
+        parts = (("mean", cut.errors), ("least", cut.lowest), ("most", cut.highest), ("sd", cut.deviation))
         columns |= {f"{name}_{part}_um": um_from_m(values[rows, i]) for part, values in parts}
     return columns
 
@@ -173,7 +170,6 @@ def line_columns(cut: Cut) -> dict[str, AnyArray]:
         "removed_mm3": mm3_from_m3(np.add.reduceat(cut.removed[cuts], first)),
         "largest_force_N": np.maximum.reduceat(force, first),
     }
-    low, high = cut.lowest, cut.highest
     for i, name in enumerate(SURFACES):
         error = cut.errors[cuts, i]
         weight = np.where(np.isfinite(error), cut.samples.weight[cuts], 0.0)
@@ -182,7 +178,7 @@ def line_columns(cut: Cut) -> dict[str, AnyArray]:
         columns |= {
             f"{name}_length_mm": mm_from_m(length),
             f"{name}_mean_um": um_from_m(np.where(length > 0.0, total / np.where(length > 0.0, length, 1.0), np.nan)),
-            f"{name}_least_um": um_from_m(np.fmin.reduceat(low[cuts, i], first)),
-            f"{name}_most_um": um_from_m(np.fmax.reduceat(high[cuts, i], first)),
+            f"{name}_least_um": um_from_m(np.fmin.reduceat(cut.lowest[cuts, i], first)),
+            f"{name}_most_um": um_from_m(np.fmax.reduceat(cut.highest[cuts, i], first)),
         }
     return columns

@@ -142,12 +142,9 @@ def _shifts(walls: Walls, shift: FloatArray) -> dict[int, tuple[FloatArray, Floa
 
 def _too_far(walls: Walls) -> dict[int, str]:
     """Rows whose shift is beyond the limit, with the reason."""
-    rows, which = np.unique(walls.row, return_inverse=True)
-    most, width = np.zeros(len(rows)), np.zeros(len(rows))
-    np.maximum.at(most, which, np.abs(walls.wanted))
-    np.maximum.at(width, which, walls.width)
-    reasons = {}
-    for row, shift, ae in zip(rows.tolist(), um_from_m(most), um_from_m(width), strict=True):
+    reasons, wanted = {}, np.abs(walls.wanted)
+    for row, some in _by_row(walls):
+        shift, ae = um_from_m(float(wanted[some].max())), um_from_m(float(walls.width[some].max()))
         limit = min(um_from_m(LARGEST), ae / 2.0)
         if shift > limit:
             what = "the limit" if limit < ae / 2.0 else "half of the width of cut"
@@ -290,14 +287,18 @@ def compensate_program(
         raise ProgramError("no pass makes a wall of the finished part", file=program.name)
     alone = {int(row): "a plunge, or an arc on edge" for row in np.unique(before.row[~movable_rows(moves)[before.row]])}
     alone |= _too_far(before)
+    fixed = shift_program(program, origin, {}, decimals=decimals, control=control)[2]
+    alone |= {
+        row: f"{fixed[row]}: put the shift into the tool's wear" for row in fixed.keys() & set(before.row.tolist())
+    }
     changes, turn = [_quantile(before.wanted)], 0
     shifts = _shifts(before, before.wanted)
     while True:
         turn += 1
         shifts |= {row: (shifts[row][0], 0.0 * shifts[row][1]) for row in alone.keys() & shifts.keys()}
-        side = SideShift(moves, shifts)
-        alone |= side.refused
-        rewritten, row_of = shift_program(program, origin, side.courses, decimals=decimals, control=control)
+        side = SideShift(moves, shifts, fixed)
+        alone = side.refused | alone
+        rewritten, row_of, _ = shift_program(program, origin, side.courses, decimals=decimals, control=control)
         read = reread(rewritten.text)
         cut = evaluate(read)
         after = walls_of(cut, read.moves, np.array(row_of, dtype=np.int64), moves)
@@ -307,7 +308,7 @@ def compensate_program(
             # Half way where it swings. A wall that another pass has taken over for the moment keeps its shift.
             back = 0.5 if changes[-1] > SWINGING * changes[-2] else 0.0
             shifts |= _shifts(after, after.wanted - back * change)
-            alone |= _too_far(after)
+            alone = _too_far(after) | alone
             continue
         spoilt = _spoilt(before, after, moves)
         if not spoilt or not side.courses:

@@ -286,11 +286,12 @@ def _evaluate(
 def _with_walls_of_all_passes(cut: Cut, own: FloatArray, step: float) -> Cut:
     """The cut with each wall at the pass that owns it; `own` as `Cut.wall_heights`."""
     walls_of_all_passes(cut.samples, cut.cutters, cut.wall_heights, own, cut.wall_profiles, step)
-    values = cut.wall_profiles
     before, deviation = np.abs(cut.wall_mean), cut.deviation[:, :2].copy()
     share = deviation / np.where(before > 0.0, before, np.nan)  # the coefficients scatter all errors alike
     usual = float(np.median(share[np.isfinite(share)])) if np.isfinite(share).any() else 0.0
-    _enter(cut, np.arange(len(own)), slice(0, 2), values @ shares()[1], values)
+    for start in range(0, len(own), BLOCK):
+        rows = np.arange(start, min(start + BLOCK, len(own)))
+        _enter(cut, rows, slice(0, 2), cut.wall_profiles[rows] @ shares()[1], cut.wall_profiles[rows])
     after = np.abs(cut.wall_mean)
     cut.deviation[:, :2] = after * np.where(before > OTHER * after, share, usual)
     return replace(cut, wall_heights=own)
@@ -333,6 +334,8 @@ def _warnings(cut: Cut, struck: BoolArray, tilted: BoolArray) -> tuple[str, ...]
             "the machine (stick_out_mm in [[tool]] of cut.toml)"
         )
     engaged = cut.ap > 0.0
+    if not cut.removed.any():
+        warnings.append("no cut meets the stock: corner_mm in [stock] and the program's zero say where both are")
     plunges = (cut.removed > 0.0) & (np.abs(samples.tangent[:, 2]) >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
     for rows, words in (
         (struck, "rapids run into material, which counts as still there afterwards"),

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import rise
 from toolpath_stiff.cutting.patches import Patches
@@ -140,8 +140,8 @@ def _volumes(
     changing = (difference > change * np.maximum(rate[1:], rate[:-1])) & (difference * length > SMALL * reach**3)
     rows = np.flatnonzero(changing & (length > STEPS[-1][1] * reach))
     for some in np.array_split(rows, len(rows) * 16 // BLOCK + 1) if len(rows) else ():
-        each = np.repeat(some, steps[some] + 1)
-        number = np.arange(len(each)) - np.repeat(np.cumsum(steps[some] + 1) - steps[some] - 1, steps[some] + 1)
+        each, number = numbered(steps[some] + 1)
+        each = some[each]
         finer = along(stations["move"][each], stations["path"][each] + length[each] * number / steps[each])
         rates = np.where(number == 0, rate[each], rate[each + 1])
         inner = (number > 0) & (number < steps[each])

@@ -17,7 +17,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.cutting.chips import chip_integrals, chip_pieces, flute_laws
 from toolpath_stiff.cutting.patches import TURN, Contact
-from toolpath_stiff.cutting.torus import torus_around, torus_forces, torus_mean
+from toolpath_stiff.cutting.torus import torus_forces, torus_mean
 
 PEAK_STEPS = 24  # angles of a tooth's pitch among which the peak is looked for: within 1 % of it
 EACH = np.eye(6)  # sets of coefficients of which one is 1
@@ -39,10 +39,7 @@ def peak_force(contact: Contact) -> FloatArray:
     steps = PEAK_STEPS * pitches
     angle = TURN * pitches / cutter.flutes * np.arange(steps) / steps
     for block, part in contact.blocks():
-        seen = part.seen_clockwise()
-        force = _cylinder_forces(seen, np.broadcast_to(angle, (len(part.feed), steps)), values)
-        if cutter.corner_radius:
-            force += torus_around(seen, values, steps)
+        force = forces_of_sets(part, np.broadcast_to(angle, (len(part.feed), steps)), values)
         force = _sideways(force, part.turning[:, None])
         largest = np.abs(force).argmax(axis=1)
         peaks[block] = np.take_along_axis(force, largest[:, None], axis=1)[:, 0]

@@ -28,7 +28,7 @@ def walls_of_all_passes(
     profiles: AnyArray,
     step: float,
 ) -> None:
-    """Make profiles of what each pass makes those of the walls that stay, from the lower to the upper end; nan: no wall.
+    """Turn profiles of what each pass makes, in place, into those of the walls that stay; nan: no wall.
 
     Parameters
     ----------

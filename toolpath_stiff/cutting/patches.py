@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray
+from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray, numbered
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
 
@@ -41,9 +41,8 @@ class Patches(ArrayColumns):
 def of_stations(patches: Patches, stations: IntArray) -> Patches:
     """The patches of some stations (n,), counted among these; a station may come more than once."""
     first, last = (np.searchsorted(patches.station, stations, side) for side in ("left", "right"))
-    station = np.repeat(np.arange(len(stations)), last - first)
-    rows = np.arange(len(station)) + np.repeat(last - np.cumsum(last - first), last - first)
-    return replace(patches.take(rows), station=station)
+    station, place = numbered(last - first)
+    return replace(patches.take(first[station] + place), station=station)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, BoolArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, IntArray, numbered
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
@@ -58,8 +58,8 @@ def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, In
         turn = np.where(bent[arcs], np.sqrt(8.0 * SAGITTA / frame.radius_start), turn)
         counts[arcs] = np.ceil(sweep / turn - 1e-9)
     first = np.append(0, np.cumsum(counts.astype(np.int64)))
-    move = np.repeat(np.arange(len(moves)), counts.astype(np.int64))
-    share = (np.arange(len(move)) - first[move]) / counts[move]
+    move, number = numbered(counts.astype(np.int64))
+    share = number / counts[move]
     start, end = points_along(moves, move, share)[0], points_along(moves, move, share + 1.0 / counts[move])[0]
     along = end - start
     level = np.hypot(along[:, 0], along[:, 1])

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray, numbered
 from toolpath_stiff.cutting.chips import flute_gaps, flute_laws
 from toolpath_stiff.cutting.patches import TURN, Contact, Patches
 
@@ -39,31 +39,6 @@ def torus_mean(contact: Contact, values: FloatArray) -> FloatArray:
             force = _edge_forces(across, normal, length, motion, np.append(taper, gaps), values)
             total += _summed(force, station, len(total))
     return total
-
-
-def torus_around(contact: Contact, values: FloatArray, steps: int) -> FloatArray:
-    """(n, steps, 3, k) forces with flute 0 at even steps of a tooth's pitch; with run-out of a turn."""
-    layers, motion, count_of = _layers(contact), _motion(contact), len(contact.feed)
-    laws, radius, flutes = flute_laws(contact.cutter), contact.cutter.corner_radius, contact.cutter.flutes
-    step = TURN * len(laws) / flutes / steps
-    total = np.zeros((count_of * steps, 3, values.shape[1]))
-    for node, weight in NODES:
-        kappa = layers.low + node * (layers.high - layers.low)
-        normal = _direction(kappa)
-        behind = contact.lag[layers.station] * radius * (1.0 - normal[1])
-        for flute, (gaps, _) in enumerate(laws):
-            late = behind + TURN * flute / flutes
-            first = np.ceil((layers.entry + late) / step).astype(np.int64)
-            count = np.floor((layers.exit + late) / step).astype(np.int64) - first + 1
-            layer, place = _repeated(np.maximum(count, 0))
-            place += first[layer]
-            phi, station = place * step - late[layer], layers.station[layer]
-            length = weight * radius * (layers.high - layers.low)[layer]
-            law = np.append(contact.coefficients.taper, gaps)
-            given = (np.take(normal, layer, axis=1), length, np.take(motion, station, axis=1), law)
-            force = _edge_forces(_direction(phi), *given, values)
-            total += _summed(force, station * steps + place % steps, len(total))
-    return total.reshape(count_of, steps, *total.shape[1:])
 
 
 def torus_forces(contact: Contact, angle: FloatArray, values: FloatArray) -> FloatArray:
@@ -99,17 +74,11 @@ def _layers(contact: Contact) -> Patches:
     patches = contact.below(radius)
     first, last = (np.arccos(1.0 - height / radius) for height in (patches.low, patches.high))
     count = np.ceil((last - first) / WIDEST).astype(np.int64)
-    row, place = _repeated(count)
+    row, place = numbered(count)
     width = (last - first)[row] / count[row]
     end = np.where(contact.feed[patches.station, 1] == 0.0, np.pi, TURN)
     ahead = replace(patches, entry=np.minimum(patches.entry, end), exit=np.minimum(patches.exit, end)).take(row)
     return replace(ahead, low=first[row] + place * width, high=first[row] + (place + 1) * width)
-
-
-def _repeated(count: IntArray) -> tuple[IntArray, IntArray]:
-    """Each place as many times as counted, and 0, 1 ... within it."""
-    place = np.repeat(np.arange(len(count)), count)
-    return place, np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
 
 
 def _edge_forces(

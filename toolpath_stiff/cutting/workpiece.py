@@ -14,8 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from toolpath_stiff.cutting.cells import cells_of_boxes, portions
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered, portions
+from toolpath_stiff.cutting.cells import PORTION, cells_of_boxes
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import (
     CLEAR,
@@ -31,7 +31,7 @@ from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.sweeps import PIECE, sweeps_of
 from toolpath_stiff.nc.moves import Moves
 
-CELL = 0.25  # radii of the smallest cutter, size of a cell of the index
+CELL = 0.33  # radii of the smallest cutter, size of a cell of the index
 MANY = 500  # pieces from where on it pays to import numba: half a second
 STAGE = 8192  # pieces
 BEFORE = 1024  # pieces: between a station of the stage before and the first of a stage are fewer
@@ -90,8 +90,8 @@ class Workpiece:
         """(n,) m, height of what some pieces leave at points, and (n,) the last piece that left it; -1: the stock.
 
         The pieces are first <= piece < last of `window`, (n,) each. Of those from `slack_from` (n,) on the cutter is
-        taken for smaller and higher by `slack`, m. A `ceiling` (n,) stands for what is higher; where the height is below
-        `enough` (n,) it may be any that is. Owners are those of all heights without them.
+        taken for smaller and higher by `slack`, m. A `ceiling` (n,) stands for what is higher; a height below `enough`
+        (n,) may be any that is. Owners are right without them.
         """
         top, owner = np.minimum(self.stock.tops(x, y), ceiling), np.full(len(x), -1)
         late = np.full(len(x), len(self.pieces)) if slack_from is None else slack_from
@@ -103,11 +103,11 @@ class Workpiece:
             return top, owner
         low, high = self._entries(x, y, window)
         counts = high - low
-        for rows in portions(counts):
+        for rows in portions(counts, PORTION):
             some = counts[rows]
-            point = np.repeat(np.arange(rows.start, rows.stop), some)
-            entry = np.arange(len(point)) + np.repeat(low[rows] - np.cumsum(some) + some, some)
-            piece = self.index[1][entry]
+            point, place = numbered(some)
+            point += rows.start
+            piece = self.index[1][low[point] + place]
             smaller = np.where(piece >= late[point], slack, 0.0)
             height = _heights(np.take(self.pieces, piece), x[point], y[point], smaller)
             hit = np.flatnonzero(some)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, numbered
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.kinematics import HEAD, LETTERS, PostedKinematics, line_point, roll_pitch, tool_poses, turned
 from toolpath_stiff.nc.moves import FEED, RAPID, Moves
@@ -73,8 +73,7 @@ def recover_moves(
             f"at most {MOST_PIECES}",
             "give a larger kinematics.tolerance_mm in the controller file",
         )
-    move = np.repeat(np.arange(len(moves)), count + 1)
-    step = np.arange(len(move)) - np.repeat(np.cumsum(count + 1) - (count + 1), count + 1)
+    move, step = numbered(count + 1)
     share, last = step / count[move], step == count[move]
     angles = moves.start[move, 3:] + share[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
     angles[last] = moves.end[:, 3:]

@@ -5,7 +5,7 @@ Samples follow the true path: lines, arcs, helices, spirals; all moves at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, numbered, portions
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import arc_frame, extents, move_lengths, points_along
 from toolpath_stiff.nc.moves import HELD, RAPID, Moves, held_once
@@ -178,23 +178,13 @@ def sample_moves(
     }
     ends = np.cumsum(counts)
     samples = _empty_samples(int(ends[-1]) if len(ends) else 0)
-    for block in _blocks(counts):
+    for block in portions(counts, BLOCK):
         rows = slice(ends[block.start] - counts[block.start], ends[block.stop - 1])
         some = {name: column[block] for name, column in columns.items()}
         put = slice(*np.searchsorted(border[0], (block.start, block.stop)))
         extra = border[0][put] - block.start, border[1][put]
         _sample_block(moves.take(block), counts[block], some, extra, block.start, orient, samples.take(rows))
     return replace(samples, **{name: held_once(getattr(samples, name)) for name in (*HELD, "abc")})
-
-
-def _blocks(counts: IntArray) -> Iterator[slice]:
-    """Slices of moves with so many samples each: at least one move, and no more samples than a block holds."""
-    last = np.cumsum(counts)
-    first, before = 0, 0
-    while first < len(counts):
-        end = max(int(np.searchsorted(last, before + BLOCK, side="right")), first + 1)
-        yield slice(first, end)
-        first, before = end, int(last[end - 1])
 
 
 def _plunge_borders(
@@ -214,7 +204,8 @@ def _plunge_borders(
     finer = np.maximum(np.ceil(np.abs(moves.arc_sweep[rows]) / ANGULAR_STEP / pieces[rows]), 1.0).astype(np.int64)
     counts = finer * pieces[rows].astype(np.int64)
     borders = [
-        _borders_of_block(moves, rows[block], counts[block], finer[block], orient) for block in _blocks(counts + 1)
+        _borders_of_block(moves, rows[block], counts[block], finer[block], orient)
+        for block in portions(counts + 1, BLOCK)
     ]
     return (
         np.concatenate([np.empty(0, dtype=np.int64), *(move for move, _ in borders)]),
@@ -226,8 +217,7 @@ def _borders_of_block(
     moves: Moves, rows: IntArray, counts: IntArray, finer: IntArray, orient: Orient
 ) -> tuple[IntArray, FloatArray]:
     """The same of some moves divided into `counts` pieces, of which `finer` lie between two samples."""
-    moves, move = moves.take(rows), np.repeat(np.arange(len(rows)), counts + 1)
-    index = np.arange(len(move)) - np.repeat(np.cumsum(counts + 1) - counts - 1, counts + 1)
+    moves, (move, index) = moves.take(rows), numbered(counts + 1)
     plunge = np.abs(_along(moves, move, index / counts[move], orient)) >= BORDER
     before = np.flatnonzero((plunge[1:] != plunge[:-1]) & (move[1:] == move[:-1]))
     move, cut = move[before], index[before + plunge[before]]
@@ -286,8 +276,8 @@ def _sample_block(
 ) -> None:
     """Samples of some moves, into their rows. `columns` holds what is known of each move, `border` further shares."""
     even = counts - np.bincount(border[0], minlength=len(moves))
-    move = np.repeat(np.arange(len(moves)), even)
-    u = (np.arange(len(move)) - np.repeat(np.cumsum(even) - even, even)) / np.repeat(columns["pieces"], even)
+    move, index = numbered(even)
+    u = index / columns["pieces"][move]
     if len(border[0]):
         move, u = np.concatenate([move, border[0]]), np.concatenate([u, border[1]])
         order = np.lexsort((u, move))

@@ -33,13 +33,19 @@ def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str
     letters = {word.letter for word in block.words}
     refused = {
         "a subprogram (M98, M99), which may run at several places,": current.flow is not Flow.NEXT,
-        "cutter compensation (G41, G42)": source.cutter is not None,
-        "polar words (G16)": source.polar is not None,
         "a corner with the next block (,R ,C)": bool(letters & set(CORNERS)),
         "a block with a slash in its middle": block.rest is not None,
     }
+    turned = {"cutter compensation (G41, G42)": source.cutter, "polar words (G16)": source.polar}
+    stays = next((what for what, state in turned.items() if state is not None), "")
+    refused[stays] = bool(stays) and controls.courses is None
     for what, holds in refused.items():
         controls.refuse_if(holds, f"{what} cannot be rewritten", "post the moves of the tool centre, one a block")
+    if stays:
+        goes_on, lines = finish(source, current) is Flow.NEXT, [controls.emit()]
+        controls.fixed |= dict.fromkeys(range(first, len(source.recorder.recent)), stays)
+        controls.check(first, first_out, pieces=False)
+        return lines, goes_on
     controls.axes = [letter for letter in AXES if current.has(letter)]
     plane_before = out.plane
     begin(out, block)

@@ -132,6 +132,8 @@ class Controls:
         Where moves go instead, by the row of the untouched program's move; None: the program is placed elsewhere.
     row_of
         Of each move of the written program, the row of the move in whose place it stands.
+    fixed
+        Rows that no course may change, with the reason.
     """
 
     def __init__(self, source: State, out: State, turn: Turn, decimals: int | None, linearise: float | None) -> None:
@@ -141,6 +143,7 @@ class Controls:
         self.notes: set[str] = set()
         self.courses: Mapping[int, Course] | None = None
         self.row_of: list[int] = []
+        self.fixed: dict[int, str] = {}
         self.edit = LineEdit("", Block(0, ()))
         self.current: CurrentBlock | None = None
         self.axes: list[str] = []

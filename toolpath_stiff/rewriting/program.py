@@ -152,8 +152,11 @@ def shift_program(
     *,
     decimals: int | None = None,
     control: Controller = UNKNOWN_CONTROL,
-) -> tuple[RewrittenProgram, list[int]]:
-    r"""A program with some moves on other courses, and of each of its moves the row of the move that was there before.
+) -> tuple[RewrittenProgram, list[int], dict[int, str]]:
+    r"""A program with some moves on other courses, what each of its moves stands for, what must stay.
+
+    The second is, for each of its moves, the row of the move that was there before; the third, for each row that no
+    course may change, the reason.
 
     Parameters
     ----------
@@ -177,7 +180,7 @@ def shift_program(
     >>> from toolpath_stiff.rewriting.side_shift import SideShift
     >>> program = parse_program("G21 G90 F600\nG0 X0 Y0 Z0\nG1 X10\nG1 Y20 (wall)\nG1 X0\nM30\n", "slot.nc")
     >>> shift = SideShift(program.moves, {1: (np.array([0.0, 1.0]), np.array([-0.02, -0.02]))})  # mm, left is +
-    >>> shifted, rows = shift_program(program, (0.0,) * 6, shift.courses)
+    >>> shifted, rows, fixed = shift_program(program, (0.0,) * 6, shift.courses)
     >>> print(shifted, end="")
     G21 G90 F600
     G0 X0 Y0 Z0
@@ -185,14 +188,14 @@ def shift_program(
     G1 Y20 (wall)
     G1 X0
     M30
-    >>> rows
-    [0, 1, 2]
+    >>> rows, fixed
+    ([0, 1, 2], {})
     """
     check_rewritable(program)
     place = pose_in_mm(origin)
     controls = _controls(program, control, place, place, decimals)
     controls.courses = courses
-    return _rewritten(program, controls, control), controls.row_of
+    return _rewritten(program, controls, control), controls.row_of, controls.fixed
 
 
 def _controls(
@@ -203,6 +206,7 @@ def _controls(
             program.name,
             Frames(copy.deepcopy(control.offsets or Offsets()), origin, origin),
             copy.deepcopy(control.tools),
+            control.dialect,
         )
         for origin in (placement, original)
     )

@@ -9,7 +9,7 @@ rotary axes and arcs that stand on edge are never shifted, so that the shift ram
 import cmath
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -55,6 +55,8 @@ class SideShift:
         Of the untouched program.
     shifts
         Of the moves that have one; a move that may not be shifted takes none, one with a shift of 0 stays.
+    fixed
+        Rows of further moves that may not be shifted.
 
     Attributes
     ----------
@@ -66,7 +68,7 @@ class SideShift:
         Largest distance of a course from its shift, mm.
     """
 
-    def __init__(self, moves: Moves, shifts: Shifts) -> None:
+    def __init__(self, moves: Moves, shifts: Shifts, fixed: Collection[int] = ()) -> None:
         self._ends = [
             np.concatenate([mm_from_m(ends[:, :3]), deg_from_rad(ends[:, 3:])], axis=1)
             for ends in (moves.start, moves.end)
@@ -78,6 +80,7 @@ class SideShift:
         self._sweep = moves.arc_sweep * self._normal  # counter-clockwise, seen from above
         self._length = mm_from_m(move_lengths(moves))
         self._movable = movable_rows(moves)
+        self._movable[list(fixed)] = False
         same = np.logical_and.reduce([moves.start[1:, axis] == moves.end[:-1, axis] for axis in range(6)])
         same &= (moves.tool[1:] == moves.tool[:-1]) & self._movable[1:] & self._movable[:-1]
         # (n + 1,) whether a move meets the one before it so that both may be shifted there

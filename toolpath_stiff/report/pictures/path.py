@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from toolpath_stiff.analysis.results import Analysis
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, numbered
 from toolpath_stiff.documents import number
 from toolpath_stiff.report.colours import CLASSES, GREY, INK, MUTED, RED, SLATE, STIFFNESS
 from toolpath_stiff.report.curves import beyond_scale, cutting_box, scale_limits
@@ -140,8 +140,7 @@ def _polyline(points: FloatArray, segments: IntArray) -> FloatArray:
     order = np.concatenate([[0], breaks, [len(segments)]])
     runs = order[1:] - order[:-1]
     # Each run of k segments takes k + 1 points and a break.
-    which = np.repeat(np.arange(len(runs)), runs + 2)
-    inside = np.arange(len(which)) - np.repeat(np.cumsum(runs + 2) - (runs + 2), runs + 2)
+    which, inside = numbered(runs + 2)
     rows = segments[order[:-1]][which] + inside
     line = points[np.minimum(rows, len(points) - 1)]
     line[inside == runs[which] + 1] = np.nan
