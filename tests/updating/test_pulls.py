@@ -173,6 +173,8 @@ def test_a_cable_off_the_tip_is_the_wrench_that_it_makes(tmp_path: Path) -> None
             "pose and joints are .* mm apart",
         ),
         ("x_mm,y_mm,z_mm,tension_N,ux_um", "1800,0,900,100,5", "no force"),
+        ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um", "1800,0,900,0,0,0,5", "no force"),
+        ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um,uy_um", "1800,0,900,1,2,3,0,nan", "nothing read"),
     ],
 )
 def test_rows_that_are_no_pulls_are_told_by_line(head: str, row: str, told: str, tmp_path: Path) -> None:

@@ -43,6 +43,8 @@ from toolpath_stiff.readings.pulls import Pulls
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.sizes import joined
 
+FEWEST_POSES = 3
+
 
 @dataclass(frozen=True, eq=False)
 class PullTask(UpdateTask):
@@ -96,6 +98,8 @@ def build_pull_ladder(task: PullTask) -> ElementUpdate:
     problem, supports, tried = task.problem, list[Support](), list[Support]()
     if not task.add and not task.strut_law and not task.auto:
         raise InputError("nothing to update", expected="--add EFFECT, --joints or --auto")
+    if (poses := int(problem.pulls.pose.max()) + 1) < FEWEST_POSES:
+        raise InputError(f"pulls at {poses} poses", expected=f"{FEWEST_POSES} or more, of which each can be left out")
     wanted = [parse_addition(text, problem.pulls, task.effect_files, problem.candidates_of) for text in task.add]
     known = known_effects(task.effect_files, task.machine.kind)
     for (candidate, *_), text in zip(wanted, task.add, strict=True):
@@ -219,6 +223,7 @@ class ElementUpdate(Update):
             "machine_file": task.machine_file if self.accepted else None,
             "data": list(task.files),
             "readings": len(task.data),
+            "notes": list(task.data.notes),
             "provenance": dict(self.provenance),
             "next": list(self.next),
         }

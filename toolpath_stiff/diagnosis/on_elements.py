@@ -11,7 +11,8 @@ import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, FloatArray
 from toolpath_stiff.column_names import Mapped
-from toolpath_stiff.documents import Document
+from toolpath_stiff.documents import Document, json_number
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.element_fits import (
     PullProblem,
     chi_square,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NRAD = 1e9  # nrad/(N m) of rad/(N m)
+FEWEST = 6  # readings below which nothing is fitted
 SHOWN = 12  # explanations in the document
 
 
@@ -92,7 +94,7 @@ class ElementDiagnosis(FolderResult):
     def to_dict(self) -> Document:
         """The content of diagnose.json."""
         problem = self.problem
-        error = problem.error_percent(self.left_out) if self.joints else None
+        error = json_number(problem.error_percent(self.left_out)) if self.joints else None
         return {
             "machine": problem.machine.name,
             **effects_stated(problem.model),
@@ -118,6 +120,7 @@ class ElementDiagnosis(FolderResult):
             "joints_fitted_nrad_per_Nm": {name: NRAD * value for name, value in self.torsions.items()},
             "chi_square_of_joints_fitted": None if self.joints is None else chi_square(self.joints),
             "error_of_joints_fitted_at_left_out_poses_percent": error,
+            "notes": list(self.pulls.notes),
         }
 
     @property
@@ -176,6 +179,8 @@ def pull_problem(
     """
     problem = PullProblem(model, read_pulls(files, model.machine, mapping), effect_files)
     pulls = problem.pulls
+    if len(pulls) < FEWEST:
+        raise InputError(f"{len(pulls)} readings", expected=f"at least {FEWEST} components of displacements")
     stated = ~np.isnan(pulls.sd)
     if noise is None and stated.all():
         problem.noise_of(pulls.sd / pulls.size, spread, "sd_um of each row")
@@ -185,7 +190,7 @@ def pull_problem(
         problem.noise_of(np.where(stated, pulls.sd / pulls.size, noise), spread, words)
     else:
         share = share_left(problem)
-        words = f"estimated, {100 * share:.2g} % of the size of each displacement (say --noise)"
+        words = f"estimated or guessed, {100 * share:.2g} % of the size of each displacement (say --noise)"
         problem.noise_of(np.full(len(pulls), share), spread, words)
     return problem, noise is not None or bool(stated.all())
 

@@ -18,7 +18,7 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect, base_fit, fit_effects, settled
 from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.least_squares import bounded_step
-from toolpath_stiff.inference.noise import STATED_FREEDOM, Noise, Scatter
+from toolpath_stiff.inference.noise import GUESSES, STATED_FREEDOM, Noise, Scatter
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS
 from toolpath_stiff.inference.votes import outvoted
 from toolpath_stiff.machine.elements import turns
@@ -30,6 +30,7 @@ from toolpath_stiff.stiffness.contract import ELEMENT, Effect
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
 from toolpath_stiff.units import deg_from_rad
 
+FEWEST = 6  # degrees of freedom that tell anything of the noise
 NONE, JOINTS = "none", "joints refitted"
 ALIKE = 10.0  # chi-square: an explanation that leaves no more than this beside the best cannot be told from it
 GAIN = 16.0  # chi-square that a name must gain over no effect, with some thirty candidates: under 1 in 500 by chance
@@ -208,8 +209,8 @@ def share_left(problem: PullProblem) -> float:
     columns = columns / np.where(scale > 0.0, scale, 1.0)
     none, all_of_it = np.zeros(columns.shape[1]), np.full(columns.shape[1], np.inf)
     left = problem.observed - columns @ bounded_step(columns.T @ columns, columns.T @ problem.observed, none, all_of_it)
-    freedom = max(len(left) - int(np.linalg.matrix_rank(columns)), 1)
-    return max(float(np.sqrt(left @ left / freedom)), LEAST)
+    freedom = len(left) - int(np.linalg.matrix_rank(columns))
+    return GUESSES["high"] if freedom < FEWEST else max(float(np.sqrt(left @ left / freedom)), LEAST)
 
 
 def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool) -> tuple[str, list[Fit]]:
