@@ -298,6 +298,11 @@ class MachineTool:
         return np.tile([-np.inf, np.inf], (len(self.joint_names), 1))
 
     @property
+    def joint_speeds(self) -> FloatArray:
+        """(j,) m/s or rad/s that the joints reach; inf: nobody says."""
+        return np.full(len(self.joint_names), np.inf)
+
+    @property
     def configurations(self) -> tuple[str, ...]:
         """Names of the ways to hold the same pose, one where there is no choice."""
         return ("",)

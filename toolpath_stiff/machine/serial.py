@@ -108,6 +108,11 @@ class Serial(MachineTool):
         return np.array([(joint.low, joint.high) for joint in self.joints])
 
     @property
+    def joint_speeds(self) -> FloatArray:
+        """(j,) m/s or rad/s that the joints reach; inf: nobody says."""
+        return np.array([joint.speed for joint in self.joints])
+
+    @property
     def elements(self) -> tuple[Element, ...]:
         """What gives way, from the base to the tool, then to the work."""
         return tuple(body.element for body in (*self.tool_bodies, *self.work_bodies))
