@@ -152,14 +152,14 @@ def test_a_cable_off_the_tip_is_the_wrench_that_it_makes(tmp_path: Path) -> None
     head = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,pull_dx_mm,pull_dy_mm,pull_dz_mm"
     by_cable, by_force = tmp_path / "cable.csv", tmp_path / "force.csv"
     cable, vector = ",".join(map(str, pulley)), ",".join
-    rows = [(f"{pose},{off},{900 * k},{cable},0,0,2,{100 * k}", f"{pose},{off},{vector(map(str, k * force))},,,{100 * k}")
+    rows = [(f"{900 * k},{cable},0,0,2,{100 * k}", f"{vector(map(str, k * force))},,,{100 * k}")
             for k in range(1, 7)]  # fmt: skip
     heads = (
         "tension_N,cable_x_mm,cable_y_mm,cable_z_mm,dial_x,dial_y,dial_z,displacement_um",
         HEAD.removesuffix(",sd_um"),
     )
     for path, more, lines in zip((by_cable, by_force), heads, zip(*rows, strict=True), strict=True):
-        path.write_text("\n".join([f"{head},{more}", *lines]), "utf-8")
+        path.write_text("\n".join([f"{head},{more}", *(f"{pose},{off},{line}" for line in lines)]), "utf-8")
     one, other = (tps.diagnose(str(path), ROBOT, noise_percent=5) for path in (by_cable, by_force))
     assert one.problem.predicted == pytest.approx(other.problem.predicted, rel=1e-9)
 
