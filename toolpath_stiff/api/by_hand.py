@@ -10,11 +10,11 @@ from toolpath_stiff.api.measurements import Data
 from toolpath_stiff.api.questions import Noise, Question
 from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.candidates import Candidate, Component
+from toolpath_stiff.inference.element_predictor import predictor_of
 from toolpath_stiff.inference.errors import deviation_percent, error_figures
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.noise import noise_models
-from toolpath_stiff.inference.element_predictor import predictor_of
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.machine.model import EffectEntry, Hexapod, StrutLaw, as_hexapod
 from toolpath_stiff.stiffness.active import read_parameters

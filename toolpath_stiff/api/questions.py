@@ -30,9 +30,9 @@ from toolpath_stiff.machine.model import Hexapod, as_hexapod
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, finite_number, names, numbers, words_of
 from toolpath_stiff.planning.menu import COSTS, Menu
-from toolpath_stiff.planning.rivals import rivals_on_elements
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.result import plan as plan_visits
+from toolpath_stiff.planning.rivals import rivals_on_elements
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.readings.pulls import pull_tables
 from toolpath_stiff.results import Progress, one_of, teller

@@ -25,11 +25,11 @@ from toolpath_stiff.comparison.summary import ComparisonSummary, summary_of
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import Document, certain, to_dict
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.noise import Noise, covariance, noise_models
 from toolpath_stiff.inference.element_predictor import predictor_of
+from toolpath_stiff.inference.noise import Noise, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import repeat_groups
-from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
+from toolpath_stiff.machine.model import MachineTool, as_hexapod
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
 

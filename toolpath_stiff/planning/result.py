@@ -23,9 +23,9 @@ from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.elements import turns
 from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.planning.campaign import Campaign, first_campaign
+from toolpath_stiff.planning.forecasts import Rival
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import MOST_RIVALS, RivalPlan, plan_measurements
-from toolpath_stiff.planning.forecasts import Rival
 from toolpath_stiff.planning.rivals import errors_so_far, fitted_rivals, rivals_of, unfitted_rivals
 from toolpath_stiff.planning.visits import AXES, Visits
 from toolpath_stiff.readings.measurements import Readings
