@@ -92,10 +92,10 @@ class PullProblem(Problem):
 
     def noise_of(self, relative: FloatArray, spread: float = 0.0, origin: str = "") -> None:
         """Scatter of readings by (m,) of their sizes, of elements by a relative `spread` of what each gives."""
-        own, every = np.maximum(relative, LEAST), np.arange(len(relative))
-        self.noise = Noise("stated", own, 0.0, spread, 0.0, OUTLIERS, OUTLIER_WIDTH, STATED_FREEDOM, origin, rest=0.0)
+        sd, every = np.maximum(relative, LEAST), np.arange(len(relative))
+        self.noise = Noise("stated", sd, 0.0, spread, 0.0, OUTLIERS, OUTLIER_WIDTH, STATED_FREEDOM, origin, rest=0.0)
         shared = spread * self.by_element / self.pulls.size[:, None]
-        self.scatter = Scatter.of(self.noise, Covariance(own**2, Groups(every), 0.0, np.ascontiguousarray(shared.T)))
+        self.scatter = Scatter.of(self.noise, Covariance(sd**2, Groups(every), 0.0, np.ascontiguousarray(shared.T)))
 
     @cached_property
     def none(self) -> Fit:
@@ -105,14 +105,14 @@ class PullProblem(Problem):
     @cached_property
     def torsions(self) -> dict[str, tuple[Candidate, float]]:
         """Joint that turns -> its torsion in place of the file's, and rad/(N m) of that."""
-        effect, found = find_effect("joint_torsion"), {}
+        effect, torsions = find_effect("joint_torsion"), {}
         for element, load in zip(self.machine.elements, self.pulls.stance.loads, strict=True):
             if turns(element):
                 stated = float(np.atleast_2d(load.compliance)[0, 5])
                 (parameter,) = (p for p in effect.parameters if not p.discrete)
                 component = Component(parameter, False, (-stated, np.inf))
-                found[element.name] = Candidate(effect, ((ELEMENT, element.name),), (component,)), stated
-        return found
+                torsions[element.name] = Candidate(effect, ((ELEMENT, element.name),), (component,)), stated
+        return torsions
 
     @cached_property
     def joints_fitted(self) -> Fit:
@@ -165,12 +165,12 @@ def question(problem: PullProblem) -> str:
     # Were the sensor's axes turned: the turn that brings it nearest to the model as given (Kabsch 1976, Acta
     # Crystallographica A32, 922).
     rows = np.unique(np.char.add(pulls.file, pulls.line.astype(str)), return_inverse=True)[1].reshape(-1)
-    read, said = np.zeros((2, rows.max() + 1, 3))
+    read, modelled = np.zeros((2, rows.max() + 1, 3))
     np.add.at(read, rows, pulls.value[:, None] * pulls.direction)
-    np.add.at(said, rows, problem.predicted[:, None] * pulls.direction)
-    left, _, right = np.linalg.svd(read.T @ said)
+    np.add.at(modelled, rows, problem.predicted[:, None] * pulls.direction)
+    left, _, right = np.linalg.svd(read.T @ modelled)
     turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    turned = float((read @ turn * said).sum() / max(np.linalg.norm(read) * np.linalg.norm(said), 1e-300))
+    turned = float((read @ turn * modelled).sum() / max(np.linalg.norm(read) * np.linalg.norm(modelled), 1e-300))
     if turned < FOLLOWS:
         return text
     a, b, c = deg_from_rad(roll_pitch_yaw(turn.T[None])[0]).round(0) + 0.0
