@@ -151,7 +151,8 @@ def _says_more(fit: Fit, other: Fit, behind: Mapping[str, float]) -> bool:
     """Whether an explanation has more parameters than another one of the same element, and gains too little by them."""
     element, same = (dict(each.candidates[-1].choice).get(ELEMENT) for each in (fit, other))
     more = len(fit.parts) - len(other.parts)
-    return element is not None and element == same and behind[label_of(other)] - behind[label_of(fit)] < PRICE * more
+    gained = behind[label_of(other)] - behind[label_of(fit)]
+    return element is not None and element == same and more > 0 and gained < PRICE * more
 
 
 def question(problem: PullProblem) -> str:
@@ -218,7 +219,8 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
 
     "adequate": nothing is missing that shows; "identified": one, which foretells pose after pose better than every
     other one beyond chance; "ambiguous": several; "unexplained": none. `known`: whether somebody states the noise; else
-    nothing can be said to be missing from the candidates, which are what it was estimated by.
+    nothing can be said to be missing from the candidates, which are what it was estimated by, and nothing is named
+    where they leave more than good readings scatter by.
     """
     from scipy.stats import chi2
 
@@ -239,6 +241,7 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
     standing = [fit for fit in fits[1:] if fit not in alike and not outvoted(ballots[label_of(fit)])]
     more = [fit for fit in (*alike, *standing) if any(_says_more(fit, other, behind) for other in alike)]
     alike, standing = ([fit for fit in some if fit not in more] for some in (alike, standing))
-    if not explained or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
+    guessed = not known and problem.noise.typical > GUESSES["low"]  # more is left than good readings scatter by
+    if guessed or not explained or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
         return "ambiguous", [*alike, *standing]
     return "identified", alike
