@@ -27,6 +27,7 @@ from toolpath_stiff.rotations import roll_pitch_yaw
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import ELEMENT, Effect
+from toolpath_stiff.stiffness.element_sum import added_by
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
 from toolpath_stiff.units import deg_from_rad
 
@@ -69,22 +70,19 @@ class PullProblem(Problem):
 
     def with_effects(self, effects: Sequence[ActiveEffect], moved: FloatArray) -> FloatArray:
         """(m,) m that the readings show: what moved, what effects add, and what instruments make of it."""
-        for active in effects:
-            if active.effect.is_instrument:
-                stiffness = self.path.force / np.maximum(np.abs(moved), 1e-15)
-                moved = moved * stiffness / active.reading(stiffness, self.path)
-                continue
-            form, more = active.adds("load_compliance", self.path), active.adds("element_compliance", self.path)
-            if form is not None:
-                moved = moved + np.einsum("ni,nij,nj->n", self.pulls.along, form[:, 6:, 6:], self.pulls.wrench)
-            if more is not None:
-                moved = moved + (more * np.concatenate(self.products, axis=1)).sum(axis=1)
+        at_tip, more = added_by((active for active in effects if not active.effect.is_instrument), self.path)
+        if at_tip is not None:
+            moved = moved + np.einsum("ni,nij,nj->n", self.pulls.along, at_tip, self.pulls.wrench)
+        if more is not None:
+            moved = moved + (more * np.concatenate(self.products, axis=1)).sum(axis=1)
+        for active in (active for active in effects if active.effect.is_instrument):  # they show what all others make
+            stiffness = self.path.force / np.maximum(np.abs(moved), 1e-15)
+            moved = moved * stiffness / active.reading(stiffness, self.path)
         return moved
 
     def residual(self, law: FloatArray, effects: Sequence[ActiveEffect]) -> FloatArray:
         """(m,) measured less modelled, of the size of each pull's displacement."""
-        machine = sorted(effects, key=lambda active: active.effect.is_instrument)  # which show what all others make
-        return np.asarray((self.pulls.value - self.with_effects(machine, self.predicted)) / self.pulls.size)
+        return np.asarray((self.pulls.value - self.with_effects(effects, self.predicted)) / self.pulls.size)
 
     def law_columns(self, residual: FloatArray, law: FloatArray, effects: object) -> list[FloatArray]:
         """Nothing: there is no strut law."""
@@ -206,10 +204,9 @@ def share_left(problem: PullProblem) -> float:
         for j, component in enumerate(candidate.components)
     ]
     columns = np.stack([problem.observed - problem.residual(NO_LAW, [active]) for active in units], axis=1)
-    scale = np.linalg.norm(columns, axis=0)
-    columns = columns / np.where(scale > 0.0, scale, 1.0)
-    none, all_of_it = np.zeros(columns.shape[1]), np.full(columns.shape[1], np.inf)
-    left = problem.observed - columns @ bounded_step(columns.T @ columns, columns.T @ problem.observed, none, all_of_it)
+    columns, most = columns / np.linalg.norm(columns, axis=0).clip(min=1e-300), np.full(len(units), np.inf)
+    sizes = bounded_step(columns.T @ columns, columns.T @ problem.observed, np.zeros(len(units)), most)
+    left = problem.observed - columns @ sizes
     freedom = len(left) - int(np.linalg.matrix_rank(columns))
     return GUESSES["high"] if freedom < FEWEST else max(float(np.sqrt(left @ left / freedom)), LEAST)
 
