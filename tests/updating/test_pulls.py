@@ -109,6 +109,18 @@ def test_an_update_refits_the_joints_and_adds_what_is_missing(
     assert tps.update(two, ROBOT, joints=True).verdict == "refused"
 
 
+def test_joints_and_an_effect_are_judged_beside_each_other(tmp_path: Path) -> None:
+    """All torsions of the file wrong, and one joint gives way across its axis besides: both are found again."""
+    true = "[620.0, 340.0, 460.0, 1900.0, 2300.0, 4800.0]"
+    off = tmp_path / "off.toml"
+    off.write_text(ROBOT.read_text("utf-8").replace(true, "[300.0, 700.0, 200.0, 3000.0, 1500.0, 3000.0]"), "utf-8")
+    data = campaign(tmp_path / "a.csv", 77, "bending", 1, 40)
+    update = tps.update(data, off, joints=True, add="joint_bending:element=joint 2")
+    assert update.verdict == "updated" and "--joints" in update.provenance["command"]
+    assert list(update.fitted_joints.values()) == pytest.approx(json.loads(true), rel=0.1)
+    assert tps.diagnose(data, update.machine).verdict == "adequate"
+
+
 @pytest.mark.parametrize(
     ("options", "told"),
     [

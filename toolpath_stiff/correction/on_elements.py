@@ -111,7 +111,6 @@ def build_pull_ladder(task: PullTask) -> ElementUpdate:
             raise InputError(f"machine {task.machine.name} has no joints that turn: nothing to refit")
         task.progress("fitting the torsions of the joints")
         steps.append(LadderStep.of(JOINTS, problem.joints_fitted, task.data))
-        supports.append(_support_of_joints(task, *steps))
     start = steps[-1]
     steps += ladder_of(task, start, wanted)
     count, full = len(start.fit.candidates), steps[-1].fit
@@ -126,6 +125,10 @@ def build_pull_ladder(task: PullTask) -> ElementUpdate:
         steps.append(better)
         supports.append(tried[-1])
         tried = []
+    if task.strut_law:  # beside the same effects on the file's torsions
+        others = [[candidate] for candidate in steps[-1].fit.candidates[count:]]
+        given = LadderStep.of(AS_GIVEN, fitted_with(task, problem.none, others), task.data)
+        supports.insert(0, _support_of_joints(task, given, steps[-1]))
     return ElementUpdate(task, tuple(steps), start, tuple(supports), turned_down=tuple(tried))
 
 
@@ -178,7 +181,7 @@ class ElementUpdate(Update):
     @property
     def cause(self) -> str:
         """What was fitted, in words."""
-        joints = ", ".join(f"{name} {value:.3g}" for name, value in self.fitted_joints.items())
+        joints = ", ".join(f"{name} {value:.0f}" for name, value in self.fitted_joints.items())
         parts = [f"the joints turn by, nrad/(N m): {joints}"] if joints else []
         return joined([*parts, *self.steps[-1].fit.findings[len(self.fitted_joints) :]])
 

@@ -180,9 +180,9 @@ def residual_columns(problem: PullProblem, further: Mapping[str, FloatArray]) ->
 
 
 def fitted_torsions(problem: PullProblem, joints: Fit) -> dict[str, float]:
-    """Joint -> rad/(N m) of joints fitted in place of the file's."""
+    """Joint -> rad/(N m) of joints fitted in place of the file's, before whatever else the fit holds."""
     stated = problem.torsions.items()
-    return {name: was + float(size[0]) for (name, (_, was)), size in zip(stated, joints.sizes, strict=True)}
+    return {name: was + float(size[0]) for (name, (_, was)), size in zip(stated, joints.sizes, strict=False)}
 
 
 def pull_problem(
