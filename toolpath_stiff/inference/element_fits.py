@@ -23,13 +23,11 @@ from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS
 from toolpath_stiff.inference.votes import outvoted
 from toolpath_stiff.machine.elements import turns
 from toolpath_stiff.readings.pulls import MOVED_AXES, Pulls
-from toolpath_stiff.rotations import roll_pitch_yaw
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import ELEMENT, Effect
 from toolpath_stiff.stiffness.element_sum import added_by
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
-from toolpath_stiff.units import deg_from_rad
 
 FEWEST = 6  # degrees of freedom that tell anything of the noise
 NONE, JOINTS = "none", "joints refitted"
@@ -155,6 +153,8 @@ def _says_more(fit: Fit, other: Fit, behind: Mapping[str, float]) -> bool:
 
 def question(problem: PullProblem) -> str:
     """Whether these are pulls of this machine, as it is described, with the reason to ask; "" where there is none."""
+    from scipy.spatial.transform import Rotation
+
     pulls, best = problem.pulls, problem.joints_fitted if problem.torsions else problem.none
     modelled = pulls.value - best.residual * pulls.size
     alike = float((pulls.value @ modelled) / np.maximum(np.linalg.norm(pulls.value) * np.linalg.norm(modelled), 1e-300))
@@ -167,12 +167,11 @@ def question(problem: PullProblem) -> str:
     read, modelled = np.zeros((2, rows.max() + 1, 3))
     np.add.at(read, rows, pulls.value[:, None] * pulls.direction)
     np.add.at(modelled, rows, problem.predicted[:, None] * pulls.direction)
-    left, _, right = np.linalg.svd(read.T @ modelled)
-    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    turned = float((read @ turn * modelled).sum() / max(np.linalg.norm(read) * np.linalg.norm(modelled), 1e-300))
+    turn = Rotation.align_vectors(modelled, read)[0]
+    turned = float((turn.apply(read) * modelled).sum() / max(np.linalg.norm(read) * np.linalg.norm(modelled), 1e-300))
     if turned < FOLLOWS:
         return text
-    a, b, c = deg_from_rad(roll_pitch_yaw(turn.T[None])[0]).round(0) + 0.0
+    a, b, c = turn.as_euler("xyz", degrees=True).round(0) + 0.0
     return (
         f"{text} Turned they would by {turned:.2f}: is the sensor in other axes? Roll, pitch, yaw of about {a:g}, "
         f"{b:g}, {c:g} degrees (columns {', '.join(MOVED_AXES)})."
