@@ -147,7 +147,7 @@ def test_components_in_turned_axes_and_poses_without_joints(tmp_path: Path) -> N
     write("turned.csv", [*head, "sensor_axes_c_deg"], turned)
     write("asked.csv", head, [row[:-1] for row in turned])
     asked = tps.diagnose(str(tmp_path / "asked.csv"), ROBOT)
-    assert asked.verdict == "unexplained" and ", 90 degrees" in str(asked)
+    assert asked.verdict == "unexplained" and "is the sensor in other axes?" in str(asked)
     write("gaps.csv", head, [[*row[:10], "NaN" if i % 4 else row[10], *row[11:]] for i, row in enumerate(rows)])
     as_read, other = (tps.diagnose(str(tmp_path / name), ROBOT) for name in ("a.csv", "turned.csv"))
     assert other.labels == as_read.labels == ["joint_torsion, joint 2"]
