@@ -109,6 +109,18 @@ def test_an_update_refits_the_joints_and_adds_what_is_missing(
     assert tps.update(two, ROBOT, joints=True).verdict == "refused"
 
 
+def test_joints_and_an_effect_are_judged_beside_each_other(tmp_path: Path) -> None:
+    """All torsions of the file wrong, and one joint gives way across its axis besides: both are found again."""
+    true = "[620.0, 340.0, 460.0, 1900.0, 2300.0, 4800.0]"
+    off = tmp_path / "off.toml"
+    off.write_text(ROBOT.read_text("utf-8").replace(true, "[300.0, 700.0, 200.0, 3000.0, 1500.0, 3000.0]"), "utf-8")
+    data = campaign(tmp_path / "a.csv", 77, "bending", 1, 40)
+    update = tps.update(data, off, joints=True, add="joint_bending:element=joint 2")
+    assert update.verdict == "updated" and "--joints" in update.provenance["command"]
+    assert list(update.fitted_joints.values()) == pytest.approx(json.loads(true), rel=0.1)
+    assert tps.diagnose(data, update.machine).verdict == "adequate"
+
+
 @pytest.mark.parametrize(
     ("options", "told"),
     [
@@ -133,6 +145,9 @@ def test_components_in_turned_axes_and_poses_without_joints(tmp_path: Path) -> N
         (tmp_path / name).write_text("\n".join(map(",".join, [heading, *lines])), "utf-8")
 
     write("turned.csv", [*head, "sensor_axes_c_deg"], turned)
+    write("asked.csv", head, [row[:-1] for row in turned])
+    asked = tps.diagnose(str(tmp_path / "asked.csv"), ROBOT)
+    assert asked.verdict == "unexplained" and "is the sensor in other axes?" in str(asked)
     write("gaps.csv", head, [[*row[:10], "NaN" if i % 4 else row[10], *row[11:]] for i, row in enumerate(rows)])
     as_read, other = (tps.diagnose(str(tmp_path / name), ROBOT) for name in ("a.csv", "turned.csv"))
     assert other.labels == as_read.labels == ["joint_torsion, joint 2"]
@@ -151,9 +166,15 @@ def test_a_cable_off_the_tip_is_the_wrench_that_it_makes(tmp_path: Path) -> None
     pose, off = ",".join(map(str, (x, y, z, *angles))), "20,0,50"
     head = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,pull_dx_mm,pull_dy_mm,pull_dz_mm"
     by_cable, by_force = tmp_path / "cable.csv", tmp_path / "force.csv"
-    by_cable.write_text(f"{head},tension_N,cable_x_mm,cable_y_mm,cable_z_mm,dial_x,dial_y,dial_z,displacement_um\n"
-                        f"{pose},{off},900,{','.join(map(str, pulley))},0,0,2,100\n")  # fmt: skip
-    by_force.write_text(f"{head},fx_N,fy_N,fz_N,ux_um,uy_um,uz_um\n{pose},{off},{','.join(map(str, force))},,,100\n")
+    cable, vector = ",".join(map(str, pulley)), ",".join
+    rows = [(f"{900 * k},{cable},0,0,2,{100 * k}", f"{vector(map(str, k * force))},,,{100 * k}")
+            for k in range(1, 7)]  # fmt: skip
+    heads = (
+        "tension_N,cable_x_mm,cable_y_mm,cable_z_mm,dial_x,dial_y,dial_z,displacement_um",
+        HEAD.removesuffix(",sd_um"),
+    )
+    for path, more, lines in zip((by_cable, by_force), heads, zip(*rows, strict=True), strict=True):
+        path.write_text("\n".join([f"{head},{more}", *(f"{pose},{off},{line}" for line in lines)]), "utf-8")
     one, other = (tps.diagnose(str(path), ROBOT, noise_percent=5) for path in (by_cable, by_force))
     assert one.problem.predicted == pytest.approx(other.problem.predicted, rel=1e-9)
 
@@ -173,6 +194,8 @@ def test_a_cable_off_the_tip_is_the_wrench_that_it_makes(tmp_path: Path) -> None
             "pose and joints are .* mm apart",
         ),
         ("x_mm,y_mm,z_mm,tension_N,ux_um", "1800,0,900,100,5", "no force"),
+        ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um", "1800,0,900,0,0,0,5", "no force"),
+        ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um,uy_um", "1800,0,900,1,2,3,0,nan", "nothing read"),
     ],
 )
 def test_rows_that_are_no_pulls_are_told_by_line(head: str, row: str, told: str, tmp_path: Path) -> None:

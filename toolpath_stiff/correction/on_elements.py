@@ -43,6 +43,8 @@ from toolpath_stiff.readings.pulls import Pulls
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.sizes import joined
 
+FEWEST_POSES = 3
+
 
 @dataclass(frozen=True, eq=False)
 class PullTask(UpdateTask):
@@ -96,6 +98,8 @@ def build_pull_ladder(task: PullTask) -> ElementUpdate:
     problem, supports, tried = task.problem, list[Support](), list[Support]()
     if not task.add and not task.strut_law and not task.auto:
         raise InputError("nothing to update", expected="--add EFFECT, --joints or --auto")
+    if (poses := int(problem.pulls.pose.max()) + 1) < FEWEST_POSES:
+        raise InputError(f"pulls at {poses} poses", expected=f"{FEWEST_POSES} or more, of which each can be left out")
     wanted = [parse_addition(text, problem.pulls, task.effect_files, problem.candidates_of) for text in task.add]
     known = known_effects(task.effect_files, task.machine.kind)
     for (candidate, *_), text in zip(wanted, task.add, strict=True):
@@ -107,7 +111,6 @@ def build_pull_ladder(task: PullTask) -> ElementUpdate:
             raise InputError(f"machine {task.machine.name} has no joints that turn: nothing to refit")
         task.progress("fitting the torsions of the joints")
         steps.append(LadderStep.of(JOINTS, problem.joints_fitted, task.data))
-        supports.append(_support_of_joints(task, *steps))
     start = steps[-1]
     steps += ladder_of(task, start, wanted)
     count, full = len(start.fit.candidates), steps[-1].fit
@@ -122,6 +125,10 @@ def build_pull_ladder(task: PullTask) -> ElementUpdate:
         steps.append(better)
         supports.append(tried[-1])
         tried = []
+    if task.strut_law:  # beside the same effects on the file's torsions
+        others = [[candidate] for candidate in steps[-1].fit.candidates[count:]]
+        given = LadderStep.of(AS_GIVEN, fitted_with(task, problem.none, others), task.data)
+        supports.insert(0, _support_of_joints(task, given, steps[-1]))
     return ElementUpdate(task, tuple(steps), start, tuple(supports), turned_down=tuple(tried))
 
 
@@ -174,7 +181,7 @@ class ElementUpdate(Update):
     @property
     def cause(self) -> str:
         """What was fitted, in words."""
-        joints = ", ".join(f"{name} {value:.3g}" for name, value in self.fitted_joints.items())
+        joints = ", ".join(f"{name} {value:.0f}" for name, value in self.fitted_joints.items())
         parts = [f"the joints turn by, nrad/(N m): {joints}"] if joints else []
         return joined([*parts, *self.steps[-1].fit.findings[len(self.fitted_joints) :]])
 
@@ -204,6 +211,7 @@ class ElementUpdate(Update):
                     "name": step.name,
                     "effects": list(step.fit.names),
                     "findings": list(step.fit.findings),
+                    "parameters": to_dict(step.sizes(self.widening)),
                     "mean_abs_error_percent": percent_of(step.error),
                     "held_out_error_percent": percent_of(step.held.mean_error),
                     "rms_error_percent": json_number(problem.error_percent(step.residual)),
@@ -215,10 +223,12 @@ class ElementUpdate(Update):
             "rejected": to_dict(self.turned_down),
             "joints_fitted_nrad_per_Nm": self.fitted_joints,
             "noise": {"name": self.noise.name, "origin": self.noise.origin},
+            "noise_floor_percent": json_number(self.noise.floor_percent),
             "machine": task.machine.name,
             "machine_file": task.machine_file if self.accepted else None,
             "data": list(task.files),
             "readings": len(task.data),
+            "notes": list(task.data.notes),
             "provenance": dict(self.provenance),
             "next": list(self.next),
         }

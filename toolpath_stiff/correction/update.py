@@ -85,7 +85,8 @@ def update(task: UpdateTask, build: Callable[[Any], Update] | None = None) -> Up
         result = replace(result, as_built=built[0], steps=(*result.steps, built[1]))
     # Where its results go does not matter to the command that repeats the fit.
     words = options(
-        add=list(task.add), strut_law=task.strut_law, keep_strut_law=task.keep_strut_law, auto=task.auto,
+        add=list(task.add), strut_law=task.strut_law and build is None,
+        joints=task.strut_law and build is not None, keep_strut_law=task.keep_strut_law, auto=task.auto,
         force=task.force, believe=task.believe, objective=task.objective if result.search else None,
         seed=task.seed or None,
     )  # fmt: skip

@@ -11,7 +11,9 @@ import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, FloatArray
 from toolpath_stiff.column_names import Mapped
-from toolpath_stiff.documents import Document
+from toolpath_stiff.diagnosis.examination import fitted_sizes, held_errors, percent_of
+from toolpath_stiff.documents import Document, json_number, to_dict
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.element_fits import (
     PullProblem,
     chi_square,
@@ -25,14 +27,15 @@ from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.readings.pulls import Pulls, read_pulls
 from toolpath_stiff.results import FolderResult, frame_of
-from toolpath_stiff.stiffness.contract import ELEMENT
 from toolpath_stiff.stiffness.model import StiffnessModel, effects_stated
+from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import um_from_m
 
 if TYPE_CHECKING:
     import pandas as pd
 
 NRAD = 1e9  # nrad/(N m) of rad/(N m)
+FEWEST = 6  # readings below which nothing is fitted
 SHOWN = 12  # explanations in the document
 
 
@@ -90,35 +93,55 @@ class ElementDiagnosis(FolderResult):
         return {} if self.joints is None else fitted_torsions(self.problem, self.joints)
 
     def to_dict(self) -> Document:
-        """The content of diagnose.json."""
-        problem = self.problem
-        error = problem.error_percent(self.left_out) if self.joints else None
+        """The content of diagnose.json: keys as of a hexapod's, and the joints fitted alone."""
+        problem, fits = self.problem, self.ranked[:SHOWN]
+        error = json_number(problem.error_percent(self.left_out)) if self.joints else None
         return {
             "machine": problem.machine.name,
             **effects_stated(problem.model),
             "readings": len(self.pulls),
             "poses": int(self.pulls.pose.max()) + 1,
-            "noise": problem.noise.origin,
+            "noise": {"name": problem.noise.name, "origin": problem.noise.origin},
             "outlying_rows": self.wild,
             "verdict": self.verdict,
+            "text": self.sentence,
             "question": question(problem),
+            "baseline": {"noise_floor_percent": problem.noise.floor_percent, "as_given": errors_of(problem.none, self)},
             "plausible": self.labels,
+            "entries": [list(dict.fromkeys(fit.names[-1] for fit in self.plausible))],
+            "best": self.plausible[0].names[-1] if self.verdict == "identified" else None,
             "findings": [finding for fit in self.plausible for finding in fit.findings],
             "chi_square_as_given": chi_square(problem.none),
             "error_as_given_percent": self.error_as_given,
-            "explanations": [
+            "candidates": [
                 {
                     "effect": fit.names[-1],
-                    "element": dict(fit.candidates[-1].choice).get(ELEMENT),
+                    "title": fit.candidates[-1].effect.title,
+                    "link": fit.candidates[-1].effect.link,
+                    "choice": dict(fit.candidates[-1].choice),
+                    "parameters": to_dict(fitted_sizes(fit)[fit.names[-1]]),
+                    "probability": None,
+                    **errors_of(fit, self),
                     "chi_square": chi_square(fit),
                     "finding": fit.findings[-1],
                 }
-                for fit in self.ranked[:SHOWN]
+                for fit in fits
             ],
             "joints_fitted_nrad_per_Nm": {name: NRAD * value for name, value in self.torsions.items()},
             "chi_square_of_joints_fitted": None if self.joints is None else chi_square(self.joints),
             "error_of_joints_fitted_at_left_out_poses_percent": error,
+            "gates": dict.fromkeys(f"{name}_probability" for name in ("baseline", "squares", "structure", "gain")),
+            **{key: [] for key in ("why", "warnings", "detectable", "next_measurements")},
+            "assumptions": [f"noise: {problem.noise.origin}"],
+            "notes": list(self.pulls.notes),
         }
+
+    @property
+    def sentence(self) -> str:
+        """Verdict, cause and error."""
+        causes = joined([finding for fit in self.plausible[:SHOWN] for finding in fit.findings])
+        told = f"{self.verdict[0].upper()}{self.verdict[1:]}{f': {causes}' if causes else ''}"
+        return f"{told}. Error as given {self.error_as_given:.1f} % of the displacements (rms)."
 
     @property
     def wild(self) -> list[str]:
@@ -139,6 +162,12 @@ class ElementDiagnosis(FolderResult):
         return f"{self.problem.machine.name}, {self.verdict}, error as given {self.error_as_given:.1f} %"
 
 
+def errors_of(fit: Fit, diagnosis: ElementDiagnosis) -> Document:
+    """Errors of a fit relative to each displacement, per cent, and those at left-out poses."""
+    held = held_out(fit, diagnosis.problem.point)
+    return {"mean_abs_error_percent": percent_of(float(fit.errors.mean())), **held_errors(held)}
+
+
 def residual_columns(problem: PullProblem, further: Mapping[str, FloatArray]) -> dict[str, AnyArray]:
     """Columns of `residuals.csv`; `further`: what other fits say, as residuals (m,)."""
     pulls = problem.pulls
@@ -151,9 +180,9 @@ def residual_columns(problem: PullProblem, further: Mapping[str, FloatArray]) ->
 
 
 def fitted_torsions(problem: PullProblem, joints: Fit) -> dict[str, float]:
-    """Joint -> rad/(N m) of joints fitted in place of the file's."""
+    """Joint -> rad/(N m) of joints fitted in place of the file's, before whatever else the fit holds."""
     stated = problem.torsions.items()
-    return {name: was + float(size[0]) for (name, (_, was)), size in zip(stated, joints.sizes, strict=True)}
+    return {name: was + float(size[0]) for (name, (_, was)), size in zip(stated, joints.sizes, strict=False)}
 
 
 def pull_problem(
@@ -176,6 +205,8 @@ def pull_problem(
     """
     problem = PullProblem(model, read_pulls(files, model.machine, mapping), effect_files)
     pulls = problem.pulls
+    if len(pulls) < FEWEST:
+        raise InputError(f"{len(pulls)} readings", expected=f"at least {FEWEST} components of displacements")
     stated = ~np.isnan(pulls.sd)
     if noise is None and stated.all():
         problem.noise_of(pulls.sd / pulls.size, spread, "sd_um of each row")
@@ -185,7 +216,7 @@ def pull_problem(
         problem.noise_of(np.where(stated, pulls.sd / pulls.size, noise), spread, words)
     else:
         share = share_left(problem)
-        words = f"estimated, {100 * share:.2g} % of the size of each displacement (say --noise)"
+        words = f"estimated or guessed, {100 * share:.2g} % of the size of each displacement (say --noise)"
         problem.noise_of(np.full(len(pulls), share), spread, words)
     return problem, noise is not None or bool(stated.all())
 

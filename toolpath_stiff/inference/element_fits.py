@@ -18,18 +18,18 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect, base_fit, fit_effects, settled
 from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.least_squares import bounded_step
-from toolpath_stiff.inference.noise import STATED_FREEDOM, Noise, Scatter
+from toolpath_stiff.inference.noise import GUESSES, STATED_FREEDOM, Noise, Scatter
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS
 from toolpath_stiff.inference.votes import outvoted
 from toolpath_stiff.machine.elements import turns
 from toolpath_stiff.readings.pulls import MOVED_AXES, Pulls
-from toolpath_stiff.rotations import roll_pitch_yaw
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import ELEMENT, Effect
+from toolpath_stiff.stiffness.element_sum import added_by
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
-from toolpath_stiff.units import deg_from_rad
 
+FEWEST = 6  # degrees of freedom that tell anything of the noise
 NONE, JOINTS = "none", "joints refitted"
 ALIKE = 10.0  # chi-square: an explanation that leaves no more than this beside the best cannot be told from it
 GAIN = 16.0  # chi-square that a name must gain over no effect, with some thirty candidates: under 1 in 500 by chance
@@ -68,22 +68,19 @@ class PullProblem(Problem):
 
     def with_effects(self, effects: Sequence[ActiveEffect], moved: FloatArray) -> FloatArray:
         """(m,) m that the readings show: what moved, what effects add, and what instruments make of it."""
-        for active in effects:
-            if active.effect.is_instrument:
-                stiffness = self.path.force / np.maximum(np.abs(moved), 1e-15)
-                moved = moved * stiffness / active.reading(stiffness, self.path)
-                continue
-            form, more = active.adds("load_compliance", self.path), active.adds("element_compliance", self.path)
-            if form is not None:
-                moved = moved + np.einsum("ni,nij,nj->n", self.pulls.along, form[:, 6:, 6:], self.pulls.wrench)
-            if more is not None:
-                moved = moved + (more * np.concatenate(self.products, axis=1)).sum(axis=1)
+        at_tip, more = added_by((active for active in effects if not active.effect.is_instrument), self.path)
+        if at_tip is not None:
+            moved = moved + np.einsum("ni,nij,nj->n", self.pulls.along, at_tip, self.pulls.wrench)
+        if more is not None:
+            moved = moved + (more * np.concatenate(self.products, axis=1)).sum(axis=1)
+        for active in (active for active in effects if active.effect.is_instrument):  # they show what all others make
+            stiffness = self.path.force / np.maximum(np.abs(moved), 1e-15)
+            moved = moved * stiffness / active.reading(stiffness, self.path)
         return moved
 
     def residual(self, law: FloatArray, effects: Sequence[ActiveEffect]) -> FloatArray:
         """(m,) measured less modelled, of the size of each pull's displacement."""
-        machine = sorted(effects, key=lambda active: active.effect.is_instrument)  # which show what all others make
-        return np.asarray((self.pulls.value - self.with_effects(machine, self.predicted)) / self.pulls.size)
+        return np.asarray((self.pulls.value - self.with_effects(effects, self.predicted)) / self.pulls.size)
 
     def law_columns(self, residual: FloatArray, law: FloatArray, effects: object) -> list[FloatArray]:
         """Nothing: there is no strut law."""
@@ -91,10 +88,10 @@ class PullProblem(Problem):
 
     def noise_of(self, relative: FloatArray, spread: float = 0.0, origin: str = "") -> None:
         """Scatter of readings by (m,) of their sizes, of elements by a relative `spread` of what each gives."""
-        own, every = np.maximum(relative, LEAST), np.arange(len(relative))
-        self.noise = Noise("stated", own, 0.0, spread, 0.0, OUTLIERS, OUTLIER_WIDTH, STATED_FREEDOM, origin, rest=0.0)
+        sd, every = np.maximum(relative, LEAST), np.arange(len(relative))
+        self.noise = Noise("stated", sd, 0.0, spread, 0.0, OUTLIERS, OUTLIER_WIDTH, STATED_FREEDOM, origin, rest=0.0)
         shared = spread * self.by_element / self.pulls.size[:, None]
-        self.scatter = Scatter.of(self.noise, Covariance(own**2, Groups(every), 0.0, np.ascontiguousarray(shared.T)))
+        self.scatter = Scatter.of(self.noise, Covariance(sd**2, Groups(every), 0.0, np.ascontiguousarray(shared.T)))
 
     @cached_property
     def none(self) -> Fit:
@@ -104,14 +101,14 @@ class PullProblem(Problem):
     @cached_property
     def torsions(self) -> dict[str, tuple[Candidate, float]]:
         """Joint that turns -> its torsion in place of the file's, and rad/(N m) of that."""
-        effect, found = find_effect("joint_torsion"), {}
+        effect, torsions = find_effect("joint_torsion"), {}
         for element, load in zip(self.machine.elements, self.pulls.stance.loads, strict=True):
             if turns(element):
                 stated = float(np.atleast_2d(load.compliance)[0, 5])
                 (parameter,) = (p for p in effect.parameters if not p.discrete)
                 component = Component(parameter, False, (-stated, np.inf))
-                found[element.name] = Candidate(effect, ((ELEMENT, element.name),), (component,)), stated
-        return found
+                torsions[element.name] = Candidate(effect, ((ELEMENT, element.name),), (component,)), stated
+        return torsions
 
     @cached_property
     def joints_fitted(self) -> Fit:
@@ -150,11 +147,14 @@ def _says_more(fit: Fit, other: Fit, behind: Mapping[str, float]) -> bool:
     """Whether an explanation has more parameters than another one of the same element, and gains too little by them."""
     element, same = (dict(each.candidates[-1].choice).get(ELEMENT) for each in (fit, other))
     more = len(fit.parts) - len(other.parts)
-    return element is not None and element == same and behind[label_of(other)] - behind[label_of(fit)] < PRICE * more
+    gained = behind[label_of(other)] - behind[label_of(fit)]
+    return element is not None and element == same and more > 0 and gained < PRICE * more
 
 
 def question(problem: PullProblem) -> str:
     """Whether these are pulls of this machine, as it is described, with the reason to ask; "" where there is none."""
+    from scipy.spatial.transform import Rotation
+
     pulls, best = problem.pulls, problem.joints_fitted if problem.torsions else problem.none
     modelled = pulls.value - best.residual * pulls.size
     alike = float((pulls.value @ modelled) / np.maximum(np.linalg.norm(pulls.value) * np.linalg.norm(modelled), 1e-300))
@@ -164,15 +164,14 @@ def question(problem: PullProblem) -> str:
     # Were the sensor's axes turned: the turn that brings it nearest to the model as given (Kabsch 1976, Acta
     # Crystallographica A32, 922).
     rows = np.unique(np.char.add(pulls.file, pulls.line.astype(str)), return_inverse=True)[1].reshape(-1)
-    read, said = np.zeros((2, rows.max() + 1, 3))
+    read, modelled = np.zeros((2, rows.max() + 1, 3))
     np.add.at(read, rows, pulls.value[:, None] * pulls.direction)
-    np.add.at(said, rows, problem.predicted[:, None] * pulls.direction)
-    left, _, right = np.linalg.svd(read.T @ said)
-    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    turned = float((read @ turn * said).sum() / max(np.linalg.norm(read) * np.linalg.norm(said), 1e-300))
+    np.add.at(modelled, rows, problem.predicted[:, None] * pulls.direction)
+    turn = Rotation.align_vectors(modelled, read)[0]
+    turned = float((turn.apply(read) * modelled).sum() / max(np.linalg.norm(read) * np.linalg.norm(modelled), 1e-300))
     if turned < FOLLOWS:
         return text
-    a, b, c = deg_from_rad(roll_pitch_yaw(turn.T[None])[0]).round(0) + 0.0
+    a, b, c = turn.as_euler("xyz", degrees=True).round(0) + 0.0
     return (
         f"{text} Turned they would by {turned:.2f}: is the sensor in other axes? Roll, pitch, yaw of about {a:g}, "
         f"{b:g}, {c:g} degrees (columns {', '.join(MOVED_AXES)})."
@@ -204,12 +203,11 @@ def share_left(problem: PullProblem) -> float:
         for j, component in enumerate(candidate.components)
     ]
     columns = np.stack([problem.observed - problem.residual(NO_LAW, [active]) for active in units], axis=1)
-    scale = np.linalg.norm(columns, axis=0)
-    columns = columns / np.where(scale > 0.0, scale, 1.0)
-    none, all_of_it = np.zeros(columns.shape[1]), np.full(columns.shape[1], np.inf)
-    left = problem.observed - columns @ bounded_step(columns.T @ columns, columns.T @ problem.observed, none, all_of_it)
-    freedom = max(len(left) - int(np.linalg.matrix_rank(columns)), 1)
-    return max(float(np.sqrt(left @ left / freedom)), LEAST)
+    columns, most = columns / np.linalg.norm(columns, axis=0).clip(min=1e-300), np.full(len(units), np.inf)
+    sizes = bounded_step(columns.T @ columns, columns.T @ problem.observed, np.zeros(len(units)), most)
+    left = problem.observed - columns @ sizes
+    freedom = len(left) - int(np.linalg.matrix_rank(columns))
+    return GUESSES["high"] if freedom < FEWEST else max(float(np.sqrt(left @ left / freedom)), LEAST)
 
 
 def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool) -> tuple[str, list[Fit]]:
@@ -217,7 +215,8 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
 
     "adequate": nothing is missing that shows; "identified": one, which foretells pose after pose better than every
     other one beyond chance; "ambiguous": several; "unexplained": none. `known`: whether somebody states the noise; else
-    nothing can be said to be missing from the candidates, which are what it was estimated by.
+    nothing can be said to be missing from the candidates, which are what it was estimated by, and nothing is named
+    where they leave more than good readings scatter by.
     """
     from scipy.stats import chi2
 
@@ -238,6 +237,7 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
     standing = [fit for fit in fits[1:] if fit not in alike and not outvoted(ballots[label_of(fit)])]
     more = [fit for fit in (*alike, *standing) if any(_says_more(fit, other, behind) for other in alike)]
     alike, standing = ([fit for fit in some if fit not in more] for some in (alike, standing))
-    if not explained or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
+    guessed = not known and problem.noise.typical > GUESSES["low"]  # more is left than good readings scatter by
+    if guessed or not explained or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
         return "ambiguous", [*alike, *standing]
     return "identified", alike

@@ -7,7 +7,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.chain import ChainJoint, Frame
 from toolpath_stiff.machine.joint_values import TURN, joint_margin, wound
-from toolpath_stiff.machine.newton import halton, newton
+from toolpath_stiff.machine.newton import newton
 
 STARTS = 96  # over the joints' ranges; of a general six-joint arm, which has up to 16 solutions, few are missed
 LARGEST_STEP = 0.5  # rad and m
@@ -21,12 +21,13 @@ def all_solutions(joints: Sequence[ChainJoint], frames: Frames, tip: FloatArray,
 
     `frames` gives base, joints and tip at joint values (j, n). Those within the limits if there are any.
     """
+    from scipy.stats import qmc  # Halton, Numerische Mathematik 2 (1960)
+
     limits = np.array([(joint.low, joint.high) for joint in joints])
     ranges = np.clip(limits, -0.5 * TURN, 0.5 * TURN)
-    starts = ranges[:, 0] + halton(STARTS)[:, : len(joints)] * (ranges[:, 1] - ranges[:, 0])
-    values = solve_from(
-        joints, frames, np.repeat(tip[:, None], STARTS, 1), np.repeat(axes[..., None], STARTS, 2), starts
-    )
+    starts = ranges[:, 0] + qmc.Halton(len(joints), scramble=False).random(STARTS) * (ranges[:, 1] - ranges[:, 0])
+    poses = np.repeat(tip[:, None], STARTS, 1), np.repeat(axes[..., None], STARTS, 2)
+    values = solve_from(joints, frames, *poses, starts)
     values = wound(values.T, limits, [joint.linear for joint in joints], None)
     margin = joint_margin(values, limits)
     solutions: list[FloatArray] = []
@@ -45,9 +46,7 @@ def solve_from(
     def equations(values: FloatArray) -> tuple[FloatArray, FloatArray]:
         stand = frames(values.T)
         end = stand[-1]
-        turned = 0.5 * np.cross(axes, end.axes, axis=0).sum(
-            axis=1
-        )  # sine of the angle, times the axis, from the target
+        turned = 0.5 * np.cross(axes, end.axes, axis=0).sum(axis=1)  # sine of the angle from the target, times the axis
         columns = []
         for joint, frame in zip(joints, stand[1:-1], strict=True):
             z = np.broadcast_to(frame.axes[:, 2], tip.shape)
@@ -77,10 +76,8 @@ def follow(
         seeds = best[:1]
         tried[lost[0]], start = True, None
         while len(seeds) and len(lost):
-            near = solve_from(
-                joints, frames, tip[:, lost], axes[..., lost], np.broadcast_to(seeds, (len(lost), len(joints)))
-            )
-            values[lost] = near
+            starts = np.broadcast_to(seeds, (len(lost), len(joints)))
+            values[lost] = solve_from(joints, frames, tip[:, lost], axes[..., lost], starts)
             solved = np.flatnonzero(np.isfinite(values[:, 0]))
             missing = np.flatnonzero(np.isnan(values[:, 0]))
             if not len(solved) or len(missing) in (0, len(lost)):

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.elements import Element, Stance
@@ -69,6 +68,7 @@ class Delta(Parallel):
     """
 
     kind: ClassVar[str] = "delta"
+    turns: ClassVar[int] = 0
 
     carriage_radius: float
     effector_radius: float
@@ -93,25 +93,6 @@ class Delta(Parallel):
         feet = _rod_joints(self.carriage_radius, self.spacing) + np.repeat(carriages, 2, axis=1)[..., None] * up
         rods = feet - tip[:, None] - arms
         return Legs(carriages, rods / self.rod_length, arms, np.full((len(tip), 6), self.rod_compliance))
-
-    def forward(self, joints: ArrayLike, tool_length: ArrayLike = np.nan) -> tuple[FloatArray, FloatArray]:
-        """Tip (n, 3) m and tool axes (n, 3, 3) of carriages (n, 3) m: where three spheres meet below them."""
-        heights = np.atleast_2d(np.asarray(joints, dtype=float)) - self.joint_height
-        heights = heights - np.reshape(self.extension(tool_length), (-1, 1))
-        radius = self.carriage_radius - self.effector_radius
-        centres = radius * OUTWARDS + heights[..., None] * np.array([0.0, 0.0, 1.0])
-        across, over = centres[:, 1] - centres[:, 0], centres[:, 2] - centres[:, 0]
-        normal = np.cross(across, over)
-        size = (normal**2).sum(axis=1, keepdims=True)
-        # The circumcentre of the carriages, and down from it.
-        middle = ((across**2).sum(axis=1, keepdims=True) * np.cross(over, normal)) - (
-            (over**2).sum(axis=1, keepdims=True) * np.cross(across, normal)
-        )
-        middle = 0.5 * middle / size
-        with np.errstate(invalid="ignore"):
-            depth = np.sqrt((self.rod_length**2 - (middle**2).sum(axis=1, keepdims=True)) / size)
-        tip = centres[:, 0] + middle - depth * normal * np.sign(normal[:, 2:])
-        return tip, np.broadcast_to(np.eye(3), (len(tip), 3, 3))
 
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
         """(n, 6, 3) m each: the rods' joints on the carriages and on the effector."""

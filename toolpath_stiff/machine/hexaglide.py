@@ -10,12 +10,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.elements import Element, Stance, beam_axes
-from toolpath_stiff.machine.kinematics import forward_kinematics
-from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.machine.parallel import Carriage, Legs, Parallel
 from toolpath_stiff.machine.parallel_file import (
     GIVE,
@@ -30,7 +27,6 @@ from toolpath_stiff.machine.parallel_file import (
     span,
 )
 from toolpath_stiff.machine.schema import Key, MachineToml, read_sections
-from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import m_from_mm, m_from_nm
 
 DIRECTIONS = Key(shape=(6, 3), low=-1.0, high=1.0)
@@ -84,27 +80,6 @@ class Hexaglide(Parallel):
         slides = along + self.sides * np.sqrt(along**2 - (apart**2).sum(axis=-1) + self.strut_length**2)
         struts = apart - slides[..., None] * self.rails
         return Legs(slides, struts / self.strut_length, arms, np.full((len(tip), 6), self.strut_compliance))
-
-    def forward(
-        self, joints: ArrayLike, tool_length: ArrayLike = np.nan, start: ArrayLike | None = None
-    ) -> tuple[FloatArray, FloatArray]:
-        """Tip (n, 3) m and platform axes (n, 3, 3) of slides (n, 6) m, near a start (6,) or the neutral pose.
-
-        With the feet where they are it is a hexapod of struts of equal length.
-        """
-        slides = np.atleast_2d(np.asarray(joints, dtype=float))
-        still = Hexapod(
-            name=self.name,
-            title=self.title,
-            source=self.source,
-            reference_tool_length=self.reference_tool_length,
-            frame_joints=self.feet + slides[..., None] * self.rails,
-            platform_joints=self.platform_joints,
-            strut_law=StrutLaw(0.0, 1.0, 1.0, 1.0, constant=True),
-            limits=self.limits,
-        )
-        poses = forward_kinematics(still, np.full(slides.shape, self.strut_length), start, tool_length)
-        return poses[:, :3], rotation_matrices(poses[:, 3:])
 
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
         """(n, 6, 3) m each: feet and platform joints."""

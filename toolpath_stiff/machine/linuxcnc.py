@@ -16,7 +16,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Hexapod, Limits, StrutLaw
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
 
-SETP = re.compile(r"^\s*setp\s+genhexkins\.(\S+?)\s*(?:=\s*|\s+)(\S+)\s*$")
+SETP = re.compile(r"^\s*setp\s+([\w-]+)\.(\S+?)\s*(?:=\s*|\s+)(\S+)\s*$")
 KNOWN = re.compile(
     r"((base|platform)(-n)?\.[0-5]\.[xyz]|tool-offset|spindle-offset|screw-lead|"
     r"convergence-criterion|limit-iterations|max-error)$"
@@ -63,7 +63,7 @@ def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tup
     InputError
         A pin is missing, set twice, unknown, or its value is no number.
     """
-    values = _read_pins(text, file)
+    values = read_pins(text, "genhexkins", file, KNOWN)
     names = np.array([[[f"{part}.{n}.{axis}" for axis in "xyz"] for n in range(6)] for part in ("base", "platform")])
     missing = [f"genhexkins.{name}" for name in names.flat if name not in values]
     if missing:
@@ -86,22 +86,23 @@ def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tup
     return _with_assumptions(frame, platform, file), notes
 
 
-def _read_pins(text: str, file: str) -> dict[str, float]:
+def read_pins(text: str, module: str, file: str, known: re.Pattern[str] | None = None) -> dict[str, float]:
+    """Pins of a module that a HAL file sets. Raises `InputError` at the line of what is no number or set twice."""
     values: dict[str, float] = {}
     for number, line in enumerate(text.splitlines(), 1):
         match = SETP.match(line.split("#")[0])
-        if not match:
+        if not match or match[1] != module:
             continue
-        pin, raw = match.groups()
-        mistake, expected = f"genhexkins.{pin} = {raw!r}", ""
+        _, pin, raw = match.groups()
+        mistake, expected = f"{module}.{pin} = {raw!r}", ""
         try:
             value = float(raw)
         except ValueError:
             value, expected = np.inf, "a number (variables are not read)"
-        if not KNOWN.match(pin):
-            mistake = f"genhexkins has no pin {pin!r}"
+        if known and not known.match(pin):
+            mistake = f"{module} has no pin {pin!r}"
         elif pin in values:
-            mistake = f"genhexkins.{pin} is set twice"
+            mistake = f"{module}.{pin} is set twice"
         elif np.isfinite(value):
             values[pin] = value
             continue

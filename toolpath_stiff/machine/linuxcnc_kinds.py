@@ -15,10 +15,11 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.linuxcnc import read_pins
 from toolpath_stiff.machine.unfilled import EXPERIENCE, JOINTS, SPINDLE, axis_row, carriages, file_text, section
 from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
 
-PIN = re.compile(r"(?m)^\s*setp\s+([\w-]+)\.(\S+?)\s*(?:=\s*|\s+)([^\s#]+)")
+PIN = re.compile(r"(?m)^\s*setp\s+([\w-]+)\.")
 GIVE = dict.fromkeys(("translation_nm_per_N", "rotation_nrad_per_Nm"))
 STRUT = f"# A strut with both joints has typically 10 to 30 nm/N ({EXPERIENCE}).\n"
 TABLE = '# The files do not say which axes carry the work: an element with moves_with = ["-X"] does, of X'
@@ -69,13 +70,6 @@ class ControlFiles:
 
 def control_files(hal: str, ini: str, module: str, scale: float, file: str) -> ControlFiles:
     """From the texts of both. Raises `InputError` for a pin that is no number."""
-    pins = {}
-    for name, pin, value in PIN.findall(hal):
-        if name == module:
-            try:
-                pins[pin] = float(value)
-            except ValueError:
-                raise InputError(f"{module}.{pin} = {value!r}", expected="a number", file=file) from None
     limits: dict[int, dict[str, float]] = {}
     joint = -1
     for line in ini.splitlines():
@@ -87,13 +81,14 @@ def control_files(hal: str, ini: str, module: str, scale: float, file: str) -> C
     both = {n: np.array([ends["MIN"], ends["MAX"]]) for n, ends in limits.items() if len(ends) == 2}
     letters = re.search(r"(?im)^\s*KINEMATICS\s*=.*coordinates\s*=\s*([A-Z]+)", ini)
     letters = letters or re.search(r"(?m)^\s*COORDINATES\s*=\s*([A-Z ]+)", ini)
+    pins = read_pins(hal, module, file)
     return ControlFiles(file, module, scale, pins, both, letters[1].replace(" ", "") if letters else "")
 
 
 def module_of(hal: str, ini: str) -> str:
     """The kinematics module that the files load; "" where they load none that is known."""
     named = re.search(r"(?m)^\s*KINEMATICS\s*=\s*([\w-]+)", ini)
-    words = [named[1]] if named else re.findall(r"(?m)^\s*loadrt\s+([\w-]+)", hal) + [m for m, _, _ in PIN.findall(hal)]
+    words = [named[1]] if named else re.findall(r"(?m)^\s*loadrt\s+([\w-]+)", hal) + PIN.findall(hal)
     return next((word for word in words if word in (*KINDS, "genhexkins", "rotarydeltakins")), "")
 
 

@@ -1,8 +1,8 @@
-"""Newton's method with bounded steps, many poses at a time; starts spread evenly."""
+"""Newton's method with bounded steps, many poses at a time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -33,15 +33,3 @@ def newton(equations: Equations, start: FloatArray, largest: FloatArray | float)
             break
     good = np.abs(residual).max(axis=1) < 1e3 * TOLERANCE
     return np.where(good[:, None], values, np.nan)
-
-
-def halton(count: int, bases: Sequence[int] = (2, 3, 5, 7, 11, 13, 17)) -> FloatArray:
-    """(count, 7) points spread over the unit cube (Halton, Numerische Mathematik 2, 1960)."""
-    points = np.zeros((count, len(bases)))
-    for column, base in enumerate(bases):
-        share, left = 1.0, np.arange(1, count + 1)
-        while left.any():
-            share /= base
-            points[:, column] += share * (left % base)
-            left = left // base
-    return points

@@ -14,11 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.bodies import Body, SpanningBeam
 from toolpath_stiff.machine.chain import Frame, columns_of
 from toolpath_stiff.machine.elements import Element, LoadRows, Spring, Stance, body_under_rods, rod_forces
 from toolpath_stiff.machine.model import MachineTool
+from toolpath_stiff.machine.newton import newton
 from toolpath_stiff.rotations import rotation_matrices
+
+LARGEST_STEPS = np.array([0.2, 0.2, 0.2, 0.3, 0.3, 0.3])  # m and rad, of Newton's method
+STEP = 1e-7  # m and rad, for differences
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,7 @@ class Parallel(MachineTool):
     """
 
     beyond: ClassVar[str] = "no lengths of the legs reach the pose"
+    turns: ClassVar[int] = 3  # how many of roll, pitch and yaw the tool takes
 
     joint_range: tuple[float, float]
     legs: tuple[Element, ...]
@@ -151,6 +157,33 @@ class Parallel(MachineTool):
         extension = np.broadcast_to(self.extension(tool_length), (len(tip),))
         with np.errstate(invalid="ignore", divide="ignore"):
             return self.legs_at(tip, axes, extension)
+
+    def forward(
+        self, joints: ArrayLike, tool_length: ArrayLike = np.nan, start: ArrayLike | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Tip (n, 3) m and tool axes (n, 3, 3) of joints (n, j) m, near the neutral pose or a start.
+
+        A start is x, y, z and the angles that the tool takes, m and rad. Raises `InputError` where no pose near it has
+        such joints.
+        """
+        wanted, free = np.atleast_2d(np.asarray(joints, dtype=float)), 3 + self.turns
+
+        def axes_of(pose: FloatArray) -> FloatArray:
+            return rotation_matrices(np.column_stack([pose[:, 3:], np.zeros((len(pose), 6 - free))]))
+
+        def joints_at(pose: FloatArray) -> FloatArray:
+            return self._legs(pose[:, :3], axes_of(pose), tool_length).joints
+
+        def equations(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+            here = joints_at(pose)
+            slopes = [(joints_at(pose + step) - here) / STEP for step in STEP * np.eye(free)]
+            return here - wanted, np.stack(slopes, axis=-1)
+
+        first = np.asarray(self.limits.neutral_pose if start is None else start, dtype=float)[..., :free]
+        pose = newton(equations, np.broadcast_to(first, (len(wanted), free)), LARGEST_STEPS[:free])
+        if missed := np.flatnonzero(np.isnan(pose).any(axis=1)).tolist():
+            raise InputError(f"row {missed[0] + 1}: no pose near the start has such joints", hint="check the lengths")
+        return pose[:, :3], axes_of(pose)
 
     @property
     def singularity_names(self) -> tuple[str, ...]:

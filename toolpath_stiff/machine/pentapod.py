@@ -11,20 +11,15 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.elements import Element, Stance
-from toolpath_stiff.machine.newton import newton
 from toolpath_stiff.machine.parallel import Legs, Parallel
 from toolpath_stiff.machine.parallel_file import LENGTH, OPTIONAL, PER_ROD, SHARED, TOP, axial, shared_fields, span
 from toolpath_stiff.machine.schema import Key, MachineToml, read_sections
 from toolpath_stiff.machine.words import refuse_words
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import m_from_mm, m_from_nm
-
-LARGEST_STEPS = np.array([0.2, 0.2, 0.2, 0.3, 0.3])  # m and rad, of Newton's method
 
 SCHEMA = {
     "": {
@@ -68,6 +63,7 @@ class Pentapod(Parallel):
     """
 
     kind: ClassVar[str] = "pentapod"
+    turns: ClassVar[int] = 2
 
     base_joints: FloatArray
     ring_radius: FloatArray
@@ -106,33 +102,6 @@ class Pentapod(Parallel):
         turning = lengths[:, held] ** 3 / (3.0 * self.bending) + lengths[:, held] ** 2 * self.hinge
         axial = self.compliance + self.slope * (lengths - self.length)
         return Legs(lengths, directions, arms, np.concatenate([axial, turning[:, None]], axis=1))
-
-    def forward(
-        self, joints: ArrayLike, tool_length: ArrayLike = np.nan, start: ArrayLike | None = None
-    ) -> tuple[FloatArray, FloatArray]:
-        """Tip (n, 3) m and tool axes (n, 3, 3) of struts (n, 5) m, near the neutral pose or a start.
-
-        A start is x, y, z, a, b, (5,) or (n, 5) m and rad.
-
-        Raises `InputError` where no pose near the start has such struts.
-        """
-        lengths = np.atleast_2d(np.asarray(joints, dtype=float))
-        extension = np.broadcast_to(self.extension(tool_length), (len(lengths),))
-
-        def equations(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-            axes = rotation_matrices(np.column_stack([pose[:, 3:], np.zeros(len(pose))]))
-            legs = self.legs_at(pose[:, :3], axes, extension)
-            u, arms = legs.directions[:, :5], legs.arms[:, :5]
-            about_y = np.array([0.0, 1.0, 0.0])  # R = Ry(b) Rx(a): b turns about y, a about R x
-            turns = [(np.cross(axis, arms) * u).sum(axis=-1) for axis in (axes[:, None, :, 0], about_y)]
-            return legs.joints - lengths, np.concatenate([u, np.stack(turns, axis=-1)], axis=-1)
-
-        first = np.asarray(self.limits.neutral_pose[:5] if start is None else start, dtype=float)
-        pose = newton(equations, np.broadcast_to(first, (len(lengths), 5)), LARGEST_STEPS)
-        missed = np.flatnonzero(np.isnan(pose).any(axis=1))
-        if len(missed):
-            raise InputError(f"row {missed[0] + 1}: no pose near the start has such struts", hint="check the lengths")
-        return pose[:, :3], rotation_matrices(np.column_stack([pose[:, 3:], np.zeros(len(pose))]))
 
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
         """(n, 5, 3) m each: base joints, and where the struts meet their rings."""

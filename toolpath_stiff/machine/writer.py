@@ -104,8 +104,8 @@ def elements_toml(machine: MachineTool, torsions: Sequence[float], preamble: str
     if torsions:
         text, count = TORSION.subn(rf"\g<1>[{', '.join(f'{value:.5g}' for value in torsions)}]", text)
         if count != 1:
-            found = f"machine {machine.name} states torsion_nrad_per_Nm {count} times"
-            raise InputError(found, expected="once, for all joints", hint="write one [[element]] of type joint")
+            mistake = f"machine {machine.name} states torsion_nrad_per_Nm {count} times"
+            raise InputError(mistake, expected="once, for all joints", hint="write one [[element]] of type joint")
     heads = re.split(r"(?m)^(?=\[)", text)
     kept = [part for part in heads if not re.match(r"\[\[?(effect|instrument|uncertainty)\b", part)]
     head = [f"# {line}".rstrip() for line in preamble.splitlines()]

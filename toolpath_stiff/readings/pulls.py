@@ -32,6 +32,7 @@ TENSION, CABLE = "tension_N", ("cable_x_mm", "cable_y_mm", "cable_z_mm")
 PULL, TARGET = (tuple(f"{what}_d{axis}_mm" for axis in "xyz") for what in ("pull", "target"))
 FORCE_AXES, MOVED_AXES = (tuple(f"{what}_axes_{axis}_deg" for axis in "abc") for what in ("force", "sensor"))
 NOT_READ = ("nan", "n/a", "na", "-")  # cells that say so, as empty ones do
+FARTHEST = -1e6, 1e6  # um, of a dial
 SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
 SAME_PLACE = m_from_mm(1.0)  # by which a pose and the joints beside it may differ: both are rounded
 
@@ -54,6 +55,8 @@ class Pulls(ArrayColumns):
         (m,) number of the distinct pose.
     file, line, component
         (m,) where it was read; "x", "y", "z" or "dial".
+    notes
+        What was assumed or not used; for the report.
     """
 
     stance: Stance
@@ -65,7 +68,7 @@ class Pulls(ArrayColumns):
     file: TextArray
     line: IntArray
     component: TextArray
-
+    notes: tuple[str, ...] = ()
     missing: ClassVar[tuple[str, ...]] = ("setup", "time_min", "temperature_C", "tool_extension_mm", "sd_N_per_mm")
 
     def __len__(self) -> int:
@@ -109,7 +112,8 @@ class Pulls(ArrayColumns):
 
 def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> Pulls:
     """Pulls on a machine of elements, or its stiffnesses as pulls. Raises `InputError`, `InputErrors`."""
-    joints, rows = _joint_columns(machine), []
+    joints, rows, notes = _joint_columns(machine), list[_Pull](), list[str]()
+    used = {*_further(machine), *POSITION, *ANGLES, "displacement_um", "sd_um"}
     tables = pull_tables(files, machine, mapping)
     if not tables:
         return _of_stiffnesses(files, machine, mapping)
@@ -120,26 +124,18 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
         if errors:
             raise InputErrors(errors)
         rows += of_file
+        notes += [
+            *table.notes,
+            *(f"{table.file}: column {name} is not used" for name in table.heading if name not in used),
+        ]
     if not rows:
         raise MeasurementError("no rows below the heading", file=tables[0].file)
-    return _of_rows(rows, machine)
+    return _of_rows(rows, machine, notes)
 
 
 def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> list[Table]:
     """The files that give forces as vectors or by cables, as tables; the others give stiffnesses along directions."""
-    further = (
-        *FORCE,
-        *MOVED,
-        *DIAL,
-        TENSION,
-        *CABLE,
-        *PULL,
-        *TARGET,
-        *FORCE_AXES,
-        *MOVED_AXES,
-        *_joint_columns(machine),
-    )
-    known = Columns((*COLUMNS.numbers, *further, *_joint_columns(machine)), COLUMNS.texts)
+    known = Columns((*COLUMNS.numbers, *_further(machine)), COLUMNS.texts)
     tables = [mapped_table(name, "measurements", known, mapping) for name in files]
     return [table for table in tables if not {FORCE[0], TENSION}.isdisjoint(table.heading)]
 
@@ -177,20 +173,19 @@ class _Pull:
             expected = f"{', '.join(POSITION)}; or {', '.join(joints)}"
             raise MeasurementError("neither a pose nor all joints", expected=expected)
         angles = tuple(rad_from_deg(number(record, name)) if record.get(name) else 0.0 for name in ANGLES)
-        tension = optional_number(record, TENSION)
-        by_vector = FORCE[0] in record and not (record.get(TENSION) and not any(record[name] for name in FORCE))
-        force = (
-            tuple(_turn(record, FORCE_AXES) @ [number(record, name) for name in FORCE]) if by_vector else (np.nan,) * 3
-        )
-        if np.isnan(tension) == np.isnan(force[0]) or (not np.isnan(tension) and not record.get(CABLE[0])):
+        tension, vector = optional_number(record, TENSION), any(record.get(name) for name in FORCE)
+        components = [number(record, name) if vector else np.nan for name in FORCE]
+        force = tuple((_turn(record, FORCE_AXES) @ components).tolist())
+        pulled = any(force) if vector else tension > 0.0 and record.get(CABLE[0])
+        if not pulled or (vector and not np.isnan(tension)):
             raise MeasurementError("no force", expected=f"{', '.join(FORCE)}; or {TENSION} and {', '.join(CABLE)}")
         axes = zip("xyz", _turn(record, MOVED_AXES).T.tolist(), MOVED, strict=True)
         moved = [(c, tuple(axis), m_from_um(number(record, name))) for c, axis, name in axes if record.get(name)]
         if record.get("displacement_um") and record.get(DIAL[0]):
             dial = np.array([number(record, name) for name in DIAL])
-            reading = m_from_um(float(record["displacement_um"]))
+            reading = m_from_um(number(record, "displacement_um", FARTHEST))
             moved.append(("dial", tuple(dial / np.linalg.norm(dial)), reading))
-        if not moved:
+        if not any(value for *_, value in moved):
             expected = f"{', '.join(MOVED)}; or displacement_um along {', '.join(DIAL)}"
             raise MeasurementError("nothing read", expected=expected)
         pose = (*mm(POSITION), *angles) if placed else (np.nan,) * 6
@@ -214,10 +209,17 @@ def _joint_columns(machine: MachineTool) -> dict[str, tuple[int, bool]]:
     return columns
 
 
-def _of_rows(rows: Sequence[_Pull], machine: MachineTool) -> Pulls:
+def _further(machine: MachineTool) -> tuple[str, ...]:
+    """Columns that pulls have beside those of stiffnesses."""
+    return (
+        *FORCE, *FORCE_AXES, *MOVED, *MOVED_AXES, *DIAL, TENSION, *CABLE, *PULL, *TARGET, *_joint_columns(machine)
+    )  # fmt: skip
+
+
+def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) -> Pulls:
     """The machine stood at each row's pose or joints; a reading for each component that was read."""
     pose, joints = np.array([row.pose for row in rows]), np.array([row.joints for row in rows])
-    stance = _stances(machine, pose, joints, rows)
+    stance, assumed = _stances(machine, pose, joints, rows)
     turn = np.broadcast_to(np.eye(3) if stance.rotation is None else stance.rotation, (len(rows), 3, 3))
     pull, target = (np.einsum("nij,nj->ni", turn, [getattr(row, name) for row in rows]) for name in ("pull", "target"))
     cable = np.array([row.pulley for row in rows]) - stance.position - pull
@@ -238,12 +240,18 @@ def _of_rows(rows: Sequence[_Pull], machine: MachineTool) -> Pulls:
         file=np.array([row.file for row in rows])[which],
         line=np.array([row.line for row in rows])[which],
         component=np.array([name for row in rows for name, *_ in row.moved]),
+        notes=tuple(dict.fromkeys([*notes, *assumed])),
     )
 
 
-def _stances(machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: Sequence[_Pull]) -> Stance:
-    """At the joints where they are given, else at the pose. Raises `InputErrors` for rows that cannot be."""
-    by_joints, errors = ~np.isnan(joints).any(axis=1), []
+def _stances(
+    machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: Sequence[_Pull]
+) -> tuple[Stance, list[str]]:
+    """At the joints where they are given, else at the pose, and what was assumed.
+
+    Raises `InputErrors` for rows that cannot be.
+    """
+    by_joints, errors, notes = ~np.isnan(joints).any(axis=1), list[MeasurementError](), list[str]()
     position, rotation, joints = pose[:, :3], rotation_matrices(pose[:, 3:]), joints.copy()
     apart = np.full(len(rows), np.nan)
     if by_joints.any():
@@ -258,11 +266,13 @@ def _stances(machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: S
         kept = max(range(len(tried)), key=lambda i: (int((room[i] >= 0.0).sum()), float(room[i].min())))
         missed = np.isnan(tried[kept]).any(axis=1, keepdims=True)
         joints[~by_joints] = np.where(missed, machine.solve(*alone).joints, tried[kept])
+        if machine.configurations[kept]:
+            notes.append(f"poses without joint values: taken in the configuration {machine.configurations[kept]}")
     for row in np.flatnonzero(np.isnan(joints).any(axis=1)).tolist():
         errors.append(MeasurementError("no joint values lead to the pose", file=rows[row].file, line=rows[row].line))
     if errors:
         raise InputErrors(errors)
-    return machine.standing(joints)
+    return machine.standing(joints), notes
 
 
 def _of_stiffnesses(files: Sequence[str], machine: MachineTool, mapping: Mapped) -> Pulls:

@@ -1,5 +1,7 @@
 """A diagnosis of a machine of elements in words, and its files."""
 
+import numpy as np
+
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.correction.on_elements import ElementUpdate
 from toolpath_stiff.diagnosis.on_elements import NRAD, ElementDiagnosis
@@ -18,19 +20,19 @@ def text(result: ElementDiagnosis) -> str:
         f"error as given {result.error_as_given:.1f} % of the displacements (rms), chi-square "
         f"{chi_square(problem.none):.0f} of {count} readings",
         *filter(None, [question(problem)]),
-        *(f"  {finding}" for fit in result.plausible for finding in fit.findings),
+        *(f"  {finding}" for fit in result.plausible[:MOST] for finding in fit.findings),
         *([f"taken for wild: {', '.join(result.wild)}"] if result.wild else []),
     ]
     rows = [(label_of(fit), f"{chi_square(fit):.0f}", "; ".join(fit.findings)) for fit in result.ranked[:MOST]]
     lines += ["", *ShownTable(("effect, fitted alone", ">chi-square", "finding"), rows).lines()]
-    if result.joints is not None:
+    if result.joints is not None and np.isfinite(result.left_out).all():
         values = ", ".join(f"{name} {NRAD * value:.0f}" for name, value in result.torsions.items())
         lines += ["", f"torsion of the joints fitted in place of the file's, nrad/(N m): {values}"]
         lines.append(
             f"error of these at poses left out of the fit {problem.error_percent(result.left_out):.1f} %; they leave "
             f"chi-square {chi_square(result.joints):.0f} of {count} readings"
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, *(f"note: {note}" for note in result.pulls.notes)])
 
 
 def residuals_csv(result: ElementDiagnosis | ElementUpdate) -> str:

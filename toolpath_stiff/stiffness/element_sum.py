@@ -4,6 +4,7 @@ Along a direction d the tip gives sum c (s . d)^2 for a force along it (Castigli
 gives what each element carries). That runs over columns, poses last: three numbers a spring, no matrix a pose.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.elements import Spring, Stance
 from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.model import StiffnessModel
 
@@ -27,9 +29,9 @@ def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
     Effects that depend on the load are left out.
     """
     compliance = stance_of(path).tip_compliance()[:, :3, :3]
-    at_tip, in_elements = _of_effects(model, path)
+    at_tip, in_elements = added_by(model.effects, path)
     if at_tip is not None:
-        compliance = compliance + at_tip
+        compliance = compliance + at_tip[:, :3, :3]
     if in_elements is not None:
         rows = element_rows(stance_of(path))
         compliance = compliance + np.einsum("nri,nr,nrj->nij", rows, in_elements, rows)
@@ -43,23 +45,23 @@ def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArra
         if model.load_dependent:
             loads = np.einsum("nri,ni->nr", element_rows(stance_of(path)), direction)
             path = replace(path, element_loads=loads * path.force[:, None])
-        at_tip, in_elements = _of_effects(model, path)
+        at_tip, in_elements = added_by(model.effects, path)
         if at_tip is not None:
-            along = along + np.einsum("ni,nij,nj->n", direction, at_tip, direction)
+            along = along + np.einsum("ni,nij,nj->n", direction, at_tip[:, :3, :3], direction)
         if in_elements is not None:
             rows = np.einsum("nri,ni->nr", element_rows(stance_of(path)), direction) if loads is None else loads
             along = along + (in_elements * rows**2).sum(axis=1)
     return exact.possible(model, path, along[:, None, None])[:, 0, 0]
 
 
-def _of_effects(model: StiffnessModel, path: LoadPath) -> tuple[FloatArray | None, FloatArray | None]:
-    """What effects add: (n, 3, 3) m/N at the tip, (n, r) m/N and rad/(N m) in the elements' loads; None: nothing."""
+def added_by(effects: Iterable[ActiveEffect], path: LoadPath) -> tuple[FloatArray | None, FloatArray | None]:
+    """What effects add: (n, 6, 6) at the tip, (n, r) m/N and rad/(N m) in the elements' loads; None: nothing."""
     at_tip: FloatArray | None = None
     in_elements: FloatArray | None = None
-    for active in model.effects:
+    for active in effects:
         form, more = active.adds("load_compliance", path), active.adds("element_compliance", path)
         if form is not None:
-            at_tip = form[:, 6:9, 6:9] if at_tip is None else at_tip + form[:, 6:9, 6:9]
+            at_tip = form[:, 6:, 6:] if at_tip is None else at_tip + form[:, 6:, 6:]
         if more is not None:
             in_elements = more if in_elements is None else in_elements + more
     return at_tip, in_elements

@@ -12,9 +12,11 @@ import toolpath_stiff as tps
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
+from toolpath_stiff.machine.elements import turns
 from toolpath_stiff.poses import pose_in_mm, pose_in_si
 from toolpath_stiff.readings.measurements import reading_columns
 from toolpath_stiff.report.scene import machine_scene, reach_boundary
+from toolpath_stiff.stiffness.contract import ELEMENT
 from toolpath_stiff.studio.session import Session
 
 POSE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
@@ -124,14 +126,18 @@ def verdict(session: Session) -> Document | None:
 
 def effects(session: Session) -> list[Document]:
     """The catalogue with what a diagnosis says of each, the likeliest first."""
-    judged = {row["effect"]: row for row in (session.document("diagnose") or {"candidates": []})["candidates"]}
-    order = [*judged]
+    candidates = (session.document("diagnose") or {"candidates": []})["candidates"]
+    judged = {row["effect"]: row for row in reversed(candidates)}  # of several elements the likeliest
+    order = [row["effect"] for row in candidates]
     rows = [
         {
             "probability": None,
             **judged.get(effect.name, {}),
             **{name: getattr(effect, name) for name in ("name", "title", "link")},
-            "sliders": [_slider(part, judged.get(effect.name, {}), session) for part in effect.parameters],
+            "sliders": [
+                _slider(part, judged.get(effect.name, {}), session, effect.link == "joints")
+                for part in effect.parameters
+            ],
             "on": session.case.state.on.get(effect.name),
         }
         for effect in session.catalogue().effects
@@ -140,14 +146,15 @@ def effects(session: Session) -> list[Document]:
     return sorted(rows, key=lambda row: order.index(row["name"]) if row["name"] in order else len(order))
 
 
-def _slider(parameter: tps.Parameter, candidate: Document, session: Session) -> Document:
-    """A parameter: its key, what it is, the ends of its slider, where it begins."""
+def _slider(parameter: tps.Parameter, candidate: Document, session: Session, of_joints: bool) -> Document:
+    """A parameter: its key, what it is, the ends of its slider, where it begins; elements are `of_joints` or others."""
     key, neutral, typical = parameter.key, parameter.neutral, parameter.typical
     value = _sizes(candidate).get(key) if candidate else None
     row = {"key": key, "name": parameter.name.replace("_", " "), "unit": parameter.unit}
     row |= {"meaning": parameter.meaning, "kind": parameter.kind}
     if parameter.kind == "text":
-        names = _setups(session)
+        machine = session.machine.model.machine
+        names = [e.name for e in machine.elements if turns(e) == of_joints] if key == ELEMENT else _setups(session)
         return row | {"choices": names, "start": value or (names[0] if names else "")}
     if parameter.kind == "integer":
         first, final = (int(end) for end in parameter.bounds)

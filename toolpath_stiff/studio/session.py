@@ -125,8 +125,8 @@ class Session:
 
     def catalogue(self) -> tps.EffectCatalogue:
         """The effects that can be switched on."""
-        files = self.case.effect_files
-        return self.once("catalogue", files, lambda: tps.effects(files))
+        files, kind = self.case.effect_files, self.machine.model.machine.kind
+        return self.once("catalogue", (files, kind), lambda: tps.effects(files, kind=kind))
 
     def trial(self) -> tps.PlacementTrial:
         """The program that can be put anywhere."""
