@@ -238,7 +238,8 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
     alike = [fit for fit in fits if behind[label_of(fit)] < ALIKE]
     standing = [fit for fit in fits[1:] if fit not in alike and not outvoted(ballots[label_of(fit)])]
     alike, standing = (
-        [fit for fit in some if not any(_says_more(fit, other, behind) for other in alike)] for some in (alike, standing)
+        [fit for fit in some if not any(_says_more(fit, other, behind) for other in alike)]
+        for some in (alike, standing)
     )
     if not explained or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
         return "ambiguous", [*alike, *standing]
