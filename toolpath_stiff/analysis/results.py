@@ -152,7 +152,7 @@ class Analysis(EvaluatedPath, FolderResult):
         return None if self.parameter_band is None else n_per_mm_from_n_per_m(self.parameter_band.deviation)
 
     def to_frame(self) -> pd.DataFrame:
-        """The samples as a pandas DataFrame, columns as in `samples.csv` and `cut.csv` (mm, degrees, N/mm, um)."""
+        """All samples as a pandas DataFrame, columns as in `samples.csv` and `cut.csv` (mm, degrees, N/mm, um)."""
         return frame_of(sample_columns(self) | ({} if self.cut is None else cut_columns(self, self.cut)))
 
     def to_dict(self) -> Document:

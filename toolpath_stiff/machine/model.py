@@ -372,6 +372,10 @@ class MachineTool:
         """(n, r) N and N m, all loads of the elements, one after the other, under the machine's own weight."""
         return np.zeros((len(stance), sum(load.compliance.shape[-1] for load in stance.loads)))
 
+    def standing(self, joints: FloatArray) -> Stance:
+        """How the machine stands at joint values (n, j) m or rad, with the reference tool."""
+        return self.solve(*self.forward(joints))
+
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
         """Bodies of a drawing by name, (n, p, 3) m in base axes."""
         raise NotImplementedError

@@ -295,6 +295,10 @@ class Serial(MachineTool):
             values[i] = (missing * np.cross(second, third, axis=0)).sum(axis=0) / volume
         return np.where(np.isfinite(angles).all(axis=0), values, np.nan)
 
+    def standing(self, joints: FloatArray) -> Stance:
+        """How it stands at joint values (n, j)."""
+        return self._stance(joints.T, np.zeros(len(joints), dtype=np.int64), np.zeros(1))
+
     def _stance(self, joints: FloatArray, chosen: IntArray, extension: FloatArray) -> Stance:
         """The stance at joint values (j, n) with tools so much longer than the reference tool."""
         tool, work = self.frames(joints)
