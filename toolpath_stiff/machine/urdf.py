@@ -70,7 +70,11 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
                 notes.append(f"joint {name} follows another one (mimic); here it moves by itself")
         link = joint.find("child").get("link", "")  # type: ignore[union-attr]
         inertia = inertias.get(link)
-        if frame and inertia is not None and (mass := _number(inertia.find("mass"), "value", f"link {link}", "kg", fault)):
+        if (
+            frame
+            and inertia is not None
+            and (mass := _number(inertia.find("mass"), "value", f"link {link}", "kg", fault))
+        ):
             centre = mm_from_m(rest.then(placement(_numbers(inertia.find("origin"), "xyz", [0.0] * 3, fault))).origin)
             masses.append(section("[[mass]]", {"name": link, "kg": mass, "frame": frame, "centre_mm": centre}))
     if not rows:
