@@ -139,15 +139,10 @@ def place(
     >>> found.worse
     []
     """
-    if write is None and not (decimals is None and linearise_mm is None):
-        raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     on, part = machine_from(machine), program_from(program)
     model, origin, turns = on.running(part), origin_si(origin_mm_deg), (tilt_a_deg, tilt_b_deg, rotate_deg)
     default, setup = model.machine.default_origin, cut_setup(cut, material, stock_mm)
-    if setup is not None and turn != FIXED:
-        raise InputError("--turn with --objective error", hint="place with another objective")
-    if (objective == ERROR) != (setup is not None):
-        raise InputError("--objective error and a cut need each other", hint="say --cut, or --material and --stock")
+    _check_together(write is None, decimals is None and linearise_mm is None, objective, setup is None, turn)
     read = part.moves(origin, default)
     present, step = origin or (read.origin if read.origin_source == "program" else default), m_from_mm(step_mm)
     now = None if setup is None else evaluate_cut(model, read, present, setup, step, progress)
@@ -169,6 +164,17 @@ def place(
     )
     placed = place_program(task, counter(progress, f"{part.name}: search"))
     return replace(placed, inputs=(*part.inputs, *on.inputs))
+
+
+def _check_together(unwritten: bool, as_written: bool, objective: str, uncut: bool, turn: str | float) -> None:
+    """Raise `InputError` for options that ask for others, or shut them out."""
+    if unwritten and not as_written:
+        raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
+    if (objective == ERROR) == uncut:
+        raise InputError("--objective error and a cut need each other", hint="say --cut, or --material and --stock")
+    if turn != FIXED and not (uncut and unwritten):
+        hint = "leave --turn out, or --write and --objective error"
+        raise InputError("--turn with --write or --objective error: neither turns the tool", hint=hint)
 
 
 def _keep_out(text: str) -> KeepOut:

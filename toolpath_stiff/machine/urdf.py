@@ -37,6 +37,36 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
         raise InputError(f"not XML: {error.msg}", file=file, line=error.position[0]) from None
     if any("}" in str(element.tag) for element in robot.iter()):  # of a namespace: xacro's
         raise macros
+    chain = _chain(robot, tip, fault)
+    rows, rest, notes, masses, frame = [], STILL, [], [], ""
+    inertias = {link.get("name"): inertia for link in robot.iter("link") for inertia in link.findall("inertial")}
+    for joint in chain:
+        name, kind = joint.get("name", "?"), joint.get("type", "")
+        rest = rest.then(_origin(joint, fault))
+        if kind not in ("fixed", *MOVING):
+            raise fault(f"joint {name} is {kind}", expected=f"fixed, {', '.join(MOVING)}")
+        if kind != "fixed":
+            rows.append(_row(joint, name, kind, rest, fault))
+            rest, frame = STILL, name
+            if joint.find("mimic") is not None:
+                notes.append(f"joint {name} follows another one (mimic); here it moves by itself")
+        link = joint.find("child").get("link", "")  # type: ignore[union-attr]
+        inertia = inertias.get(link, ET.Element("none"))
+        mass = _number(inertia.find("mass"), "value", f"link {link}", "kg", fault)
+        if frame and mass:
+            centre = mm_from_m(rest.then(placement(_numbers(inertia.find("origin"), "xyz", [0.0] * 3, fault))).origin)
+            masses.append(section("[[mass]]", {"name": link, "kg": mass, "frame": frame, "centre_mm": centre}))
+    if not rows:
+        raise fault("no joint moves on the way to the tip", expected="a chain of joints")
+    notes.insert(0, f"Made from {file}: {len(rows)} joints; limits of effort are left out.")
+    name = robot.get("name", "robot")
+    return file_text(
+        name, "serial", f"URDF {file}", notes, [*rows, tool_section(rest), JOINTS, SPINDLE, *masses]
+    ), notes
+
+
+def _chain(robot: ET.Element, tip: str, fault: Fault) -> list[ET.Element]:
+    """The joints from the root link to the tip."""
     above: dict[str, ET.Element] = {}
     for joint in robot.iter("joint"):
         if (child := joint.find("child")) is None or joint.find("parent") is None:
@@ -56,34 +86,7 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
             raise fault(f"joint {above[tip].get('name')} leads back to itself: a loop", expected="a tree")
         chain.insert(0, above[tip])
         tip = above[tip].find("parent").get("link", "")  # type: ignore[union-attr]
-    rows, rest, notes, masses, frame = [], STILL, [], [], ""
-    inertias = {link.get("name"): link.find("inertial") for link in robot.iter("link")}
-    for joint in chain:
-        name, kind = joint.get("name", "?"), joint.get("type", "")
-        rest = rest.then(_origin(joint, fault))
-        if kind not in ("fixed", *MOVING):
-            raise fault(f"joint {name} is {kind}", expected=f"fixed, {', '.join(MOVING)}")
-        if kind != "fixed":
-            rows.append(_row(joint, name, kind, rest, fault))
-            rest, frame = STILL, name
-            if joint.find("mimic") is not None:
-                notes.append(f"joint {name} follows another one (mimic); here it moves by itself")
-        link = joint.find("child").get("link", "")  # type: ignore[union-attr]
-        inertia = inertias.get(link)
-        if (
-            frame
-            and inertia is not None
-            and (mass := _number(inertia.find("mass"), "value", f"link {link}", "kg", fault))
-        ):
-            centre = mm_from_m(rest.then(placement(_numbers(inertia.find("origin"), "xyz", [0.0] * 3, fault))).origin)
-            masses.append(section("[[mass]]", {"name": link, "kg": mass, "frame": frame, "centre_mm": centre}))
-    if not rows:
-        raise fault("no joint moves on the way to the tip", expected="a chain of joints")
-    notes.insert(0, f"Made from {file}: {len(rows)} joints from link {tip}; limits of effort are left out.")
-    name = robot.get("name", "robot")
-    return file_text(
-        name, "serial", f"URDF {file}", notes, [*rows, tool_section(rest), JOINTS, SPINDLE, *masses]
-    ), notes
+    return chain
 
 
 def _row(joint: ET.Element, name: str, kind: str, rest: FixedFrame, fault: Fault) -> str:

@@ -119,8 +119,6 @@ def _check(task: PlacementTask) -> None:
         raise InputError(mistake, hint="place it with --rotate 0, untilted")
     if not task.write:
         return
-    if len(task.bounds.low) > 6:
-        raise InputError("--write with --turn: a program does not say how the tool is turned about its axis")
     check_rewritable(task.program)
     if task.program.interpreter != "builtin":
         raise InputError(
