@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import toolpath_stiff as tps
-from benchmarks.bars import JUST_SEEN, Record, share
+from benchmarks.bars import Record, share
 from benchmarks.case_loop import document, record_of, run_benchmark, sound
 from benchmarks.pages import table
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.robot import FAULTS, robot_case
+from toolpath_stiff.rig.sizes import DETECTABLE
 
 FIRST_SEED = 92_000_000
 RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_robots.jsonl"
@@ -74,12 +75,12 @@ def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
     """The page, and whether all bars are cleared."""
     cases = sound(records, lambda r: r["seed"])
     inside, outside, none = ([r for r in cases if r["kind"] == kind] for kind in ("one", "outside", "none"))
-    carried = [r for r in inside if r["seen"] >= JUST_SEEN]
+    carried = [r for r in inside if r["seen"] >= DETECTABLE]
     counted = [
         ("known effect: right", carried, named, 0.90, None),
         ("known effect: right, or listed", carried, lambda r: set(r["right"]) & set(r["plausible"]), None, None),
         ("known effect that no reading carries: right, or called sound",
-         [r for r in inside if r["seen"] < JUST_SEEN], lambda r: named(r) or r["verdict"] == "adequate", None, None),
+         [r for r in inside if r["seen"] < DETECTABLE], lambda r: named(r) or r["verdict"] == "adequate", None, None),
         ("wrong name", cases, misnamed, None, 0.03),
         ("outside the catalogue: `unexplained`", outside, lambda r: r["verdict"] == "unexplained", 0.90, None),
         ("sound: `adequate`", none, lambda r: r["verdict"] == "adequate", 0.95, None),

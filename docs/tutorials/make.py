@@ -39,6 +39,8 @@ PICTURES = {
     "2_ladder_again.png": ("2_after_a_plan.md", "ex2/second/ladder.png", 1.0),
     "3_portrait.png": ("3_outside_the_catalogue.md", "ex3/first/portrait.png", 1.0),
     "3_before_after.png": ("3_outside_the_catalogue.md", "ex3/update/before_after.png", 1.0),
+    "4_machine.png": ("4_a_robot_cell.md", "cell/machine.png", 1.0),
+    "4_path.png": ("4_a_robot_cell.md", "cell/placed/path.png", 1.0),
     "5_part.png": ("5_micrometres.md", "shop/analyze/cut.png", 1.0),
     "5_forces.png": ("5_micrometres.md", "shop/forces/forces.png", 1.0),
 }

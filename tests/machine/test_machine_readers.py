@@ -58,11 +58,25 @@ def test_urdf_is_the_robot_with_its_tool_and_limits():
     with pytest.raises(InputError, match=r"torsion_nrad_per_Nm is missing.*0 to|torsion_nrad_per_Nm is missing"):
         parse_machine(made.text)
     machine = filled(made.text)
+    assert machine.weight_loads(machine.solve([[1.5, 0.0, 0.8]])).any()  # masses of the links
     for ours, theirs in zip(machine.forward(JOINTS), ROBOT.forward(JOINTS), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-12)
     np.testing.assert_allclose(machine.joint_limits, ROBOT.joint_limits, rtol=1e-12)
     assert machine.wrist is not None  # right angles survive the way through rpy
     assert [element.name for element in machine.elements][:2] == ["joint 1", "joint 2"]
+
+
+def test_what_files_of_robots_have_besides_is_read_past(tmp_path):
+    """As files on the web have it: comments on xacro, a link "world" below, joints named again by transmissions."""
+    besides = "<!-- made from robot.xacro: see there --><gazebo><plugin/></gazebo>" + "".join(
+        f'<transmission name="t{i}"><joint name="J{i}"/><actuator name="m{i}"/></transmission>' for i in range(1, 7)
+    )
+    world = '<link name="world"/><joint name="w" type="fixed"><parent link="world"/><child link="base"/></joint>'
+    file = tmp_path / "arm.urdf"
+    file.write_text(URDF.replace("</robot>", f"{besides}{world}</robot>").replace('velocity="0"', 'velocity="2.5"'))
+    machine = filled(tps.machine_from_urdf(file, "tip").text)
+    np.testing.assert_allclose(machine.forward(JOINTS)[0], ROBOT.forward(JOINTS)[0], atol=1e-12)
+    np.testing.assert_allclose(machine.joint_speeds, 2.5)
 
 
 def test_a_table_of_dh_rows_is_the_robot(tmp_path):

@@ -312,15 +312,15 @@ def kept_configurations(
     limits, winds = machine.joint_limits, np.array(machine.joint_kinds) == "rotary"
     stances = list(machine.stances(position, rotation, lengths))
     margins = np.array([reach(machine, position, stance).margin.reshape(paths, -1) for stance in stances])
-    counts = (margins >= 0.0).any(axis=0)
-    counts |= ~counts.any(axis=1)[:, None]
+    counts: BoolArray = np.asarray((margins >= 0.0).any(axis=0))
+    counts |= ~np.asarray(counts.any(axis=1, keepdims=True))
     least = np.where(counts, margins, np.inf).min(axis=2)
-    for stance, margin in zip(stances, least, strict=True):
+    for i, stance in enumerate(stances):
         joints = stance.joints.reshape(paths, -1, len(limits)).swapaxes(0, 1)
         number = np.where(counts.T, np.arange(len(joints))[:, None], counts.T.argmax(axis=0))
         there = np.take_along_axis(joints, np.maximum.accumulate(number)[:, :, None], axis=0)
         goes_on = room_to_wind(unwound(there, winds), limits, winds)
-        margin -= np.where(goes_on, 0.0, np.maximum(margin, 0.0) + TURNING_BACK)
+        least[i] -= np.where(goes_on, 0.0, np.maximum(least[i], 0.0) + TURNING_BACK)
     return np.asarray(np.argmax(least, axis=0))
 
 

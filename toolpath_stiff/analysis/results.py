@@ -13,6 +13,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.assumptions import assumptions_of, pose_words, words_turn_the_platform
 from toolpath_stiff.analysis.cut_figures import cut_columns, cut_document, lines_beyond
 from toolpath_stiff.analysis.evaluation import Progress, evaluate
+from toolpath_stiff.analysis.joint_motion import joint_warnings, lines_named
 from toolpath_stiff.analysis.loads import Load, parse_load
 from toolpath_stiff.analysis.statistics import (
     FIGURES,
@@ -25,7 +26,7 @@ from toolpath_stiff.analysis.statistics import (
 )
 from toolpath_stiff.analysis.turning import FIXED, TurnChoice, choose_turn
 from toolpath_stiff.analysis.uncertainty import band_figures
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
@@ -43,7 +44,7 @@ from toolpath_stiff.stiffness.model import (
     condition_warnings,
     effects_stated,
 )
-from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,8 +52,6 @@ if TYPE_CHECKING:
 
 
 STANDING = ("weakest", "out_of_reach_samples", "extrapolated_share")  # of a machine compared with
-MOST_NAMED = 5  # lines in a warning
-SHORTEST = 1e-9  # s between samples: less is the rounding of one time
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -251,15 +250,13 @@ def analyze(
     place_at, source = _effective_origin(model.machine, program, origin)
     words = model.machine.angles_of if program.native else None
     samples = sample_moves(place(program.moves, place_at), step, model.machine.rapid_feed, place_at, words)
-    choice = None
-    if turn != FIXED:
-        poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+    choice, poses = None, (samples.position, samples.abc, samples.tangent, samples.tool_length)
+    if turn == FIXED:
+        there = evaluate(model, *poses, direction, force, progress)
+    else:
         choice = choose_turn(model, *poses, direction, turn)
         samples = replace(samples, abc=choice.abc)
         there = choice.evaluate(model, samples, direction, force, progress)
-    else:
-        poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
-        there = evaluate(model, *poses, direction, force, progress)
     analysis = Analysis(
         program=program,
         model=model,
@@ -295,13 +292,7 @@ def _effective_origin(machine: MachineTool, program: ReadProgram, origin: Pose |
 def _warnings(analysis: Analysis) -> list[str]:
     """What the evaluation itself has to say."""
     warnings, samples, there = [], analysis.samples, analysis.at
-    if len(changes := _changes(analysis)):
-        at_lines = ", ".join(map(str, changes[:MOST_NAMED]))
-        warnings.append(
-            f"lines {at_lines}: the joints cannot go on as they stand; the configuration has to change there, or a "
-            "joint to turn back"
-        )
-    warnings += _too_fast(analysis)
+    warnings += joint_warnings(analysis, () if analysis.turn is None else analysis.turn.changes)
     rapids, swapped = ~samples.cutting & ~there.reachable, samples.cutting & there.substituted
     if rapids.any():
         first = int(np.argmax(rapids))
@@ -310,45 +301,11 @@ def _warnings(analysis: Analysis) -> list[str]:
             f"{_sample_words(analysis, first)}"
         )
     if swapped.any():
-        where = np.unique(samples.line[swapped])
-        more = f" and {len(where) - MOST_NAMED} more" if len(where) > MOST_NAMED else ""
         warnings.append(
-            f"lines {', '.join(map(str, where[:MOST_NAMED]))}{more}: the load direction does not exist there "
+            f"{lines_named(samples.line[swapped])}: the load direction does not exist there "
             "(rotary axes alone, or a move along the tool axis); the softest direction stands in"
         )
     return warnings
-
-
-def _changes(analysis: Analysis) -> IntArray:
-    """Lines of cuts within which the joints do not go on."""
-    samples, rotary = analysis.samples, np.array(analysis.machine.joint_kinds) == "rotary"
-    going = samples.cutting[1:] & samples.cutting[:-1]
-    back = (np.abs(np.diff(analysis.at.joints[:, rotary], axis=0)) > np.pi).any(axis=1) & going
-    changes = analysis.turn.changes if analysis.turn else np.zeros(0, dtype=np.int64)
-    return np.unique(samples.line[np.union1d(np.flatnonzero(back) + 1, changes)])
-
-
-def _too_fast(analysis: Analysis) -> list[str]:
-    """The lines of cuts that ask more of a joint than its speed."""
-    machine, samples = analysis.machine, analysis.samples
-    if not np.isfinite(machine.joint_speeds).any():
-        return []
-    duration, going = np.diff(samples.t)[:, None], samples.cutting[1:] & samples.cutting[:-1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        speed = np.abs(np.diff(analysis.at.joints, axis=0)) / duration
-    speed[~going | (duration <= SHORTEST)[:, 0]] = 0.0
-    share = np.nan_to_num(speed) / machine.joint_speeds
-    fast = np.unique(samples.line[1:][(share > 1.0).any(axis=1)])
-    if not len(fast):
-        return []
-    row, joint = np.unravel_index(int(share.argmax()), share.shape)
-    unit, shop = ("mm/s", mm_from_m) if machine.joint_kinds[joint] == "linear" else ("deg/s", deg_from_rad)
-    asked, most = (shop(float(value)) for value in (speed[row, joint], machine.joint_speeds[joint]))
-    more = f" and {len(fast) - MOST_NAMED} more" if len(fast) > MOST_NAMED else ""
-    return [
-        f"lines {', '.join(map(str, fast[:MOST_NAMED]))}{more} ask more of a joint than its speed, most line "
-        f"{samples.line[row + 1]}: {machine.joint_names[joint]} {asked:.3g} {unit} of {most:.3g}: feed slower there"
-    ]
 
 
 def _sample_words(analysis: Analysis, i: int) -> str:

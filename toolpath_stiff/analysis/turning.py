@@ -67,7 +67,7 @@ class TurnChoice:
     configuration: IntArray
     constant: bool
     changes: IntArray
-    mode: str = BEST
+    mode: str | float = BEST
     mean: float = np.nan
     best_constant: float = np.nan
     median_constant: float = np.nan
@@ -76,7 +76,7 @@ class TurnChoice:
         self, model: StiffnessModel, samples: Samples, load: Load, force: float, progress: Progress | None = None
     ) -> Evaluation:
         """What the machine does along the path, stretch by stretch of one configuration where these were chosen."""
-        parts, chosen = [], self.mode == BEST and len(model.machine.configurations) > 1
+        parts, chosen = [], self.mode not in (FIXED, FEED) and len(model.machine.configurations) > 1
         changes = (np.flatnonzero(np.diff(self.configuration)) + 1).tolist()
         for start, stop in pairwise([0, *changes, len(samples)]):
             there, only = samples.take(slice(start, stop)), model
@@ -96,8 +96,6 @@ class TurnChoice:
             chosen = f"kept {first:.1f} deg from the program's"
         else:
             chosen = f"changed along the path from {first:.1f} to {last:.1f} deg from the program's"
-        if np.isnan(self.mean):
-            return f"the turn about the tool's axis is {chosen}"
         figures = f"mean compliance {nm_from_m(self.mean):.1f} nm/N at up to {NODES} places"
         if np.isfinite(self.best_constant):
             figures += (
@@ -135,7 +133,8 @@ def choose_turn(
     load
         Whose compliance counts.
     mode
-        "fixed" as programmed, "feed" with the tool's x along the feed, "best", or so many degrees.
+        "fixed" as programmed, "feed" with the tool's x along the feed, "best", or so many degrees, with the stiffest
+        configuration.
 
     Raises
     ------
@@ -148,14 +147,12 @@ def choose_turn(
     check_free_turn(machine, mode)
     if mode == FEED:
         return replace(_kept(rotation, feed_turns(rotation, tangent)), mode=FEED)
-    if mode != BEST:
-        return replace(_kept(rotation, np.full(len(abc), rad_from_deg(float(mode)))), mode=FIXED)
     nodes = np.unique(np.linspace(0, len(abc) - 1, NODES).round().astype(np.int64))
-    angles = np.asarray(TURN / TURNS * np.arange(TURNS), dtype=np.float64)
+    angles = np.array([rad_from_deg(float(mode))] if mode != BEST else TURN / TURNS * np.arange(TURNS))
     poses = (position[nodes], rotation[nodes], tangent[nodes])
     joints, cost = _candidates(model, poses, tool_length[nodes], load, angles)
     if not np.isfinite(cost).any():
-        raise InputError(f"--turn best: machine {machine.name} reaches no pose of the path at any turn")
+        raise InputError(f"--turn {mode}: machine {machine.name} reaches no pose of the path so")
     limits = machine.joint_limits
     winds = np.array([kind == "rotary" for kind in machine.joint_kinds]) & (np.ptp(limits, axis=1) > TURN)
     constant = constant_costs(joints, cost, limits, winds, STEP)
@@ -183,8 +180,9 @@ def choose_turn(
         turn=turn,
         abc=roll_pitch_yaw(turned_about_tool(rotation, turn)) + 0.0,
         configuration=configuration[nearest],
-        constant=bool(keeps),
+        constant=bool(keeps) or len(angles) == 1,
         changes=np.array(changes, dtype=np.int64),
+        mode=mode,
         mean=means[1] if keeps else means[0],
         best_constant=means[1] if np.isfinite(means[1]) else np.nan,
         median_constant=float(np.median(possible)) if len(possible) else np.nan,

@@ -139,27 +139,19 @@ def place(
     >>> found.worse
     []
     """
-    if write is None and not (decimals is None and linearise_mm is None):
-        raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     on, part = machine_from(machine), program_from(program)
     model, origin, turns = on.running(part), origin_si(origin_mm_deg), (tilt_a_deg, tilt_b_deg, rotate_deg)
     default, setup = model.machine.default_origin, cut_setup(cut, material, stock_mm)
-    if (objective == ERROR) != (setup is not None):
-        raise InputError("--objective error and a cut need each other", hint="say --cut, or --material and --stock")
+    _check_together(write is None, decimals is None and linearise_mm is None, objective, setup is None, turn)
     read = part.moves(origin, default)
     present, step = origin or (read.origin if read.origin_source == "program" else default), m_from_mm(step_mm)
-    bounds = _bounds(model.machine, *_from_base(base_mm, (x_mm, y_mm, z_mm), z_values_mm), turns)
-    if turn != FIXED:
-        bounds = _with_tool(bounds, model.machine, turn)
-        if setup is not None:
-            raise InputError("--turn with --objective error", hint="place with another objective")
     now = None if setup is None else evaluate_cut(model, read, present, setup, step, progress)
     task = PlacementTask(
         model=model,
         program=read,
         present=present,
         read=lambda other: part.moves(other, default),
-        bounds=bounds,
+        bounds=_bounds(model.machine, *_from_base(base_mm, (x_mm, y_mm, z_mm), z_values_mm), turns, turn),
         rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
         load=parse_load(load),
         step=step,
@@ -174,6 +166,17 @@ def place(
     return replace(placed, inputs=(*part.inputs, *on.inputs))
 
 
+def _check_together(unwritten: bool, as_written: bool, objective: str, uncut: bool, turn: str | float) -> None:
+    """Raise `InputError` for options that ask for others, or shut them out."""
+    if unwritten and not as_written:
+        raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
+    if (objective == ERROR) == uncut:
+        raise InputError("--objective error and a cut need each other", hint="say --cut, or --material and --stock")
+    if turn != FIXED and not (uncut and unwritten):
+        hint = "leave --turn out, or --write and --objective error"
+        raise InputError("--turn with --write or --objective error: neither turns the tool", hint=hint)
+
+
 def _keep_out(text: str) -> KeepOut:
     """`NAME:X0,Y0,Z0,X1,Y1,Z1`."""
     name, _, corners = text.rpartition(":")
@@ -184,7 +187,11 @@ def _keep_out(text: str) -> KeepOut:
 
 
 def _bounds(
-    machine: MachineTool, box: Sequence[Range | None], heights_mm: Sequence[float], turns: Sequence[Range]
+    machine: MachineTool,
+    box: Sequence[Range | None],
+    heights_mm: Sequence[float],
+    turns: Sequence[Range],
+    tool: str | float,
 ) -> Bounds:
     """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
     heights = sorted(set(map(float, heights_mm)))
@@ -194,21 +201,21 @@ def _bounds(
         if side is None and not np.isfinite(reach).all():
             raise InputError(f"the machine file bounds no workspace in {axis}", hint=f"give --{axis} LO:HI")
     lengths = np.array([_pair(reach if side is None else side) for side, reach in zip(sides, workspace, strict=True)])
-    angles = np.array([_pair(turn) for turn in turns])
+    angles = np.array([_pair(turn) for turn in (*turns, *_turn_of_tool(machine, tool))])
     if not np.abs(lengths).max() <= inputs.FARTHEST_MM or not np.abs(angles).max() <= FARTHEST_TURN_DEG:
         raise InputError("bounds beyond reason", expected=f"within 100 m and {FARTHEST_TURN_DEG:g} degrees")
     low, high = np.concatenate([m_from_mm(lengths), rad_from_deg(angles)]).T
     return Bounds(low, high, tuple(m_from_mm(z) for z in heights))
 
 
-def _with_tool(bounds: Bounds, machine: MachineTool, turn: str | float) -> Bounds:
-    """The bounds with a constant turn of the tool about its axis: any, or so many degrees. Raises `InputError`."""
+def _turn_of_tool(machine: MachineTool, turn: str | float) -> list[Range]:
+    """Bounds of a constant turn of the tool about its axis, one or, as programmed, none. Raises `InputError`."""
+    if turn == FIXED:
+        return []
     check_free_turn(machine, turn)
     if turn == FEED:
         raise InputError(f"--turn {turn}", expected=f"{FIXED}, {BEST}, or degrees: one turn for the whole path")
-    low, high = (0.0, 360.0) if turn == BEST else (float(turn), float(turn))
-    ends = [np.append(end, rad_from_deg(angle)) for end, angle in ((bounds.low, low), (bounds.high, high))]
-    return Bounds(ends[0], ends[1], bounds.heights)
+    return [(0.0, 360.0) if turn == BEST else float(turn)]
 
 
 def _from_base(

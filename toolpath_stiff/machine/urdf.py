@@ -8,10 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.chain import STILL, FixedFrame, placement
-from toolpath_stiff.machine.unfilled import JOINTS, SPINDLE, axis_row, file_text, place_keys, tool_section
+from toolpath_stiff.machine.unfilled import JOINTS, SPINDLE, axis_row, file_text, place_keys, section, tool_section
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 Fault = Callable[..., InputError]
@@ -29,12 +28,45 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
     def fault(mistake: str, expected: str = "", hint: str = "") -> InputError:
         return InputError(mistake, expected=expected, hint=hint, file=file)
 
-    if "<!ENTITY" in text or "xacro:" in text:
-        raise fault("not a plain URDF", expected="XML without entities and macros", hint="run xacro over it first")
+    macros = fault("not a plain URDF", expected="XML without entities and macros", hint="run xacro over it first")
+    if "<!ENTITY" in text:
+        raise macros
     try:
         robot = ET.fromstring(text)
     except ET.ParseError as error:
         raise InputError(f"not XML: {error.msg}", file=file, line=error.position[0]) from None
+    if any("}" in str(element.tag) for element in robot.iter()):  # of a namespace: xacro's
+        raise macros
+    chain = _chain(robot, tip, fault)
+    rows, rest, notes, masses, frame = [], STILL, [], [], ""
+    inertias = {link.get("name"): inertia for link in robot.iter("link") for inertia in link.findall("inertial")}
+    for joint in chain:
+        name, kind = joint.get("name", "?"), joint.get("type", "")
+        rest = rest.then(_origin(joint, fault))
+        if kind not in ("fixed", *MOVING):
+            raise fault(f"joint {name} is {kind}", expected=f"fixed, {', '.join(MOVING)}")
+        if kind != "fixed":
+            rows.append(_row(joint, name, kind, rest, fault))
+            rest, frame = STILL, name
+            if joint.find("mimic") is not None:
+                notes.append(f"joint {name} follows another one (mimic); here it moves by itself")
+        link = joint.find("child").get("link", "")  # type: ignore[union-attr]
+        inertia = inertias.get(link, ET.Element("none"))
+        mass = _number(inertia.find("mass"), "value", f"link {link}", "kg", fault)
+        if frame and mass:
+            centre = mm_from_m(rest.then(placement(_numbers(inertia.find("origin"), "xyz", [0.0] * 3, fault))).origin)
+            masses.append(section("[[mass]]", {"name": link, "kg": mass, "frame": frame, "centre_mm": centre}))
+    if not rows:
+        raise fault("no joint moves on the way to the tip", expected="a chain of joints")
+    notes.insert(0, f"Made from {file}: {len(rows)} joints; limits of effort are left out.")
+    name = robot.get("name", "robot")
+    return file_text(
+        name, "serial", f"URDF {file}", notes, [*rows, tool_section(rest), JOINTS, SPINDLE, *masses]
+    ), notes
+
+
+def _chain(robot: ET.Element, tip: str, fault: Fault) -> list[ET.Element]:
+    """The joints from the root link to the tip."""
     above: dict[str, ET.Element] = {}
     for joint in robot.iter("joint"):
         if (child := joint.find("child")) is None or joint.find("parent") is None:
@@ -54,27 +86,30 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
             raise fault(f"joint {above[tip].get('name')} leads back to itself: a loop", expected="a tree")
         chain.insert(0, above[tip])
         tip = above[tip].find("parent").get("link", "")  # type: ignore[union-attr]
-    rows, rest, notes = [], STILL, []
-    for joint in chain:
-        name, kind = joint.get("name", "?"), joint.get("type", "")
-        rest = rest.then(_origin(joint, fault))
-        if kind == "fixed":
-            continue
-        if kind not in MOVING:
-            raise fault(f"joint {name} is {kind}", expected=f"fixed, {', '.join(MOVING)}")
-        if joint.find("mimic") is not None:
-            notes.append(f"joint {name} follows another one (mimic); here it moves by itself")
-        axis = _numbers(joint.find("axis"), "xyz", [1.0, 0.0, 0.0], fault)
-        if not np.linalg.norm(axis) > 0.0:
-            raise fault(f"joint {name}: axis 0 0 0", expected="a direction")
-        limits, place = _limits(joint, name, kind, fault), place_keys(rest, axis / np.linalg.norm(axis))
-        rows.append(axis_row(name, MOVING[kind], {**place, **_speed(joint, name, MOVING[kind], fault)}, limits))
-        rest = STILL
-    if not rows:
-        raise fault("no joint moves on the way to the tip", expected="a chain of joints")
-    notes.insert(0, f"Made from {file}: {len(rows)} joints from link {tip}; masses and limits of effort are left out.")
-    name = robot.get("name", "robot")
-    return file_text(name, "serial", f"URDF {file}", notes, [*rows, tool_section(rest), JOINTS, SPINDLE]), notes
+    return chain
+
+
+def _row(joint: ET.Element, name: str, kind: str, rest: FixedFrame, fault: Fault) -> str:
+    """The `[[axis]]` of a joint that moves."""
+    axis, linear = _numbers(joint.find("axis"), "xyz", [1.0, 0.0, 0.0], fault), MOVING[kind]
+    if not np.linalg.norm(axis) > 0.0:
+        raise fault(f"joint {name}: axis 0 0 0", expected="a direction")
+    speed = _number(joint.find("limit"), "velocity", f"joint {name}", "m/s or rad/s", fault)
+    key, value = ("speed_mm_per_s", mm_from_m(speed)) if linear else ("speed_deg_per_s", deg_from_rad(speed))
+    place = place_keys(rest, axis / np.linalg.norm(axis))
+    return axis_row(name, linear, {**place, **({key: value} if speed else {})}, _limits(joint, name, kind, fault))
+
+
+def _number(element: ET.Element | None, key: str, where: str, unit: str, fault: Fault) -> float:
+    """A number of 0 or more; 0 where there is none."""
+    word = "0" if element is None else element.get(key, "0")
+    try:
+        number = float(word)
+    except ValueError:
+        number = np.nan
+    if not 0.0 <= number < np.inf:
+        raise fault(f'{where}: {key}="{word}"', expected=f"a number, {unit}")
+    return number
 
 
 def _numbers(element: ET.Element | None, key: str, default: list[float], fault: Fault) -> FloatArray:
@@ -94,23 +129,6 @@ def _origin(joint: ET.Element, fault: Fault) -> FixedFrame:
         mistake = f"joint {joint.get('name')}: origin {place[0].tolist()}, rpy {place[1].tolist()}"
         raise fault(mistake, expected="metres and radians", hint="these look like mm or degrees")
     return placement(*place)
-
-
-def _speed(joint: ET.Element, name: str, linear: bool, fault: Fault) -> Document:
-    """The key of the speed that a joint reaches; none where the file has none, or 0."""
-    limit = joint.find("limit")
-    word = "0" if limit is None else limit.get("velocity", "0")
-    try:
-        speed = float(word)
-    except ValueError:
-        speed = np.nan
-    if not 0.0 <= speed < np.inf:
-        raise fault(f'joint {name}: velocity="{word}"', expected="a number, m/s or rad/s")
-    return (
-        {("speed_mm_per_s" if linear else "speed_deg_per_s"): (mm_from_m if linear else deg_from_rad)(speed)}
-        if speed
-        else {}
-    )
 
 
 def _limits(joint: ET.Element, name: str, kind: str, fault: Fault) -> FloatArray:

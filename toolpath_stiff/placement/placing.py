@@ -1,6 +1,7 @@
 """Placing a program: the search, the placement that it recommends analyzed, the program written for it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,18 +11,21 @@ from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import share, stiffness_figures
 from toolpath_stiff.analysis.turning import FIXED
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.defaults import OBJECTIVES
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.placement.evaluator import Evaluator
-from toolpath_stiff.placement.paths import WorkPath, work_path
+from toolpath_stiff.placement.goals import Goal
+from toolpath_stiff.placement.paths import WorkPath, representative_path, work_path
 from toolpath_stiff.placement.result import FIGURES, Placement, PlacementRow, PlacementTask, Written
-from toolpath_stiff.placement.search import PlacementResult, search_placements
-from toolpath_stiff.placement.working import Search
+from toolpath_stiff.placement.search import SCOUTS, PlacementResult, search_placements
+from toolpath_stiff.placement.working import NO_FLOORS, SCOUT_SAMPLES, Search
 from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
 from toolpath_stiff.rewriting.program import RewrittenProgram, check_rewritable, rewrite_program
+from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, n_per_mm_from_n_per_m, um_from_m
 
 ZERO = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "rotation_deg")
@@ -60,12 +64,14 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     """
     _check(task)
     path = work_path(task.program, task.step, task.load, task.model.machine)
-    present = np.append(task.present, np.zeros(len(task.bounds.low) - 6))  # the tool's turn as programmed
+    present, given = np.append(task.present, np.zeros(len(task.bounds.low) - 6)), task  # the tool's turn as programmed
+    if len(present) > 6 and len(task.model.machine.configurations) > 1:
+        task = replace(task, model=_in_best_configuration(task, path))
     search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, present)
     search.report, search.errors = progress or search.report, task.errors
     found = search_placements(search)
     front = numbered_rows(task, path, found)
-    before, reason = _analyzed(task, task.program, task.present)
+    before, reason = _analyzed(given, task.program, task.present)
     row = front[found.best]
     program = task.read(row.origin) if task.program.moves.from_machine.any() else task.program
     best, beyond = _analyzed(task, program, row.origin, row.tool_turn_deg)
@@ -91,6 +97,20 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     )
 
 
+def _in_best_configuration(task: PlacementTask, path: WorkPath) -> StiffnessModel:
+    """The model in the configuration of the machine in which some placement of many is best for the objective."""
+    bounds, rules, model = task.bounds, task.rules, task.model
+    draws = np.random.default_rng(rules.seed).uniform(size=(SCOUTS, len(bounds.free)))
+    scouts, few = bounds.placements(draws), representative_path(path, SCOUT_SAMPLES)
+    goal, values = Goal(OBJECTIVES[rules.objective], NO_FLOORS), []
+    machines = [model.machine.with_changes(only=i) for i in range(len(model.machine.configurations))]
+    for machine in machines:
+        tried = replace(model, machine=machine)
+        figures = Evaluator(tried, few, task.load, task.force, rules.keepouts).figures(scouts)
+        values.append(np.where(rules.violation(figures) > 0.0, -np.inf, goal.value(figures)).max())
+    return replace(model, machine=machines[int(np.argmax(values))])
+
+
 def _check(task: PlacementTask) -> None:
     """Raise `InputError` for what can be told before a search."""
     machine, turns = task.model.machine, np.concatenate([task.bounds.low[3:6], task.bounds.high[3:6]])
@@ -99,8 +119,6 @@ def _check(task: PlacementTask) -> None:
         raise InputError(mistake, hint="place it with --rotate 0, untilted")
     if not task.write:
         return
-    if len(task.bounds.low) > 6:
-        raise InputError("--write with --turn: a program does not say how the tool is turned about its axis")
     check_rewritable(task.program)
     if task.program.interpreter != "builtin":
         raise InputError(

@@ -1,0 +1,50 @@
+"""What a path asks of the joints: where they cannot go on as they stand, and where they are too slow."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from toolpath_stiff.analysis.statistics import EvaluatedPath
+from toolpath_stiff.arrays import IntArray
+from toolpath_stiff.units import deg_from_rad, mm_from_m
+
+MOST_NAMED = 5  # lines in a warning
+SHORTEST = 1e-9  # s between samples: less is the rounding of one time
+
+
+def lines_named(lines: IntArray) -> str:
+    """Lines in words, the first ones of many."""
+    each = np.unique(lines)
+    more = f" and {len(each) - MOST_NAMED} more" if len(each) > MOST_NAMED else ""
+    return f"lines {', '.join(map(str, each[:MOST_NAMED]))}{more}"
+
+
+def joint_warnings(path: EvaluatedPath, changes: IntArray | Sequence[int] = ()) -> list[str]:
+    """Lines of cuts in which a joint turns back, or is too slow; `changes`: samples before which the joints jump."""
+    samples, machine, warnings = path.samples, path.machine, []
+    rotary = np.array(machine.joint_kinds) == "rotary"
+    if not rotary.any() and not np.isfinite(machine.joint_speeds).any():
+        return []
+    going = samples.cutting[1:] & samples.cutting[:-1]
+    step = np.abs(np.diff(path.at.joints, axis=0))
+    back = np.flatnonzero((step[:, rotary] > np.pi).any(axis=1) & going) + 1
+    jumps = np.union1d(back, np.asarray(changes, dtype=np.int64))
+    if len(jumps):
+        warnings.append(
+            f"{lines_named(samples.line[jumps])}: the joints cannot go on as they stand; the configuration has to "
+            "change there, or a joint to turn back"
+        )
+    duration = np.diff(samples.t)
+    counted = np.setdiff1d(np.flatnonzero(going & (duration > SHORTEST)), jumps - 1)
+    speed = step[counted] / duration[counted, None]
+    share = np.nan_to_num(speed) / machine.joint_speeds
+    if (share > 1.0).any():
+        row, joint = np.unravel_index(int(share.argmax()), share.shape)
+        unit, shop = ("deg/s", deg_from_rad) if rotary[joint] else ("mm/s", mm_from_m)
+        asked, most = (shop(float(value)) for value in (speed[row, joint], machine.joint_speeds[joint]))
+        line = samples.line[counted + 1]
+        warnings.append(
+            f"{lines_named(line[(share > 1.0).any(axis=1)])} ask more of a joint than its speed, most line "
+            f"{line[row]}: {machine.joint_names[joint]} {asked:.3g} {unit} of {most:.3g}: feed slower there"
+        )
+    return warnings
