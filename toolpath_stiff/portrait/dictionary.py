@@ -192,9 +192,8 @@ def _relative(
     ground: Ground, plain: Term, values: FloatArray, kept: IntArray | None = None, scale: FloatArray | None = None
 ) -> FloatArray:
     """(s, n) change of compliance over the compliance by a link with shapes (s, n), some of them over their scale."""
-    if kept is None or scale is None:
-        return ground.columns(plain, ground.share(plain), values) / ground.compliance
-    return ground.columns(plain, ground.share(plain), values[kept]) / ground.compliance / scale[kept, None]
+    relative = ground.columns(plain, ground.share(plain), values) / ground.compliance
+    return relative if kept is None or scale is None else relative[kept] / scale[kept, None]
 
 
 def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:
