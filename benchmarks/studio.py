@@ -103,7 +103,7 @@ def measure_one(
     with studio(case, *words) as address:
         page = browser.new_page(viewport={"width": 1400, "height": 900})
         page.goto(address)
-        page.wait_for_selector("#sw-table_compliance", timeout=PATIENCE)
+        page.wait_for_selector("#sw-table_compliance", state="attached", timeout=PATIENCE)
         page.click("#cancel")
         page.evaluate(ASKING, [[on]])
         page.wait_for_selector("#profile-card:not([hidden])", timeout=PATIENCE)

@@ -10,10 +10,10 @@ from scipy.stats import norm
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, make_problem, simple_noise, table_1
-from tests.updating.test_evidence import by_hand, logs_by_hand, one_table, scatter
+from tests.updating.test_evidence import by_hand, logs_by_hand, one_table, scatter, scored
 from toolpath_stiff.inference.detectable import Detectable, detectable_sizes
 from toolpath_stiff.inference.evidence import Problem
-from toolpath_stiff.inference.hypotheses import Family, score_families, score_single
+from toolpath_stiff.inference.hypotheses import Family, score_families
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
@@ -33,7 +33,7 @@ def sizes(problem: Problem, families: list[Family], threshold: float = 9.0) -> d
 def gain(problem: Problem) -> float:
     """Of soft joints over the base model, by the real search."""
     base = problem.score_base()
-    return float(2.0 * (score_single(problem, one_table(), base).log_posterior - base.log_posterior))
+    return float(2.0 * (scored(problem, one_table(), base).log_posterior - base.log_posterior))
 
 
 def test_a_detectable_size_is_seen_in_four_campaigns_of_five():

@@ -7,9 +7,9 @@ from typing import Annotated
 
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.results import analyze as analyze_path
-from toolpath_stiff.analysis.turning import BEST, FEED, FIXED
+from toolpath_stiff.analysis.turning import FIXED
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, Tolerance, cut_setup
-from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si, pose_si
+from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, Turn, origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD
@@ -38,7 +38,7 @@ def analyze(
     step_mm: Step = 1.0,
     force_N: Force = FORCE,
     partial: Annotated[bool, Option("--partial")] = False,
-    turn: Annotated[str, Option("--turn", choices=(FIXED, FEED, BEST))] = FIXED,
+    turn: Turn = FIXED,
     require_N_per_mm: Annotated[float | None, Option("--require", "N/mm", above=0, at_most=1e7)] = None,
     compare_with: Annotated[Machine | str | Path | None, Option("--compare", "MACHINE")] = None,
     cut: Cutting = None,
@@ -65,8 +65,8 @@ def analyze(
     partial
         Keep the reachable samples of a program that leaves the workspace (exit code 1).
     turn
-        How a robot turns the tool about its axis: fixed as programmed, with the feed, or best: the stiffest within the
-        limits of the joints, constant unless a changing turn gains or is needed.
+        How a robot turns the tool about its axis: fixed as programmed, by so many degrees, with the feed, or best: the
+        stiffest within the limits of the joints, constant unless a changing turn gains or is needed.
     require_N_per_mm
         Stiffness that every cutting move must have; those below are listed (exit code 3).
     compare_with

@@ -6,6 +6,7 @@ derivatives (Nelder and Mead 1965) from several starts; the paper searched one v
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -77,7 +78,11 @@ def _searched(problem: Problem, start: FloatArray, weight: FloatArray, fine: flo
     from scipy.optimize import minimize
 
     free = 1 if problem.predictor.machine.strut_law.constant else 2
-    options = {"xatol": fine, "fatol": 1e-3 * fine, "initial_simplex": start[:free] + 0.05 * np.eye(free + 1, free, -1)}
+    options: Any = {
+        "xatol": fine,
+        "fatol": 1e-3 * fine,
+        "initial_simplex": start[:free] + 0.05 * np.eye(free + 1, free, -1),
+    }
 
     def error(law: FloatArray) -> float:
         return _error(problem, np.resize(law, 2), weight)

@@ -12,7 +12,7 @@ from toolpath_stiff.nc.courses import points_along
 from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.path.sampling import Samples
 
-BLOCK = 2048  # stations at a time
+BLOCK = 8192  # stations at a time
 # The front of the cutter would touch what the pieces just before have left: these are taken for smaller by SLACK. It is
 # above the rounding of coordinates (4 decimals of a mm); a turn of the tool moves it on by much more.
 RECENT, SLACK = 0.05, 5e-7  # radii of the cutter along the path; m

@@ -341,18 +341,10 @@ def interval(
 ) -> tuple[float, float]:
     """95 % interval of a size, within the bounds.
 
-    From its profile where that was scanned, averaged over subsets of components where there are several, else normal.
+    Averaged over subsets of components where there are several, else normal.
     """
     low_bound, high_bound = component.bounds
     best = family.best if family is not None else None
-    if best is not None and best.interval is not None and index == 0:
-        # The scan ran on the table; the final fit with the model itself may sit a little beside it. What reached to a
-        # bound does so still.
-        shift, near = size - float(best.sizes[0][0]), TOUCHES * float(np.ptp(best.interval))
-        low, high = (float(end) for end in best.interval)
-        low = low_bound if low - low_bound < near else max(min(low + shift, size), low_bound)
-        high = high_bound if high_bound - high < near else min(max(high + shift, size), high_bound)
-        return low, high
     averaged = None if family is None else averaged_interval(family, index)
     if index in fit.free:
         reach = NORMAL_95 * widening * fit.deviation(index)

@@ -136,6 +136,9 @@ def _rivals(diagnosis: Examination) -> str:
         moved = float(np.mean(np.abs(diagnosis.base.jacobian @ diagnosis.base.law)))
         causes[0] = f"the strut law is off and moves the stiffness by {100.0 * moved:.2g} %"
         return f"Readings of the tip do not tell which of these it is: either {', or '.join(causes)}."
+    if diagnosis.explanations[0] == NONE and diagnosis.main.base_gate.probability > FALSE_ALARM:
+        left = f"what is not excluded may leave more than {100 * LEFT:g} % of the stiffness"
+        return f"What the model leaves looks like scatter, but {left}: either {', or '.join(causes)}."
     first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
     if first < POSITIVE * second or len(causes) < 2:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
@@ -273,7 +276,8 @@ def assumptions(diagnosis: Examination) -> list[str]:
         f"and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, or by {SMALL:g} without the pose that "
         "says most; else it is one of several",
         f"a model is adequate where its refitted strut law moves the stiffness by up to {100 * LEFT:g} % (95 %), or "
-        "nothing else explains the readings as well beside the file's law: assumed",
+        "nothing else explains the readings as well beside the file's law; and where no effect may hide more (95 %) "
+        "beside what struts and joints leave on average: assumed",
         f"a further effect matters from {100 * MATTERS:g} % of the tip's stiffness on",
     ]
     if "force_N" in diagnosis.data.missing:

@@ -230,10 +230,7 @@ class CandidateTable:
 
     def delta(self, sizes: FloatArray) -> FloatArray:
         """(..., n) for sizes (..., p)."""
-        if not self.knots:
-            return np.asarray(sizes @ self.columns.T)
-        size = sizes[..., 0]
-        out = np.zeros((*size.shape, len(self.columns)))
+        size, out = sizes[..., 0], np.asarray(sizes @ self.columns.T)  # on a side without knots a line
         for sign, course in self._splines.items():
             logs = self.knots[sign][0]
             where = size * sign > 0.0

@@ -80,8 +80,6 @@ def error_model(
         log_weights += _log_likelihoods(left @ residual, [left @ part @ left.T for part in parts], sizes**2)
         away.append(np.diag(left @ parts[2] @ left.T))
         taken += _by_scatter_and_geometry(left, out, parts), _by_scatter_and_geometry(left + foretold, out, parts)
-    # Of the geometry what is left unknown, with the scatter that its offsets have taken up.
-    unknown = (taken[0].sum() - taken[1, 0]) / taken[1, 1] if taken[1, 1] > 0.0 else 1.0
     weights = np.exp(log_weights - log_weights.max())
     weights /= weights.sum()
 
@@ -89,18 +87,23 @@ def error_model(
     taken_up = by_reading * covariance.own_variance
     taken_up += common * covariance.groups.sums(by_reading)[:, covariance.groups.of]
     own, geometry = _root(taken_up @ by_reading.T), by_reading @ shared.T
-    left = np.eye(len(rows)) - jacobian @ _estimator(jacobian, assumed, fit.law_free)
-    left -= known.T @ np.linalg.solve(assumed, known.T).T @ left
+    every, law_alone = np.arange(len(rows)), np.eye(len(rows)) - jacobian @ _estimator(jacobian, assumed, fit.law_free)
+    left = law_alone - known.T @ np.linalg.solve(assumed, known.T).T @ law_alone
+    unknown = _unknown(*(_by_scatter_and_geometry(m, every, parts) for m in (left, law_alone)))
+    further = max(_unknown(*taken) - unknown, 0.0)
     near = float(np.diag(left @ parts[2] @ left.T).mean())
     here = [fit.jacobian @ own, shared.T - fit.jacobian @ geometry]
     typical = np.array([*(float((part**2).sum(axis=1).mean()) for part in here), near]) * [1.0, unknown, 1.0]
     factor = _coverage_factor(weights, sizes**2 @ typical)
-    scatter, of_geometry, form = (factor * np.sqrt(weights @ sizes**2 * [1.0, unknown, 1.0])).tolist()
+    scatter, of_geometry, form = (factor * np.sqrt(weights @ sizes**2)).tolist()
+    apart = float((here[1] ** 2).sum(axis=1).mean())
+    far = form**2 * max(float(np.concatenate(away).mean()), near) + of_geometry**2 * further * apart
+    of_geometry *= float(np.sqrt(unknown))
     either = np.zeros((len(own), 0)) if given is None else _apart(fit, given)[:, None] * np.sqrt(0.5)
     return ErrorModel(
         np.concatenate([either, scatter * own, of_geometry * geometry], axis=1),
         of_geometry * noise.strut_spread, of_geometry * noise.joint_error,
-        form * float(np.sqrt(near)), form * float(np.sqrt(max(float(np.concatenate(away).mean()), near))), places,
+        form * float(np.sqrt(near)), float(np.sqrt(far)), places,
     )  # fmt: skip
 
 
@@ -164,9 +167,13 @@ def _left_out(
 
 def _by_scatter_and_geometry(left: FloatArray, out: IntArray, parts: Sequence[FloatArray]) -> FloatArray:
     """(2,) squares of the errors of left-out stiffnesses, their own readings' scatter set aside."""
-    pulled = left.copy()
-    pulled[:, out] = 0.0
+    pulled = left - np.eye(left.shape[1])[out]
     return np.array([float(((m @ part) * m).sum()) for m, part in ((pulled, parts[0]), (left, parts[1]))])
+
+
+def _unknown(after: FloatArray, before: FloatArray) -> float:
+    """Share of the squares by geometry that its offsets leave, with the scatter that they have taken up."""
+    return float((after.sum() - before[0]) / before[1]) if before[1] > 0.0 else 1.0
 
 
 def _log_likelihoods(error: FloatArray, parts: Sequence[FloatArray], squares: FloatArray) -> FloatArray:

@@ -71,8 +71,6 @@ class Fit:
         Of a search: the candidates' tables.
     log_evidence
         Of a search: how likely it makes the data, integrated over sizes and law under their priors; else nan.
-    interval
-        Of a search: (2,) 95 % interval of the size of a single parameter from its profile; None otherwise.
     possible
         Whether the sizes lie within their bounds; if not, only `log_evidence` means anything.
     """
@@ -89,7 +87,6 @@ class Fit:
     absent: dict[int, tuple[float, float]] = field(default_factory=dict)
     tables: tuple[CandidateTable, ...] = ()
     log_evidence: float = np.nan
-    interval: FloatArray | None = None
     possible: bool = True
 
     @property
@@ -283,9 +280,10 @@ class Problem:
             scatter = again
         components = [every[i][0].candidate.components[every[i][1]] for i in free]
         bounded = dict(zip(unknowns[2:], components, strict=True))
-        # A little beyond its bound: tables of two effects describe neither exactly.
-        out = [i for i, component in bounded.items() if len(tables) > 1 and not component.allows(x[i])]
-        beyond = [i for i in out if bounded[i].allows(x[i] / (1.0 + BEYOND))]
+        # Of a parameter by itself; where tables of two effects, which describe neither exactly, bring it little beyond.
+        near = np.inf if len(every) == 1 else 1.0 + BEYOND if len(tables) > 1 else 1.0
+        reach = {i: component.reach(float(np.sign(x[i]))) for i, component in bounded.items()}
+        beyond = [i for i in bounded if 0.0 < reach[i] < abs(x[i]) <= near * reach[i]]
         if beyond:  # put onto their bounds, the others once more beside them
             for i in beyond:
                 x[i] = np.clip(x[i], *bounded[i].bounds)

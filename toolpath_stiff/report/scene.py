@@ -23,7 +23,7 @@ def machine_scene(machine: MachineTool, poses: FloatArray) -> Document:
     machine
         Of any kind.
     poses
-        (n, 6) m and rad, at which bodies are given, evenly chosen of many; out of reach there are none.
+        (n, 6) m and rad, at which bodies are given, evenly chosen of many, where joint values lead there.
     """
     if isinstance(machine, Hexapod):
         frame, platform = (mm_from_m(joints).tolist() for joints in (machine.frame_joints, machine.platform_joints))

@@ -96,6 +96,7 @@ def gauge(session: Session) -> Document:
     )
     diagnosed, fitted = session.document("diagnose"), session.document("update") if session.is_fitted else None
     floor = left_out = None
+    error = session.errors()["mean_abs_error_percent"]
     if diagnosed:
         rows = [{"effect": row["effect"], **_sizes(row)} for row in diagnosed["candidates"]]
         on = [{"effect": name, **keys} for name, keys in state.on.items()]
@@ -104,9 +105,9 @@ def gauge(session: Session) -> Document:
             left_out = diagnosed["baseline"]["as_given"]["held_out_error_percent"]
         elif len(on) == 1 and on[0] in rows:
             left_out = diagnosed["candidates"][rows.index(on[0])]["held_out_error_percent"]
-    if fitted:
-        left_out, floor = fitted["steps"][-1]["held_out_error_percent"], fitted["noise_floor_percent"]
-    error = session.errors()["mean_abs_error_percent"]
+    if fitted:  # what it wrote, form of the machine included
+        last, floor = fitted["steps"][-1], fitted["noise_floor_percent"]
+        error, left_out = last["mean_abs_error_percent"], last["held_out_error_percent"]
     return {"as_given": as_given, "refitted": refitted, "now": error, "left_out": left_out, "floor": floor}
 
 

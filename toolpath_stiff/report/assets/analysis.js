@@ -113,7 +113,7 @@ function step(by) {
 // The path in 3-D.
 const body = new MachineBody(data.scene), machineBox = document.getElementById("machine");
 const scene = {
-  beside: 40,
+  beside: 90,
   paths: [path],
   heavy: n > 20000,
   // The box of the cuts: of all, or of the operation that is looked at.
@@ -209,7 +209,6 @@ const model = {
     { holds: (i) => cutting(i) && kind[i] & OUT, colour: ink["bad-soft"] },
   ],
   rings: () => data.weakest,
-  tools: data.tools,
   operations: { count: operations.length, range: operationRange, name: operationName, chosen: () => chosenOperation },
   marked() {
     if (!chosenLine || !firstOf.has(chosenLine)) return null;

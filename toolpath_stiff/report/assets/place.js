@@ -6,7 +6,7 @@ const widthOf = (svg) => Math.max(280, svg.clientWidth || 400);
 // Where the path and program zero are (p' = o + Q p), the program's axes there, the tool's direction where it leans.
 function placed(row, stiffness) {
   const zero = [row.x_mm, row.y_mm, row.z_mm], q = turnOf([...zero, row.a_deg, row.b_deg, row.rotation_deg]);
-  const points = d.position.map((p) => moved(zero, q, p)), leans = d.axis !== null || row.a_deg !== 0 || row.b_deg !== 0;
+  const points = d.position.map((p) => moved(zero, q, p)), leans = d.axis !== null || row.a_deg || row.b_deg;
   const tools = leans ? d.position.map((_, i) => moved([0, 0, 0], q, d.axis ? d.axis[i] : [0, 0, 1])) : null;
   const xyz = [0, 1, 2].map((k) => Float32Array.from(points, (p) => p[k]));
   return { row, zero, stiffness, points, xyz, axes: [0, 1, 2].map((k) => q.map((r) => r[k])), tools };
@@ -21,26 +21,22 @@ let chosen = d.recommended;
 const places = d.front.map((row, i) => placed(row, d.stiffness[i]));
 const before = d.before ? placed(d.before, d.stiffness[d.stiffness.length - 1]) : null;
 const n = d.position.length;
-// Boxes that are shown: [low, high] of each axis.
-const join = (boxes) => [0, 1, 2].map((k) => [Math.min(...boxes.map((b) => b[k][0])),
-  Math.max(...boxes.map((b) => b[k][1]))]);
 const around = ({ xyz }) => xyz.map((axis) => axis.reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)],
   [Infinity, -Infinity]));
-const everywhere = join([...places, ...(before ? [before] : [])].map(around));
-everywhere[0] = [Math.min(0, everywhere[0][0]), Math.max(0, everywhere[0][1])];  // the machine's axis is in sight
-everywhere[1] = [Math.min(0, everywhere[1][0]), Math.max(0, everywhere[1][1])];
-const workspace = [0, 1, 2].map((k) => [0, 1].map((end) => d.workspace[end][k] ?? everywhere[k][end]));
-const bounded = d.workspace.flat().some((v) => v !== null);
-const zoomed = () => document.querySelector("input[name=zoom]:checked").value;
-// About the middle of what is shown; both placements get boxes of one size, so that they are drawn to one scale.
+const workspace = d.workspace[0].map((low, k) => [low, d.workspace[1][k]]);
+const bounded = d.workspace.flat().every((v) => v !== null);
+const whole = () => document.querySelector("input[name=zoom]:checked").value !== "path";
+// Of the path about its middle: both placements get boxes of one size, so that they are drawn to one scale.
 function boxOf(place) {
-  if (zoomed() !== "path") return zoomed() === "all" ? everywhere : join([workspace, everywhere]);
+  if (whole()) return endsOf(outlineOf(place));
   const sizes = [place, ...(before ? [before] : [])].map(around), own = around(place);
   return own.map(([low, high], k) => {
     const half = Math.max(...sizes.map((box) => box[k][1] - box[k][0])) / 2;
     return [(low + high) / 2 - half, (low + high) / 2 + half];
   });
 }
+const outlineOf = (place) => (whole() ? [...body.outline(poseOf(place, 0)), ...(bounded ? cornersOf(workspace) : [])]
+  : place.points);
 // A placement in the viewer.
 const classOf = (v) => classAt(v, d.scale, CLASSES);
 let here = -1;  // the point of the path that is pointed at, in both placements
@@ -52,8 +48,10 @@ function sceneOf(placeNow) {
     path,
     heavy: false,
     beside: 40,
+    get frame() { return !whole(); },
+    get iso() { return whole() ? body.iso : VIEWS.iso; },
     box: () => boxOf(placeNow()),
-    outline: () => (zoomed() === "path" ? placeNow().points : null),
+    outline: () => outlineOf(placeNow()),
     take() {
       const place = placeNow();
       path.move(place.xyz);
@@ -61,16 +59,12 @@ function sceneOf(placeNow) {
         CLASSES);
     },
     draw(g, viewer) {
-      const place = placeNow(), reach = Math.max(...viewer.box.map(([low, high]) => high - low));
-      const close = zoomed() === "path";
+      const place = placeNow(), reach = Math.max(...viewer.box.map(([low, high]) => high - low)), close = !whole();
       paint(g, viewer, body.items(viewer, poseOf(place, Math.max(here, 0)), { work: around(place), close,
         floor: viewer.box[2][0] }), close);
-      if (bounded && zoomed() === "workspace") viewer.edges(g, workspace, ink.muted, 1, [6, 4]);
+      if (bounded && whole()) viewer.edges(g, workspace, ink.muted, 1, [6, 4]);
       for (const { name, box } of d.keepouts) this.keepOut(g, viewer, name, [0, 1, 2]
         .map((k) => [box[0][k], box[1][k]]));
-      // the machine's axis
-      viewer.segment(g, [0, 0, viewer.box[2][0]], [0, 0, viewer.box[2][1]], ink.muted, 1, [12, 3, 2, 3]);
-      if (place.tools) this.drawTools(g, viewer, place, 0.08 * reach);
       for (let c = CLASSES - 1; c >= 0; c--) path.stroke(g, c, coloursNow()[c], 2.2);
       place.axes.forEach((axis, k) => {
         const tip = place.zero.map((z, m) => z + 0.09 * reach * axis[m]), [x, y] = viewer.project(tip),
@@ -81,17 +75,6 @@ function sceneOf(placeNow) {
         aligned(g, "center", "middle");
         g.fillText("XYZ"[k], x + 6, y - 6);
       });
-    },
-    // Thin lines from the path along the tool.
-    drawTools(g, viewer, place, length) {
-      g.beginPath();
-      for (let i = 0; i < n; i += Math.max(1, Math.ceil(n / 40))) {
-        const foot = place.xyz.map((axis) => axis[i]), tip = viewer.project(foot.map((c, k) => c
-          + length * place.tools[i][k]));
-        g.moveTo(...path.at(i));
-        g.lineTo(tip[0], tip[1]);
-      }
-      stroke(g, ink.muted, 1);
     },
     keepOut(g, viewer, name, box) {
       viewer.edges(g, box, ink.bad, 1.5);
@@ -200,7 +183,7 @@ function drawFacts(row) {
     figure("b_deg", 3)]);
   if (row.extrapolated_share !== undefined) rows.push(["strut law extrapolated, % of samples", columns
     .map((r) => group(100 * r.extrapolated_share, 1))]);
-  const line = (name, cells, tag) => h("tr", {}, h("th", { scope: "row" }, name), cells.map((cell) => h(tag, {}, cell)));
+  const line = (name, cells, tag) => h("tr", {}, h("th", { scope: "row" }, name), cells.map((v) => h(tag, {}, v)));
   const origin = [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6));
   table.replaceChildren(h("thead", {}, line("", d.before ? ["shown", "present"] : ["shown"], "th")), h("tbody", {},
     rows.map(([name, cells]) => line(name, cells, "td")), h("tr", {}, h("th", { colspan: columns.length + 1 },
@@ -268,7 +251,8 @@ const chosenView = viewerOf("chosen", () => places[chosen]), beforeView = before
 const views = [chosenView, ...(beforeView ? [beforeView] : [])];
 const profile = new Profile($("profile"), model, { point: (row) => point(rows[row], profile), step });
 for (const stage of [...views, profile]) stage.resize();
-for (const radio of document.querySelectorAll("input[name=zoom]")) radio.addEventListener("change", refit);
+for (const radio of document.querySelectorAll("input[name=zoom]")) radio.addEventListener("change",
+  () => { for (const view of views) view.turnTo("iso"); });
 addEventListener("hashchange", fromAddress);
 addEventListener("resize", drawFront);
 ready = true;

@@ -330,8 +330,9 @@ function outline(reach, z) {
     for (let i = 1; i < reach.length; i++) {
       const [a, b] = [reach[i - 1][k], reach[i][k]];
       if ((a[2] - z) * (b[2] - z) > 0 || a[2] === b[2]) continue;
-      const p = between(a, b, (z - a[2]) / (b[2] - a[2])), far = Math.hypot(p[0] - reach[0][0][0], p[1] - reach[0][0][1]);
-      if (!best || far > best[2]) best = [p[0], p[1], far];
+      const [x, y] = between(a, b, (z - a[2]) / (b[2] - a[2]));
+      const far = Math.hypot(x - reach[0][0][0], y - reach[0][0][1]);
+      if (!best || far > best[2]) best = [x, y, far];
     }
     if (best) found.push([best[0], best[1]]);
   }
@@ -354,12 +355,13 @@ function dragMap(state, act) {
     `translate(${act.origin[0]} ${act.origin[1]}) rotate(${act.origin[5]})`);
   put();
   act.put = put;
-  const svg = h("svg", { viewBox: [left - 9 * pen, -far - 9 * pen, right - left + 18 * pen, far - near + 18 * pen].join(" "), class: "drag live", id: "drag",
+  const viewBox = [left - 9 * pen, -far - 9 * pen, right - left + 18 * pen, far - near + 18 * pen].join(" ");
+  const svg = h("svg", { viewBox, class: "drag live", id: "drag",
     role: "application", tabindex: "0",
     "aria-label": "Work over the reach boundary, from above. Drag or use arrow keys to move, Shift to turn." },
     h("g", { transform: "scale(1 -1)" }, h("polygon", { points: reach.map((p) => p.map((v) => v.toFixed(0)).join(","))
-      .join(" "), fill: "var(--soft)", stroke: "var(--muted)", "stroke-width": pen }), [[12, 0], [0, 12]].map(([x, y]) =>
-      h("line", { x1: -x * pen, x2: x * pen, y1: -y * pen, y2: y * pen, stroke: "var(--muted)",
+      .join(" "), fill: "var(--soft)", stroke: "var(--muted)", "stroke-width": pen }),
+      [[12 * pen, 0], [0, 12 * pen]].map(([x, y]) => h("line", { x1: -x, x2: x, y1: -y, y2: y, stroke: "var(--muted)",
         "stroke-width": pen / 2 })), work));
   const where = (e) => { const m = svg.getScreenCTM().inverse(), p = new DOMPoint(e.clientX, e.clientY).matrixTransform(
     m); return [p.x, -p.y]; };
@@ -411,9 +413,7 @@ function exercisePanel(state, act) {
 function historyPanel(state, act) {
   const copy = (text) => button("copy", (e) => { navigator.clipboard?.writeText(text); e.target.textContent = "copied";
     }, { "aria-label": `copy ${text.slice(0, 40)}` });
-  // broken between words alone
-  const words = (text) => text.split(" ").flatMap((word, k) => [k ? " " : "", h("span", {}, word)]);
-  const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, words(text)), copy(text)) : null);
+  const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, text), copy(text)) : null);
   const step = (one) => h("div", { class: "step" }, h("b", {}, one.stops > 1 ? `${one.text} (${one.stops} stops)`
     : one.text), line(one.command), line(one.python));
   return [h("h2", {}, "What was done"), h("p", { class: "muted" },

@@ -53,6 +53,19 @@ const hand = latest((on) => post("/do", JSON.stringify({ do: "hand", on })), (fo
   $("gauge").replaceChildren(gaugeOf(state));
   view.redraw();
 });
+// The path where the work would lie with program zero elsewhere.
+function carry(origin) {
+  const { path: p, origin: from } = state.program, [q, r] = [turnOf(from), turnOf(origin)], [path] = scene.paths;
+  if (!path) return;
+  const xyz = [0, 1, 2].map(() => new Float32Array(path.n));
+  for (let i = 0; i < path.n; i++) {
+    const d = minus([p.x_mm[i], p.y_mm[i], p.z_mm[i]], from);
+    moved(origin, r, [0, 1, 2].map((k) => dot3(q.map((row) => row[k]), d))).forEach((v, k) => { xyz[k][i] = v; });
+  }
+  path.move(xyz);
+  if (here < 0) scene.pose = [...origin.slice(0, 3), 0, 0, 0];
+  view.redraw();
+}
 const placed = latest((origin) => post("/do", JSON.stringify({ do: "at", origin })), (found) => {
   state.placement.now = found;
   $("pl")?.replaceWith(placementFigures(found, state, "pl"));
@@ -66,6 +79,7 @@ Object.assign(act, {
     if (!Number.isFinite(value)) return;
     act.origin[axis] = axis === 5 ? ((value % 360) + 360) % 360 : value;
     act.put();
+    carry(act.origin);
     for (const name of ["X", "Y", "Z", "C"]) { const k = { X: 0, Y: 1, Z: 2, C: 5 }[name];
       for (const id of [`o-${name}`, `o-${name}n`]) if ($(id) && document.activeElement !== $(id)) $(id).value =
       Number(act.origin[k].toFixed(1)); }
@@ -306,7 +320,8 @@ function draw() {
   if (!scene.scaled && sizes.length) { scene.scale = Math.max(5,
     5 * Math.ceil(sizes[Math.floor(0.95 * sizes.length)] / 5)); scene.scaled = true; }
   if (scene.selected >= (r?.line.length ?? 0)) scene.selected = -1;
-  if (scene.selected < 0 && here < 0) scene.pose = [...state.machine.origin];
+  const rest = (state.program?.origin ?? state.machine.origin).slice(0, 3);
+  if (scene.selected < 0 && here < 0) scene.pose = [...rest, 0, 0, 0];
   if (!pending) act.origin = [...(state.program?.origin ?? state.machine.origin)];
   $("title").textContent = state.case;
   $("machine-name").textContent =
