@@ -171,6 +171,8 @@ def dictionary_of(ground: Ground) -> Dictionary:
             columns = columns_of(variable, ground, local.link == "joints")
             for column in columns:
                 named, values = ground.shapes(variable, column, plain.signed, local.where)
+                if not named:
+                    continue
                 relative = _relative(ground, plain, values)
                 scale = np.sqrt((relative**2).mean(axis=1))
                 shaped = [local.term(variable, shape, constants, column) for shape, constants in named]

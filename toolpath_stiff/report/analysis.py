@@ -3,11 +3,8 @@
 import textwrap
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from toolpath_stiff.analysis.results import Analysis
-from toolpath_stiff.analysis.statistics import sample_columns
-from toolpath_stiff.arrays import IntArray
+from toolpath_stiff.analysis.statistics import sample_columns, table_rows
 from toolpath_stiff.column_files import check_parquet, csv_pieces, parquet_pieces
 from toolpath_stiff.documents import Document
 from toolpath_stiff.path.table import LENGTH_DECIMALS, PATH_COLUMNS
@@ -34,7 +31,6 @@ COLUMNS: dict[str, int | None] = {
     "margin": 6,
     **dict.fromkeys(("margin_limit", "operation", "cut")),
 }
-ROUNDED = 1e-9  # m: a move of half a step is not a shorter one, whatever rounding does
 MOST_OPERATIONS = 12  # on the terminal; all are in summary.json
 
 
@@ -44,15 +40,6 @@ def unwritten(table: str, cut: bool) -> tuple[str, ...]:
         check_parquet()
     others = tuple(name for name in ("samples.csv", "samples.parquet") if not name.endswith(table))
     return others if cut else (*others, *OF_CUT)
-
-
-def table_rows(analysis: Analysis) -> IntArray:
-    """Samples of `samples.csv`: all, but of a move shorter than half a step that has two the last one alone."""
-    samples = analysis.samples
-    last = np.flatnonzero(np.diff(samples.move, append=-1))
-    first = np.append(0, last[:-1] + 1)[: len(last)]
-    short = (last - first == 1) & (samples.s[last] - samples.s[first] < 0.5 * analysis.step - ROUNDED)
-    return np.delete(np.arange(len(samples)), first[short])
 
 
 def samples_csv(analysis: Analysis) -> Iterator[bytes]:
