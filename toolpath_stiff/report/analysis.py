@@ -7,7 +7,7 @@ from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import sample_columns, table_rows
 from toolpath_stiff.column_files import check_parquet, csv_pieces, parquet_pieces
 from toolpath_stiff.documents import Document
-from toolpath_stiff.path.table import LENGTH_DECIMALS, PATH_COLUMNS
+from toolpath_stiff.path.table import PATH_COLUMNS, decimals_of
 from toolpath_stiff.report import analysis_page, cut, cut_files
 from toolpath_stiff.report.analysis_tables import (
     TITLES,
@@ -45,7 +45,7 @@ def unwritten(table: str, cut: bool) -> tuple[str, ...]:
 def samples_csv(analysis: Analysis) -> Iterator[bytes]:
     """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
     names = sample_columns(analysis, slice(0))
-    decimals = {name: COLUMNS.get(name, LENGTH_DECIMALS if name.endswith("_mm") else 6) for name in names}
+    decimals = {name: COLUMNS.get(name, decimals_of(name)) for name in names}
     rows = table_rows(analysis)
     return csv_pieces(lambda some: sample_columns(analysis, rows[some]), len(rows), decimals)
 
