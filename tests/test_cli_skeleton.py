@@ -253,10 +253,10 @@ def test_path_goes_to_standard_output_or_a_file_with_the_same_bytes(part, capsys
 def test_the_programs_own_origin_holds_unless_one_is_given(part, capsys):
     part.write_text("G10 L2 P1 X-100 Y50 Z800\n" + PROGRAM)
     assert main(["path", "part.nc"]) == 0
-    assert capsys.readouterr().out.splitlines()[-1].split(",")[5:8] == ["0.000000", "50.000000", "800.000000"]
+    assert capsys.readouterr().out.splitlines()[-1].split(",")[5:8] == ["0.0000", "50.0000", "800.0000"]
     assert main(["path", "part.nc", "--origin", "1,2,3"]) == 0
     captured = capsys.readouterr()
-    assert captured.out.splitlines()[-1].split(",")[5:8] == ["101.000000", "2.000000", "3.000000"]
+    assert captured.out.splitlines()[-1].split(",")[5:8] == ["101.0000", "2.0000", "3.0000"]
     assert "tps: warning: part.nc" in captured.err
 
 

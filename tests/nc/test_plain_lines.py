@@ -148,6 +148,7 @@ def test_random_programs(blocks, dialect):
 
 
 @settings(max_examples=40, deadline=None)
+@example(["f100f100s100", "G2I0.50J0", "G19", "G91\nG2X1.00Y0R0.50\nG90"])  # an arc by R that ends where it starts
 @given(st.lists(st.one_of(plain(), arc(), modal), min_size=1, max_size=20))
 def test_random_programs_are_checked_alike(blocks):
     lines = split_lines("F300\n" + "\n".join(blocks), "p")

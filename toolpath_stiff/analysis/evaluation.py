@@ -183,8 +183,9 @@ def _by_closed_form(
     compliance, determinant, lengths, good = core.compliance_along_columns(
         machine, position, towards, turns, tool, route
     )
-    stand, certain = Extremes(machine, position, lengths, determinant, turns, tool).reach()
-    extrapolated = machine.strut_law.room(lengths).min(axis=0) < 0.0
+    extremes = Extremes(machine, position, lengths, determinant, turns, tool)
+    stand, certain = extremes.reach()
+    extrapolated = machine.strut_law.room_of(extremes.shortest, extremes.longest) < 0.0
     for (_, known), along in zip(directed, compliance, strict=True):
         sure = certain & good & known & (along > 0.0) & (along < np.inf)
         along[~(stand.reachable & known)] = np.nan

@@ -24,6 +24,7 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, um_from_m
 FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
 ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"  # what headline figures are about
 WEAKEST_PLACES = 3
+ROUNDED = 1e-9  # m: a move of half a step is not a shorter one, whatever rounding does
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -260,3 +261,12 @@ def sample_columns(path: EvaluatedPath, rows: slice | IntArray = slice(None)) ->
         "operation": path.operations.of_move[path.samples.move[rows]] + 1,
         "cut": np.where(moving, np.where(path.along_axis[rows], "plunge", "across"), ""),  # whatever the load
     }
+
+
+def table_rows(path: EvaluatedPath) -> IntArray:
+    """Samples of `samples.csv`: all, but of a move shorter than half a step that has two the last one alone."""
+    samples = path.samples
+    last = np.flatnonzero(np.diff(samples.move, append=-1))
+    first = np.append(0, last[:-1] + 1)[: len(last)]
+    short = (last - first == 1) & (samples.s[last] - samples.s[first] < 0.5 * path.step - ROUNDED)
+    return np.delete(np.arange(len(samples)), first[short])

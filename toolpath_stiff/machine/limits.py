@@ -348,7 +348,7 @@ class Extremes:
             apart = limit.margin(self.of(limit))
             nearer = apart < margin
             np.copyto(margin, apart, where=nearer)
-            which[nearer] = number
+            np.copyto(which, number, where=nearer)
         column, sure = np.zeros(n, dtype=np.int64), np.ones(n, dtype=bool)
         for number, (limit, columns) in enumerate(self.kinds):
             rows = np.flatnonzero(which == number)

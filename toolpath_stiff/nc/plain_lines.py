@@ -219,7 +219,8 @@ class Lines:
         letters = (AXES[first], AXES[second], centers[first], centers[second], "R", centers[normal])
         words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()
         points = np.stack([frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
-        starts, clockwise = points[:, [first, second]].tolist(), (self.mode[rows] == CLOCKWISE).tolist()
+        starts = zip(points[:, first].tolist(), points[:, second].tolist(), strict=True)  # tuples, as ends are
+        clockwise = (self.mode[rows] == CLOCKWISE).tolist()
         inch, middles, sweeps = self.state.inch, list[geometry.Point2](), list[float]()
         try:
             for start, numbers, turn in zip(starts, words, clockwise, strict=True):

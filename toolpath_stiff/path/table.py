@@ -23,14 +23,16 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_
 if TYPE_CHECKING:
     import pandas as pd
 
-LENGTH_DECIMALS = 4  # in mm: a tenth of a micrometre is finer than machines move
+
+def decimals_of(column: str) -> int:
+    """Decimals of a column by the unit in its name: a tenth of a micrometre is finer than machines move."""
+    return 4 if column.endswith("_mm") else 6
+
+
 # Column -> decimals; None: a whole number or a word.
 PATH_COLUMNS: dict[str, int | None] = {
     **dict.fromkeys(("line", "motion", "tool")),
-    "s_mm": LENGTH_DECIMALS,
-    "t_s": 6,
-    **dict.fromkeys(("x_mm", "y_mm", "z_mm"), LENGTH_DECIMALS),
-    **dict.fromkeys(("a_deg", "b_deg", "c_deg"), 6),
+    **{name: decimals_of(name) for name in ("s_mm", "t_s", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")},
     "feed_mm_per_min": 3,
 }
 

@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.portrait.columns import Ground
-from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Term
+from toolpath_stiff.stiffness.terms import PARALLEL, PINS, PLACE, SWINGS, Action, Constants, Term
 
 WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
 ONCE = ("constant", "direction")  # variables whose every place stands in the dictionary as it is
 ALL_STRUTS, ALL_VERTICES = (None, 1, 2, 3, 4, 5, 6), (None, 1, 2, 3)
 ALONE = ("coupling", "joint offset")  # actions that depend on nothing
 SIDE = 0.2  # prior weight of what a link could do by a way round: a frame does not feel where the tip is
-MOST_HELD = 8_000_000  # numbers of columns that are kept, 64 MB; the others are made again when they are asked for
+# Numbers in columns that are kept, 64 MB, and the dear ones of `PARALLEL`; the others are made again when asked for.
+MOST_HELD = 8_000_000
 NOTHING = 1e-4  # rms change of stiffness by the largest size below which a term does nothing to these readings
 
 
@@ -170,6 +171,8 @@ def dictionary_of(ground: Ground) -> Dictionary:
             columns = columns_of(variable, ground, local.link == "joints")
             for column in columns:
                 named, values = ground.shapes(variable, column, plain.signed, local.where)
+                if not named:
+                    continue
                 relative = _relative(ground, plain, values)
                 scale = np.sqrt((relative**2).mean(axis=1))
                 shaped = [local.term(variable, shape, constants, column) for shape, constants in named]
@@ -177,7 +180,7 @@ def dictionary_of(ground: Ground) -> Dictionary:
                 # A term that changes every reading alike is the strut law's affair.
                 kept = np.flatnonzero((scale * limits > NOTHING) & (relative.std(axis=1) > 1e-6 * scale))
                 block = partial(_relative, ground, plain, values, kept, scale)
-                blocks.append(block() if held < MOST_HELD else block)
+                blocks.append(block() if held < MOST_HELD or plain.action in PARALLEL else block)
                 held += len(kept) * relative.shape[1]
                 kinds = Counter(shape for shape, _ in named)
                 log = priors[variable] - float(np.log(len(kinds) * len(columns)))
@@ -191,9 +194,8 @@ def _relative(
     ground: Ground, plain: Term, values: FloatArray, kept: IntArray | None = None, scale: FloatArray | None = None
 ) -> FloatArray:
     """(s, n) change of compliance over the compliance by a link with shapes (s, n), some of them over their scale."""
-    if kept is None or scale is None:
-        return ground.columns(plain, ground.share(plain), values) / ground.compliance
-    return ground.columns(plain, ground.share(plain), values[kept]) / ground.compliance / scale[kept, None]
+    relative = ground.columns(plain, ground.share(plain), values) / ground.compliance
+    return relative if kept is None or scale is None else relative[kept] / scale[kept, None]
 
 
 def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:

@@ -3,14 +3,11 @@
 import textwrap
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from toolpath_stiff.analysis.results import Analysis
-from toolpath_stiff.analysis.statistics import sample_columns
-from toolpath_stiff.arrays import IntArray
+from toolpath_stiff.analysis.statistics import sample_columns, table_rows
 from toolpath_stiff.column_files import check_parquet, csv_pieces, parquet_pieces
 from toolpath_stiff.documents import Document
-from toolpath_stiff.path.table import LENGTH_DECIMALS, PATH_COLUMNS
+from toolpath_stiff.path.table import PATH_COLUMNS, decimals_of
 from toolpath_stiff.report import analysis_page, cut, cut_files
 from toolpath_stiff.report.analysis_tables import (
     TITLES,
@@ -34,7 +31,6 @@ COLUMNS: dict[str, int | None] = {
     "margin": 6,
     **dict.fromkeys(("margin_limit", "operation", "cut")),
 }
-ROUNDED = 1e-9  # m: a move of half a step is not a shorter one, whatever rounding does
 MOST_OPERATIONS = 12  # on the terminal; all are in summary.json
 
 
@@ -46,19 +42,10 @@ def unwritten(table: str, cut: bool) -> tuple[str, ...]:
     return others if cut else (*others, *OF_CUT)
 
 
-def table_rows(analysis: Analysis) -> IntArray:
-    """Samples of `samples.csv`: all, but of a move shorter than half a step that has two the last one alone."""
-    samples = analysis.samples
-    last = np.flatnonzero(np.diff(samples.move, append=-1))
-    first = np.append(0, last[:-1] + 1)[: len(last)]
-    short = (last - first == 1) & (samples.s[last] - samples.s[first] < 0.5 * analysis.step - ROUNDED)
-    return np.delete(np.arange(len(samples)), first[short])
-
-
 def samples_csv(analysis: Analysis) -> Iterator[bytes]:
     """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
     names = sample_columns(analysis, slice(0))
-    decimals = {name: COLUMNS.get(name, LENGTH_DECIMALS if name.endswith("_mm") else 6) for name in names}
+    decimals = {name: COLUMNS.get(name, decimals_of(name)) for name in names}
     rows = table_rows(analysis)
     return csv_pieces(lambda some: sample_columns(analysis, rows[some]), len(rows), decimals)
 
