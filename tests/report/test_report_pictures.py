@@ -147,7 +147,7 @@ def test_plunges_are_grey_unless_asked_for(analysis):
     slate = tuple(int(SLATE[i : i + 2], 16) for i in (1, 3, 5))
     for picture in (path_picture, profile_picture):
         hidden, shown = (count_colour(picture(analysis, show_plunges=show), slate) for show in (False, True))
-        assert hidden > 20 > shown, picture.__name__
+        assert hidden > 5 > shown, picture.__name__
 
 
 def test_the_axis_of_the_profile_is_that_of_the_headline(analysis):

@@ -158,15 +158,15 @@ let against = "z_mm";
 function whyPanel(state, act) {
   const v = state.verdict;
   if (!v) return h("p", {}, state.readings ? "The diagnosis is under way." : "There are no readings yet.");
-  const gates = [["a model without a further effect", v.gates.baseline_probability],
+  const gates = v.gates && [["a model without a further effect", v.gates.baseline_probability],
     ["sum of squares", v.gates.squares_probability], ["structure", v.gates.structure_probability],
     ["gain of the best effect", v.gates.gain_probability]];
   const c = state.compare;
   return [
     h("h2", {}, "Why believe it?"), h("p", {}, v.text), list([...v.why, ...v.warnings]),
     h("h3", {}, "Residuals"), residuals(state, act),
-    h("h3", {}, "Gates: how often scatter alone would look so"), table(["test", "probability"],
-      gates.map(([name, p]) => [name, p === null ? "\u2013" : short(p)])),
+    gates && [h("h3", {}, "Gates: how often scatter alone would look so"), table(["test", "probability"],
+      gates.map(([name, p]) => [name, p === null ? "\u2013" : short(p)]))],
     h("h3", {}, "Plane by direction"),
     c ? [table(["readings", "number", "mean error", "bias", "rms"], Object.entries(c.by_plane_and_direction)
       .map(([name, one]) => [name, one.readings, percent(one.mean_abs_error_percent), percent(one.bias_percent),
