@@ -159,9 +159,9 @@ let against = "z_mm";
 function whyPanel(state, act) {
   const v = state.verdict;
   if (!v) return h("p", {}, state.readings ? "The diagnosis is under way." : "There are no readings yet.");
-  const gates = Number.isFinite(v.gates?.squares_probability) && [["a model without a further effect", v.gates.baseline_probability],
-    ["sum of squares", v.gates.squares_probability], ["structure", v.gates.structure_probability],
-    ["gain of the best effect", v.gates.gain_probability]];
+  const gates = Number.isFinite(v.gates?.squares_probability) && [
+    ["a model without a further effect", v.gates.baseline_probability], ["sum of squares", v.gates.squares_probability],
+    ["structure", v.gates.structure_probability], ["gain of the best effect", v.gates.gain_probability]];
   const c = state.compare;
   return [
     h("h2", {}, "Why believe it?"), h("p", {}, v.text), list([...v.why, ...v.warnings]),
