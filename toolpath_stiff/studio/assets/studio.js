@@ -1,5 +1,4 @@
 // The page: it asks for the state, draws it, posts what is to be done, and hears of every change.
-const $ = (id) => document.getElementById(id);
 const scene = new MachineScene();
 let state = JSON.parse($("state").textContent), panel = "effects", here = -1, which = "now", playing = 0, version = -1;
 const readonly = state !== null;
