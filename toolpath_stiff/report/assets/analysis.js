@@ -89,7 +89,7 @@ function point(i, stage) {
     if (stage) stage.tell(stage === view ? path.at(i) : stage.at(i), text);
     showLine(line[i]);
   }
-  if (machineBox.checked) view.redraw(); else view.drawOverlay();
+  if (machineBox.checked && !scene.heavy) view.redraw(); else view.drawOverlay();
   profile.drawOverlay();
   part?.drawOverlay();
 }
