@@ -9,6 +9,7 @@ import pytest
 
 import toolpath_stiff as tps
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.readings.measurements import model_stiffness, read_measurements
 
 ROBOT = Path(__file__).parents[1] / "machine" / "data" / "robot200.toml"
 MACHINE = tps.Machine.load(ROBOT).stated
@@ -179,3 +180,27 @@ def test_rows_that_are_no_pulls_are_told_by_line(head: str, row: str, told: str,
     path.write_text(f"{head}\n{row}\n", "utf-8")
     with pytest.raises((tps.InputError, tps.TpsError), match=rf"bad.csv:[12].*{told}"):
         tps.diagnose(str(path), ROBOT, noise_percent=5)
+
+
+@pytest.mark.parametrize("kind", ["robot200", "mill5", "delta", "pentapod"])
+def test_a_plan_tells_elements_apart_on_every_kind(kind: str, tmp_path: Path) -> None:
+    """Its rows are a measurement file, which a diagnosis reads once it is filled in: here with one element softer."""
+    machine = tps.Machine.load(ROBOT.parent / f"{kind}.toml")
+    first, second = [row.name for row in machine.stated.elements if row.link != "tool"][1:3]
+    effect = "joint_torsion" if kind == "robot200" else "weak_element"
+    plan = tps.plan(machine=machine, between=(f"{effect}:{first}", f"{effect}:{second}"), n=8)
+    assert plan.choice.separable and len(plan.choice.chosen) == 8
+    keys = {"compliance_nrad_per_N_per_m": 300.0} if kind == "robot200" else {"factor": 0.5}
+    softer = tmp_path / "softer.toml"
+    entry = "\n".join(f"{key} = {value}" for key, value in keys.items())
+    softer.write_text(f'{machine.stated.text}\n[[effect]]\nname = "{effect}"\nelement = "{first}"\n{entry}\n', "utf-8")
+    plan.save(tmp_path / "plan", plots=False)
+    head, *rows = (tmp_path / "plan" / "plan.csv").read_text("utf-8").splitlines()
+    planned = read_measurements(str(tmp_path / "plan" / "plan.csv"), machine.stated, planned=True)
+    read = model_stiffness(tps.Machine.load(softer).model, planned) / 1e3
+    column = head.split(",").index("stiffness_N_per_mm")
+    cells = [row.split(",") for row in rows]
+    filled = [[*row[:column], f"{k:.7g}", *row[column + 1 :]] for row, k in zip(cells, read, strict=True)]
+    (tmp_path / "read.csv").write_text("\n".join([head, *map(",".join, filled)]), "utf-8")
+    found = tps.diagnose(str(tmp_path / "read.csv"), machine, noise_percent=2)
+    assert f"{effect}, {first}" == found.labels[0] and f"{effect}, {second}" not in found.labels

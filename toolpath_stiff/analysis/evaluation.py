@@ -1,17 +1,18 @@
 """Stiffness along a load, strut lengths and reach at many poses, block by block, fast where that is safe."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import Load, geometric_directions, load_directions
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.limits import Extremes, Reach, machine_limits, reach, solved
 from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
+from toolpath_stiff.path.turning import room_to_wind, unwound
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core, element_sum
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
@@ -19,9 +20,11 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
 OF_THE_WORK = ("tangential", "axial", "normal", "radial")  # loads that turn with the work; others are of the machine
+TURNING_BACK = 1e-6  # of a limit's span
 MOST_TRIED = 60  # poses of a path at which every configuration is tried
 FEW_CORNERS = 0.2  # share of the rows; a second load of every pose costs more than these poses twice
 Progress = Callable[[int, int], None]
+OF_POSES, OF_REACH = ("stiffness", "substituted", "joints", "extrapolated"), ("margin", "limit", "value")
 # Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, length of the tool (nan: the reference tool).
 Poses = tuple[FloatArray, FloatArray | None, float]
 # Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, tangents (n, 3), all in work axes.
@@ -60,11 +63,24 @@ class Evaluation:
         """(n,) whether every limit is kept."""
         return self.reach.reachable
 
+    @classmethod
+    def joined(cls, parts: "Sequence[Evaluation]") -> "Evaluation":
+        """The parts of a path, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+
+        def whole(names: Sequence[str], of: Sequence[object]) -> dict[str, AnyArray]:
+            return {name: np.concatenate([getattr(part, name) for part in of]) for name in names}
+
+        stand = Reach(**whole(OF_REACH, [part.reach for part in parts]), limits=parts[0].reach.limits)
+        configuration = ", then ".join(part.configuration for part in parts)
+        return cls(**whole(OF_POSES, parts), reach=stand, configuration=configuration)
+
     def put(self, rows: IntArray, part: "Evaluation") -> None:
         """Enter the figures of some rows."""
-        for name in ("stiffness", "substituted", "joints", "extrapolated"):
+        for name in OF_POSES:
             getattr(self, name)[rows] = getattr(part, name)
-        for name in ("margin", "limit", "value"):
+        for name in OF_REACH:
             getattr(self.reach, name)[rows] = getattr(part.reach, name)
 
 
@@ -263,7 +279,7 @@ def _by_elements(
         kept = int(kept_configurations(machine, position[few], rotation_matrices(abc[few]), lengths[few])[0])
     stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(machine))
     substituted, extrapolated = np.zeros((2, n), dtype=bool)
-    joints, name = np.empty((n, len(machine.joint_names))), "" if kept is None else machine.configurations[kept]
+    joints, name = np.empty((n, len(machine.joint_names))), machine.configurations[kept or 0] if follows else ""
     result = Evaluation(np.empty(n), substituted, joints, extrapolated, stand, name)
     before = None
     if follows and n:
@@ -288,10 +304,24 @@ def tried_rows(count: int) -> IntArray:
 def kept_configurations(
     machine: MachineTool, position: FloatArray, rotation: FloatArray | None, lengths: FloatArray, paths: int = 1
 ) -> IntArray:
-    """(paths,) the configuration whose smallest margin is the largest; of poses of paths, one after the other."""
-    stances = machine.stances(position, rotation, lengths)
-    margins = [reach(machine, position, stance).margin.reshape(paths, -1).min(axis=1) for stance in stances]
-    return np.argmax(margins, axis=0)
+    """(paths,) the configuration whose smallest margin is the largest; of poses of paths, one after the other.
+
+    Poses that no configuration reaches do not count; one in which a joint has to turn back on the way comes after all
+    that keep the limits.
+    """
+    limits, winds = machine.joint_limits, np.array(machine.joint_kinds) == "rotary"
+    stances = list(machine.stances(position, rotation, lengths))
+    margins = np.array([reach(machine, position, stance).margin.reshape(paths, -1) for stance in stances])
+    counts = (margins >= 0.0).any(axis=0)
+    counts |= ~counts.any(axis=1)[:, None]
+    least = np.where(counts, margins, np.inf).min(axis=2)
+    for stance, margin in zip(stances, least, strict=True):
+        joints = stance.joints.reshape(paths, -1, len(limits)).swapaxes(0, 1)
+        number = np.where(counts.T, np.arange(len(joints))[:, None], counts.T.argmax(axis=0))
+        there = np.take_along_axis(joints, np.maximum.accumulate(number)[:, :, None], axis=0)
+        goes_on = room_to_wind(unwound(there, winds), limits, winds)
+        margin -= np.where(goes_on, 0.0, np.maximum(margin, 0.0) + TURNING_BACK)
+    return np.asarray(np.argmax(least, axis=0))
 
 
 def evaluate_stance(

@@ -32,6 +32,7 @@ from toolpath_stiff.options import Option, checked, finite_number, names, number
 from toolpath_stiff.planning.menu import COSTS, Menu
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.result import plan as plan_visits
+from toolpath_stiff.planning.rivals import rivals_on_elements
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.readings.pulls import pull_tables
 from toolpath_stiff.results import Progress, one_of, teller
@@ -398,7 +399,7 @@ def plan(
     noise_percent: NoisePercent = None,
     strut_spread_percent: StrutSpread = 1.0,
     seed: Seed = 0,
-    diagnosis: Diagnosis | None = None,
+    diagnosis: Diagnosis | ElementDiagnosis | None = None,
 ) -> Plan:
     """What to measure next to tell explanations apart; without data, what to measure first.
 
@@ -407,7 +408,8 @@ def plan(
     data, machine
         The machine; measurements, or the files that hold them; None before the first campaign.
     between
-        Effects to tell apart, or "none"; unless given, what a diagnosis of the data leaves standing.
+        Effects to tell apart, on elements "joint_torsion:joint 2", or "none"; unless given, what a diagnosis of the
+        data leaves standing.
     n
         Poses; unless given 6, or 24 of a first campaign.
     radius_mm
@@ -452,13 +454,17 @@ def plan(
     """
     line = words_of(plan, {name: value for name, value in locals().items() if name not in COMMON})
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
-    model = question.hexapod("plan")
     minutes = {name: float(value) for name, value in (minutes or {}).items()}
     for name, value in minutes.items():
         one_of("minutes", name, tuple(COSTS))
         if not value >= 0.0:
             raise InputError(f"{name}={value:g}", expected="minutes, 0 or more")
-    readings = None if question.data is None else question.readings
+    of_struts, pulled = isinstance(question.model, Hexapod), dict[str, Any]()
+    if question.data is not None and not of_struts:
+        found = diagnosis if isinstance(diagnosis, ElementDiagnosis) else question.of_elements()
+        fits = [found.problem.none, *found.ranked]
+        pulled = {"rivals": rivals_on_elements(fits, found.plausible, between), "noise": found.problem.noise.typical}
+    readings = question.readings if question.data is not None and of_struts else None
     menu = Menu.of(readings).with_options(
         radius=None if radius_mm is None else m_from_mm(radius_mm),
         heights=_in_metres(heights_mm),
@@ -469,15 +475,9 @@ def plan(
         indicators=indicators,
         costs={**COSTS, **minutes},
     )
-    judgement = None if diagnosis is None else diagnosis.main
+    judgement = diagnosis.main if isinstance(diagnosis, Diagnosis) else None
     proposal = plan_visits(
-        model,
-        readings,
-        menu,
-        between=tuple(between),
-        n=n,
-        judgement=judgement,
-        **question.common,
+        question.model, readings, menu, between=tuple(between), n=n, judgement=judgement, **question.common | pulled
     )
     command = question.request.command("plan", *line)
     return replace(proposal, names=question.request.data, line=command, inputs=question.inputs)

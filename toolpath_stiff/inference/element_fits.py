@@ -21,7 +21,7 @@ from toolpath_stiff.inference.least_squares import bounded_step
 from toolpath_stiff.inference.noise import STATED_FREEDOM, Noise, Scatter
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS
 from toolpath_stiff.inference.votes import outvoted
-from toolpath_stiff.machine.elements import SIX
+from toolpath_stiff.machine.elements import turns
 from toolpath_stiff.readings.pulls import MOVED_AXES, Pulls
 from toolpath_stiff.rotations import roll_pitch_yaw
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -106,7 +106,7 @@ class PullProblem(Problem):
         """Joint that turns -> its torsion in place of the file's, and rad/(N m) of that."""
         effect, found = find_effect("joint_torsion"), {}
         for element, load in zip(self.machine.elements, self.pulls.stance.loads, strict=True):
-            if element.link == "joints" and element.directions == SIX:
+            if turns(element):
                 stated = float(np.atleast_2d(load.compliance)[0, 5])
                 (parameter,) = (p for p in effect.parameters if not p.discrete)
                 component = Component(parameter, False, (-stated, np.inf))
@@ -129,8 +129,7 @@ class PullProblem(Problem):
 
     def candidates_of(self, effect: Effect) -> list[Candidate]:
         """An effect with each element that it may act on, or with each other choice."""
-        joints = effect.link == "joints"
-        elements = [e.name for e in self.machine.elements if joints == (e.link == "joints" and e.directions == SIX)]
+        elements = [e.name for e in self.machine.elements if turns(e) == (effect.link == "joints")]
         carried = {active.values.get(ELEMENT) for active in self.model.effects if active.effect.name == effect.name}
         if carried & {None}:
             return []  # a machine carries it once
@@ -237,10 +236,8 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
     ballots = votes(problem, best, {label_of(fit): fit for fit in (base, *fits[1:])})
     alike = [fit for fit in fits if behind[label_of(fit)] < ALIKE]
     standing = [fit for fit in fits[1:] if fit not in alike and not outvoted(ballots[label_of(fit)])]
-    alike, standing = (
-        [fit for fit in some if not any(_says_more(fit, other, behind) for other in alike)]
-        for some in (alike, standing)
-    )
+    more = [fit for fit in (*alike, *standing) if any(_says_more(fit, other, behind) for other in alike)]
+    alike, standing = ([fit for fit in some if fit not in more] for some in (alike, standing))
     if not explained or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
         return "ambiguous", [*alike, *standing]
     return "identified", alike

@@ -77,6 +77,7 @@ class Predictor:
     """
 
     def __init__(self, machine: Hexapod, data: Readings, effect_files: Sequence[str | Path] = ()) -> None:
+        self.stated: MachineTool = machine
         self.machine = machine
         self.effect_files = tuple(effect_files)
         self.base = build_model(machine, self.effect_files)

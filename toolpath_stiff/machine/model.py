@@ -298,6 +298,11 @@ class MachineTool:
         return np.tile([-np.inf, np.inf], (len(self.joint_names), 1))
 
     @property
+    def joint_speeds(self) -> FloatArray:
+        """(j,) m/s or rad/s that the joints reach; inf: nobody says."""
+        return np.full(len(self.joint_names), np.inf)
+
+    @property
     def configurations(self) -> tuple[str, ...]:
         """Names of the ways to hold the same pose, one where there is no choice."""
         return ("",)
@@ -366,6 +371,10 @@ class MachineTool:
     def weight_loads(self, stance: Stance) -> FloatArray:
         """(n, r) N and N m, all loads of the elements, one after the other, under the machine's own weight."""
         return np.zeros((len(stance), sum(load.compliance.shape[-1] for load in stance.loads)))
+
+    def standing(self, joints: FloatArray) -> Stance:
+        """How the machine stands at joint values (n, j) m or rad, with the reference tool."""
+        return self.solve(*self.forward(joints))
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
         """Bodies of a drawing by name, (n, p, 3) m in base axes."""

@@ -108,6 +108,11 @@ class Serial(MachineTool):
         return np.array([(joint.low, joint.high) for joint in self.joints])
 
     @property
+    def joint_speeds(self) -> FloatArray:
+        """(j,) m/s or rad/s that the joints reach; inf: nobody says."""
+        return np.array([joint.speed for joint in self.joints])
+
+    @property
     def elements(self) -> tuple[Element, ...]:
         """What gives way, from the base to the tool, then to the work."""
         return tuple(body.element for body in (*self.tool_bodies, *self.work_bodies))
@@ -289,6 +294,10 @@ class Serial(MachineTool):
         for i, (second, third) in zip(linear, ((b, c), (c, a), (a, b)), strict=True):  # Cramer's rule
             values[i] = (missing * np.cross(second, third, axis=0)).sum(axis=0) / volume
         return np.where(np.isfinite(angles).all(axis=0), values, np.nan)
+
+    def standing(self, joints: FloatArray) -> Stance:
+        """How it stands at joint values (n, j)."""
+        return self._stance(joints.T, np.zeros(len(joints), dtype=np.int64), np.zeros(1))
 
     def _stance(self, joints: FloatArray, chosen: IntArray, extension: FloatArray) -> Stance:
         """The stance at joint values (j, n) with tools so much longer than the reference tool."""

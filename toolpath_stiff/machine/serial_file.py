@@ -42,6 +42,10 @@ AXIS = {
         for side in ("min", "max")
         for unit in ("mm", "deg")
     },
+    **{
+        f"speed_{unit}_per_s": Key(unit=f"{unit}/s", low=0.0, open_low=True, high=1e5, required=False)
+        for unit in ("mm", "deg")
+    },
 }
 DH = ("a_mm", "d_mm", "alpha_deg", "offset_deg")
 TRUNNION = ("x_rot_point_mm", "y_rot_point_mm", "z_rot_point_mm", "x_offset_mm", "y_offset_mm", "z_offset_mm")
@@ -122,7 +126,9 @@ def _of_rows(
         before, after = _placements(toml, section, row, convention)
         given = STILL if any(key in row for key in DH) else after
         place = rests[side].then(before)
-        sides[side].append(ChainJoint(row["name"], linear, place, *_bounds(toml, section, row, linear), given))
+        unit, si = ("mm", m_from_mm) if linear else ("deg", rad_from_deg)
+        speed = si(row.get(f"speed_{unit}_per_s", np.inf))
+        sides[side].append(ChainJoint(row["name"], linear, place, *_bounds(toml, section, row, linear), given, speed))
         rests[side] = after
     _check_units(toml, sides["tool"] + sides["work"])
     tip, work = values.get("tool"), values.get("work", {})
@@ -171,9 +177,10 @@ def _bounds(toml: MachineToml, section: str, row: Document, linear: bool) -> tup
     """M or rad; every joint has both, so that none is without limits by mistake."""
     unit, other = ("mm", "deg") if linear else ("deg", "mm")
     for side in ("min", "max"):
-        if f"{side}_{other}" in row:
-            kind = "linear" if linear else "rotary"
-            raise toml.fault(section, f"{side}_{other}", f": the axis is {kind}", expected=f"{side}_{unit}")
+        for key in (f"{side}_{other}", f"speed_{other}_per_s"):
+            if key in row:
+                expected, kind = key.replace(other, unit), "linear" if linear else "rotary"
+                raise toml.fault(section, key, f": the axis is {kind}", expected=expected)
         if f"{side}_{unit}" not in row:
             expected = f"its limit in {unit}; {'-' if side == 'min' else ''}inf where it has none"
             raise toml.fault(section, f"{side}_{unit}", " is missing", expected)

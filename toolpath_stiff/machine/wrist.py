@@ -151,7 +151,7 @@ class SphericalWrist:
         shoulder = joints[1] + np.angle(self.upper)
         gamma = self.sign * joints[2] + np.angle(self.lower) - np.angle(self.upper)
         out = (self.shoulder.imag + upper * np.sin(shoulder) + lower * np.sin(shoulder + gamma)) / (upper + lower)
-        return np.abs(np.stack([out, np.sin(gamma), np.sin(joints[4] + self.bend)]))
+        return np.asarray(np.abs(np.stack([out, np.sin(gamma), np.sin(joints[4] + self.bend)])))
 
 
 def _meeting_point(origins: Sequence[FloatArray], axes: Sequence[FloatArray], most: float) -> FloatArray | None:

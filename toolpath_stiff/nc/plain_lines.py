@@ -239,16 +239,16 @@ class Lines:
     ) -> tuple[geometry.Point2, geometry.Point2]:
         """End and centre of an arc; `words`: X, Y, I, J of the plane, R, the offset off the plane, nan for none."""
         (x, y, i, j, radius, off_plane), scale = words, self.state.length_scale
-        by_radius = radius == radius  # a nan is not itself; `math.isnan` takes three times as long
-        fits = by_radius == (i != i and j != j) and not (by_radius and x != x and y != y)
+        no_x, no_y, no_i, no_j, by_center = map(math.isnan, words[:5])
+        fits = by_center != (no_i and no_j) and not (no_x and no_y and not by_center)
         if not fits or abs(off_plane) > 0.0:
             raise geometry.ArcError("words that do not fit", "")
         a, b = start
         over, up = (0.0, 0.0) if self.state.absolute else start
-        end = (a if x != x else over + x * scale, b if y != y else up + y * scale)
-        if by_radius:
+        end = (a if no_x else over + x * scale, b if no_y else up + y * scale)
+        if not by_center:
             return end, geometry.center_from_radius(start, end, radius * scale, clockwise)
-        return end, (a if i != i else a + i * scale, b if j != j else b + j * scale)
+        return end, (a if no_i else a + i * scale, b if no_j else b + j * scale)
 
     def _leave(self, control: FloatArray | None) -> int:
         """Set the state as the lines executed leave it; their number."""

@@ -34,6 +34,7 @@ from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 POSES_AT_A_TIME = 30_000  # fits the processor's cache
+UNREACHABLE = -9.0  # margin where no joint values lead to a pose: finite, because a search takes differences of it
 COMPLIANCE_DECIDES = ("softest", "normal")  # loads whose direction asks the compliance, the second at plunges
 
 
@@ -133,7 +134,7 @@ class Evaluator:
         """Rows of placements (k, 6) m and rad; all in memory at once."""
         k, n = len(placements), len(self.path)
         self.poses += k * n
-        turn = rotation_matrices(placements[:, 3:])
+        turn = rotation_matrices(placements[:, 3:6])
         position = _turned(turn, self.position) + placements[:, :3].T[:, :, None]
         motion, rotation = _turned(turn, self.tangent), self._orientations(placements, turn)
         clearance = np.broadcast_to(np.inf, (k, n))
@@ -197,16 +198,17 @@ class Evaluator:
         return np.unique([part[int(np.argmin(values[part]))] for part, values in parts])
 
     def _orientations(self, placements: FloatArray, turn: FloatArray) -> FloatArray | None:
-        """(9, k, n) rows of R' = Q R Rz(-C), the rule of `path`; None: all vertical."""
+        """(9, k, n) rows of R' = Q R Rz(-C), the rule of `path`, and the tool's turn; None: all vertical."""
         k, n = len(placements), len(self.path)
+        back = placements[:, 5] - placements[:, 6:].sum(axis=1)
         if self.turned is None:
-            if not placements[:, 3:5].any():
+            if not placements[:, 3:5].any() and placements.shape[1] == 6:
                 return None
-            turned = product(turn, rotation_about_z(-placements[:, 5]))
+            turned = product(turn, rotation_about_z(-back))
             return np.repeat(turned.reshape(k, 9).T[:, :, None], n, axis=2)
         rotation = np.empty((3, 3, k, n))
         first, second, rotation[:, 2] = (_turned(turn, self.turned[:, column]) for column in range(3))
-        cosine, sine = np.cos(placements[:, 5])[:, None], np.sin(placements[:, 5])[:, None]
+        cosine, sine = np.cos(back)[:, None], np.sin(back)[:, None]
         rotation[:, 0] = cosine * first - sine * second
         rotation[:, 1] = sine * first + cosine * second
         return rotation.reshape(9, k, n)
@@ -234,7 +236,7 @@ class Evaluator:
             rows = np.flatnonzero(chosen == configuration)
             in_work, tools = placed(rows, np.arange(n))
             stance = machine.solve(*in_work[:2], tools, configuration)
-            margin[rows] = reach(machine, in_work[0], stance).margin.reshape(-1, n)
+            margin[rows] = np.maximum(reach(machine, in_work[0], stance).margin, UNREACHABLE).reshape(-1, n)
             possible = margin[rows][:, self.cuts].min(axis=1, initial=np.inf) >= 0.0
             wanted = np.flatnonzero(np.logical_and.outer(possible, self.path.headline).ravel())
             if len(wanted):

@@ -16,7 +16,7 @@ import numpy as np
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputErrors, MeasurementError
-from toolpath_stiff.machine.elements import LoadRows, Spring, Stance
+from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.joint_values import joint_margin
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.readings.mapping import mapped_table
@@ -244,61 +244,25 @@ def _of_rows(rows: Sequence[_Pull], machine: MachineTool) -> Pulls:
 def _stances(machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: Sequence[_Pull]) -> Stance:
     """At the joints where they are given, else at the pose. Raises `InputErrors` for rows that cannot be."""
     by_joints, errors = ~np.isnan(joints).any(axis=1), []
-    position, rotation = pose[:, :3].copy(), rotation_matrices(pose[:, 3:])
+    position, rotation, joints = pose[:, :3], rotation_matrices(pose[:, 3:]), joints.copy()
+    apart = np.full(len(rows), np.nan)
     if by_joints.any():
-        there, turn = machine.forward(joints[by_joints])
-        apart = np.linalg.norm(there - position[by_joints], axis=1)
-        for row, off in zip(np.flatnonzero(by_joints).tolist(), apart.tolist(), strict=True):
-            if not off > SAME_PLACE:
-                continue
-            text = f"pose and joints are {mm_from_m(off):.1f} mm apart"
-            errors.append(MeasurementError(text, file=rows[row].file, line=rows[row].line))
-        position[by_joints], rotation[by_joints] = there, turn
-    stances = [machine.solve(position, rotation, configuration=i) for i in range(len(machine.configurations))]
-    best = machine.solve(position, rotation)
-    chosen = best.configuration.copy()
-    for i, stance in enumerate(stances):
-        off = np.abs(np.exp(1j * stance.joints) - np.exp(1j * joints)).max(axis=1)
-        chosen[by_joints & (off < 1e-6)] = i
-    # Poses alone: the configuration of rows with joints, else that in which most poses lie farthest from the limits.
-    known = np.bincount(chosen[by_joints], minlength=len(stances))
-    room = [joint_margin(stance.joints.T, machine.joint_limits)[~by_joints] for stance in stances]
-    kept = max(range(len(stances)), key=lambda i: (known[i], (room[i] >= 0.0).sum(), room[i].min(initial=np.inf)))
-    chosen[~by_joints & ~np.isnan(stances[kept].joints).any(axis=1)] = kept
-    for row in np.flatnonzero(np.isnan(best.joints).any(axis=1)).tolist():
+        apart[by_joints] = np.linalg.norm(machine.forward(joints[by_joints])[0] - position[by_joints], axis=1)
+    for row in np.flatnonzero(apart > SAME_PLACE).tolist():
+        text = f"pose and joints are {mm_from_m(float(apart[row])):.1f} mm apart"
+        errors.append(MeasurementError(text, file=rows[row].file, line=rows[row].line))
+    if not by_joints.all():  # one configuration for all poses: of those that reach most, that farthest from limits
+        alone = position[~by_joints], rotation[~by_joints]
+        tried = [machine.solve(*alone, configuration=i).joints for i in range(len(machine.configurations))]
+        room = [joint_margin(values.T, machine.joint_limits) for values in tried]
+        kept = max(range(len(tried)), key=lambda i: (int((room[i] >= 0.0).sum()), float(room[i].min())))
+        missed = np.isnan(tried[kept]).any(axis=1, keepdims=True)
+        joints[~by_joints] = np.where(missed, machine.solve(*alone).joints, tried[kept])
+    for row in np.flatnonzero(np.isnan(joints).any(axis=1)).tolist():
         errors.append(MeasurementError("no joint values lead to the pose", file=rows[row].file, line=rows[row].line))
     if errors:
         raise InputErrors(errors)
-    order = np.argsort(np.concatenate([np.flatnonzero(chosen == i) for i in range(len(stances))]))
-    return _joined([stance.take(np.flatnonzero(chosen == i)) for i, stance in enumerate(stances)]).take(order)
-
-
-def _joined(parts: Sequence[Stance]) -> Stance:
-    """Stances one after the other, in whatever configuration."""
-
-    def whole(values: Sequence[FloatArray | None], *inner: int) -> FloatArray:
-        full = [np.eye(3) if value is None else value for value in values]
-        return np.concatenate([np.broadcast_to(v, (len(s), *inner)) for v, s in zip(full, parts, strict=True)])
-
-    joined: list[Spring | LoadRows] = []
-    for loads in zip(*(part.loads for part in parts), strict=True):
-        k = loads[0].compliance.shape[-1]
-        compliance = whole([load.compliance for load in loads], k)
-        springs = [load for load in loads if isinstance(load, Spring)]
-        if springs:
-            axes = whole([spring.axes for spring in springs], 3, 3)
-            joined.append(Spring(whole([spring.place for spring in springs], 3), axes, compliance))
-        else:
-            rows = [load.loads for load in loads if isinstance(load, LoadRows)]
-            joined.append(LoadRows(whole(rows, k, 6), compliance))
-    return Stance(
-        joints=np.concatenate([part.joints for part in parts]),
-        position=np.concatenate([part.position for part in parts]),
-        rotation=whole([part.rotation for part in parts], 3, 3),
-        work_axes=whole([part.work_axes for part in parts], 3, 3),
-        configuration=np.concatenate([part.configuration for part in parts]),
-        loads=tuple(joined),
-    )
+    return machine.standing(joints)
 
 
 def _of_stiffnesses(files: Sequence[str], machine: MachineTool, mapping: Mapped) -> Pulls:

@@ -36,9 +36,7 @@ class GearBacklash(Effect):
     parameters = (
         element_parameter("which joint, by its name in `tps machine show`"),
         Parameter("gap", "arcsec", np.pi / 648000.0, (0.0, 3600.0), (10.0, 90.0), TYPICAL, meaning="turn to one side"),
-        Parameter(
-            "closing", "N m", 1.0, (0.0, 500.0), (2.0, 130.0), CLOSED, meaning="moment over which the gap closes"
-        ),
+        Parameter("closing", "N m", 1.0, (0.0, 500.0), (2.0, 130.0), CLOSED, meaning="moment that closes the gap"),
     )
 
     def element_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
