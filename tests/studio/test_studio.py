@@ -483,6 +483,8 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     page.wait_for_selector("button[id^=use-]")
     front = json.loads((running.folder / tps.Case.open(running.folder).latest("place") / "placement.json").read_text())
     cells = [re.sub(r"[^\d.-]", "", one) for one in page.locator("tr:has(button[id^=use-]) td").all_inner_texts()][:8]
+    placed = tps.Case.open(running.folder).history[-1]
+    assert f"--machine {placed.result}/machine.toml" in placed.command  # which carries what is switched on
     first = front["front"][0]
     keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "x_mm", "y_mm", "z_mm", "rotation_deg")
     assert [float(one) for one in cells[1:]] == pytest.approx([first[key] for key in keys], abs=0.51)
@@ -696,6 +698,28 @@ SMALL = """
 () => [...document.querySelectorAll("button, input, select, summary, a.button")].filter((one) => one.checkVisibility()
   && one.getBoundingClientRect().height < 32).map((one) => one.outerHTML.slice(0, 90))
 """
+
+
+def test_a_robot_moves_along_the_path(tmp_path, browser):
+    (tmp_path / "slot.nc").write_text(SLOT)
+    robot = Path(__file__).parents[1] / "machine/data/robot200.toml"
+    studio = Running(tmp_path / "case", "--machine", str(robot), "--program", str(tmp_path / "slot.nc"))
+    tab = Tab(browser, studio.address)
+    try:
+        tab.page.wait_for_selector("#which-now")
+        scene = studio.idle()["machine"]["scene"]
+        assert [body["name"] for body in scene["bodies"]] == ["J1", "J2", "J3", "J4", "J5", "J6", "tool"]
+        assert len(scene["frames"]) > 40
+        for focus in ("part", "machine", "work"):
+            tab.page.click(f"[data-focus={focus}]")
+        tab.page.click("#play")
+        tab.until("Number(document.querySelector('#scrub').value) > 3")
+        tab.go("placement")
+        tab.page.wait_for_selector("#drag")
+        assert tab.faults == []
+    finally:
+        tab.close()
+        studio.end()
 
 
 def test_the_work_is_dragged_by_touch(running, browser, tmp_path):
