@@ -103,7 +103,7 @@ def brute_force(observed: FloatArray, added: FloatArray) -> float:
 def test_projection_is_the_inverse_covariance_with_the_law_as_one_more_scatter():
     """Woodbury: what a refit with a prior leaves has the inverse covariance (V + s^2 J J^T)^-1."""
     problem = by_hand(logs_by_hand())
-    law = problem.law_jacobian(np.zeros(2), problem.base_compliance)
+    law = problem.predictor.law_columns(-np.log(problem.base_compliance))
     dense = np.linalg.inv(COVARIANCE + LAW_PRIOR**2 * law @ law.T)
     found = problem.projected(law).times(np.eye(COUNT))
     assert found == pytest.approx(dense, rel=1e-7, abs=1e-7 * np.abs(dense).max())

@@ -131,7 +131,7 @@ def test_simulated_scatter_has_the_covariance_and_its_uncertainty():
 def test_a_reading_set_aside_is_as_if_it_had_never_been_taken():
     """Against the pulls of the readings that stay, their own sub-matrix inverted."""
     problem, spread, _ = setting()
-    law = problem.law_jacobian(np.zeros(2), problem.base_compliance)
+    law = problem.predictor.law_columns(-np.log(problem.base_compliance))
     projected, residual = (
         problem.projected(law),
         np.random.default_rng(1).multivariate_normal(np.zeros(N), spread, method="cholesky"),
@@ -151,7 +151,7 @@ def test_a_reading_set_aside_is_as_if_it_had_never_been_taken():
 def test_structure_of_pure_noise_surprises_no_one():
     """Each form's tail probability is uniform under the null, as well as Satterthwaite's approximation has it."""
     problem, _, forms = setting()
-    law = problem.law_jacobian(np.zeros(2), problem.base_compliance)
+    law = problem.predictor.law_columns(-np.log(problem.base_compliance))
     projected = problem.projected(law)
     draws = simulator_of(4, 1000)
     structure = FormStatistics(forms, projected)

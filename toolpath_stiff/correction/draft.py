@@ -15,6 +15,7 @@ from toolpath_stiff.correction.machines import data_hash
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.inference.judgement import NONE
 from toolpath_stiff.machine.writer import value_text
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.portrait.words import portrait_text, size_words, term_words
@@ -114,7 +115,7 @@ def _nothing_to_describe(diagnosis: Diagnosis) -> str:
     portrait, verdict = diagnosis.portrait, diagnosis.verdict
     if diagnosis.main.question:
         return f"{diagnosis.main.question} Nothing is drafted from readings that may be of another machine."
-    if verdict == "adequate":
+    if verdict == "adequate" or (portrait is None and NONE in diagnosis.explanations):
         return "Nothing is missing that these data could show: there is nothing to describe."
     if verdict == "unexplained" and (portrait is None or not portrait.terms):
         return "Something is missing, but no simple form of it stands out from chance: there is nothing to write down."

@@ -147,7 +147,7 @@ def _without_slips(
     if clear and kept.sum() >= FEWEST:
         # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
         progress("once more with the rows mended that look mistyped")
-        clear = clear if judged(slips.mended(data, clear))[1].explained else []
+        clear = [] if judged(slips.mended(data, clear))[1].verdict == "unexplained" else clear
     entries = tuple(slips.suspect_entries(suspects, data, left_out=clear))
     if not clear:
         return judgements, main, data, entries

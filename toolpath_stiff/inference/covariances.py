@@ -213,15 +213,6 @@ class Precision:
         shared = flat @ self.factors.T
         return np.asarray(blocks - np.einsum("iq,iq->i", shared, shared)).reshape(rows.shape[:-1])
 
-    def products(self, rows: FloatArray) -> FloatArray:
-        """(..., k, k) of rows (..., k, n): each with each of the same leading index. Cheaper than by `times`."""
-        over = rows / self.own_variance
-        sums = self.groups.sums(over)
-        flat = rows.reshape(-1, rows.shape[-1]) @ self.factors.T
-        shared = flat.reshape(*rows.shape[:-1], len(self.factors))
-        blocks = rows @ np.swapaxes(over, -1, -2) - (sums * self.pull) @ np.swapaxes(sums, -1, -2)
-        return np.asarray(blocks - shared @ np.swapaxes(shared, -1, -2))
-
     @cached_property
     def diagonal(self) -> FloatArray:
         """(n,)."""

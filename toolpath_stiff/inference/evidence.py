@@ -37,7 +37,6 @@ def law_prior(unknowns: int) -> FloatArray:
 
 
 MOST_ROUNDS = 3  # searches for wild readings
-BASE_ROUNDS = 3  # the same of the model without any further effect
 TABLE_STEPS, TABLE_TOLERANCE = 12, 1e-4  # of a fit on tables; standard deviations
 BEYOND = 0.05  # share of a bound by which a search may overshoot it
 
@@ -178,8 +177,7 @@ class Problem:
         self.base_compliance = np.exp(-predictor.log_stiffness())
         self.rest = self.base_compliance - predictor.strut_part()
         self.prior = cache(self._prior)
-        jacobian = self.law_jacobian(np.zeros(2), self.base_compliance)
-        self.sight = Sight(self.base_compliance, self.projected(jacobian))
+        self.sight = Sight(self.base_compliance, self.projected(predictor.law_columns(-np.log(self.base_compliance))))
 
     @classmethod
     def of(cls, predictor: Predictor, noise: Noise) -> Problem:
@@ -220,54 +218,29 @@ class Problem:
         """(..., n) with the machine file's own effects; above a tenth of the base model's."""
         return np.maximum(compliance + self.rest, 0.1 * self.base_compliance)
 
-    def law_jacobian(self, law: FloatArray, compliance: FloatArray) -> FloatArray:
-        """(n, 2) of ln k."""
-        return np.asarray((-self.predictor.strut_part_and_slopes(law)[1] / compliance).T)
-
-    def fit_law(
-        self, delta: FloatArray, precision: Precision, start: FloatArray, steps: int = 3
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Laws (g, 2), residuals (g, n), information matrices (g, 2, 2) for added compliances (g, n)."""
-        law = np.asarray(start)[None]  # the same for all at first
-        for _ in range(steps):
-            part, slopes = self.predictor.strut_part_and_slopes(law)
-            compliance = self._held(part + delta)
-            rows = np.empty((len(compliance), 3, len(self.observed)))  # of the jacobian, then of the residual
-            np.divide(-slopes, compliance[:, None], out=rows[:, :2])
-            rows[:, 2] = self.observed + np.log(compliance)
-            products = precision.products(rows)
-            information = products[:, :2, :2] + np.eye(2) / LAW_PRIOR**2
-            gradient = products[:, :2, 2] - law / LAW_PRIOR**2
-            law = law + np.clip(np.linalg.solve(information, gradient[..., None])[..., 0], -0.5, 0.5)
-        return law, self.observed + np.log(self.compliance(law, delta)), information
-
     def score_base(self) -> Fit:
         """The model without any further effect."""
-        scatter, law = self.scatter, np.zeros(2)
-        none = np.zeros((1, len(self.observed)))
-        for _ in range(BASE_ROUNDS):
-            (law,), (residual,), (information,) = self.fit_law(none, scatter.precision, law)
-            scatter, wild = self.scatter.with_wild(residual), scatter.wild
-            if scatter.wild == wild:
-                break
-        return Fit(
-            (), (), (), law, residual, self.law_jacobian(law, self.compliance(law, none[0])),
-            np.asarray(np.linalg.inv(information), dtype=float), scatter,
-            log_evidence=float(scatter.log_likelihood(residual)) + float(law_terms(law[None], information[None])[0]),
-        )  # fmt: skip
+        fit = self.score_subset((), ())
+        assert fit is not None  # the law's prior holds it
+        return fit
 
     def score_subset(
-        self, tables: Sequence[CandidateTable], free: tuple[int, ...], start: Fit, sizes: FloatArray | None = None
+        self,
+        tables: Sequence[CandidateTable],
+        free: tuple[int, ...],
+        start: Fit | None = None,
+        sizes: FloatArray | None = None,
     ) -> Fit | None:
         """Candidates with these components free (counted over all of them); None if one ends at zero or at its bound.
 
-        Gauss-Newton from the law of `start`, then Laplace's approximation. `sizes`: where to begin, with the scatter of
-        `start`; else at 0.
+        Gauss-Newton from the law of `start`, else the machine file's, then Laplace's approximation. `sizes`: where to
+        begin, with the scatter of `start`; else at 0.
         """
         every = [(table, j) for table in tables for j in range(len(table.candidate.components))]
-        x, unknowns = np.concatenate([start.law, np.zeros(len(every))]), [0, 1, *(2 + i for i in free)]
-        scatter = self.scatter
-        if sizes is not None:
+        x, unknowns, scatter = np.zeros(2 + len(every)), [0, 1, *(2 + i for i in free)], self.scatter
+        if start is not None:
+            x[:2] = start.law
+        if start is not None and sizes is not None:
             x[unknowns[2:]], scatter = sizes[list(free)], start.scatter
         for last in range(MOST_ROUNDS, -1, -1):
             converged = self._gauss_newton(tables, x, unknowns, scatter.precision)
@@ -292,9 +265,9 @@ class Problem:
         possible = all(component.allows(float(x[i])) for i, component in bounded.items())
         if not possible and len(free) > 1:
             return None
-        candidates, parts = zip(*((table.candidate, part) for table, part in split(tables, x[2:].copy())), strict=True)
+        parts = tuple(part for _, part in split(tables, x[2:].copy()))
         fit = Fit(
-            candidates, parts, free, x[:2].copy(), residual, equations.jacobian,
+            tuple(table.candidate for table in tables), parts, free, x[:2].copy(), residual, equations.jacobian,
             np.asarray(scaled_inverse(equations.information), dtype=float), scatter, tables=tuple(tables),
             possible=possible,
         )  # fmt: skip
@@ -306,7 +279,7 @@ class Problem:
 
         `chosen`: table and component of each free size; `information` (2 + p, 2 + p).
         """
-        sizes = np.concatenate(fit.sizes)[list(fit.free)]
+        sizes = np.array([fit.parts[i][1] for i in fit.free])
         deviations = np.array([fit.deviation(i) for i in fit.free])
         peak = fit.log_posterior - 2.0 * np.log(LAW_PRIOR)
         if len(chosen) == 1:
@@ -367,7 +340,7 @@ class Problem:
 def split(tables: Sequence[CandidateTable], sizes: FloatArray) -> Iterator[tuple[CandidateTable, FloatArray]]:
     """Each table with its own of the sizes (p,)."""
     ends = np.cumsum([len(table.candidate.components) for table in tables])
-    return zip(tables, np.split(sizes, ends[:-1]), strict=True)
+    return zip(tables, np.split(sizes, ends)[:-1], strict=True)
 
 
 def normal_equations(
@@ -379,9 +352,3 @@ def normal_equations(
     information[:2, :2] += prior * np.eye(2)
     gradient[:2] -= prior * law
     return NormalEquations(jacobian, information, gradient)
-
-
-def law_terms(laws: FloatArray, information: FloatArray) -> FloatArray:
-    """(g,) log prior of the laws and Laplace's term for integrating them out."""
-    penalty = -0.5 * (laws**2).sum(axis=-1) / LAW_PRIOR**2
-    return np.asarray(penalty - 0.5 * np.linalg.slogdet(information)[1] - 2.0 * np.log(LAW_PRIOR))

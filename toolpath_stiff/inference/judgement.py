@@ -41,9 +41,10 @@ from toolpath_stiff.inference.fits import refine, with_given_law
 from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
+from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import findings, fitted_nuisances, mean_left_by_nuisances
-from toolpath_stiff.inference.rivals import SERIES, entries, left_out_of, lowers_error, rivals_of, rivals_of_law
+from toolpath_stiff.inference.rivals import SERIES, entries, lowers_error, rivals_of, rivals_of_law
 from toolpath_stiff.inference.several import search_pairs, search_triples
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded, rooms
 from toolpath_stiff.inference.votes import Votes, closest, outvoted
@@ -125,11 +126,6 @@ class Judgement:
     noise_factor: float = 1.0
     drawn: Drawn | None = None
     votes: Votes = field(default_factory=dict)
-
-    @property
-    def explained(self) -> bool:
-        """Whether an explanation stands, the model alone among them."""
-        return self.verdict != "unexplained"
 
     @property
     def plausible(self) -> tuple[str, ...]:
@@ -424,8 +420,8 @@ def put_to_vote(
         likely = explanations if not noise.guess and _may_leave(problem, candidates) > LEFT else ()
         standing = [NONE, *(name for name in TAKEN_UP if name in fits), *likely]
     elif verdict in ("identified", "ambiguous"):
-        before = left_out_of(base, data)
-        standing = [n for n in explanations if n == NONE or lowers_error(before, left_out_of(fits[n], data))]
+        left_out = {name: held_out(fits[name], data.point).of_readings(data.tip) for name in {NONE, *explanations}}
+        standing = [n for n in explanations if n == NONE or lowers_error(left_out[NONE], left_out[n])]
         top = next((name for name in standing if name != NONE), NONE)
         if top == NONE and not gates.none_stands:
             return "unexplained", (), {}
@@ -457,9 +453,7 @@ def _shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) 
     """Explanations without those beyond the `MOST_OPEN` entries that come first; the model alone stays."""
     groups = entries(problem, fits, tuple(dict.fromkeys(names)))
     kept = groups[:MOST_OPEN]
-    for group in groups[MOST_OPEN:]:
-        if NONE in group:
-            kept[-1] = group
+    kept[-1:] = [group for group in groups[MOST_OPEN:] if NONE in group] or kept[-1:]
     return tuple(name for group in kept for name in group)
 
 

@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from toolpath_stiff.inference.candidates import candidates_of, testable_effects
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect
-from toolpath_stiff.inference.left_out import HeldOut, held_out
+from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.votes import SMALL
-from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.stiffness.contract import SETUP, Effect
 
 INSTRUMENT = "instrument"
@@ -78,11 +77,6 @@ def _alike(problem: Problem, fit: Fit, other: Fit) -> bool:
 
     apart = float(problem.scatter.precision.squares(fit.residual - other.residual))
     return places(fit) == places(other) and 0.5 * apart <= SMALL
-
-
-def left_out_of(fit: Fit, data: Readings) -> HeldOut:
-    """Residuals at the tip's left-out points."""
-    return held_out(fit, data.point).of_readings(data.tip)
 
 
 def lowers_error(before: HeldOut, after: HeldOut) -> bool:

@@ -103,9 +103,9 @@ class _Beside:
         for sizes in self._sizes(table, j):
             every = sizes[:, None] * np.eye(len(candidate.components))[j]
             change = np.log1p(np.maximum(table.delta(every) / whole, -0.9))
-            squares, left = self._fitted(self.fit.residual + change)
+            squares, stays = self._fitted(self.fit.residual + change)
             changes = np.sqrt(np.mean(change[:, self.tip] ** 2, axis=1))
-            sides.append((sizes, changes, left, squares))
+            sides.append((sizes, changes, stays, squares))
             # Of the prior, as far as sizes are expected; whether the readings would show them does not matter here.
             weights = np.exp(log_expected(changes) + log_usual(sizes, component.typical()))
             weights *= np.abs(np.gradient(np.log(np.abs(sizes))))
