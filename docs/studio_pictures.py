@@ -51,7 +51,7 @@ def journey(page: Page, address: str) -> None:
     page.click("[data-focus=machine]")
     page.click("#best")
     page.wait_for_selector("button[id^=use-]")
-    page.click("button[id^=use-]")
+    page.locator("tr", has_text="recommended").locator("button").click()
     idle(page)
     page.evaluate("document.querySelector('.right').scrollTop = 0")
     shot("placement")

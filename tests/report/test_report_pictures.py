@@ -145,9 +145,11 @@ def test_plunges_are_on_the_scale_when_asked_for(analysis):
 
 def test_plunges_are_grey_unless_asked_for(analysis):
     slate = tuple(int(SLATE[i : i + 2], 16) for i in (1, 3, 5))
-    for picture in (path_picture, profile_picture):
-        hidden, shown = (count_colour(picture(analysis, show_plunges=show), slate) for show in (False, True))
-        assert hidden > 20 > shown, picture.__name__
+    hidden, shown = (count_colour(path_picture(analysis, show_plunges=show), slate) for show in (False, True))
+    assert hidden > 20 > shown
+    for show in (False, True):
+        lines = {line.get_label(): line.get_color() for line in profile(analysis, show_plunges=show).axes[0].lines}
+        assert lines.get("plunges") == (None if show else SLATE)
 
 
 def test_the_axis_of_the_profile_is_that_of_the_headline(analysis):

@@ -483,6 +483,8 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     page.wait_for_selector("button[id^=use-]")
     front = json.loads((running.folder / tps.Case.open(running.folder).latest("place") / "placement.json").read_text())
     cells = [re.sub(r"[^\d.-]", "", one) for one in page.locator("tr:has(button[id^=use-]) td").all_inner_texts()][:8]
+    placed = tps.Case.open(running.folder).history[-1]
+    assert f"--machine {placed.result}/machine.toml" in placed.command  # which carries what is switched on
     first = front["front"][0]
     keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "x_mm", "y_mm", "z_mm", "rotation_deg")
     assert [float(one) for one in cells[1:]] == pytest.approx([first[key] for key in keys], abs=0.51)
@@ -698,6 +700,28 @@ SMALL = """
 """
 
 
+def test_a_robot_moves_along_the_path(tmp_path, browser):
+    (tmp_path / "slot.nc").write_text(SLOT)
+    robot = Path(__file__).parents[1] / "machine/data/robot200.toml"
+    studio = Running(tmp_path / "case", "--machine", str(robot), "--program", str(tmp_path / "slot.nc"))
+    tab = Tab(browser, studio.address)
+    try:
+        tab.page.wait_for_selector("#which-now")
+        scene = studio.idle()["machine"]["scene"]
+        assert [body["name"] for body in scene["bodies"]] == ["J1", "J2", "J3", "J4", "J5", "J6", "tool"]
+        assert len(scene["frames"]) > 40
+        for focus in ("part", "machine", "work"):
+            tab.page.click(f"[data-focus={focus}]")
+        tab.page.click("#play")
+        tab.until("Number(document.querySelector('#scrub').value) > 3")
+        tab.go("placement")
+        tab.page.wait_for_selector("#drag")
+        assert tab.faults == []
+    finally:
+        tab.close()
+        studio.end()
+
+
 def test_the_work_is_dragged_by_touch(running, browser, tmp_path):
     tab = Tab(browser, running.address, viewport={"width": 390, "height": 844}, has_touch=True)
     (tmp_path / "touch.nc").write_text(SLOT)
@@ -882,7 +906,8 @@ def test_the_export_is_read_without_a_studio_and_has_the_figures_of_the_commands
         shown = rows.pop(one["effect"])
         if one["finding"]:
             errors = [one[f"{key}_error_percent"] for key in ("mean_abs", "held_out")]
-            assert [f"{v:.2f} %" in shown for v in errors] == [True, True], (one["effect"], errors, shown)
+            halves_up = [f"{v + 1e-9:.2f} %" for v in errors]  # 2.125 is 2.13 to the page, 2.12 to Python
+            assert [text in shown for text in halves_up] == [True, True], (one["effect"], errors, shown)
         p = one["probability"]
         assert p is None or ("> 99" if p > 0.99 else "< 1" if p < 0.01 else f"{100 * p:.0f}") + " %" in shown
     shown = " ".join(tab.text("#portrait").split())

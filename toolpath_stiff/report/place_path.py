@@ -10,7 +10,7 @@ import numpy as np
 
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.loads import headline_rows, plunging_rows
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.documents import Document, number
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.placement.paths import placed_path
@@ -21,7 +21,7 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
 POINTS = (150, 800)  # of the path on the page, fewest and most
 VALUES = 48_000  # points times placements that the page holds, some 300 kB
-ENDS = (0.05, 0.95)  # of the path's length, all placements together, between which the colours run
+ENDS = (0.05, 0.95)  # of the points drawn, all placements together, between which the colours run
 CORNER = rad_from_deg(10.0)  # a sharper one is kept before samples along straight cuts are
 SHARE_OF_CORNERS = 0.6  # at most, of the points drawn
 
@@ -44,10 +44,9 @@ def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[Documen
     plunge &= ~headline_rows(counting, plunge)
     about = np.isfinite(stiffness) & ~plunge
     about = about if about.any() else np.isfinite(stiffness)
-    step = np.where(np.diff(cut) == 0, np.diff(few.s), 0.0)  # each point stands for half the way to its neighbours
-    length = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
-    length = length if length.any() else np.ones(len(length))
-    low, high = _scale(stiffness[about], np.broadcast_to(length, stiffness.shape)[about])
+    low, high = (float(end) for end in np.quantile(stiffness[about], ENDS))  # a few corners would take all contrast
+    if high <= low * (1.0 + 1e-6):
+        low, high = low * (1.0 - 1e-3), high * (1.0 + 1e-3)
     digits = max(0, 5 - int(np.log10(max(float(stiffness[about].max()), 1.0))))  # six digits
     rounded, axis = np.round(stiffness, digits), rotation_matrices(few.abc)[:, :, 2]
     values = (rounded if digits else np.nan_to_num(rounded).astype(np.int64)).tolist()
@@ -64,7 +63,7 @@ def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[Documen
         "scale": [low, high],
         "beyond": [bool(np.nanmin(stiffness) < low), bool(np.nanmax(stiffness) > high)],
     }
-    colours = f" Colours span the middle {100.0 * (ENDS[1] - ENDS[0]):.0f} % of the length at all placements"
+    colours = f" Colours span the middle {100.0 * (ENDS[1] - ENDS[0]):.0f} % of these points at all placements"
     colours += ", plunges left out." if plunge.any() else "."
     if len(few) == len(cuts):
         return data, f"All {number(len(few))} samples of the cutting path are drawn.{colours}"
@@ -73,14 +72,6 @@ def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[Documen
         "lines, each with the stiffness that was evaluated there; the figures in the table are of all samples."
         f"{colours}"
     )
-
-
-def _scale(stiffness: FloatArray, length: FloatArray) -> tuple[float, float]:
-    """Ends of the colour scale in N/mm: a few corners would otherwise take all the contrast."""
-    order = np.argsort(stiffness, kind="stable")
-    along = np.cumsum(length[order])
-    low, high = (float(v) for v in stiffness[order[np.searchsorted(along, np.array(ENDS) * along[-1])]])
-    return (low, high) if high > low * (1.0 + 1e-6) else (low * (1.0 - 1e-3), high * (1.0 + 1e-3))
 
 
 def thinned_rows(samples: Samples, cut: IntArray, points: int) -> IntArray:

@@ -7,7 +7,6 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
@@ -20,6 +19,7 @@ import toolpath_stiff as tps
 from toolpath_stiff.case.case import Case, find
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
+from toolpath_stiff.report.curves import extremes_by_column
 from toolpath_stiff.units import mm_from_m, um_from_m
 
 COARSE_SAMPLES = 6000  # of a path in the page; the statistics are those of all samples
@@ -186,11 +186,9 @@ def _thinned(values: Any, starts: Any) -> Any:
     """Rows of a drawing: all, or the lowest and highest of each of many stretches, and starts of lines."""
     if len(values) <= COARSE_SAMPLES:
         return np.arange(len(values))
-    edges = np.linspace(0, len(values), COARSE_SAMPLES // 3 + 1).astype(int)
-    low, high = np.nan_to_num(values, nan=np.inf), np.where(np.isfinite(values), values, -1)
-    extremes = [a + part for a, b in pairwise(edges) for part in (np.argmin(low[a:b]), np.argmax(high[a:b]))]
     some = starts[:: max(1, len(starts) // (COARSE_SAMPLES // 3))]
-    return np.unique(np.concatenate([extremes, edges[:-1], some, [len(values) - 1]]))
+    extremes = extremes_by_column(np.arange(len(values), dtype=float), values, COARSE_SAMPLES // 5)
+    return np.unique(np.concatenate([extremes, some]))
 
 
 def _plain(values: Any, digits: int) -> list[float | None]:

@@ -1,5 +1,5 @@
 // Data.
-const data = JSON.parse(document.getElementById("data").textContent);
+const data = JSON.parse($("data").textContent);
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
 const NONE = 65535, RAPID = 0, OUT = 8, PLUNGE = 16;
 const n = data.count;
@@ -23,8 +23,8 @@ const other = data.other && { s: new Float32Array(bytes(data.other.s)),
   k: new Float32Array(bytes(data.other.stiffness)), plunge: new Uint8Array(bytes(data.other.plunge)) };
 const cutting = (i) => (kind[i] & 7) !== RAPID;
 // Plunges along the tool axis: unless the switch is on they set neither the colours nor the axis of the profile.
-const rapidsBox = document.getElementById("rapids"), plungesBox = document.getElementById("plunges");
-document.getElementById("plunges-label").hidden = data.scale_with_plunges === null;
+const rapidsBox = $("rapids"), plungesBox = $("plunges");
+$("plunges-label").hidden = data.scale_with_plunges === null;
 const setAside = (i) => !plungesBox.checked && (kind[i] & PLUNGE) !== 0;
 const MOTIONS = data.motions;
 
@@ -69,7 +69,7 @@ function lineColour(number) {
 }
 // What is pointed at.
 let here = -1, chosenLine = 0, part;
-const status = document.getElementById("status");
+const status = $("status");
 function describe(i) {
   const [x, y, z] = xyz.map((axis) => axis[i].toFixed(2));
   const turned = angles ? " " + angles.map((a, axis) => "ABC"[axis] + a[i].toFixed(2)).join(" ") : "";
@@ -89,7 +89,7 @@ function point(i, stage) {
     if (stage) stage.tell(stage === view ? path.at(i) : stage.at(i), text);
     showLine(line[i]);
   }
-  if (machineBox.checked) view.redraw(); else view.drawOverlay();
+  if (machineBox.checked && !scene.heavy) view.redraw(); else view.drawOverlay();
   profile.drawOverlay();
   part?.drawOverlay();
 }
@@ -111,7 +111,7 @@ function step(by) {
   point(i, view);
 }
 // The path in 3-D.
-const body = new MachineBody(data.scene), machineBox = document.getElementById("machine");
+const body = new MachineBody(data.scene), machineBox = $("machine");
 const scene = {
   beside: 90,
   paths: [path],
@@ -221,13 +221,12 @@ const model = {
 };
 // The program; only the rows in sight exist.
 const ROW = 19;
-const listing = document.getElementById("listing"), space = document.getElementById("listing-space");
+const listing = $("listing"), space = $("listing-space");
 const source = data.source;
 let lineHere = 0;
 listing.style.setProperty("--digits", String(source.length).length);
 space.style.height = `${source.length * ROW}px`;
-document.getElementById("program-note").textContent =
-  `${group(source.length)} lines; the bar is the line's lowest stiffness`;
+$("program-note").textContent = `${group(source.length)} lines; the bar is the line's lowest stiffness`;
 function drawListing() {
   const first = Math.max(0, Math.floor(listing.scrollTop / ROW) - 5);
   const last = Math.min(source.length, Math.ceil((listing.scrollTop + listing.clientHeight) / ROW) + 5), rows = [];
@@ -266,7 +265,7 @@ listing.addEventListener("keydown", (e) => {
 });
 new ResizeObserver(drawListing).observe(listing);
 // Everything together.
-const legendRamp = document.getElementById("legend-ramp");
+const legendRamp = $("legend-ramp");
 function retheme() {
   legendRamp.style.background = ramp(coloursNow());
   view.redraw();
@@ -276,12 +275,12 @@ function retheme() {
 }
 let view, profile;
 watchTheme(() => retheme());
-view = new Viewer(document.getElementById("view"), scene, {
+view = new Viewer($("view"), scene, {
   point: (i) => point(i, i < 0 ? null : view),
   pick: (i) => { chosenLine = i < 0 ? 0 : line[i]; point(i, i < 0 ? null : view); },
   step,
 });
-profile = new Profile(document.getElementById("profile"), model, {
+profile = new Profile($("profile"), model, {
   point: (i) => point(i, profile),
   step,
   operation: (i) => chooseOperation(operationOf(i)),
@@ -293,15 +292,15 @@ for (const box of [rapidsBox, machineBox]) box.addEventListener("change", () => 
 for (const button of document.querySelectorAll("button.place")) button.addEventListener("click", () => {
   chosenLine = Number(button.dataset.line);
   point(Number(button.dataset.sample), view);
-  document.getElementById("view-panel").scrollIntoView({ block: "nearest" });
+  $("view-panel").scrollIntoView({ block: "nearest" });
 });
 function showLegend() {
   const { ends: [low, high], beyond_low, beyond_high } = scaleNow();
-  document.getElementById("legend-low").textContent = (beyond_low ? "\u2264 " : "") + group(low);
-  document.getElementById("legend-high").textContent = (beyond_high ? "\u2265 " : "") + group(high);
+  $("legend-low").textContent = (beyond_low ? "\u2264 " : "") + group(low);
+  $("legend-high").textContent = (beyond_high ? "\u2265 " : "") + group(high);
   document.querySelector(".rapid-key").hidden = !path.has(RAPIDS);
-  document.getElementById("plunge-key").hidden = !path.has(PLUNGES);
-  document.getElementById("out-key").hidden = !path.has(UNREACHED);
+  $("plunge-key").hidden = !path.has(PLUNGES);
+  $("out-key").hidden = !path.has(UNREACHED);
   for (const entry of document.querySelectorAll("#profile-key .plunge-key")) entry.hidden = plungesBox.checked;
 }
 plungesBox.addEventListener("change", () => {
@@ -310,7 +309,7 @@ plungesBox.addEventListener("change", () => {
   retheme();
   showLegend();
 });
-const key = document.getElementById("profile-key");
+const key = $("profile-key");
 function addKey(kindOfLine, text) {
   const entry = document.createElement("span");
   entry.className = `key ${kindOfLine}`;
@@ -325,8 +324,7 @@ if (data.scale_with_plunges) addKey("plunge-key",
   `plunges ${group(data.plunges[0])} to ${group(data.plunges[1])} N/mm`);
 showLegend();
 // One operation alone: in the path, in the profile.
-const operationRows = [...document.querySelectorAll("[data-operation]")], operationShown = document.getElementById(
-  "operation-shown");
+const operationRows = [...document.querySelectorAll("[data-operation]")], operationShown = $("operation-shown");
 function chooseOperation(k) {
   chosenOperation = k === chosenOperation ? -1 : k;
   for (const row of operationRows) row.closest("tr").classList.toggle("chosen",
@@ -347,6 +345,6 @@ function chooseOperation(k) {
 }
 for (const row of operationRows) row.addEventListener("click", () => {
   chooseOperation(Number(row.dataset.operation));
-  if (chosenOperation >= 0) document.getElementById("view-panel").scrollIntoView({ block: "nearest" });
+  if (chosenOperation >= 0) $("view-panel").scrollIntoView({ block: "nearest" });
 });
 operationShown.addEventListener("click", () => chooseOperation(chosenOperation));

@@ -119,7 +119,7 @@ class MachineBody {
     const below = close || !hangs ? low - 0.04 * size : Math.min(floor, low - 0.05 * size);
     items.push({ ...block(view, [about(x), about(y), [below, low]], colour("table", "", pale)), depth: -1e9 });
     if (work) items.push({ ...block(view, [...[x, y].map(([a, b]) => [a - 0.01 * size, b + 0.01 * size]),
-      [low, Math.max(z[0], low) + 1e-3]], mix(ink.curve, ink.panel, 0.75)), depth: -9e8 });
+      [low, Math.max(z[0], low) + 1e-3]], mix(ink.curve, ink.panel, 0.88)), depth: -9e8 });
     return items;
   }
 }

@@ -1,5 +1,5 @@
 // A stiffness map: surfaces above their planes.
-const data = JSON.parse(document.getElementById("data").textContent), $ = (id) => document.getElementById(id);
+const data = JSON.parse($("data").textContent);
 const { x: xs, y: ys, z: planes, values } = data, across = xs.length, deep = ys.length, CLASSES = data.colours.length;
 const known = values.flat().filter((v) => v !== null);
 const least = known.reduce((a, b) => Math.min(a, b), Infinity), most = known.reduce((a, b) => Math.max(a, b),

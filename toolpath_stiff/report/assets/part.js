@@ -39,13 +39,13 @@ function pointPart(q) {
     : `${e > 0 ? "+" : ""}${e.toFixed(1)} um, ${e > 0 ? "material left" : "cut too deep"}`;
   part.tell([whereOf[2 * q], whereOf[2 * q + 1]], [`line ${line[made[q]]} \u00b7 ${text}`]);
 }
-part = new Viewer(document.getElementById("part"), partScene, {
+part = new Viewer($("part"), partScene, {
   point: pointPart,
   pick: (q) => { chosenLine = q < 0 ? 0 : line[made[q]]; pointPart(q); },
   moved: () => view.follow(part, view.zoom),
 });
 view.on.moved = () => part.follow(view, part.zoom);
-document.getElementById("error-ramp").style.background = ramp(errors.colours);
-document.getElementById("error-low").textContent = `\u2264 ${group(-errors.limit, 1)}`;
-document.getElementById("error-high").textContent = `\u2265 +${group(errors.limit, 1)}`;
+$("error-ramp").style.background = ramp(errors.colours);
+$("error-low").textContent = `\u2264 ${group(-errors.limit, 1)}`;
+$("error-high").textContent = `\u2265 +${group(errors.limit, 1)}`;
 part.resize();

@@ -1,5 +1,5 @@
 // Placements: where the work sits, and what that brings.
-const d = JSON.parse(document.getElementById("data").textContent), $ = (id) => document.getElementById(id);
+const d = JSON.parse($("data").textContent);
 const coloursNow = () => (theme.dark ? d.colours_dark : d.colours), CLASSES = d.colours.length;
 // The front is as wide as its element, so that letters keep their size.
 const widthOf = (svg) => Math.max(280, svg.clientWidth || 400);

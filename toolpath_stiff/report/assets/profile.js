@@ -22,19 +22,19 @@ class Profile extends Stage {
   get last() { return this.model.s[this.model.s.length - 1]; }
   all() { this.show(this.model.s[0], this.last); }
   show(from, to) { this.from = from; this.to = to > from ? to : from + 1; }
-  x(value) { return this.pad.left + (value - this.from) / (this.to - this.from) * (this.width - this.pad.left
-    - this.pad.right); }
-  y(value) { return this.height - this.pad.bottom - (value - this.low) / (this.high - this.low) * (this.height
-    - this.pad.top - this.pad.bottom); }
+  get right() { return this.width - this.pad.right; }
+  get bottom() { return this.height - this.pad.bottom; }
+  get wide() { return this.right - this.pad.left; }
+  x(value) { return this.pad.left + (value - this.from) / (this.to - this.from) * this.wide; }
+  y(value) { return this.bottom - (value - this.low) / (this.high - this.low) * (this.bottom - this.pad.top); }
   at(i) {
-    const k = this.model.value(i), bottom = this.height - this.pad.bottom;
-    return [this.x(this.model.s[i]), Number.isNaN(k) ? bottom : Math.max(this.pad.top, Math.min(bottom, this.y(k)))];
+    const k = this.model.value(i), y = Number.isNaN(k) ? this.bottom : this.y(k);
+    return [this.x(this.model.s[i]), Math.max(this.pad.top, Math.min(this.bottom, y))];
   }
   draw() {
     const g = this.clear(this.base), { model } = this;
     this.setHeights();
-    const left = this.pad.left, right = this.width - this.pad.right, top = this.pad.top, bottom = this.height
-      - this.pad.bottom;
+    const { left, top } = this.pad, { right, bottom } = this;
     const within = (paint) => {
       g.save();
       g.beginPath();
@@ -43,8 +43,7 @@ class Profile extends Stage {
       paint();
       g.restore();
     };
-    within(() => { for (const { holds, colour } of model.shades?.() ?? []) this.shade(g, holds, colour, top, bottom);
-      });
+    within(() => model.shades?.().forEach(({ holds, colour }) => this.shade(g, holds, colour, top, bottom)));
     this.drawScales(g, left, right, top, bottom);
     within(() => {
       for (const { value, colour, dash } of model.levels()) this.level(g, value, colour, dash);
@@ -71,8 +70,8 @@ class Profile extends Stage {
     for (const { s, k } of this.model.curves()) see(s, k);
     if (low > high && beside) see(this.model.s, beside.k);  // nothing else is in sight
     if (low > high) [low, high] = this.model.ends();
-    for (const { value, held } of this.model.levels()) if (held) { low = Math.min(low, value);
-      high = Math.max(high, value); }
+    const held = this.model.levels().filter((level) => level.held).map(({ value }) => value);
+    [low, high] = [Math.min(low, ...held), Math.max(high, ...held)];
     const pad = Math.max((high - low) * 0.1, high * 0.002);
     this.low = low - pad;
     this.high = high + pad;
@@ -132,7 +131,7 @@ class Profile extends Stage {
   level(g, value, colour, dash) {
     g.beginPath();
     g.moveTo(this.pad.left, this.y(value));
-    g.lineTo(this.width - this.pad.right, this.y(value));
+    g.lineTo(this.right, this.y(value));
     stroke(g, colour, 1.1, dash);
   }
   // Of the rows in one column of pixels the first, lowest, highest and last are drawn: no extreme is lost.
@@ -158,40 +157,34 @@ class Profile extends Stage {
     stroke(g, colour, 1.5);
   }
   drawOverlay() {
-    const g = this.clear(this.overlay), bottom = this.height - this.pad.bottom, marked = this.model.marked?.(),
-      here = this.model.here?.() ?? -1;
+    const g = this.clear(this.overlay), marked = this.model.marked?.(), here = this.model.here?.() ?? -1;
+    const { left, top } = this.pad, { right, bottom } = this;
     g.fillStyle = ink.accent;
     if (marked) {
       g.globalAlpha = 0.3;
-      const a = Math.max(this.pad.left, this.x(this.model.s[marked[0]])), b = Math.min(this.width - this.pad.right,
-        this.x(this.model.s[marked[1]]));
-      if (b >= a) g.fillRect(a - 1, this.pad.top, b - a + 2, bottom - this.pad.top);
+      const [from, to] = marked.map((row) => Math.max(left, Math.min(right, this.x(this.model.s[row]))));
+      g.fillRect(from - 1, top, to - from + 2, bottom - top);
       g.globalAlpha = 1;
     }
     if (here < 0) return;
     const [x, y] = this.at(here);
-    if (x < this.pad.left - 1 || x > this.width - this.pad.right + 1) return;
-    g.fillRect(x - 0.5, this.pad.top, 1, bottom - this.pad.top);
+    if (x < left - 1 || x > right + 1) return;
+    g.fillRect(x - 0.5, top, 1, bottom - top);
     mark(g, x, y, 4);
   }
+  under(x) { return this.from + (x - this.pad.left) / this.wide * (this.to - this.from); }
   rowUnder(x) {
-    const { s } = this.model, value = this.from + (x - this.pad.left) / (this.width - this.pad.left
-      - this.pad.right) * (this.to - this.from);
-    const i = Math.min(s.length - 1, rowAt(s, value));
+    const { s } = this.model, value = this.under(x), i = Math.min(s.length - 1, rowAt(s, value));
     return i > 0 && value - s[i - 1] < s[i] - value ? i - 1 : i;
   }
   zoomAt(factor, x) {
-    const first = this.model.s[0], last = this.last > first ? this.last : first + 1;
-    const fixed = this.from + (x - this.pad.left) / (this.width - this.pad.left - this.pad.right) * (this.to
-      - this.from);
-    const span = Math.max((last - first) * 1e-5, Math.min(last - first, (this.to - this.from) / factor));
-    this.from = Math.max(first, Math.min(last - span, fixed - (fixed - this.from) * span / (this.to - this.from)));
-    this.to = this.from + span;
-    this.redraw();
+    const whole = Math.max(this.last - this.model.s[0], 1), fixed = this.under(x), before = this.to - this.from;
+    const span = Math.max(whole * 1e-5, Math.min(whole, before / factor));
+    this.slide(fixed - (fixed - this.from) * span / before, span);
   }
-  move(by) {
-    const first = this.model.s[0], span = this.to - this.from, last = Math.max(this.last, first + span);
-    this.from = Math.max(first, Math.min(last - span, this.from + by));
+  slide(from, span = this.to - this.from) {
+    const first = this.model.s[0], last = Math.max(this.last, first + span);
+    this.from = Math.max(first, Math.min(last - span, from));
     this.to = this.from + span;
     this.redraw();
   }
@@ -203,7 +196,7 @@ class Profile extends Stage {
         this.rowUnder(e.offsetX));
     });
     canvas.addEventListener("pointermove", (e) => {
-      if (e.buttons) this.move(-e.movementX / (this.width - this.pad.left - this.pad.right) * (this.to - this.from));
+      if (e.buttons) this.slide(this.from - e.movementX / this.wide * (this.to - this.from));
       else this.on.point?.(this.rowUnder(e.offsetX));
     });
     canvas.addEventListener("pointerleave", () => { this.tip.hidden = true; });

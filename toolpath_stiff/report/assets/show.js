@@ -1,7 +1,7 @@
 // A machine by itself, at a pose.
-const data = JSON.parse(document.getElementById("data").textContent), body = new MachineBody(data.scene);
+const data = JSON.parse($("data").textContent), body = new MachineBody(data.scene);
 const whole = () => body.outline(data.pose);
-const view = new Viewer(document.getElementById("view"), {
+const view = new Viewer($("view"), {
   frame: false,
   room: [40, 40],
   iso: body.iso,

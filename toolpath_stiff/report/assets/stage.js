@@ -1,6 +1,7 @@
 // What the viewer and the profile stand on: figures as text, colours of the page, a pair of stacked canvases.
 // Nothing here knows a page: elements, data and what to do when something is pointed at are handed in.
 
+const $ = (id) => document.getElementById(id);
 // "45 123": groups of thousands by thin spaces, as in the tables.
 function group(v, digits = 0) {
   if (!Number.isFinite(v)) return "-";

@@ -21,7 +21,8 @@ function gaugeOf(state) {
     "Drop a measurement file on the page, or start a blind exercise: the error of the model stands here then.");
   const most = Math.max(...STAGES.map(([key]) => g[key] ?? 0), g.floor ?? 0) * 1.04 || 1, width = (v) =>
     `${100 * Math.min(1, v / most)}%`;
-  return h("dl", { class: "gauge", "aria-label": "Mean error of the model" }, STAGES.map(([key, label]) => {
+  const stages = STAGES.filter(([key]) => key !== "refitted" || state.machine.scene.joints);  // struts alone have a law
+  return h("dl", { class: "gauge", "aria-label": "Mean error of the model" }, stages.map(([key, label]) => {
     const note = key === "left_out" && g[key] === null ? "Fit tells" : percent(g[key]);
     return [h("dt", {}, label), h("dd", { class: "track", "aria-hidden": "true" },
       h("span", { class: `fill ${key}`, style: `width:${width(g[key] ?? 0)}` }),
@@ -128,8 +129,8 @@ function effectRow(effect, act) {
       h("span", { class: "bars", "aria-hidden": "true" }, h("i", { style: `width:${100 * effect.probability}%` })),
       chance(effect.probability))),
     effect.finding ? h("div", { class: "note" },
-      `${effect.finding}: mean error ${percent(effect.mean_abs_error_percent)}, `
-        + `${percent(effect.held_out_error_percent)} at left-out points; ${effect.words}`)
+      [`${effect.finding}: mean error ${percent(effect.mean_abs_error_percent)}, `
+        + `${percent(effect.held_out_error_percent)} at left-out points`, effect.words].filter(Boolean).join("; "))
       : effect.words ? h("div", { class: "note" }, [effect.words, effect.remark].filter(Boolean).join("; ")) : null,
     on ? h("div", { class: "sizes" }, effect.sliders.map((s) => slider(effect, s, act))) : null);
 }
@@ -158,15 +159,15 @@ let against = "z_mm";
 function whyPanel(state, act) {
   const v = state.verdict;
   if (!v) return h("p", {}, state.readings ? "The diagnosis is under way." : "There are no readings yet.");
-  const gates = [["a model without a further effect", v.gates.baseline_probability],
-    ["sum of squares", v.gates.squares_probability], ["structure", v.gates.structure_probability],
-    ["gain of the best effect", v.gates.gain_probability]];
+  const gates = Number.isFinite(v.gates?.squares_probability) && [
+    ["a model without a further effect", v.gates.baseline_probability], ["sum of squares", v.gates.squares_probability],
+    ["structure", v.gates.structure_probability], ["gain of the best effect", v.gates.gain_probability]];
   const c = state.compare;
   return [
     h("h2", {}, "Why believe it?"), h("p", {}, v.text), list([...v.why, ...v.warnings]),
     h("h3", {}, "Residuals"), residuals(state, act),
-    h("h3", {}, "Gates: how often scatter alone would look so"), table(["test", "probability"],
-      gates.map(([name, p]) => [name, p === null ? "\u2013" : short(p)])),
+    gates && [h("h3", {}, "Gates: how often scatter alone would look so"), table(["test", "probability"],
+      gates.map(([name, p]) => [name, p === null ? "\u2013" : short(p)]))],
     h("h3", {}, "Plane by direction"),
     c ? [table(["readings", "number", "mean error", "bias", "rms"], Object.entries(c.by_plane_and_direction)
       .map(([name, one]) => [name, one.readings, percent(one.mean_abs_error_percent), percent(one.bias_percent),

@@ -13,7 +13,7 @@ class MachineScene {
     this.focus = "work";
     this.frame = false;
     this.beside = 30;
-    this.room = [56, 16];
+    this.room = [56, 30];
     this.showReach = true;
     this.selected = -1;   // reading
     this.paths = [];

@@ -1,5 +1,4 @@
 // The page: it asks for the state, draws it, posts what is to be done, and hears of every change.
-const $ = (id) => document.getElementById(id);
 const scene = new MachineScene();
 let state = JSON.parse($("state").textContent), panel = "effects", here = -1, which = "now", playing = 0, version = -1;
 const readonly = state !== null;
@@ -80,9 +79,9 @@ Object.assign(act, {
     act.origin[axis] = axis === 5 ? ((value % 360) + 360) % 360 : value;
     act.put();
     carry(act.origin);
-    for (const name of ["X", "Y", "Z", "C"]) { const k = { X: 0, Y: 1, Z: 2, C: 5 }[name];
-      for (const id of [`o-${name}`, `o-${name}n`]) if ($(id) && document.activeElement !== $(id)) $(id).value =
-      Number(act.origin[k].toFixed(1)); }
+    for (const [name, k] of [["X", 0], ["Y", 1], ["Z", 2], ["C", 5]])
+      for (const field of [$(`o-${name}`), $(`o-${name}n`)])
+        if (field && document.activeElement !== field) field.value = Number(act.origin[k].toFixed(1));
     placed([...act.origin]);
     if (done) act.drop();
   },
@@ -174,7 +173,6 @@ const numbers = (values, keep) => Float32Array.from(values, (v, i) => (v === nul
 function drawProfile() {
   const path = state.program?.path;
   $("profile-card").hidden = !path;
-  document.body.classList.toggle("with-profile", Boolean(path));
   if (!path) { profile = null; return; }
   const s = Float32Array.from(path.s_mm), cut = (i) => path.cut[i] && !path.plunge[i], shown = numbers(curve(), cut);
   const curves = () => {
@@ -193,12 +191,8 @@ function drawProfile() {
       ? [{ value: state.program.require, colour: ink.bad, dash: [6, 4], held: true }] : []),
   };
   if (profile) { profile.model = model; profile.all(); profile.redraw(); }
-  else {
-    profile = new Profile($("profile"), model,
-      { point: goTo, step: (by) => goTo(Math.max(0, Math.min(s.length - 1, here + by))) });
-    profile.drawOverlay = function () { const g = this.clear(this.overlay);
-      if (here >= 0 && here < this.model.s.length) mark(g, ...this.at(here), 5, ink.ink, 2); };
-  }
+  else profile = new Profile($("profile"), model,
+    { point: goTo, step: (by) => goTo(Math.max(0, Math.min(s.length - 1, here + by))) });
   $("scrub").max = path.s_mm.length - 1;
   const focus = document.activeElement?.id;
   $("which").replaceChildren(...["now", "given", ...(path.given ? ["difference"] : []),
@@ -208,10 +202,9 @@ function drawProfile() {
       drawText(path.line[Math.max(0, here)]); } }, name)));
   refocus(focus, "");
   const other = which === "now" && path.given?.some((v, i) => v !== path.now[i]);
-  $("curves").textContent = [layer()[2], other ? "orange: as given" : "", which === "now" && path.sd
-    ? "grey: 95 % band of what was fitted" : "", state.program.require && !layer()[2]
-    ? "dashed: required" : ""].filter(Boolean)
-    .join(", ");
+  $("curves").textContent = [layer()[2], other && "orange: as given", which === "now" && path.sd
+    && "grey: 95 % band of what was fitted", state.program.require && !layer()[2] && "dashed: required"]
+    .filter(Boolean).join(", ");
 }
 function goTo(i) {
   const path = state.program?.path;
