@@ -19,10 +19,10 @@ from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.parametric.run import ParametricRun
-from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun
+from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.reader import INTERPRETERS, LANGUAGE_RUNS, in_language, on_the_part, program_of, read
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.run_records import Tally
+from toolpath_stiff.nc.run_records import MOST_ERRORS, Tally
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import WORK_OFFSETS
 
@@ -210,7 +210,7 @@ def _run_to_the_end(run: ProgramRun, g_code: bool) -> tuple[list[InputError], li
         try:
             warnings = run.run()
         except InputError as error:
-            if error not in errors:
+            if str(error) not in map(str, errors):
                 errors.append(error)
         suspects = errors if g_code else ()
         foreign = next((f for e in suspects if (f := foreign_program(lines, name, e.line)) is not None), None)

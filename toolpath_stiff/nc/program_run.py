@@ -30,7 +30,6 @@ DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older cont
 MOST_BLOCKS = 1_000_000  # that run, all repeats counted; a count beyond is a slip in a number of repeats
 MOST_IDLE = 100_000  # of loops that run without a move between; a program that works out values needs far fewer
 MOST_REPEATS = 9999
-MOST_ERRORS = 100  # beyond, a file is not a program for this reader
 SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
 HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
 REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
@@ -55,6 +54,7 @@ class ProgramRun:
     def __init__(self, request: Request, tally: Tally | None = None, fast: bool = True) -> None:
         state, lines, name = request.start(), request.lines, request.name
         self.state, self.lines, self.name = state, lines, name
+        state.keep = tally.keep if tally is not None else None
         self.switches, self.tally = request.controller.switches, tally
         self._plain = PlainRun(state, lines, name) if fast else None
         self._levels: list[Subprogram] = []
@@ -121,9 +121,7 @@ class ProgramRun:
         except InputError as error:
             if self.tally is None:
                 raise
-            self.tally.errors.append(error)
-            if len(self.tally.errors) >= MOST_ERRORS:
-                raise
+            self.tally.keep(error)
             return instead
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:

@@ -1,8 +1,8 @@
 """APPR and DEP: how a contour is approached and left, LT, LN, CT and LCT, by X and Y or polar (PLT ...). mm.
 
-HEIDENHAIN, user's manuals of the TNC 426, the iTNC 530 and the TNC 640, "Contour approach and departure". Lines and arcs
-are those of the tool's centre: the manuals' examples approach with R5 and a tool of R10 (linear and circular movements),
-and with R2 and a tool of R5 (helix). The compensation begins, and ends, beside the contour's first and last point.
+HEIDENHAIN, user's manuals of the TNC 426, the iTNC 530 and the TNC 640, "Contour approach and departure". Lines and
+arcs are those of the tool's centre: the manuals' examples approach with R5 and a tool of R10 (linear and circular
+movements), and with R2 and a tool of R5 (helix). The compensation begins, and ends, beside the contour's ends.
 """
 
 import cmath
@@ -116,9 +116,7 @@ def depart(state: State, block: CurrentBlock, code: str) -> None:
     if plain.heading is None:
         raise block.fail(None, "without a contour element in the plane before it", "L, C, CR or CT before it")
     heading, cutter, to_point = plain.heading / abs(plain.heading), state.cutter, code.endswith("LCT")
-    block.refuse_if(
-        cutter is None and code != "DEP LT", None, "without RL or RR, which give its side", "L statements"
-    )
+    block.refuse_if(cutter is None and code != "DEP LT", None, "without RL or RR, which give its side", "L statements")
     there = _point(state, block, code)
     block.refuse_if(feed(state, block), "FMAX", "on the way off a contour", "F with a number")
     block.take("R0")

@@ -136,9 +136,10 @@ class HeidenhainRun(ProgramRun):
         head = Word("", 0.0, statement.column, statement.head)
         block = CurrentBlock(self.name, Block(line, (head, *words), optional=statement.optional))
         for word in words:
-            block.refuse_if(word.letter in block.values, word, "repeats a word of its statement", "each word once")
-            largest = LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD
-            block.refuse_if(abs(word.value) > largest, word, "is beyond 100 m, or any number of a control")
+            if word.letter in block.values:
+                raise block.fail(word, "repeats a word of its statement", "each word once")
+            if abs(word.value) > (LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD):
+                raise block.fail(word, "is beyond 100 m, or any number of a control")
             block.values[word.letter] = word
         block.free = set(block.values)
         return block
