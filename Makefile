@@ -48,7 +48,7 @@ benchmark: $(VENV)/.dev
 	$(BIN)/python -m benchmarks
 
 clean:
-	rm -rf $(VENV) reports/demo docs/_build docs/api build dist
+	rm -rf $(VENV) reports/demo docs/_build docs/api docs/commands build dist
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

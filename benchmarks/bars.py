@@ -11,9 +11,6 @@ from benchmarks.pages import table
 Record = dict[str, Any]
 
 NORMAL_95 = NormalDist().inv_cdf(0.975)
-# Detectability of the smallest effects that the rig draws (`toolpath_stiff.rig.sizes.DETECTABLE`); one whose largest
-# size of 30 % stays below cannot be seen in the layout.
-JUST_SEEN = 3.9
 
 
 def wilson(count: int, of: int) -> tuple[float, float]:
@@ -100,11 +97,6 @@ def summary(figures: Sequence[Figure]) -> str:
     return f"{len(failed)} of {count} bars are not cleared. " + "; ".join(failed) + "."
 
 
-def truth_of(record: Record) -> str:
-    """The one hidden effect."""
-    return str(record["truth"][0])
-
-
 def holds_truth(record: Record) -> bool:
     """Whether all that was hidden is in `plausible`; `none` where nothing was."""
     return set(record["truth"] or ["none"]) <= set(record["plausible"])
@@ -113,8 +105,3 @@ def holds_truth(record: Record) -> bool:
 def named(record: Record) -> bool:
     """`identified`, and exactly what was hidden."""
     return record["verdict"] == "identified" and set(record["plausible"]) == set(record["truth"])
-
-
-def misnamed(record: Record) -> bool:
-    """`identified`, and not exactly what was hidden: also where a second effect is named beside the right one."""
-    return record["verdict"] == "identified" and not named(record)

@@ -22,6 +22,7 @@ from benchmarks.pages import table
 
 FIRST_SEED = 91_000_000
 RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_built.jsonl"
+OUT = Path(__file__).parent / "built.md"
 SMALL, RISE = 3.0, 0.3  # % left that `adequate` may leave; points by which an update may raise an error
 ABOVE_FLOOR = 1.2  # of the median error of sound machines as they are: what scatter of their parts leaves
 COUNTS = {"sound": 50, "single": 70, "pair": 30, "outside": 70}
@@ -98,13 +99,21 @@ def figures_of(built: str, records: Sequence[Record]) -> list[Figure]:
         ("ill: rows left out", hidden, lambda r: r["left_out"] > 0, None, 0.02),
         ("error along the path rises by more than 0.3 points", records,
          lambda r: r["after"] > r["before"] + RISE, None, 0.0),
+        ("the same after a plan", planned, lambda r: r["after"] > r["before"] + RISE, None, 0.0),
     ]  # fmt: skip
     made = [share(built, what, [rule(r) for r in some], least, most) for what, some, rule, least, most in shares]
     floor = round(ABOVE_FLOOR * median(r["before"] for r in sound_ones), 2) if sound_ones else None
-    errors = (("before", hidden, None), ("after", hidden, floor))
+    after_plan = [r | r.get("planned", {}) for r in hidden]
+    errors = (
+        ("before", "before", hidden, None),
+        ("where a machine was written, before", "before", [r for r in hidden if r["updated"]], None),
+        ("where a machine was written, after", "after", [r for r in hidden if r["updated"]], floor),
+        ("all, after", "after", hidden, None),
+        ("all, after, with a plan where a single effect is ambiguous", "after", after_plan, None),
+    )
     medians = [
-        middle_of(built, f"error along the path {what}, median", [r[what] for r in some], most, " %")
-        for what, some, most in errors
+        middle_of(built, f"error along the path, {what}, median", [r[key] for r in some], most, " %")
+        for what, key, some, most in errors
     ]
     bands = (
         ("along the path, 95 %", "band_near", 0.93, 0.97),
@@ -153,7 +162,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.add_argument(f"--{group}", type=int, default=count, help=f"cases of each build (default: {count})")
     return run_benchmark(
         parser, arguments, lambda args: make_jobs(args.first_seed, vars(args), args.built), run, report,
-        records=RECORDS,
+        records=RECORDS, out=OUT,
     )  # fmt: skip
 
 

@@ -88,27 +88,27 @@ def _judged(job: Job, folder: Path) -> Record:
     start = time.process_time()
     diagnosis = tps.diagnose(file)
     cpu = time.process_time() - start
-    after = {}
-    if diagnosis.verdict == "ambiguous" and job.group == "single":
-        after = {"planned": planned(diagnosis, file, case, np.random.default_rng([job.seed, 5]))}
     truths = [truth_of(effect, job.built) for effect in case.truth["effects"]]
     rows, rng = rig.rows_of(plan), np.random.default_rng(job.seed)
     path = case.truth.get("path") or path_truth(case.nominal, case.machine, rows, rng)
+    after = {}
+    if diagnosis.verdict == "ambiguous" and job.group == "single":
+        more = planned(diagnosis, file, case, np.random.default_rng([job.seed, 5]))
+        again = tps.diagnose([file, *more])
+        after = {"planned": answer_of(again) | along_path(again, [file, *more], path, folder)}
     return {
         "truths": truths, "poses": len(np.unique(plan["point"])), "readings": len(plan["point"]), "cpu": round(cpu, 2),
-        **answer_of(diagnosis), **after, **along_path(diagnosis, file, path, folder),
+        **answer_of(diagnosis), **after, **along_path(diagnosis, [file], path, folder),
     }  # fmt: skip
 
 
-def planned(diagnosis: tps.Diagnosis, file: Path, case: rig.DrawnCase, rng: np.random.Generator) -> Record:
-    """What is said after a plan of a few visits was measured on the same machine; the same where nothing tells more."""
+def planned(diagnosis: tps.Diagnosis, file: Path, case: rig.DrawnCase, rng: np.random.Generator) -> list[Path]:
+    """A plan of a few visits, measured on the same machine, as a file; none where nothing tells more."""
     plan = tps.plan(file, n=PLANNED, indicators=True, diagnosis=diagnosis)
-    if not plan.rows:
-        return answer_of(diagnosis)
     more = file.with_name("plan.csv")
     more.write_text(plan_csv(plan.rows))
     more.write_text(csv_text(case.again(read_plan(str(more), case.nominal), rng)))
-    return answer_of(tps.diagnose([file, more]))
+    return [more]
 
 
 def truth_of(effect: Mapping[str, Any], built: str) -> dict[str, Any]:
@@ -139,14 +139,14 @@ def answer_of(diagnosis: tps.Diagnosis) -> Record:
     }
 
 
-def along_path(diagnosis: tps.Diagnosis, file: Path, path: Mapping[str, Any], folder: Path) -> Record:
+def along_path(diagnosis: tps.Diagnosis, files: Sequence[Path], path: Mapping[str, Any], folder: Path) -> Record:
     """Mean error (%) along the path before and after what the verdict proposes, and how often bands hold."""
     near = np.array(path["measured_near"])
     true = np.column_stack([path[f"{axis}_N_per_mm"] for axis in "xyz"])
     given = tps.Machine.load("nist")
     before = stiffness_along(given, path)[0]
     error = {"before": _percent(before, true, near)}
-    update = updated(diagnosis, file, folder)
+    update = updated(diagnosis, files, folder)
     if update is None or not update.accepted:
         return {**error, "after": error["before"], "updated": ""}
     there, sd = stiffness_along(update.machine.under(setup=DEFAULT_SETUP), path)
@@ -166,23 +166,23 @@ def _percent(model: FloatArray, true: FloatArray, rows: FloatArray) -> float:
     return round(float(100.0 * np.mean(np.abs(model / true - 1.0)[rows])), 3)
 
 
-def updated(diagnosis: tps.Diagnosis, file: Path, folder: Path) -> tps.Update | None:
+def updated(diagnosis: tps.Diagnosis, files: Sequence[Path], folder: Path) -> tps.Update | None:
     """The update that a verdict leads to: its first explanation, a draft, or the strut law; None for none."""
     said = diagnosis.to_dict()
     try:
         if said["verdict"] == "unexplained":
-            draft = tps.draft_effect(file, file=folder / "missing.toml")
+            draft = tps.draft_effect(files, file=folder / "missing.toml")
             if not draft.text:
                 return None
             (folder / "missing.toml").write_text(draft.text)
             with_draft = tps.Machine.load("nist", effects=[folder / "missing.toml"])
-            return tps.update(file, with_draft, add=list(draft.effects))
+            return tps.update(files, with_draft, add=list(draft.effects))
         first = next((words for words in said["explanations"] if words != "none"), "")
         if said["verdict"] == "adequate":
-            law = tps.update(file, strut_law=True)
+            law = tps.update(files, strut_law=True)
             errors = law.to_frame()["mean_abs_error_percent"]
             return law if errors.iloc[0] > errors.iloc[-1] + WORTH_A_LAW else None
-        return tps.update(file, add=first.split(" + "))
+        return tps.update(files, add=first.split(" + "))
     except tps.InputError:
         return None
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.bars import Record
 from benchmarks.case_loop import document, run_benchmark, sound
-from benchmarks.portrait_bars import calibration_table, failures_table, figures, kinds_table
+from benchmarks.portrait_bars import failures_table, figures, kinds_table
 from benchmarks.portrait_cases import LAYOUTS, Job, make_jobs, run
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.unknowns import UNKNOWNS
@@ -26,9 +26,6 @@ WHAT = (
     "settled by the physics of each kind. A set is right if it holds one of them and is short: four links, three "
     "variables at most. Intervals of shares are Wilson's; a bar is cleared by the figure."
 )
-PROBABILITIES = (
-    "Tilted layout. Several words may be right for one unknown, so that honest probabilities may lie below the share."
-)
 
 
 def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
@@ -39,7 +36,6 @@ def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
     parts = [
         ("Verdicts", [f"- {layout}, {of}, `{verdict}`: {n}" for (layout, of, verdict), n in sorted(counts.items())]),
         *((f"Each unknown, {layout} layout", kinds_table(good, layout)) for layout in LAYOUTS),
-        ("Probabilities", [PROBABILITIES, "", *calibration_table(good)]),
         ("Cases that count against a bar", failures_table(good)),
     ]
     return document("Descriptions of what is in no catalogue", WHAT, figures(good), parts, records, command)

@@ -5,13 +5,11 @@ from collections.abc import Sequence
 from statistics import fmean, median
 
 from benchmarks.bars import Figure, Record, mean, middle_of, share
-from benchmarks.diagnosis_tables import by_probability
 from benchmarks.pages import table
 
 LARGEST_SET = {"links": 4, "variables": 3}  # a longer list says that it cannot tell
 SEEN = ("unexplained", "described")
 RATIOS = ((1.3, 0.75), (1.5, 0.90))  # held-out error over the noise floor, and the share of cases that must keep to it
-PROBABILITIES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0 + 1e-9)
 
 
 def right_set(record: Record, name: str) -> bool:
@@ -118,22 +116,6 @@ def kinds_table(records: Sequence[Record], layout: str) -> list[str]:
         "variable right: | of how many: | held-out over floor:",
         rows,
     )
-
-
-def calibration_table(records: Sequence[Record]) -> list[str]:
-    """Stated probabilities of links and variables against how often they are acceptable."""
-    rows = []
-    drawn = [r for r in records if r["hidden"] != "none" and r["portrait"] and r["layout"] == "tilted"]
-    for name in LARGEST_SET:
-        claims = [
-            (weight, word in r["effects"][0].get(name, ()))
-            for r in drawn
-            for word, weight in r["portrait"][name].items()
-        ]
-        for label, inside in by_probability(claims, PROBABILITIES):
-            means = (f"{100 * fmean(column):.0f} %" for column in zip(*inside, strict=True))
-            rows.append((name, label, len(inside), *means))
-    return table("set | stated | words: | mean stated: | right:", rows)
 
 
 def failures_table(records: Sequence[Record]) -> list[str]:

@@ -80,6 +80,7 @@ html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_copy_source = False
 html_show_copyright = False
+html_context = {"default_mode": "auto"}  # the theme's script asks for it
 html_sidebars = {"docs/index": []}
 html_theme_options = {
     "header_links_before_dropdown": 7,

@@ -32,7 +32,7 @@ from toolpath_stiff.stiffness.catalogue import packaged_effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect, Parameter
 
 DOCS = Path(__file__).parent
-API = DOCS / "api"  # one page for each public name, made and git-ignored
+API, COMMANDS = DOCS / "api", DOCS / "commands"  # a page for each public name and command, made and git-ignored
 HELP_WIDTH = 90
 
 
@@ -248,27 +248,45 @@ def faults_table() -> str:
 
 
 def commands() -> str:
-    """Every command and every action of a command, with its usage and options, from the parsers themselves."""
-    from toolpath_stiff.cli.main import GROUPS, actions_of
+    """Tables of the commands by group, each with what it does, leading to its page."""
+    from toolpath_stiff.cli.main import GROUPS
 
     lines: list[str] = []
     for group, names in GROUPS.items():
-        lines += [f"## {group.capitalize()}", ""]
-        for name, about in names.items():
-            actions = actions_of(name)
-            if name not in actions:
-                lines += [f"### tps {name}", "", _escaped(about[:1].upper() + about[1:]) + ".", ""]
-            for title, command in actions.items():
-                alone = title == name
-                lines += _command(command.parser(f"tps {title}"), about if alone else "", 3 if alone else 4)
+        table = ((f"[`tps {name}`](commands/{name}.md)", _sentence(about)) for name, about in names.items())
+        lines += [f"## {group.capitalize()}", "", *rows(("command", "what it does"), *table), ""]
+        lines += _hidden_toctree(f"commands/{name}" for name in names)
     return "\n".join(lines)
+
+
+def command_pages() -> dict[str, str]:
+    """A page for each command: itself or its actions, with usage and options, from the parsers themselves."""
+    from toolpath_stiff.cli.main import GROUPS, actions_of
+
+    pages = {}
+    for name, about in (row for names in GROUPS.values() for row in names.items()):
+        actions = actions_of(name)
+        lines = [] if name in actions else [f"# tps {name}", "", _sentence(about), ""]
+        for title, command in actions.items():
+            alone = title == name
+            lines += _command(command.parser(f"tps {title}"), about if alone else "", 1 if alone else 2)
+        pages[f"{name}.md"] = "\n".join(lines)
+    return pages
+
+
+def _hidden_toctree(pages: Iterable[str]) -> list[str]:
+    return ["```{toctree}", ":hidden:", "", *pages, "```", ""]
+
+
+def _sentence(text: str) -> str:
+    return f"{_escaped(text[:1].upper() + text[1:])}."
 
 
 def _command(parser: argparse.ArgumentParser, about: str, level: int) -> list[str]:
     formatter = argparse.HelpFormatter(parser.prog, width=HELP_WIDTH)
     formatter.add_usage(parser.usage, parser._actions, parser._mutually_exclusive_groups)
     about = about or (parser.description or "").rstrip(".")
-    lines = ["#" * level + " " + parser.prog, "", _escaped(about[:1].upper() + about[1:]) + ".", ""]
+    lines = ["#" * level + " " + parser.prog, "", _sentence(about), ""]
     lines += ["```text", formatter.format_help().strip(), "```", ""]
     for group in parser._action_groups:
         lines += _options(group, formatter)
@@ -305,7 +323,7 @@ def api() -> str:
     for kind, names in _public().items():
         lines += [f"## {kind}", ""]
         lines += rows(("name", "what it is"), *((f"[`{name}`](api/{name}.md)", _summary(name)) for name in names))
-        lines += ["", "```{toctree}", ":hidden:", "", *(f"api/{name}" for name in names), "```", ""]
+        lines += ["", *_hidden_toctree(f"api/{name}" for name in names)]
     return "\n".join(lines)
 
 
@@ -328,16 +346,17 @@ def _summary(name: str) -> str:
     return " ".join((inspect.getdoc(getattr(toolpath_stiff, name)) or "").split("\n\n")[0].split())
 
 
-def write_api_pages(app: Any) -> None:
-    """One page for each public name; those of names that are gone are removed."""
-    API.mkdir(exist_ok=True)
-    pages = {f"{name}.md": _page(name, kind) for kind, names in _public().items() for name in names}
-    for old in API.glob("*.md"):
-        if old.name not in pages:
-            old.unlink()
-    for file, text in pages.items():
-        if not (API / file).exists() or (API / file).read_text("utf-8") != text:
-            (API / file).write_text(text, "utf-8")
+def write_pages(app: Any) -> None:
+    """One page for each public name and for each command; those of what is gone are removed."""
+    names = {f"{name}.md": _page(name, kind) for kind, names in _public().items() for name in names}
+    for folder, pages in ((API, names), (COMMANDS, command_pages())):
+        folder.mkdir(exist_ok=True)
+        for old in folder.glob("*.md"):
+            if old.name not in pages:
+                old.unlink()
+        for file, text in pages.items():
+            if not (folder / file).exists() or (folder / file).read_text("utf-8") != text:
+                (folder / file).write_text(text, "utf-8")
 
 
 def _page(name: str, kind: str) -> str:
@@ -380,7 +399,7 @@ def on_source_read(app: Any, docname: str, source: list[str]) -> None:
 
 def setup(app: Any) -> dict[str, bool]:
     """Register with Sphinx."""
-    app.connect("builder-inited", write_api_pages)
+    app.connect("builder-inited", write_pages)
     app.connect("source-read", on_source_read)
     app.connect("autodoc-process-docstring", on_docstring, priority=600)  # after napoleon
     app.connect("autodoc-process-signature", on_signature)

@@ -200,6 +200,7 @@ NO_EXAMPLE = {
     "Reduction": {"loops"},
     "Diagnosis": {
         "nuisances",
+        "entries",
         "likeliest",
         "rows",
         "noise",

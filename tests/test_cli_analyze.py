@@ -242,7 +242,7 @@ def test_path_alone_needs_no_machine(part, capsys):
     assert main(["path", "part.nc", "--csv", "--step", "50"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == COLUMNS.split(",stiffness", maxsplit=1)[0]
-    assert lines[1].startswith("3,rapid,0,0.000000,0.000000,0.000000,0.000000,0.000000,")
+    assert lines[1].startswith("3,rapid,0,0.0000,0.000000,0.0000,0.0000,0.0000,")
     assert "-0.000000" not in "\n".join(lines)
     assert main(["path", "part.nc", "--out", "path.csv", "--origin", "10,20,30"]) == 0
     table = np.genfromtxt(part.parent / "path.csv", delimiter=",", names=True)

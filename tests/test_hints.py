@@ -79,7 +79,7 @@ def test_from_an_exercise_to_the_machine_that_explains_it(here, capsys):
 
 
 def test_what_the_data_leave_open_is_planned(here, capsys):
-    rows, _ = case.make_case(7, layout="paper", hidden="spindle_compliance", size=0.1)
+    rows, _ = case.make_case(11, layout="paper", hidden="spindle_compliance", size=0.1)
     (here / "a spindle.csv").write_text(exercise.csv_text(rows), encoding="utf-8")
     done = follow("tps diagnose 'a spindle.csv' --noise 2,1", capsys)
     assert done[1:] == ["tps plan 'a spindle.csv' --noise 2,1"]

@@ -95,7 +95,10 @@ def test_sdist_holds_what_the_readme_shows(built):
         "docs/conf.py",
         "docs/images/report.png",
     } <= names
-    assert not any(name.startswith(("docs/_build", "docs/api/", ".venv")) or "__pycache__" in name for name in names)
+    assert not any(
+        name.startswith(("docs/_build", "docs/api/", "docs/commands/", ".venv")) or "__pycache__" in name
+        for name in names
+    )
 
 
 def test_the_tool_runs_from_the_wheel(unpacked, tmp_path):

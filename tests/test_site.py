@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import json
 import re
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 import toolpath_stiff
+from tests.browser import needs_browser, opened
 from toolpath_stiff.cli.main import MODULES as COMMANDS
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.cutter_location.vocabulary import WORDS
@@ -29,7 +31,7 @@ SPEC.loader.exec_module(from_code)
 # Tags that make a browser fetch something, and where from; `a` waits for a click.
 FETCHED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "link": "href", "object": "data"}
 PAGES = sorted({*DOCS.glob("*.md"), *DOCS.glob("[!_]*/*.md"), *ROOT.glob("*.md"), *ROOT.glob("[bpr]*/**/*.md")})
-PAGES = [page for page in PAGES if page.parent != DOCS / "api"]
+PAGES = [page for page in PAGES if page.parent not in (DOCS / "api", DOCS / "commands")]
 
 
 class Page(HTMLParser):
@@ -115,7 +117,7 @@ def test_every_link_of_a_checkout_leads_somewhere(page):
     text = re.sub(r"^```.*?^```", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
     for link in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"`[^`\n]*`", "", text)):
         parts = urlsplit(link)
-        if parts.scheme or (page == DOCS / "api.md" and link.startswith("api/")):
+        if parts.scheme or (page.parent == DOCS and link.startswith(f"{page.stem}/")):  # made with the site
             continue
         target = (page.parent / parts.path).resolve() if parts.path else page
         assert target.exists(), link
@@ -136,12 +138,13 @@ def test_codes_and_words_are_listed(pages):
 
 
 def test_commands_and_their_options_are_listed(pages):
-    text = shown(pages, "docs/commands.html")
+    assert {path.stem for path in pages if path.parent.name == "commands"} == set(COMMANDS)
     for command in COMMANDS:
-        assert f"tps {command}" in text
-    assert "tps machine from-linuxcnc" in text
-    for option in ("--keep-out", "--rs274", "--strut-law", "--block-delete"):
-        assert option in text
+        assert f"tps {command}" in shown(pages, "docs/commands.html")
+        assert f"tps {command}" in shown(pages, f"docs/commands/{command}.html")
+    assert "tps machine from-linuxcnc" in shown(pages, "docs/commands/machine.html")
+    for page, option in (("place", "--keep-out"), ("analyze", "--rs274"), ("update", "--strut-law")):
+        assert option in shown(pages, f"docs/commands/{page}.html")
 
 
 def test_the_notebook_goes_round_the_loop(pages):
@@ -151,6 +154,10 @@ def test_the_notebook_goes_round_the_loop(pages):
     assert text.index("AMBIGUOUS") < text.index("IDENTIFIED") < text.index("UPDATED")
     assert "('right', 'tool_length_error'" in text
     assert "<Figure" not in text
+    page, path = next((page, path) for path, page in pages.items() if path.match("docs/notebooks/measuring_loop.html"))
+    (file,) = [path.parent / link for link in page.links if link.endswith("measuring_loop.ipynb")]
+    cells = json.loads(file.read_text("utf-8"))["cells"]  # what opens in Jupyter, with what it gave
+    assert any(cell["cell_type"] == "code" and "tps.update(" in "".join(cell["source"]) for cell in cells)
 
 
 def test_public_names_have_a_page(pages):
@@ -171,3 +178,10 @@ def test_help_is_safe_within_markdown():
     )
     page = "\n".join(from_code._command(parser, "try", 3))
     assert "`--out DIR`\n: into \\<name\\>, \\*all\\*, `as_it_is` (default: a\\_b)" in page
+
+
+@needs_browser
+def test_a_page_of_the_site_says_nothing_to_the_console(site, tmp_path):
+    done = opened((site / "docs" / "index.html").as_uri(), tmp_path)
+    said = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    assert [line for line in said if "Changed to auto mode" not in line] == []  # an error, as of a theme it has not

@@ -15,9 +15,8 @@ from tests.stiffness.test_kernels import tensors
 from toolpath_stiff.analysis.machine_check import check_machine
 from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.comparison.compare import compare
-from toolpath_stiff.correction.strut_law import minimise_mean_error
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.prediction import Predictor, at_both_ends, scaled_law
+from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
@@ -275,7 +274,7 @@ def test_update_refits_the_law_in_its_own_form(law, tmp_path):
 
 
 @pytest.mark.parametrize("law", [CONSTANT, table_text(BENT)], ids=["constant", "table"])
-def test_the_fit_has_the_right_slopes_and_the_search_for_the_mean_error_its_ends(law):
+def test_the_fit_has_the_right_slopes(law):
     machine, data = machine_with(law), campaign(law)[1]
     predictor, at, step = Predictor(machine, data), np.array([0.05, -0.03]), 1e-6
     columns = predictor.law_columns(predictor.log_stiffness(at), at)
@@ -286,9 +285,6 @@ def test_the_fit_has_the_right_slopes_and_the_search_for_the_mean_error_its_ends
         numeric = (predictor.log_stiffness(moved) - predictor.log_stiffness(at)) / step
         np.testing.assert_allclose(columns[:, k], numeric, atol=1e-5)
         np.testing.assert_allclose(-slopes[k] / part, numeric, atol=1e-5)
-    found = minimise_mean_error(predictor, starts=2)
-    assert found.error < 0.02
-    np.testing.assert_array_equal(at_both_ends(machine.strut_law, found.ends), found.ends)
 
 
 @pytest.mark.parametrize("law", [CONSTANT, table_text(BENT)], ids=["constant", "table"])

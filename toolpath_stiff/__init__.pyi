@@ -7,6 +7,7 @@ from toolpath_stiff.analysis.program_check import ProgramCheck as ProgramCheck
 from toolpath_stiff.analysis.results import Analysis as Analysis
 from toolpath_stiff.api.by_hand import Preview as Preview
 from toolpath_stiff.api.by_hand import preview as preview
+from toolpath_stiff.api.checks import check as check
 from toolpath_stiff.api.compensation import compare_walls as compare_walls
 from toolpath_stiff.api.compensation import compensate as compensate
 from toolpath_stiff.api.cutting import cut_template as cut_template
@@ -32,7 +33,6 @@ from toolpath_stiff.api.poses import pose as pose
 from toolpath_stiff.api.poses import read_poses as read_poses
 from toolpath_stiff.api.programs import analyze as analyze
 from toolpath_stiff.api.programs import case_study as case_study
-from toolpath_stiff.api.programs import check as check
 from toolpath_stiff.api.programs import sample_path as sample_path
 from toolpath_stiff.api.questions import compare as compare
 from toolpath_stiff.api.questions import diagnose as diagnose

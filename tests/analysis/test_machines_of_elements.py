@@ -191,7 +191,8 @@ def torsion(joint: int) -> np.ndarray:
         (entry("spindle_compliance", radial_nm_per_N=500.0, axial_nm_per_N=100.0), "tip"),
         (entry("joint_torsion", element="joint 3", compliance_nrad_per_N_per_m=700.0), 700.0),
         (entry("weak_element", element="joint 3", factor=0.5), "bending too"),
-        (entry("gear_backlash", element="joint 3", gap_arcsec=20.0), "gap"),
+        (entry("gear_backlash", element="joint 3", gap_arcsec=20.0, closing_N_m=0.0), "gap"),
+        (entry("gear_backlash", element="joint 3", gap_arcsec=20.0, closing_N_m=900.0), "gap closing over 900 N m"),
     ],
 )
 def test_effects_of_elements_add_what_the_mechanics_says(effect: str, added: object, tmp_path: Path) -> None:
@@ -208,8 +209,12 @@ def test_effects_of_elements_add_what_the_mechanics_says(effect: str, added: obj
             "joint_bending", element="joint 3", compliance_nrad_per_N_per_m=220.0)))  # fmt: skip
         assert rest == pytest.approx(1e9 * across.tip_compliance[0] - tensor, rel=1e-5, abs=1e-4)
         assert np.linalg.eigvalsh(rest).min() > -1e-4
-    elif added == "gap":  # m of the tip per N along X: gap times its lever over the load
-        along = 1e9 * math.radians(20 / 3600) * math.sqrt(third[0, 0]) / 2000
+    elif isinstance(
+        added, str
+    ):  # m of the tip per N along X: gap, as far as it is closed, times its lever over the load
+        lever, closing = math.sqrt(third[0, 0]), 900.0 if "900" in added else 0.0
+        along = 1e9 * math.radians(20 / 3600) * lever / 2000
+        along *= math.sin(math.atan2(2000 * lever, closing))
         seen = 1e9 / tps.pose(pose, machine, force_N=2000).along_axes[0, 0] - tensor[0, 0]
         assert seen == pytest.approx(along, rel=1e-4)
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import toolpath_stiff as tps
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.turning import choose_turn
 from toolpath_stiff.errors import InputError
@@ -113,6 +115,66 @@ def test_where_the_configuration_has_to_change_the_place_is_told():
     chosen = choose_turn(ROBOT, position, np.zeros((80, 3)), tangent, np.full(80, np.nan), SOFTEST)
     assert not chosen.constant and len(chosen.changes) >= 1
     assert choose_turn(ROBOT, *path(20), SOFTEST, "fixed").constant
+
+
+ROUND = "\n".join(
+    ["G21 G90 F6000", "G0 X{:.3f} Y{:.3f} Z500".format(*(1400.0 * np.array([np.cos(-2.98), np.sin(-2.98)])))]
+    + [f"G1 X{1400 * np.cos(a):.3f} Y{1400 * np.sin(a):.3f}" for a in np.linspace(-2.9, 4.2, 60)]
+)
+
+
+def test_a_program_round_the_base_is_evaluated_as_its_joints_have_to_go(tmp_path):
+    """Axis 1 turns by 340 degrees: on the way round the arm stands otherwise, and every sample is within reach."""
+    program = tps.Program.from_text(ROUND, name="round.nc")
+    found = tps.analyze(program, DATA / "robot200.toml", origin_mm_deg=(0, 0, 0), step_mm=20, turn="best")
+    assert found.complete and found.to_dict()["configuration"].startswith("shoulder ")
+    told = next(words for words in found.warnings if "the configuration has to change" in words)
+    cutting = found.samples.cutting[1:] & found.samples.cutting[:-1]
+    jumps = np.flatnonzero((np.abs(np.diff(found.at.joints, axis=0)).max(axis=1) > 0.35) & cutting)
+    assert len(jumps) and {f"{found.samples.line[row + 1]}" for row in jumps} <= set(re.findall(r"\d+", told))
+    low, high = ROBOT.machine.joint_limits.T
+    held = found.at.joints[found.samples.cutting]
+    assert (held >= low).all() and (held <= high).all()
+
+
+def test_lines_that_ask_more_than_a_joints_speed_are_told(tmp_path):
+    text = (DATA / "robot200.toml").read_text()
+    slow = tmp_path / "slow.toml"
+    slow.write_text(text.replace("min_deg", "speed_deg_per_s = 40.0\nmin_deg"))
+    cuts = "G21 G90\nG0 X1800 Y-200 Z900\nG1 Y200 F1000\nG1 X1700 Y0 F90000\nG1 Y200 F1000\nM2"
+    program = tps.Program.from_text(cuts, name="cuts.nc")
+    here = {"origin_mm_deg": (0, 0, 0), "step_mm": 2}
+    found = tps.analyze(program, slow, **here)
+    told = [words for words in found.warnings if "more of a joint than its speed" in words]
+    assert len(told) == 1 and told[0].startswith("lines 4 ask") and " of 40: feed slower there" in told[0]
+    rows = found.to_frame()
+    line = rows[rows.line == 4]
+    rates = [(line[f"joint_J{i}_deg"].diff().abs() / line["t_s"].diff()).max() for i in range(1, 7)]
+    assert max(rates) == pytest.approx(float(re.search(r"([\d.]+) deg/s of", told[0])[1]), rel=0.01)
+    assert not [words for words in tps.analyze(program, DATA / "robot200.toml", **here).warnings if "speed" in words]
+
+
+def test_a_placement_is_chosen_with_the_tools_turn(tmp_path):
+    """The search finds what a grid of turns and places finds, and its figures are those of the analysis."""
+    program = tps.Program.from_text("G21 G90\nG0 X-60 Y0 Z5\nG1 Z0 F600\nG1 X60\nG1 Y50\nM2", name="slot.nc")
+    where = {"x_mm": 1500, "y_mm": (-300, 300), "z_mm": 600, "rotate_deg": 0, "margin_percent": 0, "step_mm": 20}
+    robot = DATA / "robot200.toml"
+    placed = tps.place(program, robot, turn="best", origin_mm_deg=(1500, 0, 600), **where)
+    chosen = placed.chosen
+    options = {"origin_mm_deg": chosen.origin_mm_deg, "step_mm": 20, "turn": chosen.tool_turn_deg}
+    assert tps.analyze(program, robot, **options).mean_N_per_mm == pytest.approx(chosen.mean_N_per_mm, rel=1e-9)
+    grid = []
+    for y, turn in product(np.linspace(-300, 300, 7), range(0, 360, 30)):
+        try:
+            found = tps.analyze(program, robot, origin_mm_deg=(1500, y, 600), step_mm=20, turn=turn)
+        except tps.UnreachableError:
+            continue
+        grid.append(found.mean_N_per_mm)
+    assert max(row.mean_N_per_mm for row in placed.front) > 0.999 * max(grid) and len(grid) > 30
+    assert "tool_turn_deg" in placed.to_dict()["chosen"] and "turned about its axis" in str(placed)
+    for way, options in (("feed", {}), ("best", {"write": "new.nc"})):
+        with pytest.raises(InputError, match="--turn"):
+            tps.place(program, robot, turn=way, **where, **options)
 
 
 def test_a_machine_without_a_free_turn_refuses():

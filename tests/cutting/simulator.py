@@ -123,8 +123,8 @@ class Mill:
         ]
         return -1e3 * (np.max(deepest, axis=0) - self.tooth_radius.max())
 
-    def below(self, aside: np.ndarray) -> np.ndarray:
-        """Um of material left below, at distances mm to the left.
+    def below(self, aside: np.ndarray, climb: float = 0.0) -> np.ndarray:
+        """Um of material left below, square to the path, at distances mm to the left; `climb`: mm a mm of travel.
 
         A floor is passed ahead and behind, the lower pass counts; a ball makes a point where the normals agree.
         """
@@ -135,12 +135,14 @@ class Mill:
             moved = self.when(angle, 0, lag)
             return 1e3 * (moved[:, 2] * up - moved[:, 1] * np.sign(aside) * out)
         ahead = np.arccos(aside / self.radius)
+        # The tip passes half a chord before the point, and half a chord beyond it.
+        tips = [climb * side * np.sqrt(self.radius**2 - aside**2) for side in (-1, 1)]
         passes = [
-            self.when(angle, tooth, np.zeros_like(angle))[:, 2]
-            for angle in (ahead, 2 * np.pi - ahead)
+            self.when(angle, tooth, np.zeros_like(angle))[:, 2] + tip
+            for angle, tip in zip((ahead, 2 * np.pi - ahead), tips, strict=True)
             for tooth in range(self.teeth)
         ]
-        return 1e3 * np.min(passes, axis=0)
+        return 1e3 * (np.min(passes, axis=0) - np.min(tips, axis=0)) / np.hypot(1.0, climb)
 
 
 class Corner(Mill):

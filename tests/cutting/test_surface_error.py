@@ -1,5 +1,7 @@
 """Walls and floors against a cutter stepped through time, which shares nothing with the package."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -72,6 +74,11 @@ def test_surface_of_a_cutter_stepped_through_time(name):
         strips = np.stack([aside, aside], axis=1)
     floors = [1e6 * floor_error(job, compliance, strip[None] / 1e3)[0][0] for strip in strips]
     assert np.concatenate(floors) == pytest.approx(mill.below(aside), abs=FLOOR)
+    for climb in () if mill.ball else (-0.05, -1e-5, 2e-5, 0.05):  # of the lowest passes, and where either may be it
+        ramp = replace(job, feed=np.array([[mill.feed / 1e3, climb * mill.feed / 1e3]]))
+        tilted = np.diag([0.0, 0.0, 1.0]) @ compliance  # the floor's normal leans with the ramp: along z alone
+        errors = 1e6 * floor_error(ramp, tilted, strips / 1e3)[0][0]
+        assert errors == pytest.approx(mill.below(aside, climb), abs=FLOOR), climb
     for which in () if mill.ball else ("left", "right") if side == "both" else (side,):
         walls = np.full((1, 2, 2), np.nan)
         walls[0, int(which == "right")] = 0.0, depth / 1e3

@@ -463,3 +463,27 @@ def test_a_word_of_a_missing_axis_is_refused(name, letter):
     words[1, "ABC".index(letter)] = 0.1
     with pytest.raises(InputError, match=f"machine {name} has no axis {letter}"):
         MACHINES[name].rotation_of(words)
+
+
+MASSES = (("J2", 160.0, [560.0, 0.0, 0.0]), ("J3", 120.0, [95.0, 630.0, 0.0]), ("J6", 45.0, [0.0, 0.0, 90.0]))
+
+
+def test_the_weight_on_joints_is_the_slope_of_its_work():
+    """The moment about each axis by what the height of the masses gains for a small turn (virtual work)."""
+    rows = "".join(
+        f'[[mass]]\nname = "{frame}"\nkg = {kg}\nframe = "{frame}"\ncentre_mm = {place}\n'
+        for frame, kg, place in MASSES
+    )
+    machine = parse_machine((DATA / "robot200.toml").read_text() + rows)
+    q = np.deg2rad([[10.0, 30.0, 20.0, 40.0, -60.0, 15.0]])
+    stances = [machine.solve(*machine.forward(q), configuration=i) for i in range(8)]
+    loads = machine.weight_loads(next(s for s in stances if np.allclose(s.joints, q, atol=1e-9)))[0].reshape(-1, 6)
+    about_z = [row[5] for row, element in zip(loads, machine.elements, strict=True) if element.link == "joints"]
+
+    def energy(joints: np.ndarray) -> float:
+        frames = machine.frames(joints.T)[0]
+        return sum(kg * 9.80665 * frames[int(name[1])].point(np.array(place) / 1e3)[2] for name, kg, place in MASSES)
+
+    steps = 1e-6 * np.eye(6)[:, None]
+    slopes = [(energy(q + step) - energy(q - step)) / 2e-6 for step in steps]
+    np.testing.assert_allclose(about_z, np.negative(slopes), rtol=1e-6, atol=1e-5)

@@ -89,7 +89,7 @@ def used_width(figure):
 @pytest.mark.parametrize("machine", ["nist", "genhexkins", "nategh_agheli"])
 def test_the_machine_is_drawn_from_two_sides(machine, pose):
     figure = tps.Machine.load(machine).plot(pose)
-    assert used_width(figure) > 0.9 and "struts 1: " in figure.texts[-1].get_text()
+    assert used_width(figure) > 0.9 and "strut1 " in figure.texts[-1].get_text()
 
 
 def test_slices_of_a_map_fill_their_rows_and_no_figure_lies_on_another(mapped):

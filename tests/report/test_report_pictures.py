@@ -19,7 +19,7 @@ from toolpath_stiff.report.curves import extremes_by_column, scale_limits
 from toolpath_stiff.report.pictures import path as path_module
 from toolpath_stiff.report.pictures.files import picture_file
 from toolpath_stiff.report.pictures.path import UNREACHABLE, path, segment_classes
-from toolpath_stiff.report.pictures.profile import MOST_OPERATIONS, _set_limits, profile
+from toolpath_stiff.report.pictures.profile import _set_limits, profile
 from toolpath_stiff.report.pictures.style import new_figure
 
 
@@ -103,27 +103,6 @@ def test_required_level_and_second_machine_change_the_profile(analysis):
     assert count_colour(plain, orange) == 0
     assert count_colour(profile_picture(replace(analysis, on_other=spiral(load="x"))), orange) > 100
     assert count_colour(profile_picture(replace(analysis, required=6e7)), (0xD6, 0x45, 0x45)) > 1000
-
-
-def with_operations(names):
-    """A cut of 100 mm for each name."""
-    lines, moves = [], []
-    for i, name in enumerate(names):
-        lines += [f"(HEAD {name})", f"G1 X{i}"]
-        moves.append({"end": (0.1 * (i % 2), 0.001 * i, 0.0), "line": 2 * i + 2})
-    return make_analysis(moves, source=lines, step=0.02)
-
-
-def test_operations_stand_above_the_profile_while_they_can_be_told_apart():
-    every_second_box = (0xD9, 0xE0, 0xE8)
-    for count, shown in ((1, False), (2, True), (150, True), (MOST_OPERATIONS + 1, False)):
-        picture = profile_picture(with_operations([f"NUMBER {i}" for i in range(count)]))
-        assert (count_colour(picture, every_second_box) > 1000) == shown, count
-
-
-@pytest.mark.parametrize("name", ["pri$ce_$5", "$\\frac{$", "a\tb\x1b[0m", "部品", "x" * 400])
-def test_any_name_can_stand_above_the_profile(name):
-    assert profile_picture(with_operations([name, name])).startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("name", ["pri$ce_$5.nc", "$\\frac{$.nc", "a\nb\x1b[0m.nc", "部品.nc", "x" * 400])

@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import toolpath_stiff as tps
 from tests.report.factory import make_analysis, short
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.report import analysis as summary_module
-from toolpath_stiff.report.analysis import unwritten
+from toolpath_stiff.report.analysis import samples_csv, unwritten
 from toolpath_stiff.report.folder import names
 from toolpath_stiff.results_folder import MANIFEST, write_folder
 
@@ -111,3 +112,17 @@ def test_a_file_in_the_place_of_the_folder_is_one_clear_error(analysis, tmp_path
         with pytest.raises(InputError, match="cannot write"):
             write(analysis, folder, plots=False)
     assert tree(tmp_path) == {"o": b"a file"}
+
+
+def test_short_moves_have_one_row_and_figures_count_both_ends():
+    """At a step of 1 mm moves of 0.3 mm have their end alone, of 0.5 and 0.6 mm both ends."""
+    lines = ["G21 G90 F600", "G0 Z5", "G1 Z0", *(f"X{0.3 * i:.1f}" for i in range(1, 5)), "X1.8", "X2.3", "M2"]
+    analysis = tps.analyze(tps.Program.from_text("\n".join(lines)), origin_mm_deg=(0, 0, 800))
+    rows = b"".join(samples_csv(analysis)).decode().splitlines()
+    names = rows[0].split(",")
+    table = [dict(zip(names, row.split(","), strict=True)) for row in rows[1:]]
+    x = [(int(row["line"]), row["x_mm"]) for row in table if int(row["line"]) > 3]
+    short = [(4, "0.3000"), (5, "0.6000"), (6, "0.9000"), (7, "1.2000")]
+    assert x == [*short, (8, "1.2000"), (8, "1.8000"), (9, "1.8000"), (9, "2.3000")]
+    assert len(analysis.to_frame()) == len(analysis.samples) == len(table) + len(short)
+    assert table[-1]["strut1_mm"] == f"{analysis.to_frame()['strut1_mm'].iloc[-1]:.4f}"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.stats import binom, chi2, kstest
+from scipy.stats import binom, chi2, kstest, norm
 
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, correlated_covariance, dense, make_problem, simple_noise
@@ -155,7 +155,7 @@ def test_structure_of_pure_noise_surprises_no_one():
     projected = problem.projected(law)
     draws = simulator_of(4, 1000)
     structure = FormStatistics(forms, projected)
-    tails = np.exp(-structure.surprises(structure.loads(draws)))
+    tails = norm.sf(structure.surprises(structure.loads(draws)))
     for column, name in zip(tails.T, forms.names, strict=True):
         assert 0.02 < np.mean(column < 0.05) < 0.08, name
         assert 0.4 < np.mean(column) < 0.6, name

@@ -1,4 +1,4 @@
-"""Intervals of sizes: closed forms, truths at a bound, several components of which some are absent."""
+"""Intervals of sizes: several components, of which some are absent."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 
 from tests.conftest import seeds
 from tests.updating.cases import campaign, predictor_for
@@ -15,27 +14,7 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.hypotheses import averaged_interval, score_family
 from toolpath_stiff.inference.noise import noise_models
-from toolpath_stiff.inference.size_priors import likely_interval
 from toolpath_stiff.stiffness.catalogue import find_effect
-
-
-def normal_scan(mean: float, sd: float, low: float, high: float) -> np.ndarray:
-    sizes = np.linspace(low, high, 2001)
-    return likely_interval(sizes, -0.5 * ((sizes - mean) / sd) ** 2 - 1234.5)
-
-
-def test_far_from_bounds_it_is_the_normal_interval():
-    assert normal_scan(5.0, 0.5, 0.01, 20.0) == pytest.approx([5.0 - 0.98, 5.0 + 0.98], abs=0.005)
-
-
-def test_it_reaches_to_a_bound_that_the_data_do_not_exclude():
-    """One-sided there: a truth at the bound is held, and the other end still leaves out 5 %."""
-    low, high = normal_scan(9.8, 0.5, 0.01, 10.0)
-    share = norm.cdf(10.0, 9.8, 0.5)
-    assert high == 10.0 and low == pytest.approx(norm.ppf(0.05 * share, 9.8, 0.5), abs=0.005)
-    low, high = normal_scan(-0.3, 1.0, 1e-6, 10.0)
-    assert low == 1e-6 and high == pytest.approx(norm.isf(0.05 * norm.sf(0.0, -0.3, 1.0), -0.3, 1.0), abs=0.01)
-    assert normal_scan(5.0, 100.0, 1e-6, 10.0) == pytest.approx([1e-6, 10.0])  # the data say nothing
 
 
 def subsets(*parts: tuple[float, tuple[int, ...], list[float], list[float]]) -> SimpleNamespace:

@@ -226,7 +226,7 @@ def joints(tmp_path_factory):
 def test_what_the_tip_cannot_tell_an_indicator_names(joints):
     """A constant compliance in series with every strut is a strut law to the tip; across a joint it is nothing else."""
     alone = diagnose(nist(), read_measurements(joints[0], nist()))
-    assert alone.verdict == "adequate" and "joint_compliance" in alone.plausible
+    assert alone.verdict == "ambiguous" and {"none", "joint_compliance"} <= set(alone.plausible)
     found = diagnose(nist(), read_measurements(list(joints), nist()))
     assert (found.verdict, found.plausible) == ("identified", ["joint_compliance"])
     written = found.to_dict()

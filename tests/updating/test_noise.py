@@ -69,15 +69,16 @@ def test_restricted_likelihood_finds_repeat_noise_and_clamping():
     assert (42 - differences).sum() <= 18
 
 
-def test_no_clamping_is_found_where_there_is_none():
-    """Of estimates that cannot be negative, half are 0; what the others take is taken from repeat noise, 3 %.
+def test_where_there_is_no_clamping_a_standard_error_of_it_is_counted():
+    """Never none, for that would be too sure: whatever else readings of a clamping share is then the machine's.
 
-    With 15 and 26 degrees of freedom the sd of clamping^2, in repeat^2, is sqrt(2 / 15 + 2 / 26) / 3 = 0.153 for
-    readings along three axes: the mean of its positive part 0.061, that of 60 with sd 0.0115, or 0.013 as simulated.
+    With 15 and 26 degrees of freedom the sd of clamping^2, in repeat^2, is s = sqrt(2 / 15 + 2 / 26) / 3 = 0.153 for
+    readings along three axes. Of a normal likelihood about m the penalised estimate is (m + sqrt(m^2 + 2 s^2)) / 2: its
+    mean over m = s z is 0.84 s = 0.129, of 60 with sd 0.013. What it takes is taken from repeat noise, 3 %.
     """
     repeat, clamping, _ = mean_of_estimates(clamping=0.0)
     assert repeat == pytest.approx(0.97 * CREDITED * REPEAT, rel=4 * 0.017)
-    assert clamping < math.sqrt(0.064 + 5 * 0.013) * REPEAT  # skewed: five of them
+    assert (clamping / REPEAT) ** 2 == pytest.approx(0.129, abs=5 * 0.013)  # skewed: five of them
 
 
 def test_wild_readings_and_a_drift_are_not_taken_for_noise():

@@ -189,7 +189,7 @@ def test_the_dictionary_speaks_the_agreed_words(folder):
     assert {t.shape for t in terms} <= set(SHAPES)
     assert len({t.key for t in terms}) == len(terms)
     assert np.exp(dictionary.log_prior).sum() <= 1.0 + 1e-9
-    np.testing.assert_allclose(np.sqrt((dictionary.columns**2).mean(axis=1)), 1.0)
+    np.testing.assert_allclose(np.sqrt((np.concatenate([*dictionary.columns()]) ** 2).mean(axis=1)), 1.0)
 
 
 def test_what_can_only_give_has_no_negative_size_and_factors_leave_a_stiffness():

@@ -12,8 +12,8 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.correction.additions import parse_addition
 from toolpath_stiff.correction.result import residuals_csv
-from toolpath_stiff.correction.task import MEAN_ERROR, UpdateTask
-from toolpath_stiff.correction.update import build_ladder, update_by_mean_error
+from toolpath_stiff.correction.task import UpdateTask
+from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import parse_machine
@@ -217,22 +217,6 @@ def test_a_users_own_effect(tmp_path):
     again = parse_machine(machine_toml(found.fitted(PROVENANCE)))
     modelled = Predictor(again, data, [file]).log_stiffness()
     assert modelled == pytest.approx(np.log(data.stiffness) - found.last.fit.residual, rel=0, abs=1e-7)
-
-
-def test_the_papers_own_estimation():
-    found = update_by_mean_error(UpdateTask(nist(), table_1(), strut_law=True, objective=MEAN_ERROR, seed=1))
-    first, last = (step.fit.errors.mean() for step in found.steps)
-    assert (first, last) == (pytest.approx(0.0962, abs=5e-5), pytest.approx(0.0942, abs=5e-5))
-    # Fitted to the points themselves, the law does worse at points that it has not seen.
-    assert found.last.held.mean_error > last
-    machine = found.fitted(PROVENANCE)
-    ends = [(law.stiffness_1, law.stiffness_2) for law in (machine.strut_law, found.search.strut_law)]
-    assert ends[0] == pytest.approx(ends[1], rel=1e-8)
-    assert machine.uncertainty.names == ("strut_law.stiffness_1_N_per_um", "strut_law.stiffness_2_N_per_um")
-    # The printed constants lie well within what 14 points can tell.
-    printed = np.array([46.5, 32.5])
-    reached = np.array([machine.strut_law.stiffness_1, machine.strut_law.stiffness_2]) / 1e6
-    assert (np.abs(printed - reached) < 2.5 * machine.uncertainty.sd).all()
 
 
 def test_the_document_and_the_residuals_agree_with_the_fit(weak):

@@ -1,17 +1,18 @@
 """Stiffness along a load, strut lengths and reach at many poses, block by block, fast where that is safe."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.loads import Load, geometric_directions, load_directions
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.limits import Extremes, Reach, machine_limits, reach, solved
 from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
+from toolpath_stiff.path.turning import room_to_wind, unwound
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core, element_sum
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
@@ -19,9 +20,11 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
 OF_THE_WORK = ("tangential", "axial", "normal", "radial")  # loads that turn with the work; others are of the machine
+TURNING_BACK = 1e-6  # of a limit's span
 MOST_TRIED = 60  # poses of a path at which every configuration is tried
 FEW_CORNERS = 0.2  # share of the rows; a second load of every pose costs more than these poses twice
 Progress = Callable[[int, int], None]
+OF_POSES, OF_REACH = ("stiffness", "substituted", "joints", "extrapolated"), ("margin", "limit", "value")
 # Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, length of the tool (nan: the reference tool).
 Poses = tuple[FloatArray, FloatArray | None, float]
 # Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, tangents (n, 3), all in work axes.
@@ -60,11 +63,24 @@ class Evaluation:
         """(n,) whether every limit is kept."""
         return self.reach.reachable
 
+    @classmethod
+    def joined(cls, parts: "Sequence[Evaluation]") -> "Evaluation":
+        """The parts of a path, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+
+        def whole(names: Sequence[str], of: Sequence[object]) -> dict[str, AnyArray]:
+            return {name: np.concatenate([getattr(part, name) for part in of]) for name in names}
+
+        stand = Reach(**whole(OF_REACH, [part.reach for part in parts]), limits=parts[0].reach.limits)
+        configuration = ", then ".join(part.configuration for part in parts)
+        return cls(**whole(OF_POSES, parts), reach=stand, configuration=configuration)
+
     def put(self, rows: IntArray, part: "Evaluation") -> None:
         """Enter the figures of some rows."""
-        for name in ("stiffness", "substituted", "joints", "extrapolated"):
+        for name in OF_POSES:
             getattr(self, name)[rows] = getattr(part, name)
-        for name in ("margin", "limit", "value"):
+        for name in OF_REACH:
             getattr(self.reach, name)[rows] = getattr(part.reach, name)
 
 
@@ -111,8 +127,8 @@ def evaluate(
     if not isinstance(model.machine, Hexapod):
         return _by_elements(model, (position, abc, tangent), tool_length, load, force, progress)
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    corners = _corners(position, abc, lengths)
-    route = core.choose_route(model, n - int(np.count_nonzero(corners)))
+    corner = corners(position, abc, lengths)
+    route = core.choose_route(model, n - int(np.count_nonzero(corner)))
     stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(model.machine))
     substituted, extrapolated = np.zeros((2, n), dtype=bool)
     result = Evaluation(np.empty(n), substituted, np.empty((n, 6)), extrapolated, stand)
@@ -121,9 +137,9 @@ def evaluate(
         for tool, some in core.rows_of_tools(lengths[block]):
             rows = block[some]
             if route != "exact" and load.kind != "softest":
-                last = corners[rows] & (rows < block[-1])
+                last = corner[rows] & (rows < block[-1])
                 first = rows[~np.append(False, last[:-1])]
-                ends = (first, first + corners[first] * (first < block[-1])) if last.any() else (first,)
+                ends = (first, first + corner[first] * (first < block[-1])) if last.any() else (first,)
                 loads, left = [tangent[part] for part in ends], []
                 fast = _by_closed_form(model, load, loads, _poses(position, abc, tool, first), route)
                 for part, (evaluated, sure) in zip(ends, fast, strict=True):
@@ -142,14 +158,14 @@ def _poses(position: FloatArray, abc: FloatArray, tool: float, rows: IntArray) -
     return position[rows], rotation_matrices(angles) if angles.any() else None, tool
 
 
-def _corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolArray:
+def corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolArray:
     """(n,) where a move ends and the next one starts in the row after: one pose, two tangents. None where few are."""
-    corners = np.zeros(len(position), dtype=bool)
-    corners[:-1] = True
+    corner = np.zeros(len(position), dtype=bool)
+    corner[:-1] = True
     for values in (*position.T, *abc.T, np.nan_to_num(lengths, nan=-1.0)):
-        corners[:-1] &= values[1:] == values[:-1]
-    corners[1:] &= ~corners[:-1]  # of more than two rows alike the others are poses of their own
-    return corners if np.count_nonzero(corners) > FEW_CORNERS * len(corners) else np.zeros_like(corners)
+        corner[:-1] &= values[1:] == values[:-1]
+    corner[1:] &= ~corner[:-1]  # of more than two rows alike the others are poses of their own
+    return corner if np.count_nonzero(corner) > FEW_CORNERS * len(corner) else np.zeros_like(corner)
 
 
 def _by_closed_form(
@@ -257,10 +273,13 @@ def _by_elements(
     machine, n = model.machine, len(position)
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
     follows = bool(tangent.any())
-    kept = kept_configuration(machine, position, abc, lengths) if follows else None
+    kept = None
+    if follows and n and len(machine.configurations) > 1:
+        few = tried_rows(n)
+        kept = int(kept_configurations(machine, position[few], rotation_matrices(abc[few]), lengths[few])[0])
     stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(machine))
     substituted, extrapolated = np.zeros((2, n), dtype=bool)
-    joints, name = np.empty((n, len(machine.joint_names))), "" if kept is None else machine.configurations[kept]
+    joints, name = np.empty((n, len(machine.joint_names))), machine.configurations[kept or 0] if follows else ""
     result = Evaluation(np.empty(n), substituted, joints, extrapolated, stand, name)
     before = None
     if follows and n:
@@ -277,27 +296,63 @@ def _by_elements(
     return result
 
 
-def kept_configuration(machine: MachineTool, position: FloatArray, abc: FloatArray, lengths: FloatArray) -> int | None:
-    """The configuration whose smallest margin over n poses is the largest; None where there is no choice."""
-    if len(machine.configurations) < 2 or not len(position):
-        return None
-    few = np.unique(np.linspace(0, len(position) - 1, MOST_TRIED).round().astype(np.int64))
-    turn = rotation_matrices(abc[few])
-    stances = (machine.solve(position[few], turn, lengths[few], i) for i in range(len(machine.configurations)))
-    return int(np.argmax([reach(machine, position[few], stance).margin.min() for stance in stances]))
+def tried_rows(count: int) -> IntArray:
+    """The poses of a path of so many at which configurations are tried."""
+    return np.unique(np.linspace(0, count - 1, MOST_TRIED).round().astype(np.int64))
+
+
+def kept_configurations(
+    machine: MachineTool, position: FloatArray, rotation: FloatArray | None, lengths: FloatArray, paths: int = 1
+) -> IntArray:
+    """(paths,) the configuration whose smallest margin is the largest; of poses of paths, one after the other.
+
+    Poses that no configuration reaches do not count; one in which a joint has to turn back on the way comes after all
+    that keep the limits.
+    """
+    limits, winds = machine.joint_limits, np.array(machine.joint_kinds) == "rotary"
+    stances = list(machine.stances(position, rotation, lengths))
+    margins = np.array([reach(machine, position, stance).margin.reshape(paths, -1) for stance in stances])
+    counts = (margins >= 0.0).any(axis=0)
+    counts |= ~counts.any(axis=1)[:, None]
+    least = np.where(counts, margins, np.inf).min(axis=2)
+    for stance, margin in zip(stances, least, strict=True):
+        joints = stance.joints.reshape(paths, -1, len(limits)).swapaxes(0, 1)
+        number = np.where(counts.T, np.arange(len(joints))[:, None], counts.T.argmax(axis=0))
+        there = np.take_along_axis(joints, np.maximum.accumulate(number)[:, :, None], axis=0)
+        goes_on = room_to_wind(unwound(there, winds), limits, winds)
+        margin -= np.where(goes_on, 0.0, np.maximum(margin, 0.0) + TURNING_BACK)
+    return np.asarray(np.argmax(least, axis=0))
 
 
 def evaluate_stance(
     model: StiffnessModel, stance: Stance, in_work: WorkPoses, load: Load, force: float = defaults.FORCE
 ) -> Evaluation:
     """A machine of elements where it stands; tip, tool axes and tangent in work axes."""
+    n, stand = len(stance), reach(model.machine, in_work[0], stance)
+    stiffness, substituted = np.full(n, np.nan), np.zeros(n, dtype=bool)
+    if len(rows := np.flatnonzero(stand.reachable)):
+        part, some = (stance, in_work) if len(rows) == n else (stance.take(rows), poses_taken(in_work, rows))
+        stiffness[rows], substituted[rows] = stiffness_within(model, part, some, load, force)
+    return Evaluation(stiffness, substituted, stance.joints, np.zeros(n, dtype=bool), stand)
+
+
+def poses_taken(in_work: WorkPoses, rows: IntArray) -> WorkPoses:
+    """Some of the poses."""
+    position, rotation, tangent = in_work
+    return position[rows], None if rotation is None else rotation[rows], tangent[rows]
+
+
+def stiffness_within(
+    model: StiffnessModel, stance: Stance, in_work: WorkPoses, load: Load, force: float
+) -> tuple[FloatArray, BoolArray]:
+    """(n,) N/m along the load and where the softest direction stands in, at poses within reach; as there."""
     position, _, tangent = in_work
-    n, stand = len(stance), reach(model.machine, position, stance)
-    along, substituted = np.full(n, np.nan), np.zeros(n, dtype=bool)
+    n = len(stance)
+    along, substituted = np.empty(n), np.zeros(n, dtype=bool)
     direction, known = geometric_directions(load, *in_work)
     if stance.work_axes is not None and load.kind in OF_THE_WORK:
         direction = np.einsum("nij,nj->ni", stance.work_axes, direction)
-    for rows in (np.flatnonzero(stand.reachable & known), np.flatnonzero(stand.reachable & ~known)):
+    for rows in (np.flatnonzero(known), np.flatnonzero(~known)):
         if not len(rows):
             continue
         part = stance if len(rows) == n else stance.take(rows)
@@ -308,5 +363,5 @@ def evaluate_stance(
             towards, substituted[rows] = load_directions(load, compliance, *some)
         along[rows] = element_sum.compliance_along(model, path, towards)
     stiffness = 1.0 / along
-    _refuse_no_number(model, position, stand.reachable & ~((stiffness > 0.0) & (stiffness < np.inf)))
-    return Evaluation(stiffness, substituted, stance.joints, np.zeros(n, dtype=bool), stand)
+    _refuse_no_number(model, position, ~((stiffness > 0.0) & (stiffness < np.inf)))
+    return stiffness, substituted

@@ -25,7 +25,7 @@ from toolpath_stiff.analysis.statistics import (
 )
 from toolpath_stiff.analysis.turning import FIXED, TurnChoice, choose_turn
 from toolpath_stiff.analysis.uncertainty import band_figures
-from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
@@ -43,7 +43,7 @@ from toolpath_stiff.stiffness.model import (
     condition_warnings,
     effects_stated,
 )
-from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
 
 STANDING = ("weakest", "out_of_reach_samples", "extrapolated_share")  # of a machine compared with
 MOST_NAMED = 5  # lines in a warning
+SHORTEST = 1e-9  # s between samples: less is the rounding of one time
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -151,7 +152,7 @@ class Analysis(EvaluatedPath, FolderResult):
         return None if self.parameter_band is None else n_per_mm_from_n_per_m(self.parameter_band.deviation)
 
     def to_frame(self) -> pd.DataFrame:
-        """The samples as a pandas DataFrame, columns as in `samples.csv` and `cut.csv` (mm, degrees, N/mm, um)."""
+        """All samples as a pandas DataFrame, columns as in `samples.csv` and `cut.csv` (mm, degrees, N/mm, um)."""
         return frame_of(sample_columns(self) | ({} if self.cut is None else cut_columns(self, self.cut)))
 
     def to_dict(self) -> Document:
@@ -204,7 +205,7 @@ def analyze(
     step: float = defaults.STEP,
     force: float = defaults.FORCE,
     partial: bool = False,
-    turn: str = FIXED,
+    turn: str | float = FIXED,
     progress: Progress | None = None,
 ) -> Analysis:
     r"""Stiffness along the path of a program.
@@ -226,7 +227,7 @@ def analyze(
     partial
         Keep the reachable samples of a program that leaves the workspace.
     turn
-        How the tool is turned about its axis: "fixed", "feed" or "best", see `turning`.
+        How the tool is turned about its axis: "fixed", "feed", "best" or so many degrees, see `turning`.
     progress
         Called with (samples done, samples in all).
 
@@ -255,8 +256,10 @@ def analyze(
         poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
         choice = choose_turn(model, *poses, direction, turn)
         samples = replace(samples, abc=choice.abc)
-        model = replace(model, machine=choice.kept(model.machine))
-    poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+        there = choice.evaluate(model, samples, direction, force, progress)
+    else:
+        poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
+        there = evaluate(model, *poses, direction, force, progress)
     analysis = Analysis(
         program=program,
         model=model,
@@ -266,7 +269,7 @@ def analyze(
         force=force,
         step=step,
         samples=samples,
-        at=evaluate(model, *poses, direction, force, progress),
+        at=there,
         turn=choice,
     )
     _check_reach(analysis, partial)
@@ -292,11 +295,13 @@ def _effective_origin(machine: MachineTool, program: ReadProgram, origin: Pose |
 def _warnings(analysis: Analysis) -> list[str]:
     """What the evaluation itself has to say."""
     warnings, samples, there = [], analysis.samples, analysis.at
-    if analysis.turn is not None and len(changes := np.unique(samples.line[analysis.turn.changes])):
+    if len(changes := _changes(analysis)):
         at_lines = ", ".join(map(str, changes[:MOST_NAMED]))
         warnings.append(
-            f"lines {at_lines}: the joints cannot go on as they stand, the configuration has to change there"
+            f"lines {at_lines}: the joints cannot go on as they stand; the configuration has to change there, or a "
+            "joint to turn back"
         )
+    warnings += _too_fast(analysis)
     rapids, swapped = ~samples.cutting & ~there.reachable, samples.cutting & there.substituted
     if rapids.any():
         first = int(np.argmax(rapids))
@@ -312,6 +317,38 @@ def _warnings(analysis: Analysis) -> list[str]:
             "(rotary axes alone, or a move along the tool axis); the softest direction stands in"
         )
     return warnings
+
+
+def _changes(analysis: Analysis) -> IntArray:
+    """Lines of cuts within which the joints do not go on."""
+    samples, rotary = analysis.samples, np.array(analysis.machine.joint_kinds) == "rotary"
+    going = samples.cutting[1:] & samples.cutting[:-1]
+    back = (np.abs(np.diff(analysis.at.joints[:, rotary], axis=0)) > np.pi).any(axis=1) & going
+    changes = analysis.turn.changes if analysis.turn else np.zeros(0, dtype=np.int64)
+    return np.unique(samples.line[np.union1d(np.flatnonzero(back) + 1, changes)])
+
+
+def _too_fast(analysis: Analysis) -> list[str]:
+    """The lines of cuts that ask more of a joint than its speed."""
+    machine, samples = analysis.machine, analysis.samples
+    if not np.isfinite(machine.joint_speeds).any():
+        return []
+    duration, going = np.diff(samples.t)[:, None], samples.cutting[1:] & samples.cutting[:-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        speed = np.abs(np.diff(analysis.at.joints, axis=0)) / duration
+    speed[~going | (duration <= SHORTEST)[:, 0]] = 0.0
+    share = np.nan_to_num(speed) / machine.joint_speeds
+    fast = np.unique(samples.line[1:][(share > 1.0).any(axis=1)])
+    if not len(fast):
+        return []
+    row, joint = np.unravel_index(int(share.argmax()), share.shape)
+    unit, shop = ("mm/s", mm_from_m) if machine.joint_kinds[joint] == "linear" else ("deg/s", deg_from_rad)
+    asked, most = (shop(float(value)) for value in (speed[row, joint], machine.joint_speeds[joint]))
+    more = f" and {len(fast) - MOST_NAMED} more" if len(fast) > MOST_NAMED else ""
+    return [
+        f"lines {', '.join(map(str, fast[:MOST_NAMED]))}{more} ask more of a joint than its speed, most line "
+        f"{samples.line[row + 1]}: {machine.joint_names[joint]} {asked:.3g} {unit} of {most:.3g}: feed slower there"
+    ]
 
 
 def _sample_words(analysis: Analysis, i: int) -> str:

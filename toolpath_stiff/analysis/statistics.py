@@ -245,8 +245,8 @@ def describe_sample(path: EvaluatedPath, row: int) -> Document:
     }
 
 
-def sample_columns(path: EvaluatedPath, rows: slice = slice(None)) -> dict[str, AnyArray]:
-    """Column name -> values in the shop's units, for some rows."""
+def sample_columns(path: EvaluatedPath, rows: slice | IntArray = slice(None)) -> dict[str, AnyArray]:
+    """Column name -> values in the shop's units, for some samples."""
     evaluation = path.at
     reach, names = evaluation.reach, np.array([limit.name for limit in evaluation.reach.limits] or ["none"])
     moving = (path.samples.motion[rows] != RAPID) & path.samples.tangent[rows].any(axis=1)

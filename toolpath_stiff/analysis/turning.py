@@ -7,15 +7,17 @@ changes along the path is taken where no constant one is feasible, or where it g
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from toolpath_stiff.analysis.evaluation import evaluate_stance
+from toolpath_stiff.analysis.evaluation import Evaluation, Progress, evaluate, evaluate_stance
 from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.joint_values import TURN
 from toolpath_stiff.machine.model import MachineTool
+from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.path.turning import (
     constant_costs,
     feed_turns,
@@ -26,7 +28,7 @@ from toolpath_stiff.path.turning import (
 )
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.model import StiffnessModel
-from toolpath_stiff.units import deg_from_rad, nm_from_m
+from toolpath_stiff.units import deg_from_rad, nm_from_m, rad_from_deg
 
 FIXED, FEED, BEST = "fixed", "feed", "best"
 TURNS = 72  # of 5 degrees: compliance is smooth over the turn, and next ones differ by some tenths of a percent
@@ -70,11 +72,19 @@ class TurnChoice:
     best_constant: float = np.nan
     median_constant: float = np.nan
 
-    def kept(self, machine: MachineTool) -> MachineTool:
-        """The machine in the configuration of the most samples; any of them where the turn was not chosen for one."""
-        if self.mode != BEST or len(machine.configurations) < 2:
-            return machine
-        return machine.with_changes(only=int(np.bincount(self.configuration).argmax()))
+    def evaluate(
+        self, model: StiffnessModel, samples: Samples, load: Load, force: float, progress: Progress | None = None
+    ) -> Evaluation:
+        """What the machine does along the path, stretch by stretch of one configuration where these were chosen."""
+        parts, chosen = [], self.mode == BEST and len(model.machine.configurations) > 1
+        changes = (np.flatnonzero(np.diff(self.configuration)) + 1).tolist()
+        for start, stop in pairwise([0, *changes, len(samples)]):
+            there, only = samples.take(slice(start, stop)), model
+            if chosen:
+                only = replace(model, machine=model.machine.with_changes(only=int(self.configuration[start])))
+            poses = (there.position, there.abc, there.tangent, there.tool_length)
+            parts.append(evaluate(only, *poses, load, force, progress))
+        return Evaluation.joined(parts)
 
     @property
     def sentence(self) -> str:
@@ -86,6 +96,8 @@ class TurnChoice:
             chosen = f"kept {first:.1f} deg from the program's"
         else:
             chosen = f"changed along the path from {first:.1f} to {last:.1f} deg from the program's"
+        if np.isnan(self.mean):
+            return f"the turn about the tool's axis is {chosen}"
         figures = f"mean compliance {nm_from_m(self.mean):.1f} nm/N at up to {NODES} places"
         if np.isfinite(self.best_constant):
             figures += (
@@ -95,6 +107,14 @@ class TurnChoice:
         return f"the turn about the tool's axis is {chosen}: {figures}"
 
 
+def check_free_turn(machine: MachineTool, mode: str | float) -> None:
+    """Raise `InputError` where a machine has no more joints than a cut needs, or for a way to turn that is none."""
+    if isinstance(mode, str) and mode not in (FIXED, FEED, BEST):
+        raise InputError(f"--turn {mode}", expected=f"{FIXED}, {FEED}, {BEST}, or degrees")
+    if len(machine.joint_names) < 6 or machine.joint_kinds.count("rotary") < 3:
+        raise InputError(f"--turn {mode}: machine {machine.name} has no turn about the tool's axis to spare")
+
+
 def choose_turn(
     model: StiffnessModel,
     position: FloatArray,
@@ -102,7 +122,7 @@ def choose_turn(
     tangent: FloatArray,
     tool_length: FloatArray,
     load: Load,
-    mode: str = BEST,
+    mode: str | float = BEST,
 ) -> TurnChoice:
     """The turn at n poses of a path under a load.
 
@@ -115,7 +135,7 @@ def choose_turn(
     load
         Whose compliance counts.
     mode
-        "fixed" as programmed, "feed" with the tool's x along the feed, "best".
+        "fixed" as programmed, "feed" with the tool's x along the feed, "best", or so many degrees.
 
     Raises
     ------
@@ -125,10 +145,11 @@ def choose_turn(
     rotation, machine = rotation_matrices(abc), model.machine
     if mode == FIXED:
         return _kept(rotation, np.zeros(len(abc)))
-    if len(machine.joint_names) < 6 or machine.joint_kinds.count("rotary") < 3:
-        raise InputError(f"--turn {mode}: machine {machine.name} has no turn about the tool's axis to spare")
+    check_free_turn(machine, mode)
     if mode == FEED:
         return replace(_kept(rotation, feed_turns(rotation, tangent)), mode=FEED)
+    if mode != BEST:
+        return replace(_kept(rotation, np.full(len(abc), rad_from_deg(float(mode)))), mode=FIXED)
     nodes = np.unique(np.linspace(0, len(abc) - 1, NODES).round().astype(np.int64))
     angles = np.asarray(TURN / TURNS * np.arange(TURNS), dtype=np.float64)
     poses = (position[nodes], rotation[nodes], tangent[nodes])

@@ -10,12 +10,13 @@ from toolpath_stiff.api.measurements import Data
 from toolpath_stiff.api.questions import Noise, Question
 from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.candidates import Candidate, Component
+from toolpath_stiff.inference.element_predictor import predictor_of
 from toolpath_stiff.inference.errors import deviation_percent, error_figures
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.noise import noise_models
-from toolpath_stiff.inference.prediction import Predictor, scaled_law
-from toolpath_stiff.machine.model import EffectEntry, StrutLaw, as_hexapod
+from toolpath_stiff.inference.prediction import scaled_law
+from toolpath_stiff.machine.model import EffectEntry, Hexapod, StrutLaw, as_hexapod
 from toolpath_stiff.stiffness.active import read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.units import n_per_mm_from_n_per_m
@@ -35,17 +36,17 @@ class Preview:
     """
 
     def __init__(self, question: Question) -> None:
-        self._hexapod = as_hexapod(question.model, "an effect set by hand")
         data, given = question.readings, question.common
         # Under the noise that a diagnosis writes out in full.
         noise = max(noise_models(data, given["noise"], given["strut_spread"]), key=lambda noise: noise.typical)
-        self._problem = Problem.of(Predictor(self._hexapod, data, question.on.effect_files), noise)
-        self._on = question.on
+        self._problem = Problem.of(predictor_of(question.model, data, question.on.effect_files), noise)
+        self._on, self._model = question.on, question.model
         self._near: tuple[Mapping[str, Document], Fit] | None = None
 
     def machine(self, effects: Mapping[str, Document]) -> Machine:
         """The machine with these effects and the strut law refitted beside them; arguments and errors as of `at`."""
-        return with_effects(self._on, effects, scaled_law(self._hexapod.strut_law, self._fit(effects).law))
+        struts = self._model.strut_law if isinstance(self._model, Hexapod) else None
+        return with_effects(self._on, effects, struts and scaled_law(struts, self._fit(effects).law))
 
     def at(
         self,
@@ -118,15 +119,15 @@ class Preview:
 
 def with_effects(machine: Machine, effects: Mapping[str, Document], strut_law: StrutLaw | None = None) -> Machine:
     """A machine with further effects, name -> the keys of its entry in a machine file, and with another strut law."""
-    entries, stated = _entries(effects), as_hexapod(machine.stated, "an effect set by hand")
+    entries, stated = _entries(effects), machine.stated
     read = [entry for entry in entries if find_effect(entry.name, machine.effect_files).is_instrument]
-    return machine.carrying(
-        stated.with_changes(
-            strut_law=strut_law or stated.strut_law,
-            effects=(*stated.effects, *(entry for entry in entries if entry not in read)),
-            instruments=(*stated.instruments, *read),
-        )
+    carrying = stated.with_changes(
+        effects=(*stated.effects, *(entry for entry in entries if entry not in read)),
+        instruments=(*stated.instruments, *read),
     )
+    if strut_law is not None:
+        return machine.carrying(as_hexapod(carrying, "a strut law").with_changes(strut_law=strut_law))
+    return machine.carrying(carrying)
 
 
 def _entries(effects: Mapping[str, Document]) -> list[EffectEntry]:

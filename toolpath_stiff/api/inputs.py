@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any
 
+from toolpath_stiff.analysis.turning import BEST, FEED, FIXED
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import Option, number_in, numbers
 from toolpath_stiff.poses import Pose, pose_in_si
@@ -11,11 +12,21 @@ from toolpath_stiff.poses import Pose, pose_in_si
 FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
 FARTHEST_DEG = 360.0
 
+
+def turn_of(word: str) -> str | float:
+    """One of the words, or degrees. Raises `ValueError`."""
+    try:
+        return word if word in (FIXED, FEED, BEST) else float(word)
+    except ValueError:
+        raise ValueError(f"{FIXED}, {FEED}, {BEST}, or degrees") from None
+
+
 # Options that several functions share.
 Step = Annotated[float, Option("--step", "mm", above=0, at_most=1000)]
 Force = Annotated[float, Option("--force", "N", above=0, at_most=1e6)]
 LoadDirection = Annotated[str, Option("--load", "DIRECTION")]
 Origin = Annotated[Sequence[float] | None, Option("--origin", "X,Y,Z[,A,B,C]", read=numbers)]
+Turn = Annotated[str | float, Option("--turn", "fixed|feed|best|DEG", read=turn_of)]
 # Coarser than 0.01 mm is not machining; beyond nine decimals a double has no more digits.
 Decimals = Annotated[int | None, Option("--decimals", at_least=2, at_most=9)]
 Linearised = Annotated[float | None, Option("--linearise", "mm", above=0, at_most=10)]

@@ -14,7 +14,6 @@ from toolpath_stiff.analysis.evaluation import joint_columns
 from toolpath_stiff.analysis.machine_check import MachineCheck, check_machine
 from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.documents import Document
 from toolpath_stiff.files import read_bytes, write_atomically
 from toolpath_stiff.machine import dh_table, freecad, urdf
 from toolpath_stiff.machine.elements import Stance
@@ -75,8 +74,6 @@ class Machine(Result):
     (0.0, 0.0, 800.0, 0.0, 0.0, 0.0)
     >>> machine.carrying(machine.stated)
     <Machine nist: 6 struts, no effects>
-    >>> [round(value) for value in machine.joints_mm["frame"][0]], machine.joints_mm["tool"]
-    ([1207, 2091, 3013], 150.0)
     """
 
     command: ClassVar[str] = "machine"
@@ -320,19 +317,6 @@ class Machine(Result):
             return stand(machine, pose_in_si(FIGURE_2_MM_DEG) if self.name == "nist" else machine.default_origin)
         return stand(machine, pose_si("pose", pose_mm_deg))
 
-    @property
-    def joints_mm(self) -> Document:
-        """What a drawing needs: "frame" (6, 3) in machine coordinates, "platform" (6, 3) from the tip, "tool" length.
-
-        The platform's joints are those at zero rotation; they turn about the tip with it.
-        """
-        machine = as_hexapod(self.model.machine, "a drawing by joints")
-        return {
-            "frame": mm_from_m(machine.frame_joints).tolist(),
-            "platform": mm_from_m(machine.platform_joints).tolist(),
-            "tool": mm_from_m(machine.reference_tool_length),
-        }
-
     def reach_mm(self, from_mm_deg: Sequence[float], directions: Sequence[Sequence[float]]) -> FloatArray:
         """(n,) how far the tool tip can go from a pose along directions (n, 3), unturned, before the first limit.
 
@@ -351,6 +335,18 @@ class Machine(Result):
     def picture(self, pose_mm_deg: Sequence[float] | None = None) -> bytes:
         """What `plot` draws as a PNG."""
         return self._picture(machine=self.model.machine, pose=self.standing(pose_mm_deg)[0])
+
+    def page(self, pose_mm_deg: Sequence[float] | None = None) -> str:
+        """The machine at a pose as a page on which it can be turned, with its reach and its figures.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> tps.Machine.load("nist").page((0, 0, 800))[:15]
+        '<!DOCTYPE html>'
+        """
+        pose, _, stand = self.standing(pose_mm_deg)
+        return str(self.view.page(self.model.machine, pose, stand))
 
     def text(self, pose_mm_deg: Sequence[float] | None = None) -> str:
         """Its figures with their origin, and how far the limits are at a pose.

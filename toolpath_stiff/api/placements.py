@@ -10,6 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from toolpath_stiff.analysis.loads import parse_load
+from toolpath_stiff.analysis.turning import BEST, FEED, FIXED, check_free_turn
 from toolpath_stiff.api import inputs
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, cut_setup
 from toolpath_stiff.api.inputs import origin_si, pose_si
@@ -52,6 +53,7 @@ def place(
     rotate_deg: Annotated[Range, Option("--rotate", "LO:HI", read=low_high)] = (0.0, 360.0),
     tilt_a_deg: Annotated[Range, Option("--tilt-a", "LO:HI", read=low_high)] = 0.0,
     tilt_b_deg: Annotated[Range, Option("--tilt-b", "LO:HI", read=low_high)] = 0.0,
+    turn: inputs.Turn = FIXED,
     keep_out: Annotated[
         Iterable[KeepOut], Option("--keep-out", "NAME:X0,Y0,Z0,X1,Y1,Z1", read=_keep_out, count="append")
     ] = (),
@@ -86,6 +88,9 @@ def place(
         Where the work's table stands, from the machine's base: bounds and heights that are given count from there.
     rotate_deg, tilt_a_deg, tilt_b_deg
         Turn and tilts of the set-up, degrees: low and high, or a number to fix it.
+    turn
+        How a robot turns the tool about its axis: fixed as programmed, by so many degrees, or best, a constant turn
+        that the search chooses with the placement.
     keep_out
         Boxes that the tool tip stays out of, rapids included, machine coordinates, mm.
     margin_percent
@@ -143,13 +148,18 @@ def place(
         raise InputError("--objective error and a cut need each other", hint="say --cut, or --material and --stock")
     read = part.moves(origin, default)
     present, step = origin or (read.origin if read.origin_source == "program" else default), m_from_mm(step_mm)
+    bounds = _bounds(model.machine, *_from_base(base_mm, (x_mm, y_mm, z_mm), z_values_mm), turns)
+    if turn != FIXED:
+        bounds = _with_tool(bounds, model.machine, turn)
+        if setup is not None:
+            raise InputError("--turn with --objective error", hint="place with another objective")
     now = None if setup is None else evaluate_cut(model, read, present, setup, step, progress)
     task = PlacementTask(
         model=model,
         program=read,
         present=present,
         read=lambda other: part.moves(other, default),
-        bounds=_bounds(model.machine, *_from_base(base_mm, (x_mm, y_mm, z_mm), z_values_mm), turns),
+        bounds=bounds,
         rules=SearchRules(objective, margin_percent / 100.0, allow_extrapolation, tuple(keep_out), seed, points),
         load=parse_load(load),
         step=step,
@@ -189,6 +199,16 @@ def _bounds(
         raise InputError("bounds beyond reason", expected=f"within 100 m and {FARTHEST_TURN_DEG:g} degrees")
     low, high = np.concatenate([m_from_mm(lengths), rad_from_deg(angles)]).T
     return Bounds(low, high, tuple(m_from_mm(z) for z in heights))
+
+
+def _with_tool(bounds: Bounds, machine: MachineTool, turn: str | float) -> Bounds:
+    """The bounds with a constant turn of the tool about its axis: any, or so many degrees. Raises `InputError`."""
+    check_free_turn(machine, turn)
+    if turn == FEED:
+        raise InputError(f"--turn {turn}", expected=f"{FIXED}, {BEST}, or degrees: one turn for the whole path")
+    low, high = (0.0, 360.0) if turn == BEST else (float(turn), float(turn))
+    ends = [np.append(end, rad_from_deg(angle)) for end, angle in ((bounds.low, low), (bounds.high, high))]
+    return Bounds(ends[0], ends[1], bounds.heights)
 
 
 def _from_base(

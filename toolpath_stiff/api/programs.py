@@ -1,22 +1,20 @@
-"""A program on a machine: its stiffness along the path, what it uses and leaves out, its path; the paper's regions."""
+"""A program on a machine: its stiffness along the path; its path alone; the paper's regions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from toolpath_stiff.analysis.program_check import ProgramCheck, check_program
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.results import analyze as analyze_path
-from toolpath_stiff.analysis.turning import BEST, FEED, FIXED
+from toolpath_stiff.analysis.turning import FIXED
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, Tolerance, cut_setup
-from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, origin_si, pose_si
+from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, Turn, origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.program import Program, program_from
-from toolpath_stiff.nc.request import ZERO
 from toolpath_stiff.options import Option, checked
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
@@ -40,7 +38,7 @@ def analyze(
     step_mm: Step = 1.0,
     force_N: Force = FORCE,
     partial: Annotated[bool, Option("--partial")] = False,
-    turn: Annotated[str, Option("--turn", choices=(FIXED, FEED, BEST))] = FIXED,
+    turn: Turn = FIXED,
     require_N_per_mm: Annotated[float | None, Option("--require", "N/mm", above=0, at_most=1e7)] = None,
     compare_with: Annotated[Machine | str | Path | None, Option("--compare", "MACHINE")] = None,
     cut: Cutting = None,
@@ -67,8 +65,8 @@ def analyze(
     partial
         Keep the reachable samples of a program that leaves the workspace (exit code 1).
     turn
-        How a robot turns the tool about its axis: fixed as programmed, with the feed, or best: the stiffest within the
-        limits of the joints, constant unless a changing turn gains or is needed.
+        How a robot turns the tool about its axis: fixed as programmed, by so many degrees, with the feed, or best: the
+        stiffest within the limits of the joints, constant unless a changing turn gains or is needed.
     require_N_per_mm
         Stiffness that every cutting move must have; those below are listed (exit code 3).
     compare_with
@@ -179,46 +177,6 @@ def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, 
     samples = sample_moves(place(read.moves, origin), step=m_from_mm(step_mm), origin=origin)
     left = [f"{read.name}:{word.line}:{word.column}: {word.word}: {word.reason}" for word in read.unsupported]
     return SampledPath(read.name, samples, list(map(str, read.warnings)), left)
-
-
-@checked
-def check(
-    program: Program | str | Path,
-    machine: Machine | str | Path | None = "nist",
-    *,
-    origin_mm_deg: Origin = None,
-    step_mm: Step = 1.0,
-) -> ProgramCheck:
-    r"""What a program uses, what is not understood, extents and times; with a machine its reach and fastest strut.
-
-    Where the reader would refuse the program the check says so and goes on with the next block.
-
-    Parameters
-    ----------
-    program, machine
-        The program, or its file; the machine, None for none.
-    origin_mm_deg
-        Where program zero sits.
-    step_mm
-        Largest distance of the samples at which the machine is asked.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read at all.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> found = tps.check(tps.Program.from_text("G21 G90\nG1 X40 F300\nG999\nM2", name="slot.nc"))
-    >>> [(finding.line, finding.severity) for finding in found.errors]
-    [(3, 'error')]
-    """
-    part = program_from(program)
-    on = None if machine is None else machine_from(machine)
-    hexapod = None if on is None else on.model.machine
-    request = part.placed(origin_si(origin_mm_deg), ZERO if hexapod is None else hexapod.default_origin)
-    return check_program(request, hexapod, m_from_mm(step_mm))
 
 
 @checked

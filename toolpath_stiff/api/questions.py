@@ -15,21 +15,24 @@ from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.compare import compare as compare_readings
 from toolpath_stiff.correction.draft import EffectDraft, draft
+from toolpath_stiff.correction.on_elements import PullTask, build_pull_ladder
 from toolpath_stiff.correction.result import Update
-from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, UpdateTask
+from toolpath_stiff.correction.task import INSTRUMENT, LIKELIHOOD, MACHINE, MEAN_ERROR, UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
-from toolpath_stiff.diagnosis.on_elements import ElementDiagnosis, diagnose_elements
+from toolpath_stiff.diagnosis.on_elements import ElementDiagnosis, diagnose_elements, pull_problem
 from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
+from toolpath_stiff.inference.element_fits import PullProblem
 from toolpath_stiff.machine.model import Hexapod, as_hexapod
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked, finite_number, names, numbers, words_of
 from toolpath_stiff.planning.menu import COSTS, Menu
 from toolpath_stiff.planning.result import Plan
 from toolpath_stiff.planning.result import plan as plan_visits
+from toolpath_stiff.planning.rivals import rivals_on_elements
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.readings.pulls import pull_tables
 from toolpath_stiff.results import Progress, one_of, teller
@@ -100,12 +103,16 @@ class Question:
             return False
         return bool(pull_tables(self.data.files, self.model, self.data.columns))
 
-    def of_elements(self) -> ElementDiagnosis:
-        """A diagnosis of pulls, or stiffnesses, on a machine of elements."""
+    def pulls(self) -> tuple[PullProblem, bool]:
+        """Pulls, or stiffnesses, on a machine of elements, and whether somebody states their scatter."""
         assert self.data is not None
         noise = None if self.request.noise is None else float(np.hypot.reduce(np.atleast_1d(self.request.noise)))
-        spread = float(self.common["strut_spread"])
-        return diagnose_elements(self.on.running(), self.data.files, self.data.columns, noise, spread)
+        spread, files = float(self.common["strut_spread"]), tuple(map(str, self.on.effect_files))
+        return pull_problem(self.on.running(), self.data.files, self.data.columns, noise, spread, files)
+
+    def of_elements(self) -> ElementDiagnosis:
+        """A diagnosis of these."""
+        return replace(diagnose_elements(*self.pulls()), inputs=self.inputs)
 
     def diagnosed(self, tell: Callable[[str], None], *words: str, inputs: Iterable[str] = ()) -> Diagnosis:
         """A diagnosis of the readings; `words` are further ones of the command that gives it."""
@@ -249,10 +256,11 @@ def update(
     add: Annotated[str | Iterable[str], Option("--add", "EFFECT[:KEY=VALUE,..]", count="append")] = (),
     strut_law: Annotated[bool, Option("--strut-law")] = False,
     keep_strut_law: Annotated[bool, Option("--keep-strut-law", instead_of="strut_law")] = False,
+    joints: Annotated[bool, Option("--joints")] = False,
     auto: Annotated[bool, Option("--auto")] = False,
     force: Annotated[bool, Option("--force")] = False,
     believe: Annotated[str | None, Option("--believe", choices=(MACHINE, INSTRUMENT))] = None,
-    objective: Annotated[str, Option("--objective", choices=("likelihood", "mean-error"))] = "likelihood",
+    objective: Annotated[str, Option("--objective", choices=(LIKELIHOOD, MEAN_ERROR))] = LIKELIHOOD,
     machine_file: str | Path = "machine.toml",
     columns: Mapped = None,
     noise_percent: NoisePercent = None,
@@ -267,11 +275,13 @@ def update(
     data, machine
         The machine; measurements, or the files that hold them.
     add
-        Effects to add: "weak_strut", or with what they act on, "weak_strut:strut=3".
+        Effects to add: "weak_strut", or with what they act on, "weak_strut:strut=3", "joint_torsion:element=joint 3".
     strut_law
         Write the refitted strut law even without an effect, if the data support it.
     keep_strut_law
         Keep the strut law as given; else it is refitted along with every effect, and written if the data support it.
+    joints
+        Of a machine of elements: refit the torsions of all joints that turn, in place of the file's.
     auto
         Add effects as long as the error at left-out points falls and the data support it.
     force
@@ -303,13 +313,22 @@ def update(
     ['as given', 'strut law refitted']
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
-    task = UpdateTask(
-        question.hexapod("update"), question.readings, [add] if isinstance(add, str) else list(add),
-        strut_law=strut_law, keep_strut_law=keep_strut_law, auto=auto, force=force, believe=believe,
-        objective=objective, files=question.request.data, machine_file=str(machine_file), request=question.request,
-        progress=teller(progress), **question.common,
-    )  # fmt: skip
-    return replace(update_machine(task), inputs=question.inputs, opened=question.on.carrying)
+    options: dict[str, Any] = {
+        "add": [add] if isinstance(add, str) else list(add), "keep_strut_law": keep_strut_law, "auto": auto,
+        "force": force, "believe": believe, "objective": objective, "files": question.request.data,
+        "machine_file": str(machine_file), "request": question.request, "progress": teller(progress), **question.common,
+    }  # fmt: skip
+    if isinstance(question.model, Hexapod):
+        if joints:
+            raise InputError("--joints is of machines of elements", hint="a hexapod's struts: --strut-law")
+        result = update_machine(UpdateTask(question.model, question.readings, strut_law=strut_law, **options))
+    else:
+        if strut_law or keep_strut_law or objective == MEAN_ERROR:
+            raise InputError(f"machine {question.model.name} has no strut law", hint="--joints refits its joints")
+        problem, _ = question.pulls()
+        task = PullTask(question.model, problem.pulls, strut_law=joints, pulls=problem, **options)
+        result = update_machine(task, build_pull_ladder)
+    return replace(result, inputs=question.inputs, opened=question.on.carrying)
 
 
 @checked
@@ -380,7 +399,7 @@ def plan(
     noise_percent: NoisePercent = None,
     strut_spread_percent: StrutSpread = 1.0,
     seed: Seed = 0,
-    diagnosis: Diagnosis | None = None,
+    diagnosis: Diagnosis | ElementDiagnosis | None = None,
 ) -> Plan:
     """What to measure next to tell explanations apart; without data, what to measure first.
 
@@ -389,7 +408,8 @@ def plan(
     data, machine
         The machine; measurements, or the files that hold them; None before the first campaign.
     between
-        Effects to tell apart, or "none"; unless given, what a diagnosis of the data leaves standing.
+        Effects to tell apart, on elements "joint_torsion:joint 2", or "none"; unless given, what a diagnosis of the
+        data leaves standing.
     n
         Poses; unless given 6, or 24 of a first campaign.
     radius_mm
@@ -434,13 +454,17 @@ def plan(
     """
     line = words_of(plan, {name: value for name, value in locals().items() if name not in COMMON})
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
-    model = question.hexapod("plan")
     minutes = {name: float(value) for name, value in (minutes or {}).items()}
     for name, value in minutes.items():
         one_of("minutes", name, tuple(COSTS))
         if not value >= 0.0:
             raise InputError(f"{name}={value:g}", expected="minutes, 0 or more")
-    readings = None if question.data is None else question.readings
+    of_struts, pulled = isinstance(question.model, Hexapod), dict[str, Any]()
+    if question.data is not None and not of_struts:
+        found = diagnosis if isinstance(diagnosis, ElementDiagnosis) else question.of_elements()
+        fits = [found.problem.none, *found.ranked]
+        pulled = {"rivals": rivals_on_elements(fits, found.plausible, between), "noise": found.problem.noise.typical}
+    readings = question.readings if question.data is not None and of_struts else None
     menu = Menu.of(readings).with_options(
         radius=None if radius_mm is None else m_from_mm(radius_mm),
         heights=_in_metres(heights_mm),
@@ -451,15 +475,9 @@ def plan(
         indicators=indicators,
         costs={**COSTS, **minutes},
     )
-    judgement = None if diagnosis is None else diagnosis.main
+    judgement = diagnosis.main if isinstance(diagnosis, Diagnosis) else None
     proposal = plan_visits(
-        model,
-        readings,
-        menu,
-        between=tuple(between),
-        n=n,
-        judgement=judgement,
-        **question.common,
+        question.model, readings, menu, between=tuple(between), n=n, judgement=judgement, **question.common | pulled
     )
     command = question.request.command("plan", *line)
     return replace(proposal, names=question.request.data, line=command, inputs=question.inputs)

@@ -522,28 +522,36 @@ def find(case: Case, kind: str, result: str, progress: Progress | None = None, *
 
 
 def _analyze(case: Case, result: str, progress: Progress | None, machine: str = "") -> Found:
-    state, on = case.state, case.machine_of(machine) if machine else case.machine_with(case.state.on)
+    state = case.state
+    on, machine = (case.machine_of(machine), machine) if machine else _switched(case, result)
     stated: Document = {"origin_mm_deg": state.origin or None, "require_N_per_mm": state.require or None}
     analysis = tps.analyze(case.program, on, cut=case.cut, partial=True, progress=progress, **stated)
     analysis.save(case.folder / result, plots=case.plots)
-    if not machine and state.on:
-        machine = f"{result}/machine.toml"
-        on.save(case.folder / machine)
     return analysis, state.program_line(machine=machine)
 
 
+def _switched(case: Case, result: str) -> tuple[tps.Machine, str]:
+    """The machine with the effects that are switched on, and its file among the results; "" where none is."""
+    on, name = case.machine_with(case.state.on), f"{result}/machine.toml"
+    if not case.state.on:
+        return on, ""
+    on.save(case.folder / name)
+    return on, name
+
+
 def _compensate(case: Case, result: str, progress: Progress | None) -> Found:
-    state, on, origin = case.state, case.machine_with(case.state.on), case.state.origin or None
+    state, origin, (on, machine) = case.state, case.state.origin or None, _switched(case, result)
     kept = tps.compensate(case.program, on, cut=case.cut, origin_mm_deg=origin, progress=progress)
     file = Path(state.program)
     kept.save(case.folder / result / f"{file.stem}_comp{file.suffix}")
-    return kept, state.program_line("compensate")
+    return kept, state.program_line("compensate", machine)
 
 
 def _place(case: Case, result: str, progress: Progress | None, **bounds: Any) -> Found:
-    kept = tps.place(case.program, case.machine, origin_mm_deg=case.state.origin or None, progress=progress, **bounds)
+    on, machine = _switched(case, result)
+    kept = tps.place(case.program, on, origin_mm_deg=case.state.origin or None, progress=progress, **bounds)
     kept.save(case.folder / result, plots=case.plots)
-    return kept, case.state.program_line("place", **bounds)
+    return kept, case.state.program_line("place", machine, **bounds)
 
 
 def _set_up(case: Case, result: str, progress: Progress | None) -> Found:
@@ -551,16 +559,16 @@ def _set_up(case: Case, result: str, progress: Progress | None) -> Found:
     if len(state.origin) < 3:
         raise InputError("the program sits where it always did", hint="put it somewhere with place_at first")
     place: Document = dict(zip(PLACE, (*state.origin, 0.0, 0.0, 0.0), strict=False))
-    name, written = Path(state.program).name, {}
+    (on, machine), name, written = _switched(case, result), Path(state.program).name, {}
     try:
-        placement = tps.place(case.program, case.machine, write=name, progress=progress, **place)
+        placement = tps.place(case.program, on, write=name, progress=progress, **place)
         content, written = placement.program_bytes, {"write": f"{result}/{name}"}
     except InputError as error:
-        placement = tps.place(case.program, case.machine, progress=progress, **place)
+        placement = tps.place(case.program, on, progress=progress, **place)
         name, content = "not_written.txt", f"{error}\n".encode()
     placement.save(case.folder / result)
     write_atomically(case.folder / result / name, content)
-    return placement, f"{state.program_line('place', origin_mm_deg=None, **place, **written)} --out {result}"
+    return placement, f"{state.program_line('place', machine, origin_mm_deg=None, **place, **written)} --out {result}"
 
 
 def _draft(case: Case, result: str, progress: Progress | None) -> Found:

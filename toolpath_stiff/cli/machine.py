@@ -9,7 +9,7 @@ for example:
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -92,6 +92,7 @@ def list_machines(args: Namespace) -> int:
 
 
 Picture = Annotated[str | None, Option("--out", "FILE.png", help="the picture (default: in reports)")]
+Drawing = Annotated[str | None, Option("--out", "FILE.png|.html", help="picture, or page (default: both, in reports)")]
 
 
 @command("machine show", REPLACE, JSON)
@@ -99,27 +100,28 @@ def show_machine(
     args: Namespace,
     machine: Annotated[str, Option("NAME|FILE", count="?")] = "nist",
     pose: Annotated[Sequence[float] | None, Option("--pose", "X,Y,Z[,A,B,C]", read=numbers)] = None,
-    out: Picture = None,
+    out: Drawing = None,
 ) -> int:
-    """Figures of a machine with their origin, and a picture of it.
+    """Figures of a machine with their origin, a picture of it, and a page on which it can be turned.
 
     Parameters
     ----------
     pose
-        Pose of the picture, mm and degrees.
+        Pose of picture and page, mm and degrees.
     """
     shown = tps.Machine.load(machine)
-    written = _draw(args, out, shown.name, lambda: shown.picture(pose))
+    makers = {".png": lambda: shown.picture(pose), ".html": lambda: shown.page(pose).encode()}
+    written = _draw(args, out, shown.name, makers)
     code = 0 if shown.standing(pose)[2].reachable[0] else OUT_OF_REACH
     return run.show(args, shown.text(pose), written, document=lambda: shown.to_dict()["figures"], code=code)
 
 
-def _draw(args: Namespace, out: str | None, name: str, picture: Callable[[], bytes]) -> str:
-    """Write a picture to --out, or to reports unless JSON is printed; what was written. Raises `InputError`."""
-    file = Path(out or f"reports/{name}.png")
-    if file.suffix.lower() != ".png":
-        raise InputError(f"--out {out}", expected="a name that ends in .png")
-    return run.written_text(run.write_single(args, {file: picture()} if out or not args.json else {}))
+def _draw(args: Namespace, out: str | None, name: str, makers: Mapping[str, Callable[[], bytes]]) -> str:
+    """Write --out, or all to reports unless JSON is printed; what was written. Raises `InputError`."""
+    files = [Path(out)] if out else [] if args.json else [Path(f"reports/{name}{suffix}") for suffix in makers]
+    if out and files[0].suffix.lower() not in makers:
+        raise InputError(f"--out {out}", expected=f"a name that ends in {' or '.join(makers)}")
+    return run.written_text(run.write_single(args, {file: makers[file.suffix.lower()]() for file in files}))
 
 
 @command("machine check", "Machine.load", REPLACE, JSON, without=["machine"])
@@ -129,7 +131,7 @@ def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Pi
         template = command_line("machine", "new", file)
         raise InputError(f"cannot read machine file {file!r}", hint=f"`{template}` writes a template")
     check = tps.Machine.load(Path(file), **run.given(args, tps.Machine.load)).check()
-    written = _draw(args, out, f"{Path(file).stem}_machine", check.picture)
+    written = _draw(args, out, f"{Path(file).stem}_machine", {".png": check.picture})
     return run.show(args, check, written, code=0 if check.good else NOT_GOOD)
 
 

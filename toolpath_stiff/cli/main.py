@@ -38,7 +38,7 @@ GROUPS = {
     "measurements": {
         "reduce": "raw force and displacement records to measured stiffnesses, lost motion, loops",
         "compare": "where the model fails: errors, structure in the residuals, pictures, page",
-        "diagnose": "which physical effect the model lacks, if any: verdict, candidates, confounding",
+        "diagnose": "which physical effect the model lacks, if any: verdict, candidates, votes",
         "update": "fit effects to measurements, see how far the error falls, write the machine file",
         "forces": "coefficients of the cutting force from dynamometer records of slots",
         "plan": "what to measure next to tell explanations apart, or a first campaign",

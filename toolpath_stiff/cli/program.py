@@ -45,7 +45,8 @@ def analyze(
       are reported separately, and --require applies to them as well.
 
     files written to --out:
-      samples.csv   every sample: line, position, stiffness, joint values, margin to the nearest limit
+      samples.csv   every sample (the end alone of a move shorter than half a step): line, position, stiffness,
+                    joint values, margin to the nearest limit
       summary.json  the figures, those of each tool and operation too, what was assumed, what was not acted upon
       path.png      three views of the path coloured by stiffness
       profile.png   stiffness along the path

@@ -7,7 +7,6 @@ from typing import Annotated, cast
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FILES, command
-from toolpath_stiff.machine.model import as_hexapod
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import Option, arguments_of
 from toolpath_stiff.studio.run import opened_case, serve
@@ -56,8 +55,6 @@ def studio(
         Print the address, open nothing.
     """
     reading = {name: value for name, value in run.given(args, Program.read).items() if value not in (None, False)}
-    if machine:
-        as_hexapod(Machine.load(machine, effects=args.effects).stated, "the studio")
     opened = opened_case(case, trust, machine, exercise)
     for file in args.effects:
         opened.add_effects(file)

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.comparison.element_predictor import ElementPredictor
 from toolpath_stiff.comparison.load_path import load_path_shares
 from toolpath_stiff.comparison.loop_readings import beside_tip
 from toolpath_stiff.comparison.principles import assess, model_free_checks
@@ -26,10 +25,11 @@ from toolpath_stiff.comparison.summary import ComparisonSummary, summary_of
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.documents import Document, certain, to_dict
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.inference.element_predictor import predictor_of
 from toolpath_stiff.inference.noise import Noise, covariance, noise_models
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import repeat_groups
-from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
+from toolpath_stiff.machine.model import MachineTool, as_hexapod
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.results import FolderResult
 
@@ -165,10 +165,7 @@ def compare(
             expected="readings of tool against work beside those of other loops",
             hint="`tps reduce` shows struts measured alone over their dates, raw records or stiffnesses",
         )
-    if isinstance(machine, Hexapod):
-        predictor = Predictor(machine, tip, effect_files)
-    else:
-        predictor = ElementPredictor(machine, tip, effect_files)
+    predictor = predictor_of(machine, tip, effect_files)
     log_model, noises = modelled(predictor), noise_models(tip, noise, strut_spread)
     values = np.log(tip.stiffness) - log_model
     numbers, (names, notes) = variables(predictor, log_model), labels(tip)

@@ -16,6 +16,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import Readings, model_stiffness
+from toolpath_stiff.readings.pulls import Pulls
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 AXIS_ALIGNED = 0.999  # |cosine| from which a direction counts as X, Y or Z
@@ -81,7 +82,7 @@ def modelled(predictor: Predictor) -> FloatArray:
     return log_model
 
 
-def directions(data: Readings) -> TextArray:
+def directions(data: Readings | Pulls) -> TextArray:
     """(n,) "X", "Y", "Z" or "oblique"."""
     axis = np.argmax(np.abs(data.direction), axis=1)
     along = np.abs(data.direction)[np.arange(len(data)), axis] >= AXIS_ALIGNED

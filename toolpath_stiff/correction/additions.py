@@ -1,21 +1,27 @@
 """What `tps update --add` names: an effect and, if the user says so, what it acts on."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Candidate, Component, candidates_of
 from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.readings.pulls import Pulls
 from toolpath_stiff.stiffness.catalogue import find_effect
-from toolpath_stiff.stiffness.contract import Parameter
+from toolpath_stiff.stiffness.contract import Effect, Parameter
 
 AXES = {"X": "1", "Y": "2", "Z": "3"}
 
 
-def parse_addition(text: str, data: Readings, effect_files: Sequence[str | Path] = ()) -> list[Candidate]:
+def parse_addition(
+    text: str,
+    data: Readings | Pulls,
+    effect_files: Sequence[str | Path] = (),
+    choices_of: Callable[[Effect], list[Candidate]] | None = None,
+) -> list[Candidate]:
     """What may be fitted of `weak_strut`, `weak_strut:strut=3`, `gauge_scale:direction=Z,setup=riser`.
 
-    One candidate of the choices that are named, or one for each choice where none is.
+    One candidate of the choices that are named, or one for each choice where none is (`choices_of`).
 
     Raises
     ------
@@ -37,13 +43,13 @@ def parse_addition(text: str, data: Readings, effect_files: Sequence[str | Path]
         values[key] = _chosen(choices[key], value, text, data)
     real = tuple(Component.of(p) for p in effect.parameters if not p.discrete)
     named = [Candidate(effect, tuple(values.items()), real)]
-    candidates = named if rest.strip() else candidates_of(effect, data)
+    candidates = named if rest.strip() else choices_of(effect) if choices_of else candidates_of(effect, data)
     if not candidates or not real:
         raise InputError(f"--add {text}: nothing of it could be fitted to these data")
     return candidates
 
 
-def _chosen(parameter: Parameter, value: str, text: str, data: Readings) -> str | int:
+def _chosen(parameter: Parameter, value: str, text: str, data: Readings | Pulls) -> str | int:
     """The value of a choice. A direction may be called by its axis, a set-up must be one of the data's."""
     if parameter.kind == "text":
         setups = sorted(set(data.setup.tolist()) - {""})

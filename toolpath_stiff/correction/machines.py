@@ -12,7 +12,9 @@ from toolpath_stiff.files import read_bytes
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.machine.error_model import ErrorModel
-from toolpath_stiff.machine.model import EffectEntry, Hexapod, StrutLaw, Uncertainty
+from toolpath_stiff.machine.file import parse_machine
+from toolpath_stiff.machine.model import EffectEntry, Hexapod, MachineTool, StrutLaw, Uncertainty
+from toolpath_stiff.machine.writer import elements_toml
 from toolpath_stiff.readings.measurements import NIST_TABLE_1
 from toolpath_stiff.stiffness.contract import SETUP
 from toolpath_stiff.units import n_per_um_from_n_per_m
@@ -59,25 +61,17 @@ def fitted_machine(
     known
         The fit that says how well law and sizes are known; None: the same.
     """
-    effects, instruments = list(machine.effects), list(machine.instruments)
-    for candidate, active in zip(fit.candidates, fit.effects, strict=True):
-        in_file = {
-            p.key: active.values[p.name] if p.discrete else _certain(float(active.values[p.name]) / p.si)
-            for p in candidate.effect.parameters
-        }
-        (instruments if candidate.effect.is_instrument else effects).append(
-            EffectEntry(candidate.name, in_file, dict(provenance))
-        )
+    effects, instruments = entries_of(machine, fit, provenance)
     # The fitted law's factors to digits on which all processors agree.
     law = scaled_law(machine.strut_law, np.round(fit.law, 8))
     named = machine.setups
     if any(SETUP in active.waits_for for active in fit.effects):
         named = (*named, *sorted({*setups} - {"", *named}))
     carrying = machine.with_changes(
-        effects=tuple(effects),
-        instruments=tuple(instruments),
+        effects=effects,
+        instruments=instruments,
         setups=named,
-        uncertainty=_uncertainty(machine, law, fit, known or fit, widened, errors),
+        uncertainty=uncertainty_of(machine, fit, known or fit, widened, errors, law),
     )
     if not fit.law_free:
         return carrying
@@ -89,22 +83,63 @@ def fitted_machine(
     )
 
 
+def entries_of(
+    machine: MachineTool, fit: Fit, provenance: Document, first: int = 0
+) -> tuple[tuple[EffectEntry, ...], tuple[EffectEntry, ...]]:
+    """Effects and instruments of the machine with those of a fit, from a candidate's number on."""
+    effects, instruments = list(machine.effects), list(machine.instruments)
+    for candidate, active in zip(fit.candidates[first:], fit.effects[first:], strict=True):
+        in_file = {
+            p.key: active.values[p.name] if p.discrete else _certain(float(active.values[p.name]) / p.si)
+            for p in candidate.effect.parameters
+        }
+        (instruments if candidate.effect.is_instrument else effects).append(
+            EffectEntry(candidate.name, in_file, dict(provenance))
+        )
+    return tuple(effects), tuple(instruments)
+
+
+def fitted_elements(
+    machine: MachineTool, fit: Fit, provenance: Document, widened: float, torsions: Sequence[float], heading: str = ""
+) -> MachineTool:
+    """A machine of elements with the torsions of its joints, nrad/(N m), and the other effects of a fit.
+
+    `torsions`: of the fit's first candidates; none where these are not fitted.
+    """
+    effects, instruments = entries_of(machine, fit, provenance, len(torsions))
+    names = [entry.name for entry in (*effects, *instruments)]
+    carrying = machine.with_changes(effects=effects, instruments=instruments)
+    if len(set(names)) == len(names):  # else no name says which of two it is
+        known = uncertainty_of(machine, fit, fit, widened, None, first=len(torsions))
+        carrying = carrying.with_changes(uncertainty=known)
+    return parse_machine(elements_toml(carrying, torsions, heading), machine.name)
+
+
 def _certain(value: float) -> float:
     """A fitted number to the digits on which all processors agree: far more than any fit is certain of."""
     return float(f"{value:.7g}")
 
 
-def _uncertainty(
-    machine: Hexapod, law: StrutLaw, fit: Fit, known: Fit, widened: float, errors: ErrorModel | None
+def uncertainty_of(
+    machine: MachineTool,
+    fit: Fit,
+    known: Fit,
+    widened: float,
+    errors: ErrorModel | None,
+    law: StrutLaw | None = None,
+    first: int = 0,
 ) -> Uncertainty | None:
-    """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already."""
-    names = list(law.parameters) if known.law_free else []
-    slopes = [n_per_um_from_n_per_m(law.stiffness_1), n_per_um_from_n_per_m(law.stiffness_2)][: len(names)]
+    """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already.
+
+    Of the fit's candidates from the `first` on.
+    """
+    names = list(law.parameters) if law and known.law_free else []
+    slopes = [n_per_um_from_n_per_m(k) for k in ((law.stiffness_1, law.stiffness_2) if law else ())][: len(names)]
     rows = [0, 1][: len(names)]
-    owners = [candidate.name for candidate in fit.candidates for _ in candidate.components]
-    for index, (owner, (component, size)) in enumerate(zip(owners, fit.parts, strict=True)):
-        if index in fit.free:
-            names.append(f"{owner}.{component.parameter.key}")
+    owners = [(i, candidate.name) for i, candidate in enumerate(fit.candidates) for _ in candidate.components]
+    for index, ((owner, name), (component, size)) in enumerate(zip(owners, fit.parts, strict=True)):
+        if index in fit.free and owner >= first:
+            names.append(f"{name}.{component.parameter.key}")
             # value = 1 / size for a stiffness whose neutral value is infinite.
             slopes.append((-1.0 / size**2 if component.inverse else 1.0) / component.parameter.si)
             rows.append(2 + known.free.index(index))

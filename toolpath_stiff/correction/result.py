@@ -14,8 +14,7 @@ import numpy as np
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.correction.machines import fitted_machine
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
-from toolpath_stiff.correction.strut_law import StrutLawSearch
-from toolpath_stiff.correction.task import LIKELIHOOD, UpdateTask
+from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.diagnosis.examination import percent_of, rounded_errors
 from toolpath_stiff.documents import Document, json_number, to_dict
 from toolpath_stiff.errors import InputError
@@ -62,8 +61,10 @@ class Update(FolderResult):
         Of every effect that was asked for, or that `auto` took; of those that it tried last and did not take.
     drawn
         How effects stand whose form was read off these readings; None where there are none.
+    as_built
+        The machine with struts and joints where they most likely are, which is the last step; None where they stay.
     search
-        Of the paper's own estimation: how its searches ended; None otherwise.
+        Of the paper's own estimation: how its searches ended; empty otherwise.
     provenance
         Where the fitted values come from, for the record.
     next
@@ -106,7 +107,8 @@ class Update(FolderResult):
     supports: tuple[Support, ...] = ()
     turned_down: tuple[Support, ...] = ()
     drawn: Drawn | None = None
-    search: StrutLawSearch | None = None
+    as_built: Hexapod | None = None
+    search: Document = field(default_factory=dict)
     provenance: Document = field(default_factory=dict)
     next: Sequence[str] = ()
     inputs: tuple[str, ...] = ()
@@ -133,6 +135,11 @@ class Update(FolderResult):
         return self.steps[-1] if self.changed else self.steps[0]
 
     @property
+    def model(self) -> LadderStep:
+        """The last step that fits law and sizes: struts and joints that are moved afterwards are none of these."""
+        return self.steps[-1 if self.as_built is None else -2]
+
+    @property
     def kept_law(self) -> Support | None:
         """Why the strut law stays as given beside effects, where the data do not support the refitted one."""
         return next((support for support in self.turned_down if support.effect == LAW_REFITTED), None)
@@ -140,7 +147,8 @@ class Update(FolderResult):
     @property
     def known(self) -> Fit:
         """The fit that says how well law and sizes are known: a law that stays as given is no better known for it."""
-        return self.steps[-2].fit if self.changed and self.kept_law else self.last.fit
+        fit = self.model.fit if self.changed else self.steps[0].fit
+        return self.steps[self.steps.index(self.model) - 1].fit if self.changed and self.kept_law else fit
 
     @property
     def changed(self) -> bool:
@@ -154,7 +162,7 @@ class Update(FolderResult):
         Counted by the mean error, which users see. The fit is by likelihood, which bounds the factor by which readings
         are off, not the difference: where nothing fits, the one can fall while the other multiplies.
         """
-        before, after = self.steps[0].error, self.steps[-1].error
+        before, after = self.steps[0].error, self.model.error
         return not after - before <= max(WORSE * before, WORSE * self.noise.floor_percent / 100.0)
 
     @cached_property
@@ -163,7 +171,7 @@ class Update(FolderResult):
 
         Load, set-up and tool: a path is under one of each as a whole, and what falls on average may rise there.
         """
-        data, first, last = self.task.data.of_tip, self.steps[0].held, self.steps[-1].held
+        data, first, last = self.task.data.of_tip, self.steps[0].held, self.model.held
         conditions = {
             "under {:g} N": data.force,
             "in set-up {}": data.setup,
@@ -207,15 +215,16 @@ class Update(FolderResult):
     def widening(self) -> float:
         """Factor on standard deviations: how much wider the residuals are than the noise model says, at least 1."""
         # A bootstrap over points has the residuals' own width already.
-        return float(np.sqrt(dispersion(self.last.fit))) if self.task.objective == LIKELIHOOD else 1.0
+        return 1.0 if self.search else float(np.sqrt(dispersion(self.known)))
 
     @cached_property
     def errors(self) -> ErrorModel | None:
         """How far the last model may be off at a pose; None where too little was measured to tell."""
-        if self.task.objective != LIKELIHOOD:
+        if self.search:
             return None
-        given = self.last.fit if self.kept_law else None
-        return error_model(self.known, self.task.problem.predictor.data, self.noise, given)
+        given = self.model.fit if self.kept_law else None
+        data, moved = self.task.problem.predictor.data, self.as_built is not None
+        return error_model(self.known, data, self.noise, given, moved=moved)
 
     @cached_property
     def corrected(self) -> Hexapod | None:
@@ -225,8 +234,8 @@ class Update(FolderResult):
     def fitted(self, provenance: Document) -> Hexapod:
         """The machine with the last model, which comes from there."""
         setups = self.task.data.setup.tolist()
-        fit = self.last.fit
-        return fitted_machine(self.task.machine, fit, provenance, self.widening, setups, self.errors, self.known)
+        machine, fit = self.as_built or self.task.machine, self.last.fit
+        return fitted_machine(machine, fit, provenance, self.widening, setups, self.errors, self.known)
 
     def _written(self) -> Hexapod:
         if self.corrected is None:
@@ -247,7 +256,10 @@ class Update(FolderResult):
             f"Command: {self.provenance['command']}\n"
             f"SHA-256 of the data: {self.provenance['data_sha256']}\n"
         )
-        return machine_toml(self._written(), heading)
+        return self._text_of(self._written(), heading)
+
+    def _text_of(self, machine: Any, heading: str) -> str:
+        return machine_toml(machine, heading)
 
     def save_machine(self, file: str | Path) -> Path:
         """Write the new machine file, whole or not at all."""
@@ -276,7 +288,7 @@ class Update(FolderResult):
         before = (None, *self.steps)
         steps = [step.document(law, self.widening, before[k]) for k, step in enumerate(self.steps)]
         uncertainty = None if self.corrected is None else self.corrected.uncertainty
-        document = {
+        return {
             "verdict": self.verdict,
             "text": self.text,
             "question": self.question,
@@ -309,11 +321,8 @@ class Update(FolderResult):
             "provenance": dict(self.provenance),
             "seed": task.seed,
             "next": list(self.next),
+            **({"search": self.search} if self.search else {}),
         }
-        if (search := self.search) is None:
-            return document
-        errors = np.round(100.0 * search.end_errors, 4).tolist()
-        return {**document, "search": {"end_errors_percent": errors, "agreeing": search.agreeing}}
 
     @property
     def text(self) -> str:
@@ -339,16 +348,26 @@ class Update(FolderResult):
             return f"{doubt}Added by force, although the data do not support it{reason}. {unconfirmed}{errors}"
         if not last.fit.names:
             return f"Strut law refitted; no effect added. {errors}"
-        cause = joined(last.fit.findings)
+        cause = self.cause
         word = "added" if self.described is None else "added as described, not as identified"
         law = f"The strut law stays as given: {'; '.join(self.kept_law.reasons)}. " if self.kept_law else ""
-        return f"{cause[:1].upper()}{cause[1:]} ({joined(last.fit.names)} {word}). {law}{unconfirmed}{errors}"
+        return f"{cause[:1].upper()}{cause[1:]} ({joined(self.added)} {word}). {law}{unconfirmed}{errors}"
+
+    @property
+    def cause(self) -> str:
+        """What was fitted, in words."""
+        return joined(self.steps[-1].fit.findings)
+
+    @property
+    def added(self) -> Sequence[str]:
+        """Names of what was added."""
+        return self.steps[-1].fit.names
 
     @property
     def _errors(self) -> str:
         """Mean error of every step; of a law that is kept also what refitting it would leave."""
         steps = [(step.name.replace("+ ", "with ", 1), 100.0 * step.error) for step in self.steps]
-        kept = self.refitted not in self.steps and self.task.objective == LIKELIHOOD
+        kept = self.refitted not in self.steps and not self.search
         law = [(f"({LAW_REFITTED} alone)", 100.0 * self.refitted.error)] if kept else []
         return errors_text(steps[0][1], None, [*law, *steps[1:]])
 
@@ -360,7 +379,7 @@ class Update(FolderResult):
             "as given, nothing is fitted, so leaving points out changes nothing: where the machine file's figures were "
             "fitted to these readings, its error at left-out points looks better than it is",
         ]
-        if self.task.objective != LIKELIHOOD:
+        if self.search:
             return [
                 *sentences,
                 "smallest mean |modelled - measured| / measured, as the paper counts it; standard deviations by a "

@@ -16,6 +16,7 @@ from toolpath_stiff.inference.left_out import HeldOut, error_falls, gain_in_stan
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.machine.model import StrutLaw
 from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.readings.pulls import Pulls
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 
@@ -49,7 +50,7 @@ class LadderStep:
     along: NDArray[np.str_]
 
     @classmethod
-    def of(cls, name: str, fit: Fit, data: Readings, held: HeldOut | None = None) -> LadderStep:
+    def of(cls, name: str, fit: Fit, data: Readings | Pulls, held: HeldOut | None = None) -> LadderStep:
         """Of a fit to these data; `held`: its residuals at left-out points, where they are known."""
         left_out = (held or held_out(fit, data.point)).of_readings(data.tip)
         return cls(name, fit, left_out, data.tip, np.asarray(directions(data.of_tip)))

@@ -15,21 +15,21 @@ An effect is supported if
   that remains, so that data which no effect explains do not lend every effect significance.
 
 Of several effects each is judged beside the others.
-
-The paper's own estimation (`--objective mean-error`) is a ladder of one step, the strut law of smallest mean error.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.correction.additions import parse_addition
+from toolpath_stiff.correction.as_built import as_built
 from toolpath_stiff.correction.machines import data_hash, fitted_machine
+from toolpath_stiff.correction.mean_error import update_by_mean_error
 from toolpath_stiff.correction.result import NEEDED, Update
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
-from toolpath_stiff.correction.strut_law import leave_points_out, minimise_mean_error, resampled_covariance
 from toolpath_stiff.correction.task import INSTRUMENT, MACHINE, MEAN_ERROR, UpdateTask
 from toolpath_stiff.diagnosis.diagnose import check_measured
 from toolpath_stiff.diagnosis.examination import percent_of
@@ -44,7 +44,7 @@ from toolpath_stiff.inference.fits import add_effect, base_fit, baseline, with_g
 from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import Family, score_families, signatures, tables_of
-from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
+from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.rivals import rivals_of_law
 from toolpath_stiff.inference.votes import outvoted, standard_error
@@ -57,8 +57,10 @@ MOST_EFFECTS = 4  # that `--auto` adds
 LAW_GIVEN = "strut law as given"
 
 
-def update(task: UpdateTask) -> Update:
+def update(task: UpdateTask, build: Callable[[Any], Update] | None = None) -> Update:
     """Fit effects to measurements, judge whether the data support them, and make the machine that carries them.
+
+    `build` makes the ladder; unless given, `build_ladder`.
 
     Raises
     ------
@@ -77,19 +79,14 @@ def update(task: UpdateTask) -> Update:
     task = replace(task, files=tuple(task.files) or tuple(dict.fromkeys(task.data.file.tolist())))
     effect_files = tuple(map(str, task.effect_files))
     request = task.request or Asked(tuple(task.files), task.machine.name, effect_files, task.noise, task.strut_spread)
-    if task.objective == MEAN_ERROR:
-        if task.add or task.auto or not task.strut_law:
-            raise InputError(
-                "--objective mean-error is the paper's own estimation, of the strut law alone",
-                expected="--strut-law, without --add and --auto",
-            )
-        result = update_by_mean_error(replace(task, data=task.data.of_tip))
-    else:
-        result = build_ladder(task)
+    result = update_by_mean_error(task) if task.objective == MEAN_ERROR else (build or build_ladder)(task)
+    of_struts = build is None and result.accepted and not (result.question or result.search)
+    if of_struts and (built := as_built(task, result.last)):
+        result = replace(result, as_built=built[0], steps=(*result.steps, built[1]))
     # Where its results go does not matter to the command that repeats the fit.
     words = options(
         add=list(task.add), strut_law=task.strut_law, keep_strut_law=task.keep_strut_law, auto=task.auto,
-        force=task.force, believe=task.believe, objective=task.objective if task.objective == MEAN_ERROR else None,
+        force=task.force, believe=task.believe, objective=task.objective if result.search else None,
         seed=task.seed or None,
     )  # fmt: skip
     # No date: the same data and command give the same bytes.
@@ -133,10 +130,12 @@ def build_ladder(task: UpdateTask) -> Update:
     full, supports, tried = steps[-1].fit, list[Support](), list[Support]()
     for j, name in enumerate(full.names):
         others = [[candidate] for k, candidate in enumerate(full.candidates) if k != j]
-        before = LadderStep.of("", _fitted(task, base_fit(task.problem, not task.keep_strut_law), others), task.data)
-        supports.append(_support(task, _field_of(task, before.fit), before, full, j, by_name[name]))
+        before = LadderStep.of(
+            "", fitted_with(task, base_fit(task.problem, not task.keep_strut_law), others), task.data
+        )
+        supports.append(support_of(task, _field_of(task, before.fit), before, full, j, by_name[name]))
     while task.auto and len(steps[-1].fit.candidates) < MOST_EFFECTS:
-        better, tried = _next_effect(task, steps[-1])
+        better, tried = next_effect(task, steps[-1], _field_of)
         if better is None:
             break
         steps.append(better)
@@ -165,7 +164,7 @@ def _check(task: UpdateTask, names: Sequence[str]) -> None:
             raise InputError(fault, hint="a machine carries an effect once")
 
 
-def _fitted(task: UpdateTask, fit: Fit, groups: Iterable[Sequence[Candidate]]) -> Fit:
+def fitted_with(task: UpdateTask, fit: Fit, groups: Iterable[Sequence[Candidate]]) -> Fit:
     """A fit with one effect of each group on top."""
     for candidates in groups:
         fit = add_effect(task.problem, fit, candidates, not task.keep_strut_law)
@@ -174,7 +173,7 @@ def _fitted(task: UpdateTask, fit: Fit, groups: Iterable[Sequence[Candidate]]) -
 
 def step_up(task: UpdateTask, before: LadderStep, groups: Sequence[Sequence[Candidate]]) -> LadderStep:
     """A rung higher: one effect, or several as one step."""
-    fit = _fitted(task, before.fit, groups)
+    fit = fitted_with(task, before.fit, groups)
     labels = [candidate.label for candidate in fit.candidates[-len(groups) :]]
     return LadderStep.of(f"+ {' + '.join(labels)}", fit, task.data)
 
@@ -199,7 +198,7 @@ def _drawn(task: UpdateTask, full: Fit) -> Drawn | None:
     others = [[c] for c in full.candidates if not seen_readings([c.effect], task.data).any()]
     if len(others) == len(full.candidates):
         return None
-    fit = _fitted(task, base_fit(task.problem, not task.keep_strut_law), others)
+    fit = fitted_with(task, base_fit(task.problem, not task.keep_strut_law), others)
     return drawn(full, {" + ".join(fit.names) or "none": fit}, task.data)
 
 
@@ -244,7 +243,7 @@ def _field_of(task: UpdateTask, others: Fit) -> Field:
     return Field(problem, gain_threshold(problem, problem.score_base().jacobian, draws, signatures(problem, tables)))
 
 
-def _support(
+def support_of(
     task: UpdateTask, others: Field, before: LadderStep, fit: Fit, j: int, candidates: Sequence[Candidate]
 ) -> Support:
     """Judge effect j of a fit against the model with the other effects."""
@@ -275,8 +274,8 @@ def _support(
     if not reasons:  # what is refused anyway needs no vote
         believed = INSTRUMENT if fit.candidates[j].effect.is_instrument else MACHINE
         rivals = others.of_instrument if believed == MACHINE else others.of_machine
-        instruments = _as_well(others.problem, alone, {family.name: family.best for family in rivals if family.best})
-        reasons += _mistakable(task, instruments, believed)
+        instruments = as_well(others.problem, alone, {family.name: family.best for family in rivals if family.best})
+        reasons += mistakable(task, instruments, believed)
     return Support(
         fit.names[j], not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
         json_number(in_se, 3), json_number(gained), json_number(others.threshold), tuple(instruments),
@@ -291,8 +290,8 @@ def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Suppo
     differences = votes(problem, fit, {LAW_GIVEN: given.fit})[LAW_GIVEN]
     reasons, instruments = [], dict[str, str]()
     if outvoted(differences):
-        instruments = _as_well(problem, fit, rivals_of_law(problem, given.fit))
-        reasons = _mistakable(task, instruments, MACHINE)
+        instruments = as_well(problem, fit, rivals_of_law(problem, given.fit))
+        reasons = mistakable(task, instruments, MACHINE)
     else:
         gain = f"{differences.sum():+.1f} +- {standard_error(differences):.1f} in log probability"
         reasons.append(f"the refitted one gains {gain}, no more than chance")
@@ -303,7 +302,7 @@ def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Suppo
     )  # fmt: skip
 
 
-def _as_well(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, str]:
+def as_well(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, str]:
     """Rivals that a fit has not outvoted -> the reading that would tell."""
     against = votes(problem, fit, rivals)
     return {
@@ -313,7 +312,7 @@ def _as_well(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str,
     }
 
 
-def _mistakable(task: UpdateTask, rivals: Mapping[str, str], believed: str) -> list[str]:
+def mistakable(task: UpdateTask, rivals: Mapping[str, str], believed: str) -> list[str]:
     """That what is taken for the machine's may be an instrument's, or the other way; nothing where the user knows."""
     if not rivals or task.believe == believed:
         return []
@@ -325,35 +324,17 @@ def _mistakable(task: UpdateTask, rivals: Mapping[str, str], believed: str) -> l
     ]
 
 
-def _next_effect(task: UpdateTask, before: LadderStep) -> tuple[LadderStep | None, list[Support]]:
+def next_effect(
+    task: UpdateTask, before: LadderStep, field_of: Callable[[UpdateTask, Fit], Field]
+) -> tuple[LadderStep | None, list[Support]]:
     """The most likely effect that the data support on top of a step, and the supports of all that were tried."""
-    others, tried = _field_of(task, before.fit), list[Support]()
+    others, tried = field_of(task, before.fit), list[Support]()
     families = sorted((*others.of_instrument, *others.of_machine), key=lambda f: (-f.log_evidence, f.name))
     for family in families[:TRIED]:
         task.progress(f"fitting {family.name}")
         candidates = family.best.candidates if family.best else ()  # the choice that its tables make the likeliest
         step = step_up(task, before, [candidates])
-        tried.append(_support(task, others, before, step.fit, len(step.fit.candidates) - 1, candidates))
+        tried.append(support_of(task, others, before, step.fit, len(step.fit.candidates) - 1, candidates))
         if tried[-1].supported:
             return step, tried
     return None, tried
-
-
-def update_by_mean_error(task: UpdateTask) -> Update:
-    """The strut law with the smallest mean error, its errors at left-out points and its uncertainty.
-
-    Noise is for the noise floor only: the objective does not know of it. Raises `InputError` as `minimise_mean_error`.
-    """
-    predictor, data = task.problem.predictor, task.data
-    task.progress("searching from several starts")
-    search = minimise_mean_error(predictor, task.seed)
-    (as_given, law_refitted), law = baseline(task.problem), search.law
-    task.progress("leaving points out, drawing points anew")
-    modelled = predictor.log_stiffness(law)
-    last = Fit(
-        (), (), (), law, task.problem.observed - modelled, predictor.law_columns(modelled, law),
-        resampled_covariance(predictor, law, task.seed), task.problem.scatter,
-    )  # fmt: skip
-    left_out = HeldOut(leave_points_out(predictor, law), np.zeros((0, 2)), data.point)
-    steps = LadderStep.of(AS_GIVEN, as_given, data), LadderStep.of("strut law by mean error", last, data, left_out)
-    return Update(task, steps, LadderStep.of(LAW_REFITTED, law_refitted, data), search=search)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, product
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter, radii_of
 from toolpath_stiff.cutting.engagement import engage
@@ -70,7 +70,8 @@ class Cut:
     deviation
         (n, 3) m, standard deviation of `errors`, from the coefficients and the machine.
     wall_profiles
-        (n, 2, HEIGHTS) m, errors of the left and right wall from its lower to its upper end, at `surface_error.shares`.
+        (n, 2, HEIGHTS) m, errors of the left and right wall from its lower to its upper end, at `surface_error.shares`;
+        in single precision, they are most of what is kept.
     assumptions, warnings
         Sentences.
     """
@@ -94,7 +95,7 @@ class Cut:
     lowest: FloatArray
     highest: FloatArray
     deviation: FloatArray
-    wall_profiles: FloatArray
+    wall_profiles: AnyArray
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
 
@@ -232,7 +233,7 @@ def _nothing_cut(
         wall_heights=np.full((n, 2, 2), np.nan),
         wall_force=np.full((n, 2, 3), np.nan),
         **{name: np.full((n, 3), np.nan) for name in ("errors", "lowest", "highest", "deviation")},
-        wall_profiles=np.full((n, 2, HEIGHTS), np.nan),
+        wall_profiles=np.full((n, 2, HEIGHTS), np.nan, dtype=np.float32),
         assumptions=(),
         warnings=(),
     )
@@ -284,14 +285,15 @@ def _evaluate(
 
 def _with_walls_of_all_passes(cut: Cut, own: FloatArray, step: float) -> Cut:
     """The cut with each wall at the pass that owns it; `own` as `Cut.wall_heights`."""
-    values = walls_of_all_passes(cut.samples, cut.cutters, cut.wall_heights, own, cut.wall_profiles, step)
+    walls_of_all_passes(cut.samples, cut.cutters, cut.wall_heights, own, cut.wall_profiles, step)
+    values = cut.wall_profiles
     before, deviation = np.abs(cut.wall_mean), cut.deviation[:, :2].copy()
     share = deviation / np.where(before > 0.0, before, np.nan)  # the coefficients scatter all errors alike
     usual = float(np.median(share[np.isfinite(share)])) if np.isfinite(share).any() else 0.0
     _enter(cut, np.arange(len(own)), slice(0, 2), values @ shares()[1], values)
     after = np.abs(cut.wall_mean)
     cut.deviation[:, :2] = after * np.where(before > OTHER * after, share, usual)
-    return replace(cut, wall_heights=own, wall_profiles=values)
+    return replace(cut, wall_heights=own)
 
 
 def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: FloatArray) -> None:

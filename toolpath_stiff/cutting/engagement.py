@@ -191,11 +191,16 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
     """Patches of stations, numbered from 0, and (n,) m2 the volume that each removes per length of path."""
     rate = _end_area(work, stations)
     corner = stations["reach"] - stations["flat"]
-    reached = _reached(work, stations, corner)
-    edges = corner[:, None] - corner[:, None] * np.cos(reached[:, None] * np.linspace(0.0, 1.0, CORNER_LAYERS + 1))
-    rows = np.flatnonzero((reached > 0.5 * np.pi - 1e-6) & ~stations["end_alone"])  # beyond the corner, or a flat end's
-    around = heights_around(work, stations[rows], (stations["reach"][rows] - TOUCH)[:, None], np.pi * SIDES[None, :])
+    rows = np.flatnonzero(~stations["end_alone"])
+    wall, low = (stations["reach"][rows] - TOUCH)[:, None], corner[rows, None]
+    around = heights_around(work, stations[rows], wall, np.pi * SIDES[None, :], enough=low)
+    beyond = (around[0] > low).any(axis=1)  # the corner
+    rows, around = rows[beyond], (around[0][beyond], around[1][beyond])
     borders = _levels(around, corner[rows, None], stations["longest"][rows, None])
+    reached = np.full(len(stations), 0.5 * np.pi)
+    below = np.setdiff1d(np.flatnonzero((corner > 0.0) & ~stations["end_alone"]), rows)
+    reached[below] = _reached(work, stations[below], corner[below])
+    edges = corner[:, None] - corner[:, None] * np.cos(reached[:, None] * np.linspace(0.0, 1.0, CORNER_LAYERS + 1))
     parts = []
     for some, levels, round_part in ((np.arange(len(stations)), edges, True), (rows, borders, False)):
         row, layer = np.nonzero((np.diff(levels, axis=1) > 0.0) & ~stations["end_alone"][some, None])
@@ -221,23 +226,22 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
 
 def _cuts(work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray, height: FloatArray) -> BoolArray:
     """Whether material stands above points of the envelope."""
-    top, bottom = heights_around(work, stations, radius, angle)
+    top, bottom = heights_around(work, stations, radius, angle, height + TOUCH, height)
     return np.asarray((top > height) & (bottom < height))
 
 
 def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatArray:
     """(n,) rad between axis and normal, up to where a corner or a ball is in contact: narrowed down twice."""
-    reached = np.full(len(stations), 0.5 * np.pi)
-    rows = np.flatnonzero((corner > 0.0) & ~stations["end_alone"])
-    some, span = stations[rows], corner[rows, None, None]
-    for _ in range(2 if len(rows) else 0):
-        rings = reached[rows, None, None] * np.linspace(0.0, 1.0, COARSE + 1)[1:, None]
+    reached, span = np.full(len(stations), 0.5 * np.pi), corner[:, None, None]
+    for _ in range(2 if len(stations) else 0):
+        rings = reached[:, None, None] * np.linspace(0.0, 1.0, COARSE + 1)[1:, None]
         heights = span - span * np.cos(rings)
-        radius = some["flat"][:, None, None] + span * np.sin(rings) - TOUCH
-        top = heights_around(work, some, radius, np.pi * SIDES[None, None, ::4])[0]
+        radius = stations["flat"][:, None, None] + span * np.sin(rings) - TOUCH
+        ceiling = np.concatenate([heights[:, 1:], heights[:, -1:]], axis=1)  # of the next ring, whose inner one this is
+        top = heights_around(work, stations, radius, np.pi * SIDES[None, None, ::4], ceiling, 0.0)[0]
         inner = np.concatenate([top[:, :1], top[:, :-1]], axis=1)
-        highest = np.clip(np.minimum(np.maximum(top, inner), heights).max(axis=(1, 2)), 0.0, corner[rows])
-        reached[rows] = np.arccos(1.0 - highest / corner[rows])
+        highest = np.clip(np.minimum(np.maximum(top, inner), heights).max(axis=(1, 2)), 0.0, corner)
+        reached = np.arccos(1.0 - highest / corner)
     return reached
 
 
@@ -274,13 +278,11 @@ def _arcs(
     padded = np.pad(inside, ((0, 0), (1, 1)))
     row, start = np.nonzero(padded[:, 1:-1] & ~padded[:, :-2])
     stop = np.nonzero(padded[:, 1:-1] & ~padded[:, 2:])[1]
-    points = ring.shape[1]
-    ends = []
-    for out, within in ((start - 1, start), (stop + 1, stop)):
-        bracket = np.stack([ring[row, np.clip(out, 0, points - 1)], ring[row, within]])
-        ends.append(_ends(work, stations[row], radius[row], height[row], bracket, halvings))
-    wide = ends[1] - ends[0] > NARROW
-    row, entry, exit_ = row[wide], ends[0][wide], ends[1][wide]
+    both, out, within = np.append(row, row), np.append(start - 1, stop + 1), np.append(start, stop)
+    bracket = np.stack([ring[both, np.clip(out, 0, ring.shape[1] - 1)], ring[both, within]])
+    entry, exit_ = np.split(_ends(work, stations[both], radius[both], height[both], bracket, halvings), 2)
+    wide = exit_ - entry > NARROW
+    row, entry, exit_ = row[wide], entry[wide], exit_[wide]
     # Behind the left side: an arc across 0 is two.
     across = np.flatnonzero(entry < 0.0)
     row = np.concatenate([row, row[across]])

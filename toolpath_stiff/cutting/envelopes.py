@@ -130,8 +130,13 @@ def lower(
     window: tuple[IntArray, IntArray],
     late: tuple[IntArray, float],
     result: tuple[FloatArray, IntArray],
+    enough: FloatArray,
 ) -> None:
-    """Lower the tops and set the owners of points in `result`, as `Workpiece.tops` has them."""
+    """Lower the tops and set the owners of points in `result`, as `Workpiece.tops` has them.
+
+    The tops come as those of the stock, or lower: what is above them is not looked at. A height below `enough` ends
+    the search.
+    """
     (corner, size, columns), (starts, piece, counts_from, below) = grid, index
     (x, y), (slack_from, slack), (top, owner) = points, late, result
     for i in range(len(x)):
@@ -144,7 +149,7 @@ def lower(
             low = first_from(piece, low, high, window[0][i])
         elif high > low:
             low = max(low, counts_from[high - 1])
-        best, last = float(math.inf), -1
+        best, last = top[i] + 2.0 * CLEAR, -1
         for entry in range(high - 1, low - 1, -1):
             if below[entry] >= best:
                 continue
@@ -160,6 +165,8 @@ def lower(
             if height < best:
                 last = piece[entry] if height < best - CLEAR else last
                 best = height
+                if best < enough[i]:
+                    break
         if best <= top[i] + CLEAR:
             owner[i] = last
         top[i] = min(top[i], best)

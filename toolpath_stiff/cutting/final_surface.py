@@ -34,13 +34,14 @@ def walls_of_passes(work: Workpiece, samples: Samples, cutters: Mapping[int, Cut
         every, tip = np.full(len(wall[0]), len(work.pieces)), np.repeat(stations["z"], 2)
         other = stations["path"] + LATER * stations["reach"]
         later = np.repeat(np.searchsorted(work.pieces["before"], other, "right"), 2)
-        high = work.tops(*wall, (np.zeros_like(every), every))[0] - tip
-        high = np.minimum(high, np.repeat(stations["longest"], 2))
+        longest = tip + np.repeat(stations["longest"], 2)
+        high = work.tops(*wall, (np.zeros_like(every), every), ceiling=longest)[0] - tip
         low = np.maximum(work.stock.bottoms(*wall) - tip, np.repeat(stations["reach"] - stations["flat"], 2))
         stands = np.flatnonzero((high - low > BESIDE) & ~np.repeat(stations["end_alone"], 2))
         for walls, offset in ((made, TOUCHED), (own, -TOUCHED)):
             x, y = (axis[stands] for axis in points_around(stations, reach + offset, sides))
-            top = np.minimum(high[stands], work.tops(x, y, (later[stands], every[stands]))[0] - tip[stands])
+            base = tip[stands]
+            top = work.tops(x, y, (later[stands], every[stands]), ceiling=base + high[stands])[0] - base
             part = np.full((len(tip), 2), np.nan)
             stays = top - low[stands] > BESIDE
             part[stands[stays]] = np.stack([low[stands], top], axis=1)[stays]
@@ -67,14 +68,17 @@ def final_strip(work: Workpiece, samples: Samples, cutters: Mapping[int, Cutter]
         x, y = points_around(stations, away, np.arctan2(-back, offset))
         every = np.full(len(surface), len(work.pieces))
         ball = np.repeat(np.where(stations["flat"] == 0.0, SCALLOP * stations["reach"], 0.0), ACROSS)
-        near = np.abs(work.tops(x, y, (np.zeros_like(every), every))[0] - surface) < BESIDE + ball
-        material = (work.stock.bottoms(x, y) < surface) & ~np.repeat(stations["end_alone"], ACROSS)
-        stays: BoolArray = np.asarray(near & material)
+        near = BESIDE + ball
+        limits = surface + 2.0 * near, surface - near
+        top = work.tops(x, y, (np.zeros_like(every), every), None, 0.0, *limits)[0]
+        stays: BoolArray = np.abs(top - surface) < near
+        stays &= (work.stock.bottoms(x, y) < surface) & ~np.repeat(stations["end_alone"], ACROSS)
         # A flat end passes a point of the floor twice, with its front and with its back.
         other = stations["path"] + LATER * stations["reach"] + 2.0 * stations["flat"]
         some = np.flatnonzero(stays)
         later = np.searchsorted(work.pieces["before"], other, "right")[some // ACROSS]
-        above = work.tops(x[some], y[some], (later, every[some]))[0] - surface[some]
+        ceiling = surface[some] + 2.0 * TOUCHED
+        above = work.tops(x[some], y[some], (later, every[some]), ceiling=ceiling)[0] - surface[some]
         stays[some] = (above > TOUCHED) | ((above < -TOUCHED) & (ball[some] > 0.0))
         stays = stays.reshape(offset.shape)
         low, high = np.where(stays, offset, np.inf).min(axis=1), np.where(stays, offset, -np.inf).max(axis=1)

@@ -9,11 +9,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter, radii_of
 from toolpath_stiff.cutting.surface_error import HEIGHTS, shares
 from toolpath_stiff.path.sampling import Samples
 
+BLOCK = 16_384  # walls at a time
 MOST_PASSES = 8  # places of earlier passes beside one of the last that are looked at
 ALIKE = 10.0  # steps along the wall that a turn of its normal by a radian counts
 SAME = 1e-7  # m, ranges of height closer than this are one
@@ -24,10 +25,10 @@ def walls_of_all_passes(
     cutters: Mapping[int, Cutter],
     made: FloatArray,
     own: FloatArray,
-    profiles: FloatArray,
+    profiles: AnyArray,
     step: float,
-) -> FloatArray:
-    """(n, 2, HEIGHTS) m, errors of the walls that stay, from the lower to the upper end of each; nan: no wall.
+) -> None:
+    """Make profiles of what each pass makes those of the walls that stay, from the lower to the upper end; nan: no wall.
 
     Parameters
     ----------
@@ -38,35 +39,44 @@ def walls_of_all_passes(
     profiles
         (n, 2, HEIGHTS) m, errors of what each pass makes, from its lower to its upper end.
     """
-    nodes = shares()[0]
-    heights = own[..., :1] + (own[..., 1:] - own[..., :1]) * nodes
     owners, walls = np.nonzero(np.isfinite(own).all(axis=2))
-    values = np.full((*own.shape[:2], HEIGHTS), np.nan)
-    values[owners, walls] = profile_at(profiles[owners, walls], made[owners, walls], heights[owners, walls])
     shared = np.isfinite(made).all(axis=2) & ~(np.abs(made - own).max(axis=2) <= SAME)
     rows, sides = np.nonzero(shared)
-    if not len(rows) or not len(owners):
-        return values
-    from scipy.spatial import cKDTree
-
-    # Weighed so that walls with another normal are far.
-    earlier_walls, last_walls = (
-        np.concatenate([foot, ALIKE * step * into], axis=1)
-        for foot, into in (walls_beside(samples, cutters, *of) for of in ((rows, sides), (owners, walls)))
-    )
-    near: IntArray = np.asarray(cKDTree(earlier_walls).query(last_walls, MOST_PASSES, distance_upper_bound=step)[1])
     apart = 2.0 * max(cutter.radius for cutter in cutters.values())
-    for column in near.T:
-        known = np.flatnonzero(column < len(rows))
-        known = known[samples.s[owners[known]] - samples.s[rows[column[known]]] > apart]
-        last, wall, earlier, side = owners[known], walls[known], rows[column[known]], sides[column[known]]
-        climb = samples.position[last, 2] - samples.position[earlier, 2]
-        left = profile_at(profiles[earlier, side], made[earlier, side], heights[last, wall] + climb[:, None])
-        values[last, wall] = np.fmin(values[last, wall], left)
-    return values
+
+    def places(rows: IntArray, sides: IntArray) -> FloatArray:
+        parts = [np.empty((0, 4))]
+        for begin in range(0, len(rows), BLOCK):
+            foot, into = walls_beside(samples, cutters, rows[begin : begin + BLOCK], sides[begin : begin + BLOCK])
+            parts.append(np.concatenate([foot, ALIKE * step * into], axis=1))  # walls with another normal are far
+        return np.concatenate(parts)
+
+    tree = None
+    if len(rows) and len(owners):
+        from scipy.spatial import cKDTree
+
+        tree = cKDTree(places(rows, sides))
+    # The last first: of earlier passes counts what they made, not what of it stays.
+    for begin in range((len(owners) - 1) // BLOCK * BLOCK, -1, -BLOCK):
+        last, wall = owners[begin : begin + BLOCK], walls[begin : begin + BLOCK]
+        low, high = own[last, wall, :, None].swapaxes(0, 1)
+        heights = low + (high - low) * shares()[0]
+        left = profile_at(profiles[last, wall], made[last, wall], heights)
+        near: IntArray = np.zeros((len(last), 0), dtype=np.int64)
+        if tree is not None:
+            near = np.asarray(tree.query(places(last, wall), MOST_PASSES, distance_upper_bound=step)[1])
+        for column in near.T:
+            known = np.flatnonzero(column < len(rows))
+            known = known[samples.s[last[known]] - samples.s[rows[column[known]]] > apart]
+            earlier, side = rows[column[known]], sides[column[known]]
+            climb = samples.position[last[known], 2] - samples.position[earlier, 2]
+            other = profile_at(profiles[earlier, side], made[earlier, side], heights[known] + climb[:, None])
+            left[known] = np.fmin(left[known], other)
+        profiles[last, wall] = left
+    profiles[~np.isfinite(own).all(axis=2)] = np.nan
 
 
-def profile_at(profiles: FloatArray, ranges: FloatArray, heights: FloatArray) -> FloatArray:
+def profile_at(profiles: AnyArray, ranges: FloatArray, heights: FloatArray) -> FloatArray:
     """(m, h) errors at heights (m, h), from profiles (m, HEIGHTS) over ranges (m, 2); nan beyond."""
     nodes, low, span = shares()[0], ranges[:, :1], np.maximum(ranges[:, 1:] - ranges[:, :1], SAME)
     share = (heights - low) / span

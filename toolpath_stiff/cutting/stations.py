@@ -12,7 +12,7 @@ from toolpath_stiff.nc.courses import points_along
 from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.path.sampling import Samples
 
-BLOCK = 2048  # stations at a time
+BLOCK = 8192  # stations at a time
 # The front of the cutter would touch what the pieces just before have left: these are taken for smaller by SLACK. It is
 # above the rounding of coordinates (4 decimals of a mm); a turn of the tool moves it on by much more.
 RECENT, SLACK = 0.05, 5e-7  # radii of the cutter along the path; m
@@ -103,12 +103,22 @@ def points_around(stations: AnyArray, radius: FloatArray, angle: FloatArray) -> 
 
 
 def heights_around(
-    work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray
+    work: Workpiece,
+    stations: AnyArray,
+    radius: FloatArray,
+    angle: FloatArray,
+    ceiling: FloatArray | float = np.inf,
+    enough: FloatArray | float = -np.inf,
 ) -> tuple[FloatArray, FloatArray]:
-    """Top of the material before each station, underside of the stock, m above the tip; points as `points_around`."""
+    """Top of the material before each station, underside of the stock, m above the tip; points as `points_around`.
+
+    `ceiling` (m above the tip) and `enough` as of `Workpiece.tops`.
+    """
     x, y = points_around(stations, radius, angle)
-    around = len(x) // max(len(stations), 1)
-    piece, recent, z = (np.repeat(stations[name], around) for name in ("piece", "recent", "z"))
-    top = work.tops(x, y, (np.zeros(len(x), dtype=np.int64), piece), recent, SLACK)[0]
-    shape = np.broadcast_shapes(radius.shape, angle.shape)
-    return (top - z).reshape(shape), (work.stock.bottoms(x, y) - z).reshape(shape)
+    whole = np.zeros(np.broadcast_shapes(radius.shape, angle.shape))
+    z = stations["z"].reshape((-1,) + (1,) * (whole.ndim - 1))
+    limits = ((whole + (z + height)).ravel() for height in (ceiling, enough))
+    piece, recent = (np.repeat(stations[name], len(x) // max(len(stations), 1)) for name in ("piece", "recent"))
+    window = np.zeros(len(x), dtype=np.int64), piece
+    top = work.tops(x, y, window, recent, SLACK, *limits)[0]
+    return top.reshape(whole.shape) - z, work.stock.bottoms(x, y).reshape(whole.shape) - z

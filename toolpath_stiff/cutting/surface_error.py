@@ -102,8 +102,13 @@ def floor_error(contact: Contact, compliance: FloatArray, strip: FloatArray) -> 
     pull = _pull(chosen, normal, compliance[cut])
     ahead = np.arccos(np.clip(aside / max(flat, 1e-9), -1.0, 1.0))  # beyond the flat end: beside the axis
     height = corner - np.sqrt(np.maximum(corner**2 - beyond**2, 0.0))
-    angles = (ahead, TURN - ahead)[:count]
-    error[cut], slopes, _ = _lowest([_errors(chosen, _tip_angle(chosen, angle, height), pull) for angle in angles])
+    # On a slope the end passes a point once more higher up: behind the axis where it climbs, ahead where it descends.
+    above = 2.0 * np.sqrt(np.maximum(flat**2 - aside**2, 0.0)) * slope[:, 1]
+    passes = []
+    for angle, higher in ((ahead, -above), (TURN - ahead, above))[:count]:
+        errors, *others = _errors(chosen, _tip_angle(chosen, angle, height), pull)
+        passes.append((errors + np.maximum(higher, 0.0), *others))
+    error[cut], slopes, _ = _lowest(passes)
     deviation[cut] = _deviation(slopes.mean(axis=1), contact.coefficients)
     return error, deviation
 

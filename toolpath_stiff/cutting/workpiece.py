@@ -33,8 +33,10 @@ from toolpath_stiff.nc.moves import Moves
 
 CELL = 0.25  # radii of the smallest cutter, size of a cell of the index
 MANY = 500  # pieces from where on it pays to import numba: half a second
-STAGE = 16_384  # pieces
+STAGE = 8192  # pieces
 BEFORE = 1024  # pieces: between a station of the stage before and the first of a stage are fewer
+# A piece in a cell, and m, bounds of the height that it leaves there.
+ENTRY = np.dtype([("cell", np.int32), ("piece", np.int32), ("below", np.float64), ("above", np.float64)])
 OFFSET = np.array([0.3819e-3, 0.2764e-3])  # m: walls at round coordinates shall not run along borders of cells
 
 
@@ -82,17 +84,22 @@ class Workpiece:
         window: tuple[IntArray, IntArray],
         slack_from: IntArray | None = None,
         slack: float = 0.0,
+        ceiling: FloatArray | float = np.inf,
+        enough: FloatArray | float = -np.inf,
     ) -> tuple[FloatArray, IntArray]:
         """(n,) m, height of what some pieces leave at points, and (n,) the last piece that left it; -1: the stock.
 
         The pieces are first <= piece < last of `window`, (n,) each. Of those from `slack_from` (n,) on the cutter is
-        taken for smaller and higher by `slack`, m.
+        taken for smaller and higher by `slack`, m. A `ceiling` (n,) stands for what is higher; where the height is below
+        `enough` (n,) it may be any that is. Owners are those of all heights without them.
         """
-        top, owner = self.stock.tops(x, y), np.full(len(x), -1)
+        top, owner = np.minimum(self.stock.tops(x, y), ceiling), np.full(len(x), -1)
         late = np.full(len(x), len(self.pieces)) if slack_from is None else slack_from
         if self.quick:
             grid = self.corner, self.size, self.columns
-            compiled()[1](self.pieces, grid, self.index, (x, y), window, (late, slack), (top, owner))
+            compiled()[1](
+                self.pieces, grid, self.index, (x, y), window, (late, slack), (top, owner), np.full(len(x), enough)
+            )
             return top, owner
         low, high = self._entries(x, y, window)
         counts = high - low
@@ -143,30 +150,30 @@ def stages_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> Iter
     corner = low.min(axis=0) - OFFSET - size
     low, high = (np.floor((ends - corner) / size).astype(np.int64) for ends in (low, high))
     rows, columns = (high.max(axis=0) + 1).tolist()
-    cell, piece, below, above = (np.zeros(0, dtype) for dtype in (np.int64, np.int64, float, float))
+    entries = np.zeros(0, dtype=ENTRY)
     for begin in range(0, len(pieces), STAGE):
         until = min(begin + STAGE, len(pieces))
-        parts = [(cell, piece, below, above)]
-        for number, place in cells_of_boxes(low[begin:until], high[begin:until]):
-            parts.append(_bounded(pieces, begin + number, place, corner, size, columns, quick))
-        cell, piece, below, above = (np.concatenate([part[k] for part in parts]) for k in range(4))
-        order = np.argsort(cell, kind="stable")
-        cell, piece, below, above = (values[order] for values in (cell, piece, below, above))
+        boxes = cells_of_boxes(low[begin:until], high[begin:until])
+        new = (_bounded(pieces, begin + number, place, corner, size, columns, quick) for number, place in boxes)
+        entries = np.concatenate([entries, *new])
+        entries = entries[np.argsort(entries["cell"], kind="stable")]
+        cell, piece, below, above = (np.ascontiguousarray(entries[name]) for name in ENTRY.names or ())
         starts = np.searchsorted(cell, np.arange(rows * columns + 1))
         outdone = np.minimum(_outdone(cell, below, above), starts[cell + 1])
         kept = outdone > np.arange(len(cell))
         before = np.append(0, np.cumsum(kept))
         counts_from = np.searchsorted(np.maximum.accumulate(before[outdone[kept]]), np.arange(before[-1]), side="right")
-        index = before[starts], piece[kept], counts_from, below[kept]
-        yield Workpiece(stock, pieces, first, until, corner, size, columns, index, quick)
+        index = before[starts], piece[kept].astype(np.int64), counts_from, below[kept]
         kept &= ~_redone(cell, below, np.where(piece < until - BEFORE, above, np.inf))
-        cell, piece, below, above = cell[kept], piece[kept], below[kept], above[kept]
+        entries = entries[kept]
+        del cell, piece, below, above, outdone, before, counts_from, kept  # while the stage is looked into
+        yield Workpiece(stock, pieces, first, until, corner, size, columns, index, quick)
 
 
 def _bounded(
     pieces: AnyArray, piece: IntArray, cell: IntArray, corner: FloatArray, size: float, columns: int, quick: bool
-) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-    """Cells (k,) that pieces pass, the piece, and m, bounds of the height that it leaves there."""
+) -> AnyArray:
+    """Entries (k,) of pieces in cells that they pass, some of those (e, 2) given."""
     x, y = (corner + (cell + 0.5) * size).T
     half = float(size / np.sqrt(2.0)) + 1e-6  # of a cell's diagonal, and a little for rounding
     rows = np.empty((3, len(piece)))
@@ -180,8 +187,10 @@ def _bounded(
     far, below, above = rows
     reach = pieces["reach"][piece]
     near = np.flatnonzero(far <= reach + half)
-    above = np.where(far + half <= reach, above, np.inf)
-    return (cell[:, 0] * columns + cell[:, 1])[near], piece[near], below[near], above[near]
+    entries = np.empty(len(near), dtype=ENTRY)
+    entries["cell"], entries["piece"] = (cell[:, 0] * columns + cell[:, 1])[near], piece[near]
+    entries["below"], entries["above"] = below[near], np.where(far + half <= reach, above, np.inf)[near]
+    return entries
 
 
 def _heights(part: AnyArray, x: FloatArray, y: FloatArray, smaller: FloatArray) -> FloatArray:

@@ -20,7 +20,6 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.inference import slips
 from toolpath_stiff.inference.candidates import testable_effects
-from toolpath_stiff.inference.confounding import confounding
 from toolpath_stiff.inference.detectable import detectable_sizes
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import baseline, refine
@@ -125,7 +124,6 @@ def diagnose(
         {name: of_readings(fit, tip) for name, fit in fits.items()},
         held_out(refitted, data.point).of_readings(tip),
         {name: held_out(fit, data.point).of_readings(tip) for name, fit in fits.items()},
-        confounding(main.problem, main.families),
         tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
         tuple(dict.fromkeys(data.file.tolist())), seed, suspects=suspects,
         unexcluded=tuple(hidden for hidden in unexcluded(main) if hidden.effect.name not in plausible),

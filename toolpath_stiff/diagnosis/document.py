@@ -3,13 +3,13 @@
 import numpy as np
 
 from toolpath_stiff.diagnosis.examination import Examination, HypothesisRow, percent_of, rounded_errors
-from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why, would_tell
+from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why
 from toolpath_stiff.documents import Document, certain, json_number, to_dict
-from toolpath_stiff.inference.confounding import CONFOUNDED
 from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.judgement import Judgement
 from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.inference.votes import vote_document
+from toolpath_stiff.planning.plan import reading_words, telling
 from toolpath_stiff.portrait.words import alike_entry, portrait_entry
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
@@ -54,12 +54,6 @@ def document_of(diagnosis: Examination) -> Document:
         },
         "gates": _gates(main),
         "detectable": [_detectable(smallest) for smallest in diagnosis.detectable],
-        "confounding": {
-            "effects": list(diagnosis.confounding.names),
-            "matrix": diagnosis.confounding.rounded,
-            "sets": [list(group) for group in diagnosis.confounding.sets],
-            "threshold": CONFOUNDED,
-        },
         "path": diagnosis.path,
         "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
         "looks_the_same": alike_entry(diagnosis.alike),
@@ -162,7 +156,7 @@ def _not_excluded(hidden: Unexcluded) -> Document:
         "up_to": json_number(hidden.value / hidden.parameter.si, 2),
         "rms_percent": percent_of(hidden.rms, 2),
         "probability": json_number(hidden.probability, 2),
-        "would_tell": would_tell(hidden.effect),
+        "would_tell": reading_words(telling(hidden.effect)),
     }
 
 

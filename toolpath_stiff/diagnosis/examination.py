@@ -12,7 +12,6 @@ from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.documents import DIGITS, Document, json_number
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import Component
-from toolpath_stiff.inference.confounding import Confounding
 from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.errors import AS_GIVEN, error_figures
@@ -126,8 +125,8 @@ class Examination:
         The machine file as it stands; its strut law refitted; effect or "a + b" -> final fit of all that were offered.
     held_out_base, held_out
         Errors at left-out points.
-    confounding, detectable
-        What these data cannot tell apart, and what they would have shown.
+    detectable
+        What these data would have shown.
     names, seed, line, asked, inputs
         For the record, and for the commands that go on from here: names of the measurement files, the command; files
         that were read.
@@ -161,7 +160,6 @@ class Examination:
     fits: dict[str, Fit]
     held_out_base: HeldOut
     held_out: dict[str, HeldOut]
-    confounding: Confounding
     detectable: tuple[Detectable, ...]
     names: tuple[str, ...]
     seed: int
@@ -343,18 +341,10 @@ def interval(
 ) -> tuple[float, float]:
     """95 % interval of a size, within the bounds.
 
-    From its profile where that was scanned, averaged over subsets of components where there are several, else normal.
+    Averaged over subsets of components where there are several, else normal.
     """
     low_bound, high_bound = component.bounds
     best = family.best if family is not None else None
-    if best is not None and best.interval is not None and index == 0:
-        # The scan ran on the table; the final fit with the model itself may sit a little beside it. What reached to a
-        # bound does so still.
-        shift, near = size - float(best.sizes[0][0]), TOUCHES * float(np.ptp(best.interval))
-        low, high = (float(end) for end in best.interval)
-        low = low_bound if low - low_bound < near else max(min(low + shift, size), low_bound)
-        high = high_bound if high_bound - high < near else min(max(high + shift, size), high_bound)
-        return low, high
     averaged = None if family is None else averaged_interval(family, index)
     if index in fit.free:
         reach = NORMAL_95 * widening * fit.deviation(index)

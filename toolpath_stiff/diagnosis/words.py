@@ -29,9 +29,8 @@ from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
 from toolpath_stiff.inference.votes import CHANCE, SMALL, outvoted, vote_words
-from toolpath_stiff.planning.plan import INDICATORS, telling
+from toolpath_stiff.planning.plan import INDICATORS, reading_words, telling
 from toolpath_stiff.portrait.words import alike_text
-from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
 
@@ -137,6 +136,9 @@ def _rivals(diagnosis: Examination) -> str:
         moved = float(np.mean(np.abs(diagnosis.base.jacobian @ diagnosis.base.law)))
         causes[0] = f"the strut law is off and moves the stiffness by {100.0 * moved:.2g} %"
         return f"Readings of the tip do not tell which of these it is: either {', or '.join(causes)}."
+    if diagnosis.explanations[0] == NONE and diagnosis.main.base_gate.probability > FALSE_ALARM:
+        left = f"what is not excluded may leave more than {100 * LEFT:g} % of the stiffness"
+        return f"What the model leaves looks like scatter, but {left}: either {', or '.join(causes)}."
     first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
     if first < POSITIVE * second or len(causes) < 2:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
@@ -207,7 +209,7 @@ def _not_told_apart(diagnosis: Examination) -> list[str]:
     rivals = [(name, votes) for name, votes in diagnosis.main.votes.items() if not outvoted(votes) and name != NONE]
     reasons = [f"{vote_words(*rival)} (log probability): not beyond chance" for rival in rivals[:MOST_BESIDE]]
     effects = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
-    reasons += [f"{would_tell(effect)} would tell {effect.name}" for effect in effects]
+    reasons += [f"{reading_words(telling(effect))} would tell {effect.name}" for effect in effects]
     if NONE in diagnosis.plausible:
         reasons.append("chance alone is not excluded either")
     for effect in effects:
@@ -274,7 +276,8 @@ def assumptions(diagnosis: Examination) -> list[str]:
         f"and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, or by {SMALL:g} without the pose that "
         "says most; else it is one of several",
         f"a model is adequate where its refitted strut law moves the stiffness by up to {100 * LEFT:g} % (95 %), or "
-        "nothing else explains the readings as well beside the file's law: assumed",
+        "nothing else explains the readings as well beside the file's law; and where no effect may hide more (95 %) "
+        "beside what struts and joints leave on average: assumed",
         f"a further effect matters from {100 * MATTERS:g} % of the tip's stiffness on",
     ]
     if "force_N" in diagnosis.data.missing:
@@ -299,9 +302,3 @@ def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
     tells = " or ".join(place for place in places if place != "none")
     words = f"{joined(effects)}: the readings neither show nor exclude {'it' if len(unexcluded) == 1 else 'them'}"
     return f"{words}; an indicator {tells} would tell" if tells else words
-
-
-def would_tell(effect: Effect) -> str:
-    """Where an indicator would show an effect, or what else to measure."""
-    place = telling(effect)
-    return place.removeprefix("none: ") if place.startswith("none: ") else f"an indicator {place}"

@@ -21,9 +21,10 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.readings.pulls import Pulls
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import known_effects
-from toolpath_stiff.stiffness.contract import Effect, Parameter
+from toolpath_stiff.stiffness.contract import ELEMENT, Effect, Parameter
 from toolpath_stiff.stiffness.effects.joint_offset import JointOffset
 
 SMALLEST, LARGEST = 2e-3, 0.7  # rms change of ln stiffness between which sizes are tabulated
@@ -154,8 +155,11 @@ def choice_text(key: str, value: Any) -> str:
     return f"{key} {value}"
 
 
-def candidates_of(effect: Effect, data: Readings) -> list[Candidate]:
-    """The candidates of an effect: one a choice. Of several discrete parameters one at a time leaves its default."""
+def candidates_of(effect: Effect, data: Readings | Pulls, elements: Sequence[str] = ()) -> list[Candidate]:
+    """The candidates of an effect: one a choice. Of several discrete parameters one at a time leaves its default.
+
+    `elements`: those of the machine that it may act on.
+    """
     real = tuple(Component.of(parameter) for parameter in effect.parameters if not parameter.discrete)
     discrete = [parameter for parameter in effect.parameters if parameter.discrete]
     if not discrete:
@@ -167,6 +171,8 @@ def candidates_of(effect: Effect, data: Readings) -> list[Candidate]:
         if parameter.kind != "text":
             low, high = (int(bound) for bound in parameter.bounds)
             choices += [{parameter.name: value} for value in range(low, high + 1) if alone or value != 0]
+        elif parameter.name == ELEMENT:
+            choices += [{ELEMENT: name} for name in elements]
         elif alone or len(setups) > 1:  # a single set-up is all readings, which other choices cover
             choices += [{parameter.name: name} for name in setups]
     return [Candidate(effect, tuple((defaults | choice).items()), real) for choice in choices]
@@ -224,10 +230,7 @@ class CandidateTable:
 
     def delta(self, sizes: FloatArray) -> FloatArray:
         """(..., n) for sizes (..., p)."""
-        if not self.knots:
-            return np.asarray(sizes @ self.columns.T)
-        size = sizes[..., 0]
-        out = np.zeros((*size.shape, len(self.columns)))
+        size, out = sizes[..., 0], np.asarray(sizes @ self.columns.T)  # on a side without knots a line
         for sign, course in self._splines.items():
             logs = self.knots[sign][0]
             where = size * sign > 0.0

@@ -46,11 +46,14 @@ TAILS = 4.0  # degrees of freedom of the expected scatter
 ROUNDING, BISECTIONS = 1e-12, 25
 
 
-def error_model(fit: Fit, data: Readings, noise: Noise, given: Fit | None = None) -> ErrorModel | None:
+def error_model(
+    fit: Fit, data: Readings, noise: Noise, given: Fit | None = None, *, moved: bool = False
+) -> ErrorModel | None:
     """The errors of a fit to n readings; None where too few poses were measured to tell.
 
     Its loadings are those of law and free sizes, in units of the fit. `given`: the same effects beside the machine
-    file's law, if that is what is written: either may be right.
+    file's law, if that is what is written: either may be right. `moved`: struts and joints stand where the readings
+    have them, and are off by what is left.
     """
     place = coordinates(data.position, data.angles)
     places = np.unique(place, axis=0)
@@ -70,11 +73,13 @@ def error_model(fit: Fit, data: Readings, noise: Noise, given: Fit | None = None
     beyond = np.log(SCATTERS) / np.sqrt(0.5 / noise.freedom)
     expected = (1.0 + beyond**2 / TAILS) ** (-0.5 * (TAILS + 1.0))
     prior = expected[:, None, None] * np.array([*GEOMETRIES.values()])[:, None] * _expected_forms(fit)
-    log_weights, away = np.log(prior.ravel()), list[FloatArray]()
+    log_weights, away, taken = np.log(prior.ravel()), list[FloatArray](), np.zeros((2, 2))
+    known = shared[:, rows] if moved else shared[:0, rows]
     for out in regions(place[rows], data.point[rows]):
-        left = _left_out(out, jacobian, assumed, fit.law_free)
+        left, foretold = _left_out(out, jacobian, assumed, fit.law_free, known)
         log_weights += _log_likelihoods(left @ residual, [left @ part @ left.T for part in parts], sizes**2)
         away.append(np.diag(left @ parts[2] @ left.T))
+        taken += _by_scatter_and_geometry(left, out, parts), _by_scatter_and_geometry(left + foretold, out, parts)
     weights = np.exp(log_weights - log_weights.max())
     weights /= weights.sum()
 
@@ -82,17 +87,23 @@ def error_model(fit: Fit, data: Readings, noise: Noise, given: Fit | None = None
     taken_up = by_reading * covariance.own_variance
     taken_up += common * covariance.groups.sums(by_reading)[:, covariance.groups.of]
     own, geometry = _root(taken_up @ by_reading.T), by_reading @ shared.T
-    left = np.eye(len(rows)) - jacobian @ _estimator(jacobian, assumed, fit.law_free)
+    every, law_alone = np.arange(len(rows)), np.eye(len(rows)) - jacobian @ _estimator(jacobian, assumed, fit.law_free)
+    left = law_alone - known.T @ np.linalg.solve(assumed, known.T).T @ law_alone
+    unknown = _unknown(*(_by_scatter_and_geometry(m, every, parts) for m in (left, law_alone)))
+    further = max(_unknown(*taken) - unknown, 0.0)
     near = float(np.diag(left @ parts[2] @ left.T).mean())
     here = [fit.jacobian @ own, shared.T - fit.jacobian @ geometry]
-    typical = np.array([*(float((part**2).sum(axis=1).mean()) for part in here), near])
+    typical = np.array([*(float((part**2).sum(axis=1).mean()) for part in here), near]) * [1.0, unknown, 1.0]
     factor = _coverage_factor(weights, sizes**2 @ typical)
     scatter, of_geometry, form = (factor * np.sqrt(weights @ sizes**2)).tolist()
+    apart = float((here[1] ** 2).sum(axis=1).mean())
+    far = form**2 * max(float(np.concatenate(away).mean()), near) + of_geometry**2 * further * apart
+    of_geometry *= float(np.sqrt(unknown))
     either = np.zeros((len(own), 0)) if given is None else _apart(fit, given)[:, None] * np.sqrt(0.5)
     return ErrorModel(
         np.concatenate([either, scatter * own, of_geometry * geometry], axis=1),
         of_geometry * noise.strut_spread, of_geometry * noise.joint_error,
-        form * float(np.sqrt(near)), form * float(np.sqrt(max(float(np.concatenate(away).mean()), near))), places,
+        form * float(np.sqrt(near)), float(np.sqrt(far)), places,
     )  # fmt: skip
 
 
@@ -136,12 +147,33 @@ def _estimator(jacobian: FloatArray, covariance: FloatArray, law_free: bool) -> 
     return np.asarray(scaled_inverse(information) @ weighted)
 
 
-def _left_out(out: IntArray, jacobian: FloatArray, assumed: FloatArray, law_free: bool) -> FloatArray:
-    """(m, n) matrix by which readings make the errors of m that are left out of the fit."""
+def _left_out(
+    out: IntArray, jacobian: FloatArray, assumed: FloatArray, law_free: bool, known: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(m, n) each: matrices by which readings make the errors of m that are left out, and what `known` foretells.
+
+    `known` (k, n): by how much offsets, of which the readings that stay tell, change each reading.
+    """
     kept = np.delete(np.arange(len(jacobian)), out)
-    left = np.eye(len(jacobian))[out]
-    left[:, kept] = -jacobian[out] @ _estimator(jacobian[kept], assumed[np.ix_(kept, kept)], law_free)
-    return left
+    left, foretold = np.eye(len(jacobian))[out], np.zeros((len(out), len(jacobian)))
+    covariance = assumed[np.ix_(kept, kept)]
+    estimator = _estimator(jacobian[kept], covariance, law_free)
+    left[:, kept] = -jacobian[out] @ estimator
+    if len(known):
+        by_others = np.linalg.solve(covariance, known[:, kept].T).T
+        foretold[:, kept] = known[:, out].T @ (by_others - by_others @ jacobian[kept] @ estimator)
+    return left - foretold, foretold
+
+
+def _by_scatter_and_geometry(left: FloatArray, out: IntArray, parts: Sequence[FloatArray]) -> FloatArray:
+    """(2,) squares of the errors of left-out stiffnesses, their own readings' scatter set aside."""
+    pulled = left - np.eye(left.shape[1])[out]
+    return np.array([float(((m @ part) * m).sum()) for m, part in ((pulled, parts[0]), (left, parts[1]))])
+
+
+def _unknown(after: FloatArray, before: FloatArray) -> float:
+    """Share of the squares by geometry that its offsets leave, with the scatter that they have taken up."""
+    return float((after.sum() - before[0]) / before[1]) if before[1] > 0.0 else 1.0
 
 
 def _log_likelihoods(error: FloatArray, parts: Sequence[FloatArray], squares: FloatArray) -> FloatArray:

@@ -10,13 +10,13 @@ chapters 27 and 28). An effect of several parameters is tried with each subset o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import FloatArray, TextArray
 from toolpath_stiff.inference.candidates import Candidate, CandidateTable, Component
 from toolpath_stiff.inference.covariances import Precision
 from toolpath_stiff.inference.least_squares import NormalEquations, gauss_newton, scaled_inverse
@@ -24,6 +24,7 @@ from toolpath_stiff.inference.noise import Noise, Scatter, covariance
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.size_priors import Sight, SizePrior, log_comparable
 from toolpath_stiff.stiffness.active import ActiveEffect
+from toolpath_stiff.stiffness.contract import Effect
 
 LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
 
@@ -70,8 +71,6 @@ class Fit:
         Of a search: the candidates' tables.
     log_evidence
         Of a search: how likely it makes the data, integrated over sizes and law under their priors; else nan.
-    interval
-        Of a search: (2,) 95 % interval of the size of a single parameter from its profile; None otherwise.
     possible
         Whether the sizes lie within their bounds; if not, only `log_evidence` means anything.
     """
@@ -88,7 +87,6 @@ class Fit:
     absent: dict[int, tuple[float, float]] = field(default_factory=dict)
     tables: tuple[CandidateTable, ...] = ()
     log_evidence: float = np.nan
-    interval: FloatArray | None = None
     possible: bool = True
 
     @property
@@ -195,6 +193,21 @@ class Problem:
         """
         return self.scatter.precision.beside(jacobian.T, law_prior(jacobian.shape[1]))
 
+    @property
+    def point(self) -> TextArray:
+        """(n,) label of each reading's point: what is left out together."""
+        return self.predictor.data.point
+
+    def residual(self, law: FloatArray, effects: Sequence[ActiveEffect]) -> FloatArray:
+        """(n,) ln measured - ln modelled."""
+        return np.asarray(self.observed - self.predictor.log_stiffness(law, effects))
+
+    def law_columns(self, residual: FloatArray, law: FloatArray, effects: Iterable[Effect]) -> list[FloatArray]:
+        """(n,) d ln k to each of the law's logarithms, where these follow from the struts' forces; else none."""
+        if not (np.isfinite(residual).all() and self.predictor.struts_carry_all(effects)):
+            return []
+        return list(self.predictor.law_columns(self.observed - residual, law).T)
+
     def _prior(self, table: CandidateTable, j: int) -> SizePrior:
         """Prior of a component's size, worked out once."""
         return SizePrior.of(table, j, self.sight)
@@ -267,9 +280,10 @@ class Problem:
             scatter = again
         components = [every[i][0].candidate.components[every[i][1]] for i in free]
         bounded = dict(zip(unknowns[2:], components, strict=True))
-        # A little beyond its bound: tables of two effects describe neither exactly.
-        out = [i for i, component in bounded.items() if len(tables) > 1 and not component.allows(x[i])]
-        beyond = [i for i in out if bounded[i].allows(x[i] / (1.0 + BEYOND))]
+        # Of a parameter by itself; where tables of two effects, which describe neither exactly, bring it little beyond.
+        near = np.inf if len(every) == 1 else 1.0 + BEYOND if len(tables) > 1 else 1.0
+        reach = {i: component.reach(float(np.sign(x[i]))) for i, component in bounded.items()}
+        beyond = [i for i in bounded if 0.0 < reach[i] < abs(x[i]) <= near * reach[i]]
         if beyond:  # put onto their bounds, the others once more beside them
             for i in beyond:
                 x[i] = np.clip(x[i], *bounded[i].bounds)

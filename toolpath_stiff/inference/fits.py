@@ -43,16 +43,13 @@ class _Model:
     def residual(self, x: FloatArray) -> FloatArray:
         """(n,) ln measured - ln modelled."""
         effects = [c.active(sizes) for c, sizes in zip(self.candidates, self.sizes(x), strict=True)]
-        return np.asarray(self.problem.observed - self.problem.predictor.log_stiffness(x[:2], effects))
+        return self.problem.residual(x[:2], effects)
 
     def equations(
         self, x: FloatArray, residual: FloatArray, unknowns: Sequence[int], scatter: Scatter
     ) -> NormalEquations:
         """Of the `unknowns` among x, the law's two always the first of them."""
-        predictor = self.problem.predictor
-        columns: list[FloatArray] = []
-        if np.isfinite(residual).all() and predictor.struts_carry_all(c.effect for c in self.candidates):
-            columns = list(predictor.law_columns(self.problem.observed - residual, x[:2]).T)
+        columns = self.problem.law_columns(residual, x[:2], [candidate.effect for candidate in self.candidates])
         for i in unknowns[len(columns) :]:
             moved, step = x.copy(), LAW_STEP
             if i > 1:
@@ -159,7 +156,7 @@ def fit_effects(
 
 
 # Shares of the largest usual size to start from: at zero itself some effects have no slope to follow, and from far
-# away others (a platform's bars) have only a slope outwards.
+# away others (a platform's bars) have only a slope outwards. What instruments show is all but straight in their sizes.
 STARTS = (0.03, 0.5)
 ROUNDS = 5  # searches for wild readings
 BEHIND = 30.0  # of log posterior: further behind, no reading taken for wild makes up for it
@@ -167,7 +164,7 @@ BEHIND = 30.0  # of log posterior: further behind, no reading taken for wild mak
 
 def base_fit(problem: Problem, law_free: bool) -> Fit:
     """The model without any further effect."""
-    return _settled(problem, fit_effects(problem, (), (), (), np.zeros(2), problem.scatter, law_free))
+    return settled(problem, fit_effects(problem, (), (), (), np.zeros(2), problem.scatter, law_free))
 
 
 def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], law_free: bool) -> Fit:
@@ -186,8 +183,8 @@ def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], l
     """
     tried = [fit for candidate in candidates for fit in _from_starts(problem, before, candidate, law_free)]
     least = max(fit.log_posterior for fit in tried) - BEHIND
-    settled = [_settled(problem, fit) for fit in tried if fit.log_posterior >= least]
-    return _without_zeros(max(settled, key=lambda fit: fit.log_posterior))
+    likely = [settled(problem, fit) for fit in tried if fit.log_posterior >= least]
+    return _without_zeros(max(likely, key=lambda fit: fit.log_posterior))
 
 
 def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: bool) -> Iterator[Fit]:
@@ -195,7 +192,7 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
     together = (*before.candidates, candidate)
     free = tuple(range(sum(len(c.components) for c in together)))
     seen: list[FloatArray] = []
-    for share in STARTS:
+    for share in STARTS[: 1 if candidate.effect.is_instrument else None]:
         start = np.array([_start(component, share) for component in candidate.components])
         fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
         x = np.concatenate([fit.law, *fit.sizes])
@@ -216,7 +213,7 @@ def _start(component: Component, share: float) -> float:
     return sign * min(share * (known if np.isfinite(known) else 1.0), reach)
 
 
-def _settled(problem: Problem, fit: Fit) -> Fit:
+def settled(problem: Problem, fit: Fit) -> Fit:
     """The fit with the readings taken for wild that it finds wild itself, continued where it was still moving."""
     for _ in range(ROUNDS):
         scatter = problem.scatter.with_wild(fit.residual, known=fit.scatter)
@@ -251,7 +248,7 @@ def _without_zeros(fit: Fit) -> Fit:
 def with_given_law(problem: Problem, fit: Fit) -> Fit:
     """The same effects, fitted beside the strut law of the machine file."""
     given = fit_effects(problem, fit.candidates, fit.sizes, fit.free, np.zeros(2), fit.scatter, law_free=False)
-    return _without_zeros(_settled(problem, given))
+    return _without_zeros(settled(problem, given))
 
 
 def baseline(problem: Problem) -> tuple[Fit, Fit]:

@@ -24,7 +24,7 @@ def votes(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, Fl
 
     Readings that either of the two takes for wild scatter widely for both.
     """
-    scatter, points = problem.scatter, Groups.by(problem.predictor.data.point)
+    scatter, points = problem.scatter, Groups.by(problem.point)
     against = {}
     for name, rival in rivals.items():
         rows = np.array(sorted({*fit.scatter.wild, *rival.scatter.wild}), dtype=np.int64)

@@ -7,14 +7,11 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.candidates import CandidateTable, candidates_of, table_of
-from toolpath_stiff.inference.covariances import Precision
-from toolpath_stiff.inference.evidence import MOST_ROUNDS, Fit, Problem, law_prior, law_terms
+from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.gates import Forms, FormStatistics, set_wild_aside
-from toolpath_stiff.inference.size_priors import likely_interval
 from toolpath_stiff.stiffness.contract import Effect
 
 NOTHING = -1e9  # log evidence of what cannot be
-GRID, ZOOMS = 24, 3  # sizes a sign of the scan of a single parameter; refinements about its peak
 
 
 @dataclass(frozen=True)
@@ -67,8 +64,6 @@ def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
 
 def _fits_of_subsets(problem: Problem, table: CandidateTable, base: Fit) -> list[tuple[Fit, float]]:
     """Fits of one candidate with the log prior weight of each subset of components."""
-    if table.knots:
-        return [(score_single(problem, table, base), 0.0)]
     subsets, fits = list(table.candidate.subsets()), []
     start, sizes = base, None
     for free in subsets:
@@ -78,72 +73,6 @@ def _fits_of_subsets(problem: Problem, table: CandidateTable, base: Fit) -> list
             # The next subset begins where this one has ended, with the readings that it takes for wild.
             start, sizes = fit, fit.sizes[0]
     return fits
-
-
-def score_single(problem: Problem, table: CandidateTable, start: Fit) -> Fit:
-    """A candidate of one parameter: its marginal likelihood by a scan over its size, refined about the peak."""
-    grids = [sign * np.geomspace(np.exp(logs[0]), np.exp(logs[-1]), GRID) for sign, (logs, _) in table.knots.items()]
-    first = np.sort(np.concatenate(grids))
-    scatter, law, delta = problem.scatter, start.law, table.delta(first[:, None])
-    for last in range(MOST_ROUNDS, -1, -1):
-        sizes, profile, laws, residuals = _scanned(problem, table, (first, delta), scatter.precision, law)
-        peak = int(np.argmax(profile))
-        residual, law = residuals[peak], laws[peak]
-        again = problem.scatter.with_wild(residual, scatter)
-        if not last or again is scatter:
-            break
-        scatter = again
-    best, log_integral = sizes[[peak]], problem.prior(table, 0).integrate(sizes, profile)
-    compliance = problem.compliance(law, table.delta(best))
-    jacobian = np.concatenate([problem.law_jacobian(law, compliance), -table.slope(best) / compliance[:, None]], axis=1)
-    information = scatter.precision.times(jacobian.T) @ jacobian + law_prior(3)
-    return Fit(
-        (table.candidate,), (best,), (0,), law, residual, jacobian,
-        np.asarray(np.linalg.pinv(information), dtype=float), scatter, tables=(table,),
-        log_evidence=log_integral + scatter.log_price, interval=likely_interval(sizes, profile),
-    )  # fmt: skip
-
-
-def _scanned(
-    problem: Problem, table: CandidateTable, given: tuple[FloatArray, FloatArray], precision: Precision, law: FloatArray
-) -> tuple[FloatArray, ...]:
-    """Rising sizes (g,), their log posterior with the law integrated out, laws (g, 2), residuals (g, n).
-
-    Of the sizes `given` with what they add, and of more about the peak: zooms, then five standard deviations to each
-    side.
-    """
-
-    def scan(sizes: FloatArray, delta: FloatArray, law: FloatArray, steps: int) -> tuple[FloatArray, ...]:
-        laws, residuals, information = problem.fit_law(delta, precision, law, steps)
-        return sizes, -0.5 * precision.squares(residuals) + law_terms(laws, information), laws, residuals
-
-    known = scan(*given, law, 3)
-
-    def with_more(more: FloatArray) -> tuple[FloatArray, ...]:
-        further = scan(more, table.delta(more[:, None]), known[2][np.argmax(known[1])], 2)
-        _, first = np.unique(np.concatenate([known[0], more]), return_index=True)
-        return tuple(np.concatenate(pair)[first] for pair in zip(known, further, strict=True))
-
-    for _ in range(ZOOMS):
-        sizes, peak = known[0], int(np.argmax(known[1]))
-        low, high = sizes[max(peak - 1, 0)], sizes[min(peak + 1, len(sizes) - 1)]
-        low, high = (max(low, 0.0), high) if sizes[peak] > 0.0 else (low, min(high, 0.0))
-        more = np.linspace(low, high, 8)[1:-1]
-        known = with_more(more[(more != 0.0) & (more != sizes[peak])])
-    peak = int(np.argmax(known[1]))
-    size = known[0][peak]
-    more = size + _width(known[0], known[1], peak) * np.linspace(-4.5, 4.5, 14)
-    more = more[(more * size > 0.0) & (np.abs(more) <= table.reach(float(np.sign(size))))]
-    return with_more(more) if len(more) else known
-
-
-def _width(sizes: FloatArray, profile: FloatArray, peak: int) -> float:
-    """Standard deviation of the size from the curvature at the peak."""
-    if not 0 < peak < len(sizes) - 1:
-        return 0.1 * abs(float(sizes[peak]))
-    x, y = sizes[peak - 1 : peak + 2], profile[peak - 1 : peak + 2]
-    curvature = 2.0 * ((y[2] - y[1]) / (x[2] - x[1]) - (y[1] - y[0]) / (x[1] - x[0])) / (x[2] - x[0])
-    return float(1.0 / np.sqrt(max(-curvature, 1e-2 / x[1] ** 2)))
 
 
 def score_families(problem: Problem, effects: Iterable[Effect], base: Fit) -> list[Family]:

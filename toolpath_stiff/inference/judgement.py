@@ -31,6 +31,7 @@ from math import comb
 
 import numpy as np
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.doubts import noise_doubt, question
 from toolpath_stiff.inference.drawn import Drawn, drawn
@@ -41,10 +42,10 @@ from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.inference.nuisances import findings, fitted_nuisances
-from toolpath_stiff.inference.rivals import INSTRUMENT, entries, left_out_of, lowers_error, rivals_of, rivals_of_law
+from toolpath_stiff.inference.nuisances import findings, fitted_nuisances, mean_left_by_nuisances
+from toolpath_stiff.inference.rivals import SERIES, entries, left_out_of, lowers_error, rivals_of, rivals_of_law
 from toolpath_stiff.inference.several import search_pairs, search_triples
-from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
+from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded, rooms
 from toolpath_stiff.inference.votes import Votes, closest, outvoted
 from toolpath_stiff.stiffness.contract import Effect
 
@@ -166,7 +167,7 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     probability, form = weigh(problem, noise, candidates, gates)
     doubtful = question(problem.predictor)
     verdict, explanations = ("unexplained", ()) if doubtful else decide(gates, probability)
-    verdict, explanations, ballots = put_to_vote(problem, candidates, gates, verdict, explanations)
+    verdict, explanations, ballots = put_to_vote(problem, noise, candidates, gates, (verdict, explanations))
     doubt, factor = ("", 1.0) if doubtful else noise_doubt(problem, noise, gates.base, verdict, seed)
     described = None
     if verdict == "identified":
@@ -407,63 +408,90 @@ def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str
 
 
 def put_to_vote(
-    problem: Problem, candidates: Candidates, gates: Gates, verdict: str, explanations: tuple[str, ...]
+    problem: Problem, noise: Noise, candidates: Candidates, gates: Gates, decided: tuple[str, tuple[str, ...]]
 ) -> tuple[str, tuple[str, ...], Votes]:
-    """Verdict and explanations after the votes of the readings, and the votes for the first explanation.
+    """Verdict and explanations (as `decided`) after the votes of the readings, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer. A name that has not outvoted every rival of another part is
-    one of several; the closest of these stand beside it. A model that passes because its nuisances have taken up more
-    than they may is not the only explanation.
+    one of several; the closest of these stand beside it, and what a strut law that had to move may stand for. A model
+    that passes is not the only explanation where its nuisances have taken up more than they may, or where more may be
+    left than an adequate one leaves; what a guessed noise would hide is told instead.
     """
-    base, fits = candidates.base, {family.name: best for family, best in candidates.offered} | gates.fits
+    verdict, explanations = decided
+    base, data, ballots = candidates.base, problem.predictor.data, dict[str, FloatArray]()
+    fits = {NONE: base} | {family.name: best for family, best in candidates.offered} | gates.fits
     if verdict == "adequate":
-        taken = [name for name in TAKEN_UP if name in fits]
-        instead, ballots = _instead_of_law(problem, base)
-        gates.fits |= instead
-        beside = _shortened(problem, fits | instead, (NONE, *taken, *instead))
-        return ("ambiguous", beside, ballots) if taken or instead else (verdict, explanations, {})
-    if verdict not in ("identified", "ambiguous"):
+        likely = explanations if not noise.guess and _may_leave(problem, candidates) > LEFT else ()
+        standing = [NONE, *(name for name in TAKEN_UP if name in fits), *likely]
+    elif verdict in ("identified", "ambiguous"):
+        before = left_out_of(base, data)
+        standing = [n for n in explanations if n == NONE or lowers_error(before, left_out_of(fits[n], data))]
+        top = next((name for name in standing if name != NONE), NONE)
+        if top == NONE and not gates.none_stands:
+            return "unexplained", (), {}
+        if top == NONE:
+            verdict, standing = "ambiguous", [*explanations, NONE]
+        else:
+            rivals = {name: fit for name, fit in fits.items() if name != NONE or gates.none_stands}
+            ballots = votes(problem, fits[top], rivals_of(fits[top], rivals))
+            ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
+            open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
+            others = [name for name in standing if name != top and name not in ballots]
+            others += [name for name in ballots if name in (*standing, *open_rivals)]  # the closest first
+            verdict, standing = "ambiguous" if open_rivals else verdict, [top, *others]
+    else:
         return verdict, explanations, {}
-    data = problem.predictor.data
-    before = left_out_of(base, data)
-    standing = [
-        name for name in explanations if name not in fits or lowers_error(before, left_out_of(fits[name], data))
-    ]
-    top = next((name for name in standing if name in fits), None)
-    if top is None:
-        beside = _shortened(problem, fits, (*explanations, NONE))
-        return ("ambiguous", beside, {}) if gates.none_stands else ("unexplained", (), {})
-    rivals = ({NONE: base} if gates.none_stands else {}) | rivals_of(fits[top], fits)
-    ballots = votes(problem, fits[top], rivals)
-    ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
-    open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
-    others = [name for name in standing if name != top and name not in ballots]
-    others += [name for name in ballots if name in (*standing, *open_rivals)]  # the closest first
-    return ("ambiguous" if open_rivals else verdict), _shortened(problem, fits, (top, *others)), ballots
+    standing = [*dict.fromkeys(standing)]
+    instead, of_law = _instead_of_law(problem, fits, standing)
+    gates.fits |= instead
+    if verdict == "adequate" and len(standing) == 1 and not instead:
+        return verdict, explanations, {}
+    return (
+        "ambiguous" if instead or verdict == "adequate" else verdict,
+        _shortened(problem, fits | instead, (*standing, *instead)),
+        closest(ballots, of_law),
+    )
 
 
 def _shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
     """Explanations without those beyond the `MOST_OPEN` entries that come first; the model alone stays."""
     groups = entries(problem, fits, tuple(dict.fromkeys(names)))
     kept = groups[:MOST_OPEN]
-    if (NONE,) in groups[MOST_OPEN:]:
-        kept[-1] = (NONE,)
+    for group in groups[MOST_OPEN:]:
+        if NONE in group:
+            kept[-1] = group
     return tuple(name for group in kept for name in group)
 
 
-def _instead_of_law(problem: Problem, base: Fit) -> tuple[dict[str, Fit], Votes]:
-    """Effects beside the file's strut law that explain as well as a law that had to move, the closest first; the votes.
+def _may_leave(problem: Problem, candidates: Candidates) -> float:
+    """Mean error (relative) at the readings' poses up to which a model that passes may still be off.
+
+    What an effect may hide there beside the refitted law (95 %), of all the one that hides most, and what struts,
+    joints and links that are not quite those of the model leave on average.
+    """
+    families = [family for family in candidates.families if family.name not in candidates.within]
+    hidden = max((room.left for room, _ in rooms(problem, families, candidates.base)), default=0.0)
+    return hidden + mean_left_by_nuisances(candidates.base, problem.predictor.data.tip)
+
+
+def _instead_of_law(problem: Problem, fits: Mapping[str, Fit], standing: Sequence[str]) -> tuple[dict[str, Fit], Votes]:
+    """Explanations beside the file's strut law that hold as well as these with a law that had to move; their votes.
 
     None where the law has moved the stiffness by less than an adequate model may leave along a path, beyond chance.
     """
-    columns, given = base.jacobian[problem.predictor.data.tip], with_given_law(problem, base)
-    spread = np.sqrt(np.einsum("ni,ij,nj->n", columns, base.covariance, columns))
-    moved = float(np.mean(np.abs(columns @ base.law) + ONE_SIDED * spread)) > LEFT
-    if not moved or not outvoted(votes(problem, base, {NONE: given})[NONE]):
-        return {}, {}
-    rivals = rivals_of_law(problem, given, (INSTRUMENT, "joints"))
-    ballots = votes(problem, base, rivals)
-    return {name: rivals[name] for name in ballots if not outvoted(ballots[name])}, ballots
+    instead, ballots = dict[str, Fit](), dict[str, FloatArray]()
+    leaders = [first for first, *_ in entries(problem, fits, standing)[:MOST_OPEN]]
+    for fit in (fits[name] for name in leaders if name in fits):
+        columns = fit.jacobian[problem.predictor.data.tip, :2]
+        spread = np.sqrt(np.einsum("ni,ij,nj->n", columns, fit.covariance[:2, :2], columns))
+        if float(np.mean(np.abs(columns @ fit.law) + ONE_SIDED * spread)) <= LEFT:
+            continue
+        given = with_given_law(problem, fit)
+        if outvoted(votes(problem, fit, {NONE: given})[NONE]):
+            rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (SERIES,)).values()}
+            ballots |= votes(problem, fit, rivals)
+            instead |= {rival: rivals[rival] for rival in rivals if not outvoted(ballots[rival])}
+    return instead, ballots
 
 
 def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from toolpath_stiff.arrays import BoolArray
+from toolpath_stiff.defaults import MEAN_OVER_SD
 from toolpath_stiff.documents import Document, json_number
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.noise import Noise
@@ -51,6 +53,18 @@ def fitted_nuisances(fit: Fit, noise: Noise) -> list[Document]:
             }
         )
     return sorted(entries, key=lambda entry: -entry["sigma"])
+
+
+def mean_left_by_nuisances(fit: Fit, rows: BoolArray) -> float:
+    """Mean error (relative) that struts, joints and links which are not quite the model's leave at some readings.
+
+    As they are known from the readings: fitted ones, and what stays open of each.
+    """
+    shared = fit.scatter.covariance.shared
+    weighted = fit.projected.times(shared)
+    open_of_each = np.eye(len(shared)) - weighted @ shared.T
+    squares = (weighted @ fit.residual @ shared) ** 2 + np.einsum("qn,qr,rn->n", shared, open_of_each, shared)
+    return float(MEAN_OVER_SD * np.sqrt(squares[rows]).mean())
 
 
 def findings(entries: Sequence[Document]) -> list[Document]:

@@ -37,11 +37,6 @@ def scaled_law(law: StrutLaw, logs: ArrayLike) -> StrutLaw:
     return replace(law, stiffness_1=law.stiffness_1 * first, stiffness_2=law.stiffness_2 * second)
 
 
-def at_both_ends(law: StrutLaw, values: FloatArray) -> FloatArray:
-    """Values (..., 2) of a law's two logarithms at its two lengths: a constant law's first one at both."""
-    return values[..., [0, 0]] if law.constant else values
-
-
 @dataclass(frozen=True)
 class _Prepared:
     """Rows without those that are mechanically the same, what effects see of them, the strut forces per unit load.
@@ -82,6 +77,7 @@ class Predictor:
     """
 
     def __init__(self, machine: Hexapod, data: Readings, effect_files: Sequence[str | Path] = ()) -> None:
+        self.stated: MachineTool = machine
         self.machine = machine
         self.effect_files = tuple(effect_files)
         self.base = build_model(machine, self.effect_files)

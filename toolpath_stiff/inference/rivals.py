@@ -13,6 +13,7 @@ from toolpath_stiff.stiffness.contract import SETUP, Effect
 INSTRUMENT = "instrument"
 # Effects that carry the tip's whole force to the floor as one body on springs (`contract.body_on_springs`).
 ONE_BODY = ("table_compliance", "frame_sway")
+SERIES = "joint_compliance"  # what a strut law that is off may be, in series with every strut
 UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
 
 
@@ -36,12 +37,13 @@ def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
     return {name: o for name, o in others.items() if parts_of(o) != own or {*o.names} < names}
 
 
-def rivals_of_law(problem: Problem, given: Fit, links: Sequence[str] = (INSTRUMENT,)) -> dict[str, Fit]:
-    """Effects of some links by name, each beside a fit with the file's strut law: what a refitted law may stand for.
+def rivals_of_law(problem: Problem, given: Fit, machine: Sequence[str] = ()) -> dict[str, Fit]:
+    """The instrument's effects, and some of the `machine`, each beside a fit with the file's strut law, by name.
 
-    Under one load a law that is softer by a share is at the tip the same as a load cell that reads too little by it.
+    What a refitted law may stand for: under one load a law that is softer by a share is at the tip the same as a load
+    cell that reads too little by it.
     """
-    effects = [effect for effect in testable_effects(problem.predictor)[0] if effect.link in links]
+    effects = [e for e in testable_effects(problem.predictor)[0] if e.link == INSTRUMENT or e.name in machine]
     wanted = {e.name: candidates_of(e, problem.predictor.data) for e in effects if e.name not in given.names}
     return {name: add_effect(problem, given, candidates, law_free=False) for name, candidates in wanted.items()}
 
@@ -57,7 +59,7 @@ def entries(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> 
     """Explanations that sit at the same places and that votes on these readings could not tell apart, together.
 
     In the order of `names`; one that is in no `fits` stands alone. The votes between two that differ by d in whitened
-    residuals come to d^2 / 2 where one of them is true.
+    residuals come to d^2 / 2 where one of them is true. A refitted law sits where `SERIES` does beside the file's.
     """
     groups: list[tuple[str, ...]] = []
     for name in names:
@@ -71,9 +73,11 @@ def entries(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> 
 
 
 def _alike(problem: Problem, fit: Fit, other: Fit) -> bool:
-    mine, others = (sorted(place_of(candidate.effect) for candidate in f.candidates) for f in (fit, other))
+    def places(fit: Fit) -> list[str]:
+        return sorted(place_of(c.effect) for c in fit.candidates if fit.law_free or c.name != SERIES)
+
     apart = float(problem.scatter.precision.squares(fit.residual - other.residual))
-    return mine == others and 0.5 * apart <= SMALL
+    return places(fit) == places(other) and 0.5 * apart <= SMALL
 
 
 def left_out_of(fit: Fit, data: Readings) -> HeldOut:

@@ -111,10 +111,6 @@ class SizePrior:
             out[where] = np.interp(log_size, logs, self.log_density[sign], left=-1e9, right=-1e9) - log_size
         return out
 
-    def integrate(self, sizes: FloatArray, log_likelihood: FloatArray) -> float:
-        """Log of the integral of likelihood times prior over rising sizes (g,) of both signs."""
-        return _log_integral(sizes, log_likelihood + self.log_at(sizes))[0]
-
     def log_mean_likelihood(self, peak: float, sd: float) -> float:
         """Ln of the prior mean of exp(-(size - peak)^2 / (2 sd^2)), which is 1 at its peak, wherever that lies."""
         total = 0.0
@@ -132,31 +128,8 @@ class SizePrior:
         return float(max(self.log_at(np.array([np.sign(size) * max(abs(size), sd)]))[0], -60.0))
 
 
-def likely_interval(sizes: FloatArray, log_likelihood: FloatArray) -> FloatArray:
-    """(2,) 95 % interval of a size from its likelihood alone at rising sizes (g,) of both signs.
-
-    Quantiles, which would always leave out a truth at the bound: where the likelihood there is not small, by the 95 %
-    of a likelihood ratio, the interval reaches to the bound and is one-sided.
-    """
-    _, cumulative = _log_integral(sizes, log_likelihood)
-    to_low, to_high = (log_likelihood[end] - log_likelihood.max() > -0.5 * LIKELY for end in (0, -1))
-    tail = 0.025 if to_low == to_high else 0.05
-    low, high = np.interp([tail, 1.0 - tail], cumulative, sizes)
-    return np.array([sizes[0] if to_low else low, sizes[-1] if to_high else high])
-
-
 def _trapezoid(values: FloatArray, x: FloatArray) -> float:
     return float((0.5 * (values[1:] + values[:-1]) * np.diff(x)).sum())
-
-
-def _log_integral(sizes: FloatArray, logs: FloatArray) -> tuple[float, FloatArray]:
-    """Log of the integral of exp(logs), the gap about 0 left out; its share up to each size (g,)."""
-    top = float(logs.max())
-    weights = np.exp(logs - top)
-    pieces = 0.5 * (weights[1:] + weights[:-1]) * np.diff(sizes)
-    pieces[(sizes[1:] > 0.0) & (sizes[:-1] < 0.0)] = 0.0
-    total = max(float(pieces.sum()), 1e-300)
-    return top + float(np.log(total)), np.concatenate([[0.0], np.cumsum(pieces)]) / total
 
 
 def _sizes(table: CandidateTable, j: int, sign: float, sight: Sight) -> FloatArray:

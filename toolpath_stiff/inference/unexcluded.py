@@ -31,6 +31,8 @@ class Unexcluded:
         SI value of the parameter up to which the readings do not exclude it (95 %), its other parameters neutral.
     rms
         Rms change of the tip's ln stiffness that it makes there, on its own.
+    left
+        Mean change of the tip's ln stiffness that stays once strut law and explanation have moved, of all choices.
     probability
         Of being there beside the explanation, at any size.
     """
@@ -40,6 +42,7 @@ class Unexcluded:
     parameter: Parameter
     value: float
     rms: float
+    left: float
     probability: float = np.nan
 
 
@@ -55,18 +58,22 @@ def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_o
     prior_odds
         Of one certain further effect being there to none being there.
     """
-    beside = _Beside(problem, fit)
-    odds: dict[str, float] = {}
-    widest: list[Unexcluded] = []
-    for family in families:
-        if family.name not in fit.names:
-            seen = ((table, np.flatnonzero(table.columns.any(axis=0)).tolist()) for table in family.tables)
-            rooms = [beside.room(table, j) for table, components in seen for j in components]
-            odds[family.name] = prior_odds * float(np.mean([mean for _, mean in rooms]))
-            widest.append(max((room for room, _ in rooms), key=lambda room: room.rms))
-    whole = 1.0 + sum(odds.values())
-    hidden = [replace(room, probability=odds[room.effect.name] / whole) for room in widest if room.rms >= MATTERS]
+    widest = rooms(problem, [family for family in families if family.name not in fit.names], fit)
+    whole = 1.0 + prior_odds * sum(mean for _, mean in widest)
+    hidden = [replace(room, probability=prior_odds * mean / whole) for room, mean in widest if room.rms >= MATTERS]
     return sorted(hidden, key=lambda room: (-room.probability, room.effect.name))
+
+
+def rooms(problem: Problem, families: Sequence[Family], fit: Fit) -> list[tuple[Unexcluded, float]]:
+    """How far each effect may go beside an explanation, and the mean of its likelihood over sizes and choices."""
+    beside = _Beside(problem, fit)
+    widest = []
+    for family in families:
+        seen = ((table, np.flatnonzero(table.columns.any(axis=0)).tolist()) for table in family.tables)
+        each, means = zip(*(beside.room(table, j) for table, components in seen for j in components), strict=True)
+        room = replace(max(each, key=lambda room: room.rms), left=max(room.left for room in each))
+        widest.append((room, float(np.mean(means))))
+    return widest
 
 
 class _Beside:
@@ -91,21 +98,21 @@ class _Beside:
         And the mean of the likelihood over the prior of the size, 1 where the readings say nothing.
         """
         component, candidate, sides = table.candidate.components[j], table.candidate, []
-        none, gain, mass = float(self._squares(self.fit.residual[None])[0]), 0.0, 0.0
+        none, gain, mass = float(self._fitted(self.fit.residual[None])[0][0]), 0.0, 0.0
         whole = self.problem.base_compliance if candidate.effect.is_instrument else self.compliance
         for sizes in self._sizes(table, j):
             every = sizes[:, None] * np.eye(len(candidate.components))[j]
             change = np.log1p(np.maximum(table.delta(every) / whole, -0.9))
-            squares = self._squares(self.fit.residual + change)
+            squares, left = self._fitted(self.fit.residual + change)
             changes = np.sqrt(np.mean(change[:, self.tip] ** 2, axis=1))
-            sides.append((sizes, changes, squares))
+            sides.append((sizes, changes, left, squares))
             # Of the prior, as far as sizes are expected; whether the readings would show them does not matter here.
             weights = np.exp(log_expected(changes) + log_usual(sizes, component.typical()))
             weights *= np.abs(np.gradient(np.log(np.abs(sizes))))
             gain, mass = gain + float(weights @ np.exp(0.5 * (none - squares))), mass + float(weights.sum())
         most = min(none, *(float(squares.min()) for *_, squares in sides)) + LIKELY
-        size, rms = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
-        room = Unexcluded(candidate.effect, candidate, component.parameter, component.value(size), rms)
+        size, rms, left = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
+        room = Unexcluded(candidate.effect, candidate, component.parameter, component.value(size), rms, left)
         return room, gain / mass
 
     def _sizes(self, table: CandidateTable, j: int) -> Iterator[FloatArray]:
@@ -120,24 +127,29 @@ class _Beside:
                 logs = table.knots[sign][0]
                 yield sign * np.exp(np.linspace(logs[0], logs[-1], SIZES))
 
-    def _squares(self, residuals: FloatArray) -> FloatArray:
-        """(g,) squares that are left of residuals (g, n) once law and sizes have moved to fit them best."""
+    def _fitted(self, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(g,) squares that are left of residuals (g, n) once law and sizes have moved to fit them best.
+
+        And the mean change (g,) at the tip that stays then, beside the explanation as it is.
+        """
         gradient = residuals @ self.weighted.T + self.pull
         moves = np.linalg.solve(self.information, gradient.T).T
         for k in np.flatnonzero(((moves < self.low) | (moves > self.high)).any(axis=1)).tolist():
             moves[k] = bounded_step(self.information, gradient[k], self.low, self.high)
         squares = self.precision.squares(residuals) - 2.0 * (gradient * moves).sum(axis=1)
-        return np.asarray(squares + ((moves @ self.information) * moves).sum(axis=1))
+        left = np.abs(residuals - self.fit.residual - moves @ self.fit.jacobian.T)[:, self.tip].mean(axis=1)
+        return squares + ((moves @ self.information) * moves).sum(axis=1), left
 
 
-def _widest(side: tuple[FloatArray, ...], none: float, most: float) -> tuple[float, float]:
-    """Size and rms at the largest size whose squares are at most `most`; between two by a line.
+def _widest(side: tuple[FloatArray, ...], none: float, most: float) -> tuple[float, float, float]:
+    """Size, rms and mean change left at the largest size whose squares are at most `most`; between two by a line.
 
     `side`: the same and the squares of sizes (g,) of one sign; `none`: the squares at size 0.
     """
-    sizes, rms, squares = np.concatenate([[[0.0], [0.0], [none]], np.array(side)], axis=1)
+    figures = np.concatenate([[[0.0], [0.0], [0.0], [none]], np.array(side)], axis=1)
+    squares = figures[-1]
     last = int(np.flatnonzero(squares <= most).max(initial=0))
     after = min(last + 1, len(squares) - 1)
     share = float(np.clip((most - squares[last]) / (squares[after] - squares[last]), 0.0, 1.0)) if after > last else 0.0
-    size, value = (float(x[last] + share * (x[after] - x[last])) for x in (sizes, rms))
-    return size, value
+    size, rms, left = (figures[:-1, last] + share * (figures[:-1, after] - figures[:-1, last])).tolist()
+    return size, rms, left

@@ -31,6 +31,11 @@ class Body:
     place: FixedFrame
     compliance: FloatArray
 
+    @property
+    def carrier(self) -> int:
+        """Number of the first frame that it carries."""
+        return self.frame
+
     def spring(self, frames: Sequence[Frame]) -> Spring:
         """It at n poses, given by the frames of its side."""
         frame = frames[self.frame]
@@ -51,6 +56,11 @@ class SpanningBeam:
     end: FloatArray
     near_z: FloatArray
     stiffness: Sequence[float]
+
+    @property
+    def carrier(self) -> int:
+        """Number of the first frame that it carries."""
+        return max(self.frames)
 
     def spring(self, frames: Sequence[Frame]) -> Spring:
         """It at n poses, at its middle."""

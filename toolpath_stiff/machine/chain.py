@@ -84,6 +84,8 @@ class ChainJoint:
         m or rad; inf: no limit.
     given
         The axes that its description gave the frame, in the frame.
+    speed
+        m/s or rad/s that it reaches; inf: nobody says.
     """
 
     name: str
@@ -92,6 +94,7 @@ class ChainJoint:
     low: float = -np.inf
     high: float = np.inf
     given: FixedFrame = STILL
+    speed: float = np.inf
 
 
 def modified_dh(alpha: float, a: float, offset: float, d: float) -> FixedFrame:

@@ -23,6 +23,8 @@ from toolpath_stiff.machine.parallel_file import (
     PER_ROD,
     SHARED,
     TOP,
+    axial,
+    give_of,
     shared_fields,
     span,
 )
@@ -80,21 +82,16 @@ class Delta(Parallel):
         refuse_words(self.name, abc, "")
         return rotation_matrices(abc)
 
-    def _joints(self, radius: float) -> FloatArray:
-        """(6, 3) m, joints of the rods on a circle, both of a tower together."""
-        return _rod_joints(radius, self.spacing)
-
     def legs_at(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> Legs:
         """The six rods; nan where a carriage is too far away, or the tool is turned."""
         up = np.array([0.0, 0.0, 1.0])
-        arms = self._joints(self.effector_radius) + (self.joint_height + extension)[:, None, None] * up
+        arms = _rod_joints(self.effector_radius, self.spacing) + (self.joint_height + extension)[:, None, None] * up
         towers = (self.carriage_radius - self.effector_radius) * OUTWARDS[:, :2]
         apart = ((towers - tip[:, None, :2]) ** 2).sum(axis=-1)
         level = np.abs(axes - np.eye(3)).max(axis=(1, 2)) < 1e-9
         carriages = tip[:, 2:] + arms[:, :1, 2] + np.sqrt(np.where(level[:, None], self.rod_length**2 - apart, np.nan))
-        rods = (
-            self._joints(self.carriage_radius) + np.repeat(carriages, 2, axis=1)[..., None] * up - tip[:, None] - arms
-        )
+        feet = _rod_joints(self.carriage_radius, self.spacing) + np.repeat(carriages, 2, axis=1)[..., None] * up
+        rods = feet - tip[:, None] - arms
         return Legs(carriages, rods / self.rod_length, arms, np.full((len(tip), 6), self.rod_compliance))
 
     def forward(self, joints: ArrayLike, tool_length: ArrayLike = np.nan) -> tuple[FloatArray, FloatArray]:
@@ -119,11 +116,13 @@ class Delta(Parallel):
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
         """(n, 6, 3) m each: the rods' joints on the carriages and on the effector."""
         up = np.array([0.0, 0.0, 1.0])
-        begin = self._joints(self.carriage_radius) + np.repeat(stance.joints, 2, axis=1)[..., None] * up
-        return begin, stance.position[:, None] + self._joints(self.effector_radius) + self.joint_height * up
+        begin = _rod_joints(self.carriage_radius, self.spacing) + np.repeat(stance.joints, 2, axis=1)[..., None] * up
+        end = _rod_joints(self.effector_radius, self.spacing) + self.joint_height * up
+        return begin, stance.position[:, None] + end
 
 
 def _rod_joints(radius: float, spacing: float) -> FloatArray:
+    """(6, 3) m, joints of the rods on a circle, both of a tower together."""
     sides = 0.5 * spacing * np.array([-1.0, 1.0])
     return np.concatenate([radius * OUTWARDS[i] + sides[:, None] * SIDEWAYS[i] for i in range(3)])
 
@@ -140,7 +139,7 @@ def read(toml: MachineToml) -> Delta:
         mistake, least = f" = {top['rod_length_mm']:g}: the rods do not reach the effector", abs(radius - effector)
         raise toml.fault("", "rod_length_mm", mistake, expected=f"more than {1e3 * least:g} mm")
     centre, height = m_from_mm(carriage["rail_radius_mm"]), m_from_mm(carriage["centre_height_mm"])
-    compliance = m_from_nm(np.concatenate([carriage["translation_nm_per_N"], carriage["rotation_nrad_per_Nm"]]))
+    compliance = give_of(carriage)
     carriages = []
     for i in range(3):
         place = centre * OUTWARDS[i] + np.array([0.0, 0.0, height])
@@ -151,7 +150,7 @@ def read(toml: MachineToml) -> Delta:
     return Delta(
         **shared_fields(toml, values),
         joint_range=span(toml, "limits", ("carriage_mm", "carriage_mm"), *values["limits"]["carriage_mm"]),
-        legs=tuple(Element(f"rod {i + 1}", "struts", ("axial",)) for i in range(6)),
+        legs=axial("rod", 6),
         carriages=tuple(carriages),
         carriage_radius=radius,
         effector_radius=effector,

@@ -39,6 +39,11 @@ class Element:
     directions: tuple[str, ...] = SIX
 
 
+def turns(element: Element) -> bool:
+    """Whether it is a joint that turns: its last load is the moment about its axis."""
+    return element.link == "joints" and element.directions == SIX
+
+
 @dataclass(frozen=True)
 class Spring:
     """A body that gives way at a place, at n poses; what does not change with the pose has no leading axis.

@@ -95,16 +95,11 @@ def parse_machine(text: str, file: str = "machine.toml") -> MachineTool:
     machine = KINDS[kind](toml)
     if isinstance(machine, Hexapod):
         return machine
-    if "setup" in toml.data:
-        return machine.with_changes(text=text, limits=replace(machine.limits, neutral_pose=machine.default_origin))
-    middle = upright_middle(machine)
-    return machine.with_changes(
-        text=text,
-        default_origin=middle,
-        limits=replace(machine.limits, neutral_pose=middle),
-        origins={**machine.origins, "setup": "assumed"},
-        remarks={
-            **machine.remarks,
-            "setup": "not in the file; program zero is put far from all limits, tool upright",
-        },
-    )
+    if "setup" not in toml.data:
+        remark = "not in the file; program zero is put far from all limits, tool upright"
+        machine = machine.with_changes(
+            default_origin=upright_middle(machine),
+            origins={**machine.origins, "setup": "assumed"},
+            remarks={**machine.remarks, "setup": remark},
+        )
+    return machine.with_changes(text=text, limits=replace(machine.limits, neutral_pose=machine.default_origin))

@@ -17,7 +17,18 @@ from toolpath_stiff.machine.elements import Element, Stance, beam_axes
 from toolpath_stiff.machine.kinematics import forward_kinematics
 from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.machine.parallel import Carriage, Legs, Parallel
-from toolpath_stiff.machine.parallel_file import GIVE, LENGTH, OPTIONAL, PER_ROD, SHARED, TOP, shared_fields, span
+from toolpath_stiff.machine.parallel_file import (
+    GIVE,
+    LENGTH,
+    OPTIONAL,
+    PER_ROD,
+    SHARED,
+    TOP,
+    axial,
+    give_of,
+    shared_fields,
+    span,
+)
 from toolpath_stiff.machine.schema import Key, MachineToml, read_sections
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import m_from_mm, m_from_nm
@@ -112,7 +123,7 @@ def read(toml: MachineToml) -> Hexaglide:
     if not (np.abs(feet["sides"]) == 1.0).all():
         raise toml.fault("feet", "sides", f" = {feet['sides'].tolist()}", expected="6 numbers, 1 or -1")
     rails = feet["rails"] / sizes[:, None]
-    compliance = m_from_nm(np.concatenate([feet["translation_nm_per_N"], feet["rotation_nrad_per_Nm"]]))
+    compliance = give_of(feet)
     carriages = []
     for i, rail in enumerate(rails):
         # x along the rail (the drive), z nearest to the machine's Z; of an upright rail to its X.
@@ -121,7 +132,7 @@ def read(toml: MachineToml) -> Hexaglide:
     return Hexaglide(
         **shared_fields(toml, values),
         joint_range=span(toml, "feet", ("min_mm", "max_mm"), feet["min_mm"], feet["max_mm"]),
-        legs=tuple(Element(f"strut {i + 1}", "struts", ("axial",)) for i in range(6)),
+        legs=axial("strut", 6),
         carriages=tuple(carriages),
         feet=m_from_mm(feet["mm"]),
         rails=rails,

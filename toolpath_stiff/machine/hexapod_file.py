@@ -31,6 +31,7 @@ def read(toml: MachineToml) -> Hexapod:
         reference_tool_length=m_from_mm(values["reference_tool"]["length_mm"]),
         strut_law=law,
         platform_bar_stiffness=values.get("platform", {}).get("bar_stiffness_N_per_m", np.inf),
+        as_built=_as_built(values["as_built"]) if "as_built" in values else None,
         limits=_limits(toml, values),
         **common_fields(toml, values, law.parameters),
     )
@@ -72,6 +73,12 @@ def _joints(toml: MachineToml, section: str, values: Document) -> FloatArray:
         radius, angle = cylindrical[:, 0], rad_from_deg(cylindrical[:, 1])
         cartesian = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), cylindrical[:, 2]])
     return m_from_mm(np.asarray(cartesian))
+
+
+def _as_built(values: Document) -> FloatArray:
+    """(42,) ln and m."""
+    joints = np.concatenate([values["frame_joints_mm"], values["platform_joints_mm"]])
+    return np.concatenate([np.log1p(0.01 * values["struts_percent"]), m_from_mm(joints).ravel()])
 
 
 def _strut_law(toml: MachineToml, values: Document, travel: Document) -> StrutLaw:

@@ -13,7 +13,8 @@ def wound(values: FloatArray, limits: FloatArray, linear: Sequence[bool], start:
     """Values (j, n) with whole turns added to rotary joints, so that they lie within limits (j, 2) where they can.
 
     Without a start each is as near to the middle of its limits as it can be. With a start (j,) the poses are a path:
-    a joint goes on from pose to pose by less than half a turn, and the whole path lies within the limits if it can.
+    a joint goes on from pose to pose by less than half a turn, and the whole path lies within the limits if it can;
+    else it turns back where it must.
     """
     wound = values.copy()
     for i, (low, high) in enumerate(limits):
@@ -28,8 +29,20 @@ def wound(values: FloatArray, limits: FloatArray, linear: Sequence[bool], start:
             path = np.concatenate([start[i : i + 1], values[i, finite]])
             path = path[1:] - TURN * np.cumsum(np.round(np.diff(path) / TURN))
             fewest, most = np.ceil((low - path.min()) / TURN), np.floor((high - path.max()) / TURN)
-            wound[i, finite] = path + TURN * (np.clip(0.0, fewest, most) if fewest <= most else 0.0)
+            turns = np.clip(0.0, fewest, most) if fewest <= most else _turns_back(path, low, high)
+            wound[i, finite] = path + TURN * turns
     return wound
+
+
+def _turns_back(path: FloatArray, low: float, high: float) -> FloatArray:
+    """(n,) whole turns that keep a path (n,) within limits where they can: others from where the ones before fail."""
+    least, most = np.ceil((low - path) / TURN), np.floor((high - path) / TURN)
+    turns, start, kept = np.zeros(len(path)), 0, 0.0
+    while (beyond := (least <= most) & ((kept < least) | (kept > most)))[start:].any():
+        start += int(beyond[start:].argmax())
+        kept = float(np.clip(np.round((0.5 * (low + high) - path[start]) / TURN), least[start], most[start]))
+        turns[start:] = kept
+    return turns
 
 
 def joint_margin(values: FloatArray, limits: FloatArray) -> FloatArray:

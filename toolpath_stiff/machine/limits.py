@@ -183,26 +183,29 @@ def reach(
     if not limits:
         nothing = np.full(len(tip), np.inf)
         return Reach(nothing, np.zeros(len(tip), dtype=np.int64), nothing, ())
-    values = _values(machine, tip, struts, rotation)[:, finite]
-    bound, span = (np.array([getattr(limit, name) for limit in limits]) for name in ("bound", "span"))
-    sign = np.array([1.0 if limit.lower else -1.0 for limit in limits])
-    margins = sign * (values - bound) / span
-    if not isinstance(machine, Hexapod):
-        margins[np.isnan(margins)] = np.inf  # no joint values: their own limit says so
-    worst = np.argmin(margins, axis=1)
-    rows = np.arange(len(tip))
-    return Reach(margins[rows, worst], worst, values[rows, worst], limits)
+    bounded = _bounded(machine, tip, struts, rotation)
+    margin, which, value = np.full(len(tip), np.inf), np.zeros(len(tip), dtype=np.int64), bounded[finite[0]].copy()
+    margin[np.isnan(tip).any(axis=1)] = np.nan
+    for number, (limit, column) in enumerate(zip(limits, finite, strict=True)):
+        apart = limit.margin(bounded[column])
+        nearer = apart < margin
+        np.copyto(margin, apart, where=nearer)
+        np.copyto(value, bounded[column], where=nearer)
+        which[nearer] = number
+    return Reach(margin, which, value, limits)
 
 
-def _values(machine: MachineTool, tip: FloatArray, stance: Struts | Stance, rotation: ArrayLike | None) -> FloatArray:
-    """(n, l) what the machine's limits bound, those that are infinite too."""
-    joints, tips = np.repeat(stance.joints, 2, axis=1), np.repeat(tip, 2, axis=1)
+def _bounded(
+    machine: MachineTool, tip: FloatArray, stance: Struts | Stance, rotation: ArrayLike | None
+) -> list[FloatArray]:
+    """(n,) values of each of the machine's limits, those that are infinite too."""
+    joints, tips = ([column for column in values.T for _ in range(2)] for values in (stance.joints, tip))
     if isinstance(stance, Struts):
         hexapod = as_hexapod(machine, "a pose of struts")
-        index = singularity_index(hexapod, stance)[:, None]
-        return np.concatenate([joints, *joint_angles(hexapod, stance, rotation), tips, index], axis=1)
-    beyond = np.where(np.isnan(stance.joints).any(axis=1), -np.inf, np.inf)
-    return np.concatenate([joints, tips, machine.singularities(stance), beyond[:, None]], axis=1)
+        angles = [column for values in joint_angles(hexapod, stance, rotation) for column in values.T]
+        return [*joints, *angles, *tips, singularity_index(hexapod, stance)]
+    beyond = np.where(np.isnan(stance.joints).any(axis=1), -np.inf, np.inf)  # nan is nearer to no other limit
+    return [*joints, *tips, *machine.singularities(stance).T, beyond]
 
 
 def solved(

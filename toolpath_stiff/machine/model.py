@@ -8,7 +8,7 @@ shows, so that the one is known better once the other is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -298,6 +298,11 @@ class MachineTool:
         return np.tile([-np.inf, np.inf], (len(self.joint_names), 1))
 
     @property
+    def joint_speeds(self) -> FloatArray:
+        """(j,) m/s or rad/s that the joints reach; inf: nobody says."""
+        return np.full(len(self.joint_names), np.inf)
+
+    @property
     def configurations(self) -> tuple[str, ...]:
         """Names of the ways to hold the same pose, one where there is no choice."""
         return ("",)
@@ -353,9 +358,23 @@ class MachineTool:
         """
         raise NotImplementedError
 
+    def stances(
+        self, position: FloatArray, rotation: FloatArray | None = None, tool_length: ArrayLike = np.nan
+    ) -> Iterable[Stance]:
+        """Of each configuration in turn how the machine stands; what elements carry may be left out."""
+        return (self.solve(position, rotation, tool_length, i) for i in range(len(self.configurations)))
+
     def forward(self, joints: FloatArray, tool_length: ArrayLike = np.nan) -> tuple[FloatArray, FloatArray]:
         """(n, 3) m, the tip, and (n, 3, 3), the tool's axes, in work axes, of joints (n, j) m or rad."""
         raise NotImplementedError
+
+    def weight_loads(self, stance: Stance) -> FloatArray:
+        """(n, r) N and N m, all loads of the elements, one after the other, under the machine's own weight."""
+        return np.zeros((len(stance), sum(load.compliance.shape[-1] for load in stance.loads)))
+
+    def standing(self, joints: FloatArray) -> Stance:
+        """How the machine stands at joint values (n, j) m or rad, with the reference tool."""
+        return self.solve(*self.forward(joints))
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
         """Bodies of a drawing by name, (n, p, 3) m in base axes."""
@@ -380,6 +399,9 @@ class Hexapod(MachineTool):
         Stiffness of a strut over its length.
     platform_bar_stiffness
         N/m of each bar of the platform truss; inf: rigid.
+    as_built
+        (42,) by how much it is off all this, unknown to the control: ln of each strut's stiffness over the law's, then
+        m of the frame joints' coordinates and of the platform joints'; None: not at all.
     """
 
     kind: ClassVar[str] = "hexapod"
@@ -389,6 +411,7 @@ class Hexapod(MachineTool):
     platform_joints: FloatArray
     strut_law: StrutLaw
     platform_bar_stiffness: float = np.inf
+    as_built: FloatArray | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:

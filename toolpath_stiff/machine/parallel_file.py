@@ -1,23 +1,24 @@
 """What files of machines with six legs share: limits, tool, bodies at base and tip."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.common_sections import common_fields, pose_of
+from toolpath_stiff.machine.elements import Element
 from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections
 from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
-from toolpath_stiff.units import m_from_mm
+from toolpath_stiff.units import m_from_mm, m_from_nm
 
 STILL: tuple[tuple[()], tuple[()]] = ((), ())  # no joints on either side: base and tip alone
 LENGTH = Key(unit="mm", low=0.0, open_low=True)
 HEIGHT, PER_ROD = Key(unit="mm"), Key(unit="nm/N", low=0.0, high=1e7)
 CORNER = Key(unit="mm", shape=(3,), required=False)
-GIVE = {
-    "translation_nm_per_N": Key(unit="nm/N", shape=(3,), low=0.0, high=1e7),
-    "rotation_nrad_per_Nm": Key(unit="nrad/(N m)", shape=(3,), low=0.0, high=1e9),
-}
+GIVE = {key: replace(ELEMENT[key], required=True) for key in ("translation_nm_per_N", "rotation_nrad_per_Nm")}
 SHARED = {
     "reference_tool": {"length_mm": Key(unit="mm", low=0.0, high=2000.0)},
     "workspace": {"min_mm": CORNER, "max_mm": CORNER},
@@ -48,6 +49,16 @@ def shared_fields(toml: MachineToml, values: Sections) -> dict[str, Any]:
         "bodies": read_bodies(toml, STILL)[0],
         "least_index": singularity.get("min_index", 0.0),
     }
+
+
+def axial(name: str, count: int) -> tuple[Element, ...]:
+    """Struts or rods of this name, from 1 on."""
+    return tuple(Element(f"{name} {i + 1}", "struts", ("axial",)) for i in range(count))
+
+
+def give_of(section: Document) -> FloatArray:
+    """(6,) m/N and rad/(N m) of the keys of `GIVE`."""
+    return m_from_nm(np.concatenate([section[key] for key in GIVE]))
 
 
 def span(toml: MachineToml, section: str, keys: tuple[str, str], low: float, high: float) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.elements import Element, Stance
 from toolpath_stiff.machine.newton import newton
 from toolpath_stiff.machine.parallel import Legs, Parallel
-from toolpath_stiff.machine.parallel_file import LENGTH, OPTIONAL, PER_ROD, SHARED, TOP, shared_fields, span
+from toolpath_stiff.machine.parallel_file import LENGTH, OPTIONAL, PER_ROD, SHARED, TOP, axial, shared_fields, span
 from toolpath_stiff.machine.schema import Key, MachineToml, read_sections
 from toolpath_stiff.machine.words import refuse_words
 from toolpath_stiff.rotations import rotation_matrices
@@ -154,17 +154,12 @@ def read(toml: MachineToml) -> Pentapod:
     length = m_from_mm(strut["length_mm"])
     if min(compliance + slope * (end - length) for end in (shortest, longest)) <= 0.0:
         mistake = f" = {strut['slope_nm_per_N_per_m']:g}: no compliance is left within the travel"
-        raise toml.fault(
-            "strut", "slope_nm_per_N_per_m", mistake, expected="a compliance above 0 from min_mm to max_mm"
-        )
-    names = tuple(f"strut {i + 1}" for i in range(5))
+        expected = "a compliance above 0 from min_mm to max_mm"
+        raise toml.fault("strut", "slope_nm_per_N_per_m", mistake, expected)
     return Pentapod(
         **shared_fields(toml, values),
         joint_range=(shortest, longest),
-        legs=(
-            *(Element(name, "struts", ("axial",)) for name in names),
-            Element(f"strut {held} bending", "struts", ("across",)),
-        ),
+        legs=(*axial("strut", 5), Element(f"strut {held} bending", "struts", ("across",))),
         base_joints=m_from_mm(top["base_mm"]),
         ring_radius=m_from_mm(top["ring_radius_mm"]),
         ring_height=m_from_mm(top["ring_height_mm"]),

@@ -75,6 +75,7 @@ JOINTS = {
     # Rows of radius, angle about Z, height: keeps the symmetry of a machine exact, and reads better.
     "cylindrical_mm_deg": Key(unit="mm, deg, mm", shape=(6, 3), required=False),
 }
+OFFSETS = Key(unit="mm", shape=(6, 3), low=-30.0, high=30.0)
 ANGLE = Key(unit="deg", low=0.0, high=180.0, open_low=True, infinite=True)
 CORNER = Key(unit="mm", shape=(3,))
 # Sections of every kind of machine.
@@ -96,6 +97,11 @@ SECTIONS: dict[str, dict[str, Key]] = {
         "stiffness_N_per_um": Key(unit="N/um", shape=(2,), low=1e-6, high=1e5, many=True, or_one=True),
     },
     "platform": {"bar_stiffness_N_per_m": Key(unit="N/m", low=1e5, high=math.inf, infinite=True, open_low=True)},
+    "as_built": {
+        "struts_percent": Key(unit="%", shape=(6,), low=-50.0, high=100.0),
+        "frame_joints_mm": OFFSETS,
+        "platform_joints_mm": OFFSETS,
+    },
     "limits.strut_length": {"min_mm": Key(unit="mm", low=0.0), "max_mm": Key(unit="mm", low=0.0, open_low=True)},
     "limits.joint_angle": {
         "frame_max_deg": ANGLE,
@@ -106,7 +112,7 @@ SECTIONS: dict[str, dict[str, Key]] = {
     "limits.singularity": {"min_index": Key(low=0.0, high=1.0)},
     "setup": SETUP,
 }
-OPTIONAL_SECTIONS = ("limits.joint_angle", "limits.workspace", "limits.singularity", "platform", "setup")
+OPTIONAL_SECTIONS = ("limits.joint_angle", "limits.workspace", "limits.singularity", "platform", "as_built", "setup")
 BESIDE = ("effect", "instrument", "uncertainty")  # sections that others read
 
 Schema = Mapping[str, Mapping[str, Key]]

@@ -39,6 +39,7 @@ from toolpath_stiff.rotations import rotation_matrices
 
 # Smallest admissible measure of a singularity unless the file has one, assumed: the sine of three degrees.
 LEAST = 0.05
+GRAVITY = 9.80665  # m/s2, standard
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +58,8 @@ class Serial(MachineTool):
         Work axes in the last frame of the work's chain.
     tool_bodies, work_bodies
         What gives way on either side.
+    tool_masses, work_masses
+        What its weight pulls at: kg, number of the frame as of a body, (3,) m in that frame.
     least
         Smallest admissible singularity measures, by name.
     only
@@ -73,6 +76,8 @@ class Serial(MachineTool):
     work: FixedFrame = STILL
     tool_bodies: tuple[Body | SpanningBeam, ...] = ()
     work_bodies: tuple[Body | SpanningBeam, ...] = ()
+    tool_masses: tuple[tuple[float, int, FloatArray], ...] = ()
+    work_masses: tuple[tuple[float, int, FloatArray], ...] = ()
     least: dict[str, float] = field(default_factory=dict)
     only: int | None = None
 
@@ -101,6 +106,11 @@ class Serial(MachineTool):
     def joint_limits(self) -> FloatArray:
         """(j, 2) m or rad; inf: none."""
         return np.array([(joint.low, joint.high) for joint in self.joints])
+
+    @property
+    def joint_speeds(self) -> FloatArray:
+        """(j,) m/s or rad/s that the joints reach; inf: nobody says."""
+        return np.array([joint.speed for joint in self.joints])
 
     @property
     def elements(self) -> tuple[Element, ...]:
@@ -197,12 +207,26 @@ class Serial(MachineTool):
             (j,) joint values before the first pose: rotary joints then wind on from pose to pose, and joints that no
             pose takes, such as a rail, stand there.
         """
+        before = None if start is None else np.asarray(start, dtype=float)
+        joints, chosen = self.joint_values(*self._target(position, rotation, tool_length), configuration, before)
+        return self._stance(joints, chosen, self.extension(tool_length))
+
+    def stances(
+        self, position: ArrayLike, rotation: ArrayLike | None = None, tool_length: ArrayLike = np.nan
+    ) -> Iterator[Stance]:
+        """Of each configuration how it stands, without what elements carry: what the limits ask."""
+        target, linear = self._target(position, rotation, tool_length), [joint.linear for joint in self.joints]
+        for number, solution in self._solutions(*target, self.only, None):
+            joints = wound(solution, self.joint_limits, linear, None).T
+            yield Stance(joints, target[0].T, None, None, np.full(len(joints), number), ())
+
+    def _target(
+        self, position: ArrayLike, rotation: ArrayLike | None, tool_length: ArrayLike
+    ) -> tuple[FloatArray, FloatArray]:
+        """Tip (3, n) and axes (3, 3, n) of the reference tool in work axes."""
         tip = np.atleast_2d(np.asarray(position, dtype=float)).T
         axes = np.eye(3)[..., None] if rotation is None else columns_of(np.asarray(rotation, dtype=float))
-        extension = self.extension(tool_length)
-        before = None if start is None else np.asarray(start, dtype=float)
-        joints, chosen = self.joint_values(tip + axes[:, 2] * extension, axes, configuration, before)
-        return self._stance(joints, chosen, extension)
+        return tip + axes[:, 2] * self.extension(tool_length), axes
 
     def joint_values(
         self, tip: FloatArray, axes: FloatArray, configuration: int | None, start: FloatArray | None
@@ -271,6 +295,10 @@ class Serial(MachineTool):
             values[i] = (missing * np.cross(second, third, axis=0)).sum(axis=0) / volume
         return np.where(np.isfinite(angles).all(axis=0), values, np.nan)
 
+    def standing(self, joints: FloatArray) -> Stance:
+        """How it stands at joint values (n, j)."""
+        return self._stance(joints.T, np.zeros(len(joints), dtype=np.int64), np.zeros(1))
+
     def _stance(self, joints: FloatArray, chosen: IntArray, extension: FloatArray) -> Stance:
         """The stance at joint values (j, n) with tools so much longer than the reference tool."""
         tool, work = self.frames(joints)
@@ -287,6 +315,21 @@ class Serial(MachineTool):
             configuration=chosen,
             loads=tuple(loads),
         )
+
+    def weight_loads(self, stance: Stance) -> FloatArray:
+        """(n, r) N and N m on the elements under the masses that they carry; gravity along -z of the base."""
+        loads, springs = [], iter(stance.loads)
+        sides = ((self.tool_bodies, self.tool_masses), (self.work_bodies, self.work_masses))
+        for frames, (bodies, masses) in zip(self.frames(stance.joints.T), sides, strict=True):
+            for body in bodies:
+                wrench = np.zeros((len(stance), 6))
+                for mass, frame, place in masses:
+                    if frame >= body.carrier:
+                        force = np.array([0.0, 0.0, -GRAVITY * mass])
+                        wrench[:, :3] += force
+                        wrench[:, 3:] += np.cross(frames[frame].point(place) - stance.position, force)
+                loads.append(np.einsum("nri,ni->nr", next(springs).rows(stance.position), wrench))
+        return np.concatenate(loads, axis=1)
 
     @property
     def singularity_names(self) -> tuple[str, ...]:

@@ -37,8 +37,16 @@ USED = {
     "joint": ("torsion_nrad_per_Nm", "bending_nrad_per_Nm"),
     "beam": ("side", "frame", "from_mm", "to_mm", "moves_with", "to_moves_with", "z_axis", *BEAM),
 }  # fmt: skip
+MASS = {
+    "name": Key(text=True),
+    "kg": Key(unit="kg", low=0.0, high=1e5),
+    **dict.fromkeys(("side", "frame"), TEXT),
+    "moves_with": NAMES,
+    "centre_mm": POINT,
+}
 LINKS = ("tool", "joints", "struts", "frame", "table")
 Part = Body | SpanningBeam
+Mass = tuple[float, int, FloatArray]  # kg, number of the frame that it moves with, (3,) m in that frame
 
 
 class ElementReader:
@@ -170,6 +178,21 @@ class ElementReader:
             raise self.fault("z_axis", " lies along the beam", "a direction across it")
         place = FixedFrame(beam_axes(along, z_axis), 0.5 * (start.origin + end.origin))
         return Body(element, first, place, beam_compliance(float(np.linalg.norm(along)), stiffness))
+
+    def mass(self, nth: int, row: Document) -> tuple[bool, Mass]:
+        """Whether a mass is on the work's side; kg, the frame that it moves with, (3,) m in that frame."""
+        self.section, self.row, work = f"mass[{nth}]", row, row.get("side") == "work"
+        frame, place = self._placed("centre_mm", "moves_with", work)
+        return work, (float(row["kg"]), frame, place.origin)
+
+
+def read_masses(
+    toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[FixedFrame]
+) -> tuple[tuple[Mass, ...], tuple[Mass, ...]]:
+    """Masses on the tool's and on the work's side."""
+    reader = ElementReader(toml, chains, ends)
+    masses = [reader.mass(nth, row) for nth, row in enumerate(read_rows(toml, "mass", MASS), 1)]
+    return tuple(mass for work, mass in masses if not work), tuple(mass for work, mass in masses if work)
 
 
 def read_bodies(

@@ -20,7 +20,7 @@ from toolpath_stiff.machine.elements import beam_axes
 from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections, read_rows, read_sections
 from toolpath_stiff.machine.serial import Serial
-from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
+from toolpath_stiff.machine.serial_elements import ELEMENT, MASS, read_bodies, read_masses
 from toolpath_stiff.machine.words import LETTERS
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
@@ -42,6 +42,10 @@ AXIS = {
         for side in ("min", "max")
         for unit in ("mm", "deg")
     },
+    **{
+        f"speed_{unit}_per_s": Key(unit=f"{unit}/s", low=0.0, open_low=True, high=1e5, required=False)
+        for unit in ("mm", "deg")
+    },
 }
 DH = ("a_mm", "d_mm", "alpha_deg", "offset_deg")
 TRUNNION = ("x_rot_point_mm", "y_rot_point_mm", "z_rot_point_mm", "x_offset_mm", "y_offset_mm", "z_offset_mm")
@@ -59,6 +63,7 @@ SCHEMA = {
     "setup": SETUP,
     "axis[]": AXIS,
     "element[]": ELEMENT,
+    "mass[]": MASS,
     "pose[]": {},
 }
 SECTIONS_BESIDE = [name for name in SCHEMA if name]
@@ -81,6 +86,7 @@ def read(toml: MachineToml) -> Serial:
         rows, names, convention = _rows_of_mill(toml, values), ["X", "Y", "Z", "A", "B", "C"], MODIFIED
     tool, work, tip, table = _of_rows(toml, rows, values, convention)
     bodies = read_bodies(toml, (tool, work), (tip, table))
+    masses = read_masses(toml, (tool, work), (tip, table))
     if not any(bodies):
         raise InputError("no [[element]]: nothing gives way", expected="springs, joints or beams", file=toml.file)
     common = common_fields(toml, values)
@@ -94,6 +100,8 @@ def read(toml: MachineToml) -> Serial:
         work=table,
         tool_bodies=bodies[0],
         work_bodies=bodies[1],
+        tool_masses=masses[0],
+        work_masses=masses[1],
         least={name: v for name, v in values.get("singularity", {}).items() if isinstance(v, float)},
     )
     _check_solvable(toml, machine)
@@ -118,7 +126,9 @@ def _of_rows(
         before, after = _placements(toml, section, row, convention)
         given = STILL if any(key in row for key in DH) else after
         place = rests[side].then(before)
-        sides[side].append(ChainJoint(row["name"], linear, place, *_bounds(toml, section, row, linear), given))
+        unit, si = ("mm", m_from_mm) if linear else ("deg", rad_from_deg)
+        speed = si(row.get(f"speed_{unit}_per_s", np.inf))
+        sides[side].append(ChainJoint(row["name"], linear, place, *_bounds(toml, section, row, linear), given, speed))
         rests[side] = after
     _check_units(toml, sides["tool"] + sides["work"])
     tip, work = values.get("tool"), values.get("work", {})
@@ -167,9 +177,10 @@ def _bounds(toml: MachineToml, section: str, row: Document, linear: bool) -> tup
     """M or rad; every joint has both, so that none is without limits by mistake."""
     unit, other = ("mm", "deg") if linear else ("deg", "mm")
     for side in ("min", "max"):
-        if f"{side}_{other}" in row:
-            kind = "linear" if linear else "rotary"
-            raise toml.fault(section, f"{side}_{other}", f": the axis is {kind}", expected=f"{side}_{unit}")
+        for key in (f"{side}_{other}", f"speed_{other}_per_s"):
+            if key in row:
+                expected, kind = key.replace(other, unit), "linear" if linear else "rotary"
+                raise toml.fault(section, key, f": the axis is {kind}", expected=expected)
         if f"{side}_{unit}" not in row:
             expected = f"its limit in {unit}; {'-' if side == 'min' else ''}inf where it has none"
             raise toml.fault(section, f"{side}_{unit}", " is missing", expected)

@@ -8,9 +8,11 @@ from collections.abc import Callable
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.chain import STILL, FixedFrame, placement
 from toolpath_stiff.machine.unfilled import JOINTS, SPINDLE, axis_row, file_text, place_keys, tool_section
+from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 Fault = Callable[..., InputError]
 FARTHEST = 100.0  # m between two joints: more are millimetres
@@ -62,17 +64,15 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
             raise fault(f"joint {name} is {kind}", expected=f"fixed, {', '.join(MOVING)}")
         if joint.find("mimic") is not None:
             notes.append(f"joint {name} follows another one (mimic); here it moves by itself")
-        if (velocity := joint.find("limit")) is not None and float(velocity.get("velocity", "0")):
-            notes.append(f"joint {name}: limits of velocity and effort are left out")
         axis = _numbers(joint.find("axis"), "xyz", [1.0, 0.0, 0.0], fault)
         if not np.linalg.norm(axis) > 0.0:
             raise fault(f"joint {name}: axis 0 0 0", expected="a direction")
-        limits = _limits(joint, name, kind, fault)
-        rows.append(axis_row(name, MOVING[kind], place_keys(rest, axis / np.linalg.norm(axis)), limits))
+        limits, place = _limits(joint, name, kind, fault), place_keys(rest, axis / np.linalg.norm(axis))
+        rows.append(axis_row(name, MOVING[kind], {**place, **_speed(joint, name, MOVING[kind], fault)}, limits))
         rest = STILL
     if not rows:
         raise fault("no joint moves on the way to the tip", expected="a chain of joints")
-    notes.insert(0, f"Made from {file}: {len(rows)} joints from link {tip}; masses are left out.")
+    notes.insert(0, f"Made from {file}: {len(rows)} joints from link {tip}; masses and limits of effort are left out.")
     name = robot.get("name", "robot")
     return file_text(name, "serial", f"URDF {file}", notes, [*rows, tool_section(rest), JOINTS, SPINDLE]), notes
 
@@ -94,6 +94,23 @@ def _origin(joint: ET.Element, fault: Fault) -> FixedFrame:
         mistake = f"joint {joint.get('name')}: origin {place[0].tolist()}, rpy {place[1].tolist()}"
         raise fault(mistake, expected="metres and radians", hint="these look like mm or degrees")
     return placement(*place)
+
+
+def _speed(joint: ET.Element, name: str, linear: bool, fault: Fault) -> Document:
+    """The key of the speed that a joint reaches; none where the file has none, or 0."""
+    limit = joint.find("limit")
+    word = "0" if limit is None else limit.get("velocity", "0")
+    try:
+        speed = float(word)
+    except ValueError:
+        speed = np.nan
+    if not 0.0 <= speed < np.inf:
+        raise fault(f'joint {name}: velocity="{word}"', expected="a number, m/s or rad/s")
+    return (
+        {("speed_mm_per_s" if linear else "speed_deg_per_s"): (mm_from_m if linear else deg_from_rad)(speed)}
+        if speed
+        else {}
+    )
 
 
 def _limits(joint: ET.Element, name: str, kind: str, fault: Fault) -> FloatArray:

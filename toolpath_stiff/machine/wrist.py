@@ -147,10 +147,11 @@ class SphericalWrist:
 
         Wrist centre's distance from axis 1 over the arm's length; sine of the elbow's bend; sine of the wrist's.
         """
+        upper, lower = abs(self.upper), abs(self.lower)
+        shoulder = joints[1] + np.angle(self.upper)
         gamma = self.sign * joints[2] + np.angle(self.lower) - np.angle(self.upper)
-        point = self.shoulder + np.exp(1j * joints[1]) * (self.upper + self.lower * np.exp(1j * self.sign * joints[2]))
-        length = abs(self.upper) + abs(self.lower)
-        return np.asarray(np.abs(np.stack([point.imag / length, np.sin(gamma), np.sin(joints[4] + self.bend)])))
+        out = (self.shoulder.imag + upper * np.sin(shoulder) + lower * np.sin(shoulder + gamma)) / (upper + lower)
+        return np.asarray(np.abs(np.stack([out, np.sin(gamma), np.sin(joints[4] + self.bend)])))
 
 
 def _meeting_point(origins: Sequence[FloatArray], axes: Sequence[FloatArray], most: float) -> FloatArray | None:

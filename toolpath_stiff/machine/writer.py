@@ -2,13 +2,15 @@
 
 import json
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.documents import Document
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.errors import InputError
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m
 
@@ -26,6 +28,8 @@ HEADINGS = {
     "# linear between. Outside it is extrapolated along the end segments, and every result says how often.",
     "strut_law, constant": "Stiffness of a strut in N/um, the same at every length.",
     "platform": "Stiffness in N/m of each of the 19 bars that stand for platform, spindle and tool; inf is rigid.",
+    "as_built": "By how much struts are stiffer than their law, and joints off their places, unknown to the control:\n"
+    "# the likeliest by the readings, given how far struts and joints of such machines are off.",
     "limits.strut_length": "Travel of the struts, between the joint centres, in mm.",
     "limits.joint_angle": "Largest swing of the joints in degrees from the direction that each strut has at the\n"
     "# neutral pose (x, y, z in mm, roll, pitch, yaw in degrees); inf is no limit.",
@@ -69,6 +73,10 @@ def machine_toml(machine: Hexapod, preamble: str = "") -> str:
             **{key: value for key, value in conditions.items() if value is not None},
         },
     }
+    if machine.as_built is not None:
+        frame, platform = mm_from_m(machine.as_built[6:]).round(6).reshape(2, 6, 3)
+        struts = (100.0 * np.expm1(machine.as_built[:6])).round(6)
+        sections["as_built"] = {"struts_percent": struts, "frame_joints_mm": frame, "platform_joints_mm": platform}
     if np.isfinite(limits.workspace).all():
         low, high = mm_from_m(limits.workspace)
         sections["limits.workspace"] = {"min_mm": low, "max_mm": high}
@@ -80,6 +88,35 @@ def machine_toml(machine: Hexapod, preamble: str = "") -> str:
         remark = {"remark": machine.remarks[name]} if name in machine.remarks else {}
         origin = {"origin": machine.origins.get(name, "assumed"), **remark}
         lines += ["", f"# {heading}", f"[{name}]", *_rows({**values, **origin})]
+    return "\n".join([*lines, *fitted_lines(machine), ""])
+
+
+TORSION = re.compile(r"(?m)^([ \t]*torsion_nrad_per_Nm[ \t]*=[ \t]*)(\[[^\]]*\]|[^#\n]*)")
+FITTED = "# Effects, and what was fitted to measurements, follow; they are written anew by `tps update`."
+
+
+def elements_toml(machine: MachineTool, torsions: Sequence[float], preamble: str = "") -> str:
+    """The text of a machine of elements with the torsions of its joints (none: the file's), effects and uncertainty.
+
+    Torsions in nrad/(N m), in the order of the joints. Raises `InputError` where the file does not hold them once.
+    """
+    text = machine.text
+    if torsions:
+        text, count = TORSION.subn(rf"\g<1>[{', '.join(f'{value:.5g}' for value in torsions)}]", text)
+        if count != 1:
+            found = f"machine {machine.name} states torsion_nrad_per_Nm {count} times"
+            raise InputError(found, expected="once, for all joints", hint="write one [[element]] of type joint")
+    heads = re.split(r"(?m)^(?=\[)", text)
+    kept = [part for part in heads if not re.match(r"\[\[?(effect|instrument|uncertainty)\b", part)]
+    head = [f"# {line}".rstrip() for line in preamble.splitlines()]
+    return "\n".join(
+        [*head, "".join(kept).rstrip().removesuffix(FITTED).rstrip(), "", FITTED, *fitted_lines(machine), ""]
+    )
+
+
+def fitted_lines(machine: MachineTool) -> list[str]:
+    """Lines of effects, instruments, and what is known of fitted parameters."""
+    lines: list[str] = []
     for kind, entries in (("effect", machine.effects), ("instrument", machine.instruments)):
         for entry in entries:
             lines += ["", f"[[{kind}]]", *_rows({"name": entry.name, **entry.parameters})]
@@ -97,7 +134,7 @@ def machine_toml(machine: Hexapod, preamble: str = "") -> str:
                 "places_mm_deg": np.round(np.hstack([mm_from_m(position), deg_from_rad(angles)]), 6),
             }
             lines += ["", f"# {HEADINGS['uncertainty.errors']}", "[uncertainty.errors]", *_rows(written)]
-    return "\n".join([*lines, ""])
+    return lines
 
 
 def _rows(values: Document) -> list[str]:

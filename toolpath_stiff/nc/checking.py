@@ -18,9 +18,17 @@ from toolpath_stiff.nc.languages import CUTTER_LOCATION_FILE, foreign_program, r
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
-from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.program_run import ProgramRun
-from toolpath_stiff.nc.reader import INTERPRETERS, LANGUAGE_RUNS, in_language, on_the_part, program_of, read
+from toolpath_stiff.nc.reader import (
+    INTERPRETERS,
+    LANGUAGE_RUNS,
+    PARAMETRIC,
+    in_language,
+    on_the_part,
+    program_of,
+    read,
+    run_of,
+)
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import MOST_ERRORS, Tally
 from toolpath_stiff.nc.state import START, State
@@ -158,7 +166,7 @@ def _checked(request: Request, language: str) -> Checked:
         return _check_cutter_location(request)
     if language in LANGUAGE_RUNS:
         request = in_language(request, language)
-        return _check_built_in(request, LANGUAGE_RUNS[language](request, Tally()))
+        return _check_built_in(request, run_of(language)(request, Tally()))
     ours = _check_built_in(request, ProgramRun(request, Tally()))
     if request.interpreter == "builtin" or ours.complete or not request.controller.plain:
         return ours
@@ -177,7 +185,7 @@ def _check_built_in(request: Request, run: ProgramRun) -> Checked:
     start, g_code = modal_state(run.state), type(run) is ProgramRun
     errors, ending = _run_to_the_end(run, g_code)
     if errors and g_code and uses_variables(request.lines):  # once more with their values, from the start
-        run = ParametricRun(request, Tally())
+        run = run_of(PARAMETRIC)(request, Tally())
         errors, ending = _run_to_the_end(run, g_code)
     state, tally = run.state, run.tally
     assert tally is not None

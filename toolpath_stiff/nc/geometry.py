@@ -65,11 +65,9 @@ def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: boo
     refuse_arc_if(radius == 0.0, "an arc of radius 0", "R other than 0")
     chord = math.dist(start, end)
     half, size = chord / 2.0, abs(radius)
-    refuse_arc_if(
-        half - size > RADIUS_FORMAT_TOLERANCE,
-        f"an arc whose radius {size:g} mm cannot reach its end {chord:.4f} mm away",
-        f"a radius of at least {half:.4f} mm",
-    )
+    if half - size > RADIUS_FORMAT_TOLERANCE:
+        problem = f"an arc whose radius {size:g} mm cannot reach its end {chord:.4f} mm away"
+        raise ArcError(problem, f"a radius of at least {half:.4f} mm")
     height = math.sqrt(max(size * size - half * half, 0.0))
     # The centre lies left of the chord for a short counter-clockwise arc.
     side = 1.0 if (radius > 0.0) != clockwise else -1.0
@@ -92,19 +90,18 @@ def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) 
     toolpath_stiff.nc.geometry.ArcError: an arc of radius 0
     """
     first, last = math.dist(start, center), math.dist(end, center)
-    refuse_arc_if(
-        first < SMALLEST_RADIUS or last < SMALLEST_RADIUS,
-        "an arc of radius 0",
-        "a centre apart from the start and the end point",
-    )
+    if first < SMALLEST_RADIUS or last < SMALLEST_RADIUS:
+        raise ArcError("an arc of radius 0", "a centre apart from the start and the end point")
     difference, least = abs(first - last), INCH_TOLERANCE if inch else MM_TOLERANCE
+    if difference <= least:  # of nearly all arcs
+        return
     allowed = min(max(least, RELATIVE_TOLERANCE * max(first, last)), MOST_TOLERANCES * least)
-    refuse_arc_if(
-        difference > allowed,
-        f"an arc whose end lies {difference:.4f} mm off its circle (radius {first:.4f} mm at the start, "
-        f"{last:.4f} mm at the end)",
-        f"radii that agree within {allowed:.4f} mm",
-    )
+    if difference > allowed:
+        raise ArcError(
+            f"an arc whose end lies {difference:.4f} mm off its circle (radius {first:.4f} mm at the start, "
+            f"{last:.4f} mm at the end)",
+            f"radii that agree within {allowed:.4f} mm",
+        )
 
 
 def check_bulge(radius: float, sweep: float) -> None:
@@ -115,11 +112,9 @@ def check_bulge(radius: float, sweep: float) -> None:
     >>> check_bulge(1e9, 1e-7)
     """
     away = 2.0 * radius * math.sin(min(abs(sweep), math.pi) / 2.0)
-    refuse_arc_if(
-        away > LARGEST_MM,
-        f"an arc of radius {radius:g} mm that goes {away:g} mm away from its start",
-        f"at most {LARGEST_MM:g} mm",
-    )
+    if away > LARGEST_MM:
+        problem = f"an arc of radius {radius:g} mm that goes {away:g} mm away from its start"
+        raise ArcError(problem, f"at most {LARGEST_MM:g} mm")
 
 
 def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns: int) -> float:

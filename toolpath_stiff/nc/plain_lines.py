@@ -219,35 +219,36 @@ class Lines:
         letters = (AXES[first], AXES[second], centers[first], centers[second], "R", centers[normal])
         words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()
         points = np.stack([frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
-        for row, point, numbers in zip(rows.tolist(), points, words, strict=True):
-            start = (float(point[first]), float(point[second]))
-            try:
-                middle, sweep[row] = self._arc(start, numbers, self.mode[row] == CLOCKWISE)
-            except geometry.ArcError:
-                self.end = row
-                break
-            point[[first, second]] = middle
+        starts, clockwise = points[:, [first, second]].tolist(), (self.mode[rows] == CLOCKWISE).tolist()
+        inch, middles, sweeps = self.state.inch, list[geometry.Point2](), list[float]()
+        try:
+            for start, numbers, turn in zip(starts, words, clockwise, strict=True):
+                end, middle = self._arc(start, numbers, turn)
+                sweeps.append(geometry.sweep_about(middle, start, end, turn, inch))
+                middles.append(middle)
+        except geometry.ArcError:
+            self.end = int(rows[len(middles)])
+        points[: len(middles), [first, second]] = np.reshape(middles, (-1, 2))
+        sweep[rows[: len(middles)]] = sweeps
         setup = np.stack([frames.axis_to_control(axis, points[:, axis]) for axis in range(3)], axis=1)
         center[rows] = setup - np.array(frames.fix_reference())
         return center, sweep
 
-    def _arc(self, start: geometry.Point2, words: list[float], clockwise: bool) -> tuple[geometry.Point2, float]:
-        """Centre and sweep of an arc; `words`: X, Y, I, J of the plane, R, the offset off the plane, nan for none."""
+    def _arc(
+        self, start: geometry.Point2, words: list[float], clockwise: bool
+    ) -> tuple[geometry.Point2, geometry.Point2]:
+        """End and centre of an arc; `words`: X, Y, I, J of the plane, R, the offset off the plane, nan for none."""
         (x, y, i, j, radius, off_plane), scale = words, self.state.length_scale
-        by_radius = not math.isnan(radius)
-        fits = by_radius == (math.isnan(i) and math.isnan(j)) and not (by_radius and math.isnan(x) and math.isnan(y))
+        no_x, no_y, no_i, no_j, by_center = map(math.isnan, words[:5])
+        fits = by_center != (no_i and no_j) and not (no_x and no_y and not by_center)
         if not fits or abs(off_plane) > 0.0:
             raise geometry.ArcError("words that do not fit", "")
-        base = (0.0, 0.0) if self.state.absolute else start
-        end = (start[0] if math.isnan(x) else base[0] + x * scale, start[1] if math.isnan(y) else base[1] + y * scale)
-        if by_radius:
-            center = geometry.center_from_radius(start, end, radius * scale, clockwise)
-        else:
-            center = (
-                start[0] + (0.0 if math.isnan(i) else i * scale),
-                start[1] + (0.0 if math.isnan(j) else j * scale),
-            )
-        return center, geometry.sweep_about(center, start, end, clockwise, self.state.inch)
+        a, b = start
+        over, up = (0.0, 0.0) if self.state.absolute else start
+        end = (a if no_x else over + x * scale, b if no_y else up + y * scale)
+        if not by_center:
+            return end, geometry.center_from_radius(start, end, radius * scale, clockwise)
+        return end, (a if no_i else a + i * scale, b if no_j else b + j * scale)
 
     def _leave(self, control: FloatArray | None) -> int:
         """Set the state as the lines executed leave it; their number."""

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.increments import point_warning
 from toolpath_stiff.nc.controller import DIALECTS, LANGUAGES, UNKNOWN_CONTROL, Controller
-from toolpath_stiff.nc.cutter_location import reader as cutter_location
-from toolpath_stiff.nc.heidenhain.run import HeidenhainRun
 from toolpath_stiff.nc.languages import (
     CUTTER_LOCATION_FILE,
     READ,
@@ -19,24 +19,35 @@ from toolpath_stiff.nc.languages import (
     refused_program,
 )
 from toolpath_stiff.nc.lines import read_lines, split_lines
-from toolpath_stiff.nc.linuxcnc import reader as linuxcnc
 from toolpath_stiff.nc.moves import RAPID, Blank, ReadProgram, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
-from toolpath_stiff.nc.parametric.run import ParametricRun
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
 from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import ORIGIN_WINS, ZERO, Request
-from toolpath_stiff.nc.siemens.run import SiemensRun
 from toolpath_stiff.nc.state import START, State
 from toolpath_stiff.nc.tables import read_tool_table
 from toolpath_stiff.poses import Pose, pose_in_si
 from toolpath_stiff.units import m_from_mm, mm_per_min_from_m_per_s
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
-LANGUAGE_RUNS: dict[str, type[ProgramRun]] = {
-    LANGUAGES["heidenhain"]: HeidenhainRun,
-    LANGUAGES["siemens"]: SiemensRun,
+PARAMETRIC = "variables and jumps"
+# What runs a program of a language, loaded where there is such a program: most are plain G code, and are not to wait.
+LANGUAGE_RUNS = {
+    LANGUAGES["heidenhain"]: ("heidenhain", "HeidenhainRun"),
+    LANGUAGES["siemens"]: ("siemens", "SiemensRun"),
 }
+
+
+def reader_of(room: str) -> ModuleType:
+    """The reader of cutter-location files, or that by LinuxCNC's interpreter, loaded when it is asked for."""
+    return import_module(f"toolpath_stiff.nc.{room}.reader")
+
+
+def run_of(language: str) -> type[ProgramRun]:
+    """What runs programs of a language of `LANGUAGE_RUNS`, or `PARAMETRIC` ones."""
+    room, name = LANGUAGE_RUNS.get(language, ("parametric", "ParametricRun"))
+    run: type[ProgramRun] = getattr(import_module(f"toolpath_stiff.nc.{room}.run"), name)
+    return run
 
 
 def read_program(
@@ -114,16 +125,16 @@ def read(request: Request) -> ReadProgram:
         problem = f"LinuxCNC's interpreter reads no {what}"
         raise ProgramError(problem, expected="--interpreter builtin", file=name)
     if language == CUTTER_LOCATION_FILE:
-        return _with_feed(cutter_location.read(request), request)
+        return _with_feed(reader_of("cutter_location").read(request), request)
     if language in LANGUAGE_RUNS:
         request = in_language(request, language)
-        return _finished(request, LANGUAGE_RUNS[language](request))
+        return _finished(request, run_of(language)(request))
     refused = foreign_program(lines, name) if native else refused_program(lines, name, request.controller.dialect)
     if refused is not None:
         raise refused
     if native:
         request.controller.check_plain()
-        return on_the_part(linuxcnc.read(request), request)
+        return on_the_part(reader_of("linuxcnc").read(request), request)
     try:
         return _read_built_in(request)
     except InputError as error:
@@ -133,7 +144,7 @@ def read(request: Request) -> ReadProgram:
         if request.interpreter == "builtin" or not request.controller.plain:
             raise
         try:
-            return on_the_part(linuxcnc.read(request), request)
+            return on_the_part(reader_of("linuxcnc").read(request), request)
         except InputError as second:
             raise ProgramError(
                 error.found,
@@ -156,7 +167,7 @@ def _read_built_in(request: Request) -> ReadProgram:
     except InputError:
         if not uses_variables(request.lines):
             raise
-    return replace(_finished(request, ParametricRun(request)), parametric=True)
+    return replace(_finished(request, run_of(PARAMETRIC)(request)), parametric=True)
 
 
 def _finished(request: Request, run: ProgramRun) -> ReadProgram:

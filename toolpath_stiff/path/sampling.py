@@ -184,7 +184,7 @@ def sample_moves(
         put = slice(*np.searchsorted(border[0], (block.start, block.stop)))
         extra = border[0][put] - block.start, border[1][put]
         _sample_block(moves.take(block), counts[block], some, extra, block.start, orient, samples.take(rows))
-    return replace(samples, **{name: held_once(getattr(samples, name)) for name in HELD})
+    return replace(samples, **{name: held_once(getattr(samples, name)) for name in (*HELD, "abc")})
 
 
 def _blocks(counts: IntArray) -> Iterator[slice]:

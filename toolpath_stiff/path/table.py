@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.column_files import csv_pieces
 from toolpath_stiff.documents import to_dict, without_nan
 from toolpath_stiff.files import write_atomically
@@ -22,16 +23,19 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_
 if TYPE_CHECKING:
     import pandas as pd
 
-# Column -> decimals; None: a whole number or a word. A millionth of a millimetre is finer than any machine and
-# lets sums over a long path keep their digits.
+LENGTH_DECIMALS = 4  # in mm: a tenth of a micrometre is finer than machines move
+# Column -> decimals; None: a whole number or a word.
 PATH_COLUMNS: dict[str, int | None] = {
     **dict.fromkeys(("line", "motion", "tool")),
-    **dict.fromkeys(("s_mm", "t_s", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"), 6),
+    "s_mm": LENGTH_DECIMALS,
+    "t_s": 6,
+    **dict.fromkeys(("x_mm", "y_mm", "z_mm"), LENGTH_DECIMALS),
+    **dict.fromkeys(("a_deg", "b_deg", "c_deg"), 6),
     "feed_mm_per_min": 3,
 }
 
 
-def path_columns(samples: Samples, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
+def path_columns(samples: Samples, rows: slice | IntArray = slice(None)) -> dict[str, NDArray[Any]]:
     r"""Column of `PATH_COLUMNS` -> values, for some rows.
 
     Examples

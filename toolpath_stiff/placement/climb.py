@@ -164,8 +164,8 @@ class Climber:
         moved[self.free] += step * self.span
         held = self.free[~bounds.round[self.free]]
         moved[held] = np.clip(moved[held], bounds.low[held], bounds.high[held])
-        if bounds.round[5]:
-            moved[5] = bounds.low[5] + np.mod(moved[5] - bounds.low[5], 2.0 * np.pi)
+        turns, low = bounds.round, bounds.low
+        moved[turns] = low[turns] + np.mod(moved[turns] - low[turns], 2.0 * np.pi)
         return moved
 
     def _differentiate(self, climbs: Sequence[_Climb]) -> None:
@@ -177,7 +177,7 @@ class Climber:
         steps = np.where(here[:, self.free] > middle, -1.0, 1.0) * DIFFERENCE  # away from the nearer bound
         around = np.repeat(here[:, None], d, axis=1)
         around[:, np.arange(d), self.free] += steps * self.span
-        rows = self.evaluator.rows(around.reshape(-1, 6))
+        rows = self.evaluator.rows(around.reshape(-1, here.shape[1]))
         for i, climb in enumerate(climbs):
             step = steps[i, :, None]
             there = rows.take(slice(i * d, (i + 1) * d))

@@ -13,10 +13,17 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from toolpath_stiff.analysis.evaluation import MOST_TRIED, WorkPoses, evaluate, evaluate_stance
+from toolpath_stiff.analysis.evaluation import (
+    WorkPoses,
+    corners,
+    evaluate,
+    kept_configurations,
+    poses_taken,
+    stiffness_within,
+    tried_rows,
+)
 from toolpath_stiff.analysis.loads import Load, geometric_directions
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, product
-from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import Extremes, reach
 from toolpath_stiff.machine.model import NO_END, Hexapod, as_hexapod
@@ -27,6 +34,7 @@ from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 POSES_AT_A_TIME = 30_000  # fits the processor's cache
+UNREACHABLE = -9.0  # margin where no joint values lead to a pose: finite, because a search takes differences of it
 COMPLIANCE_DECIDES = ("softest", "normal")  # loads whose direction asks the compliance, the second at plunges
 
 
@@ -92,28 +100,41 @@ class Evaluator:
         self, model: StiffnessModel, path: WorkPath, load: Load, force: float, keepouts: tuple[KeepOut, ...] = ()
     ) -> None:
         self.model, self.path, self.load, self.force, self.keepouts = model, path, load, force, keepouts
-        self.poses = 0
+        self.poses, self.known = 0, dict[bytes, PlacementFigures]()
         self.direct = core.is_closed_form(model) and load.kind not in COMPLIANCE_DECIDES
         # A still sample has no direction; none of them is a headline sample, so any direction does.
         still = ~np.asarray(path.tangent.any(axis=1))
         tangent = np.where(still[:, None], np.array([0.0, 0.0, 1.0]), path.tangent)
         self.position, self.tangent = (np.ascontiguousarray(values.T) for values in (path.position, tangent))
         self.turned = np.ascontiguousarray(np.moveaxis(rotation_matrices(path.abc), 0, -1)) if path.abc.any() else None
-        self.of_one_tool = core.rows_of_tools(path.tool_length)
+        # Of each tool its poses; with those of corners the samples there too, which are the same under other loads.
+        corner = corners(path.position, path.abc, path.tool_length)
+        first, self.of_one_tool = ~np.append(False, corner[:-1]), list[tuple[float, tuple[IntArray | slice, ...]]]()
+        for tool, some in core.rows_of_tools(path.tool_length):
+            rows = np.arange(len(path))[some]
+            poses = rows[first[rows]]
+            self.of_one_tool.append((tool, (poses, poses + corner[poses]) if len(poses) < len(rows) else (some,)))
         self.head, self.rest = _columns(path.headline), _columns(~path.headline)
         self.cuts, self.rapids = _columns(path.cutting), _columns(~path.cutting)
 
     def figures(self, placements: FloatArray) -> PlacementFigures:
-        """Figures of placements (k, 6) m and rad."""
+        """Figures of placements (k, 6) m and rad; those of a long path are kept, as a search asks for them again."""
         group = max(1, POSES_AT_A_TIME // max(len(self.path), 1))
-        starts = range(0, max(len(placements), 1), group)
-        return PlacementFigures.joined([self.summary(self.rows(placements[i : i + group])) for i in starts])
+        parts = [placements[i : i + group] for i in range(0, max(len(placements), 1), group)]
+        if group > 1 or not len(placements):
+            return PlacementFigures.joined([self.summary(self.rows(part)) for part in parts])
+        for part in parts:
+            if (key := part.tobytes()) in self.known:
+                self.poses += len(self.path)
+            else:
+                self.known[key] = self.summary(self.rows(part))
+        return PlacementFigures.joined([self.known[part.tobytes()] for part in parts])
 
     def rows(self, placements: FloatArray) -> PlacedRows:
         """Rows of placements (k, 6) m and rad; all in memory at once."""
         k, n = len(placements), len(self.path)
         self.poses += k * n
-        turn = rotation_matrices(placements[:, 3:])
+        turn = rotation_matrices(placements[:, 3:6])
         position = _turned(turn, self.position) + placements[:, :3].T[:, :, None]
         motion, rotation = _turned(turn, self.tangent), self._orientations(placements, turn)
         clearance = np.broadcast_to(np.inf, (k, n))
@@ -123,11 +144,16 @@ class Evaluator:
             stiffness, margin = self._of_elements(position, motion, rotation)
             return PlacedRows(stiffness, np.full((k, n), NO_END), margin, clearance)
         along, margin, law = np.empty((3, k, n))
-        for tool, rows in self.of_one_tool:
-            some = None if rotation is None else rotation[:, :, rows].reshape(9, -1)
-            tip, towards = position[:, :, rows].reshape(3, -1), motion[:, :, rows].reshape(3, -1)
-            for column, values in zip((along, margin, law), self._kernel_rows(tool, tip, towards, some), strict=True):
-                column[:, rows] = values.reshape(k, -1)
+        for tool, loaded in self.of_one_tool:
+            some = None if rotation is None else rotation[:, :, loaded[0]].reshape(9, -1)
+            tip, towards = (
+                position[:, :, loaded[0]].reshape(3, -1),
+                [motion[:, :, rows].reshape(3, -1) for rows in loaded],
+            )
+            compliances, margins, laws = self._kernel_rows(tool, tip, towards, some)
+            for rows, compliance in zip(loaded, compliances, strict=True):
+                for column, values in ((along, compliance), (margin, margins), (law, laws)):
+                    column[:, rows] = values.reshape(k, -1)
         if self.direct:
             with np.errstate(divide="ignore"):
                 stiffness = np.divide(1.0, along)
@@ -172,16 +198,17 @@ class Evaluator:
         return np.unique([part[int(np.argmin(values[part]))] for part, values in parts])
 
     def _orientations(self, placements: FloatArray, turn: FloatArray) -> FloatArray | None:
-        """(9, k, n) rows of R' = Q R Rz(-C), the rule of `path`; None: all vertical."""
+        """(9, k, n) rows of R' = Q R Rz(-C), the rule of `path`, and the tool's turn; None: all vertical."""
         k, n = len(placements), len(self.path)
+        back = placements[:, 5] - placements[:, 6:].sum(axis=1)
         if self.turned is None:
-            if not placements[:, 3:5].any():
+            if not placements[:, 3:5].any() and placements.shape[1] == 6:
                 return None
-            turned = product(turn, rotation_about_z(-placements[:, 5]))
+            turned = product(turn, rotation_about_z(-back))
             return np.repeat(turned.reshape(k, 9).T[:, :, None], n, axis=2)
         rotation = np.empty((3, 3, k, n))
         first, second, rotation[:, 2] = (_turned(turn, self.turned[:, column]) for column in range(3))
-        cosine, sine = np.cos(placements[:, 5])[:, None], np.sin(placements[:, 5])[:, None]
+        cosine, sine = np.cos(back)[:, None], np.sin(back)[:, None]
         rotation[:, 0] = cosine * first - sine * second
         rotation[:, 1] = sine * first + cosine * second
         return rotation.reshape(9, k, n)
@@ -193,49 +220,42 @@ class Evaluator:
         machine, (k, n) = self.model.machine, position.shape[1:]
         stiffness, margin = np.full((k, n), np.nan), np.empty((k, n))
 
-        def poses(columns: FloatArray, where: tuple[IntArray, IntArray]) -> FloatArray:
-            return np.ascontiguousarray(columns[:, where[0]][:, :, where[1]]).reshape(len(columns), -1)
+        def placed(rows: IntArray, samples: IntArray) -> tuple[WorkPoses, FloatArray]:
+            tip, towards, turns = (
+                None if columns is None else columns[:, rows][:, :, samples].reshape(len(columns), -1)
+                for columns in (position, motion, rotation)
+            )
+            assert tip is not None and towards is not None
+            return (tip.T, _matrices(turns), towards.T), np.tile(self.path.tool_length[samples], len(rows))
 
-        def stand(rows: IntArray, samples: IntArray, configuration: int | None) -> tuple[Stance, WorkPoses]:
-            where = (rows, samples)
-            turns = None if rotation is None else _matrices(poses(rotation, where))
-            tip, towards = poses(position, where).T, poses(motion, where).T
-            tools = np.tile(self.path.tool_length[samples], len(rows))
-            return machine.solve(tip, turns, tools, configuration), (tip, turns, towards)
-
-        every, chosen = np.arange(k), np.zeros(k, dtype=np.int64)
-        if (count := len(machine.configurations)) > 1:
-            few = np.unique(np.linspace(0, n - 1, MOST_TRIED).round().astype(np.int64))
-            tried = (stand(every, few, i) for i in range(count))
-            margins = [
-                reach(machine, in_work[0], stance).margin.reshape(k, -1).min(axis=1) for stance, in_work in tried
-            ]
-            chosen = np.argmax(margins, axis=0)
+        chosen = np.zeros(k, dtype=np.int64)
+        if len(machine.configurations) > 1:
+            (tip, turns, _), tools = placed(np.arange(k), tried_rows(n))
+            chosen = kept_configurations(machine, tip, turns, tools, k)
         for configuration in np.unique(chosen).tolist():
             rows = np.flatnonzero(chosen == configuration)
-            stance, in_work = stand(rows, np.arange(n), configuration)
-            margin[rows] = reach(machine, in_work[0], stance).margin.reshape(-1, n)
+            in_work, tools = placed(rows, np.arange(n))
+            stance = machine.solve(*in_work[:2], tools, configuration)
+            margin[rows] = np.maximum(reach(machine, in_work[0], stance).margin, UNREACHABLE).reshape(-1, n)
             possible = margin[rows][:, self.cuts].min(axis=1, initial=np.inf) >= 0.0
             wanted = np.flatnonzero(np.logical_and.outer(possible, self.path.headline).ravel())
             if len(wanted):
-                tip, turns, towards = in_work
-                some = tip[wanted], None if turns is None else turns[wanted], towards[wanted]
-                values = np.full(len(rows) * n, np.nan)
-                values[wanted] = evaluate_stance(self.model, stance.take(wanted), some, self.load, self.force).stiffness
+                some, values = poses_taken(in_work, wanted), np.full(len(rows) * n, np.nan)
+                values[wanted] = stiffness_within(self.model, stance.take(wanted), some, self.load, self.force)[0]
                 stiffness[rows] = values.reshape(-1, n)
         return stiffness, margin
 
     def _kernel_rows(
-        self, tool: float, tip: FloatArray, motion: FloatArray, rotation: FloatArray | None
+        self, tool: float, tip: FloatArray, motions: list[FloatArray], rotation: FloatArray | None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Compliance along the load, margin and law of n poses with one tool; (3, n), (3, n), (9, n)."""
+        """Compliance along the load of each motion, margin and law of n poses with one tool; (3, n), (3, n), (9, n)."""
         machine, turns = as_hexapod(self.model.machine, "the closed form"), _matrices(rotation)
-        direction = motion
+        directions = motions
         if self.direct and self.load.kind != "tangential":
-            direction = np.ascontiguousarray(geometric_directions(self.load, tip.T, turns, motion.T)[0].T)
+            directions = [geometric_directions(self.load, tip.T, turns, motion.T)[0].T for motion in motions]
         # The same kernel whatever is installed: a search amplifies the last digit, and gives the same everywhere.
         along, determinant, lengths, good = core.compliance_along_columns(
-            machine, tip, direction, rotation, tool, "closed_form"
+            machine, tip, np.stack(directions), rotation, tool, "closed_form"
         )
         extremes = Extremes(machine, tip, lengths, determinant, rotation, tool)
         margin, law = extremes.margin, machine.strut_law.room_of(extremes.shortest, extremes.longest)
@@ -243,8 +263,8 @@ class Evaluator:
         if len(doubtful):
             there, leaning = tip[:, doubtful].T, None if turns is None else turns[doubtful]
             margin[doubtful] = reach(machine, there, solve_struts(machine, there, leaning, tool), leaning).margin
-            if self.direct:
-                along[doubtful] = 1.0 / self._evaluated(there, motion[:, doubtful].T, leaning, tool)
+            for compliance, motion in zip(along, motions, strict=True) if self.direct else ():
+                compliance[doubtful] = 1.0 / self._evaluated(there, motion[:, doubtful].T, leaning, tool)
         return along, margin, law
 
     def _with_effects(

@@ -15,7 +15,8 @@ from toolpath_stiff.placement.keep_out import KeepOut
 class Bounds:
     """Bounds of the search. SI.
 
-    `low`, `high` (6,): x, y, z in m, A, B, C in rad; equal where fixed. `heights`: the only z allowed, or empty.
+    `low`, `high` (6,): x, y, z in m, A, B, C in rad, equal where fixed; (7,) with the tool's turn about its axis, rad.
+    `heights`: the only z allowed, or empty.
     """
 
     low: FloatArray
@@ -29,8 +30,8 @@ class Bounds:
 
     @cached_property
     def round(self) -> BoolArray:
-        """(6,) turns that go all the way round, and so have no end."""
-        angle = np.arange(6) == 5
+        """(6,) or (7,) turns that go all the way round, and so have no end."""
+        angle = np.arange(len(self.low)) >= 5
         return np.asarray(angle & (self.high - self.low >= 2.0 * np.pi - 1e-9))
 
     def placements(self, unit: FloatArray) -> FloatArray:
@@ -67,10 +68,10 @@ class Bounds:
         return chosen
 
     def holds(self, placement: FloatArray) -> bool:
-        """True for a placement (6,) within; the turn counts modulo a whole one."""
-        apart = np.mod(placement[5] - self.low[5] + 1e-9, 2.0 * np.pi) - 1e-9
+        """True for a placement within; turns count modulo a whole one."""
+        apart = np.mod(placement[5:] - self.low[5:] + 1e-9, 2.0 * np.pi) - 1e-9
         inside = (placement >= self.low - 1e-9) & (placement <= self.high + 1e-9)
-        inside[5] = apart <= self.high[5] - self.low[5] + 1e-9
+        inside[5:] = apart <= self.high[5:] - self.low[5:] + 1e-9
         on_a_height = not self.heights or bool(np.abs(np.array(self.heights) - placement[2]).min() < 1e-9)
         return bool(inside.all()) and on_a_height
 

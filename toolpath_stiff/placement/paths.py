@@ -18,7 +18,8 @@ from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.path.sampling import Samples, sample_moves
-from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.path.turning import turned_about_tool
+from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 
 COLUMNS = ("position", "tangent", "abc", "weight", "line", "tool_length", "cutting")  # as sampled
 MOST_COMPARED = 6000  # samples of a long path that are compared with each other, evenly spread
@@ -162,7 +163,9 @@ def _spread(path: WorkPath, rows: IntArray, count: int) -> tuple[IntArray, Float
 
 
 def placed_path(path: WorkPath | Samples, placement: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Positions, tangents and orientations of a path's samples at one placement (6,)."""
-    turn = rotation_matrices(placement[3:])
-    position = path.position @ turn.T + placement[:3]
-    return position, path.tangent @ turn.T, place_orientations(path.abc, placement)
+    """Positions, tangents and orientations of a path's samples at one placement (6,), or (7,) with the tool's turn."""
+    turn = rotation_matrices(placement[3:6])
+    abc = place_orientations(path.abc, placement[:6])
+    for angle in placement[6:]:
+        abc = roll_pitch_yaw(turned_about_tool(rotation_matrices(abc), np.full(len(path), angle)))
+    return path.position @ turn.T + placement[:3], path.tangent @ turn.T, abc

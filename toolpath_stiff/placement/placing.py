@@ -8,6 +8,7 @@ import numpy as np
 from toolpath_stiff.analysis.loads import plunging_rows
 from toolpath_stiff.analysis.results import Analysis, analyze
 from toolpath_stiff.analysis.statistics import share, stiffness_figures
+from toolpath_stiff.analysis.turning import FIXED
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError, UnreachableError
 from toolpath_stiff.machine.model import Hexapod
@@ -16,12 +17,14 @@ from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.placement.evaluator import Evaluator
 from toolpath_stiff.placement.paths import WorkPath, work_path
-from toolpath_stiff.placement.result import COLUMNS, FIGURES, Placement, PlacementRow, PlacementTask, Written
+from toolpath_stiff.placement.result import FIGURES, Placement, PlacementRow, PlacementTask, Written
 from toolpath_stiff.placement.search import PlacementResult, search_placements
 from toolpath_stiff.placement.working import Search
 from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
 from toolpath_stiff.rewriting.program import RewrittenProgram, check_rewritable, rewrite_program
-from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
+from toolpath_stiff.units import deg_from_rad, n_per_mm_from_n_per_m, um_from_m
+
+ZERO = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "rotation_deg")
 
 
 def place_program(task: PlacementTask, progress: Callable[[int, int], None] | None = None) -> Placement:
@@ -57,14 +60,15 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
     """
     _check(task)
     path = work_path(task.program, task.step, task.load, task.model.machine)
-    search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, np.array(task.present))
+    present = np.append(task.present, np.zeros(len(task.bounds.low) - 6))  # the tool's turn as programmed
+    search = Search(task.model, path, task.load, task.bounds, task.rules, task.force, present)
     search.report, search.errors = progress or search.report, task.errors
     found = search_placements(search)
     front = numbered_rows(task, path, found)
     before, reason = _analyzed(task, task.program, task.present)
     row = front[found.best]
     program = task.read(row.origin) if task.program.moves.from_machine.any() else task.program
-    best, beyond = _analyzed(task, program, row.origin)
+    best, beyond = _analyzed(task, program, row.origin, row.tool_turn_deg)
     if best is None:
         raise UnreachableError(f"placement {row.number} of the front: {beyond}", hint="search again")
     rewritten, written = _rewritten(task, best) if task.write else (None, None)
@@ -89,12 +93,14 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
 
 def _check(task: PlacementTask) -> None:
     """Raise `InputError` for what can be told before a search."""
-    machine, turns = task.model.machine, np.concatenate([task.bounds.low[3:], task.bounds.high[3:]])
+    machine, turns = task.model.machine, np.concatenate([task.bounds.low[3:6], task.bounds.high[3:6]])
     if not isinstance(machine, Hexapod) and task.program.native and task.program.moves.end[:, 3:].any() and turns.any():
         mistake = f"the program turns axes of machine {machine.name}, whose words another turn of the work would change"
         raise InputError(mistake, hint="place it with --rotate 0, untilted")
     if not task.write:
         return
+    if len(task.bounds.low) > 6:
+        raise InputError("--write with --turn: a program does not say how the tool is turned about its axis")
     check_rewritable(task.program)
     if task.program.interpreter != "builtin":
         raise InputError(
@@ -119,7 +125,8 @@ def numbered_rows(task: PlacementTask, path: WorkPath, found: PlacementResult) -
     rows = []
     for i, values in enumerate(np.stack(columns, axis=1).tolist()):
         cells: list[Any] = [value if np.isfinite(value) else None for value in values]
-        rows.append(PlacementRow(i + 1, *_mm_deg(found.front[i]), *cells))
+        turn = [deg_from_rad(float(angle)) % 360.0 for angle in found.front[i, 6:]]
+        rows.append(PlacementRow(i + 1, *_mm_deg(found.front[i, :6]), *cells, *turn))
     return rows
 
 
@@ -129,7 +136,7 @@ def _analyzed_row(analysis: Analysis, like: PlacementRow | None = None) -> Place
     cells: list[Any] = [headline[key] for key in (*FIGURES.values(), "mean_deflection_um")]
     cells += [plunges["mean_N_per_mm"], plunges["min_N_per_mm"]]
     cells.append(share(analysis.at.extrapolated, analysis.samples.cutting))
-    cells += [like.margin, like.rapid_margin] if like else []
+    cells += [like.margin, like.rapid_margin, like.tool_turn_deg] if like else []
     return PlacementRow(like.number if like else None, *_mm_deg(analysis.origin), *cells)
 
 
@@ -139,10 +146,15 @@ def _mm_deg(placement: Pose | FloatArray) -> ShopPose:
     return x, y, z, a, b, c % 360.0
 
 
-def _analyzed(task: PlacementTask, program: ReadProgram, origin: Pose) -> tuple[Analysis | None, str]:
-    """The program at a placement, or None and why."""
+def _analyzed(
+    task: PlacementTask, program: ReadProgram, origin: Pose, turn_deg: float | None = None
+) -> tuple[Analysis | None, str]:
+    """The program at a placement, the tool turned about its axis, or None and why."""
+    turn = FIXED if turn_deg is None else turn_deg
     try:
-        return analyze(task.model, program, origin=origin, load=task.load, step=task.step, force=task.force), ""
+        return analyze(
+            task.model, program, origin=origin, load=task.load, step=task.step, force=task.force, turn=turn
+        ), ""
     except UnreachableError as error:
         return None, str(error)
 
@@ -155,7 +167,7 @@ def _rewritten(task: PlacementTask, best: Analysis) -> tuple[bytes | None, Writt
         differences = rewriting_differences(best, rewritten, task.present, task.control)
     except InputError as error:
         return None, Written(task.write, refused=str(error))
-    zero = dict(zip(COLUMNS[1:7], _mm_deg(task.present), strict=True))
+    zero = dict(zip(ZERO, _mm_deg(task.present), strict=True))
     return rewritten.content, Written(task.write, zero, differences, tuple(rewritten.notes))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
@@ -98,6 +98,12 @@ class PlacementRow:
     extrapolated_share: float
     margin: float | None = None
     rapid_margin: float | None = None
+    tool_turn_deg: float | None = None  # about its axis; None: as programmed
+
+    @property
+    def cells(self) -> Document:
+        """What is known of it, by column."""
+        return {name: value for name, value in vars(self).items() if name != TOOL_TURN or value is not None}
 
     @property
     def origin_mm_deg(self) -> ShopPose:
@@ -110,7 +116,7 @@ class PlacementRow:
         return pose_in_si(self.origin_mm_deg)
 
 
-COLUMNS = tuple(field.name for field in fields(PlacementRow))
+TOOL_TURN = "tool_turn_deg"
 
 
 @dataclass(frozen=True)
@@ -286,7 +292,7 @@ class Placement(FolderResult):
         """The reason why the program could not be written for the placement, "" unless that is so."""
         return "" if self.written is None else self.written.refused
 
-    @property
+    @cached_property
     def offsets(self) -> OffsetBlocks:
         """Offsets to key in at the control."""
         return offset_blocks(self.best.program, self.best.origin)
@@ -318,12 +324,12 @@ class Placement(FolderResult):
                 "load": str(self.best.load),
                 "force_N": self.best.force,
                 "objective": self.task.rules.objective,
-                "chosen": self.chosen,
-                "before": self.present,
+                "chosen": self.chosen.cells,
+                "before": self.present and self.present.cells,
                 "before_reason": self.present_reason or None,
                 "trade_offs": self.trade_offs,
                 **({} if self.surface_error_um is None else {"surface_error_um": self.surface_error_um}),
-                "front": self.front,
+                "front": [row.cells for row in self.front],
                 "offset_blocks": {name: text or None for name, text in vars(self.offsets).items()},
                 "written": self.written,
                 "search": {name: getattr(self, name) for name in SEARCH},
@@ -334,7 +340,7 @@ class Placement(FolderResult):
 
     def to_frame(self) -> pd.DataFrame:
         """The front, one placement a row, as in `placements.csv`."""
-        return frame_of(self.front)
+        return frame_of([row.cells for row in self.front])
 
     def _short(self) -> str:
         words = [f"{axis}{value:.6g}" for axis, value in zip("XYZABC", self.origin_mm_deg, strict=True)]
@@ -344,12 +350,12 @@ class Placement(FolderResult):
 def bound_warnings(bounds: Bounds, placement: ShopPose, workspace: FloatArray) -> list[str]:
     """Bounds of the search that a placement lies on, with the options that widen them by half."""
     words = []
-    lows, highs = (pose_in_mm(ends.tolist()) for ends in (bounds.low, bounds.high))
+    lows, highs = (pose_in_mm(ends[:6].tolist()) for ends in (bounds.low, bounds.high))
     least, most = (
         np.append(mm_from_m(ends), [far] * 3) for ends, far in zip(workspace, (-np.inf, np.inf), strict=True)
     )
     for i in bounds.free:
-        if bounds.round[i] or (i == 2 and bounds.heights):
+        if i > 5 or bounds.round[i] or (i == 2 and bounds.heights):
             continue
         low, high, half = lows[i], highs[i], 0.5 * (highs[i] - lows[i])
         value = low + (placement[i] - low + 1e-6) % 360.0 - 1e-6 if i == 5 else placement[i]  # the row's: 0 to 360

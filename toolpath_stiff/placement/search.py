@@ -384,7 +384,7 @@ def _infeasible(search: Search, placement: FloatArray) -> UnreachableError:
         room = np.where(path.cutting, rows.law[0], np.inf)
         row, hint = int(np.argmin(room)), "widen the bounds, or allow it with --allow-extrapolation"
         fault = f"takes a strut {mm_from_m(-float(room[row])):.3g} mm out of the lengths of its law"
-    x, y, z, _, _, turned = pose_in_mm(placement.tolist())
+    x, y, z, _, _, turned = pose_in_mm(placement[:6].tolist())
     return UnreachableError(
         f"no placement is feasible: at the least bad one (X{x:.1f} Y{y:.1f} Z{z:.1f}, turned by {turned:.1f} degrees) "
         f"{'' if path.cutting[row] else 'the rapid of '}line {int(path.line[row])} {fault}",

@@ -58,7 +58,7 @@ class Search:
     heeded: IntArray = field(init=False)
 
     def __post_init__(self) -> None:
-        self.start, self.heeded = np.zeros((0, 6)), np.zeros(0, dtype=np.int64)
+        self.start, self.heeded = np.zeros((0, len(self.bounds.low))), np.zeros(0, dtype=np.int64)
         self.evaluators["whole"] = self.evaluator(self.path)
         for name, count in (("middle", POLISH_SAMPLES), ("few", SCOUT_SAMPLES)):
             short = len(self.path) <= count

@@ -9,9 +9,10 @@ import numpy as np
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
 from toolpath_stiff.inference.candidates import Component
+from toolpath_stiff.inference.element_predictor import predictor_of
 from toolpath_stiff.inference.noise import JOINT_ERROR, REST
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.readings.measurements import Readings, measured_path
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.geometry_slopes import geometry_slopes
@@ -78,7 +79,7 @@ class Forecast:
 
 
 def forecast_all(
-    machine: Hexapod,
+    machine: MachineTool,
     rivals: Sequence[Rival],
     readings: Readings,
     effect_files: Sequence[str | Path] = (),
@@ -91,13 +92,14 @@ def forecast_all(
     The last is (m, k), a factor of the covariance that the struts' spread (relative sd), the joints' errors (m, sd of
     each coordinate) and the links that the model takes for rigid (rms over the readings) cause.
     """
-    predictor = Predictor(machine, readings, effect_files)
+    predictor = predictor_of(machine, readings, effect_files)
     forecasts = [_forecast(rival, predictor) for rival in rivals]
     good = np.all([np.isfinite(f.mean) & np.isfinite(f.factor).all(axis=1) for f in forecasts], axis=0)
     # What a loop beside the tip reads hangs on the joints' places too little to count them.
     joints, tip = np.zeros((len(readings), 36)), readings.of_tip
     path = measured_path(predictor.base, tip)
-    joints[readings.tip] = geometry_slopes(predictor.base, path, tip.direction)[:, 6:] * joint_error
+    if isinstance(machine, Hexapod):
+        joints[readings.tip] = geometry_slopes(predictor.base, path, tip.direction)[:, 6:] * joint_error
     shared = [strut_spread * predictor.strut_columns(), joints, rest * predictor.rest_columns()]
     return forecasts, good, principal(np.concatenate(shared, axis=1))
 
@@ -167,5 +169,5 @@ def _answers(predictor: Predictor, law: FloatArray, effects: Sequence[ActiveEffe
     if not np.isnan(logs).all() or len(logs) <= 1:
         return logs
     parts = (predictor.data.select(rows) for rows in np.array_split(np.arange(len(logs)), 2))
-    halves = (Predictor(predictor.machine, part, predictor.effect_files) for part in parts)
+    halves = (predictor_of(predictor.stated, part, predictor.effect_files) for part in parts)
     return np.concatenate([_answers(half, law, effects) for half in halves])

@@ -24,7 +24,7 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.inference.noise import LEAST
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.planning.forecasts import Forecast, Rival, forecast_all
 from toolpath_stiff.planning.gaps import (
     Expectation,
@@ -37,7 +37,7 @@ from toolpath_stiff.planning.gaps import (
 from toolpath_stiff.planning.indicators import loops_between, with_indicators
 from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.visits import Visits, possible_visits
-from toolpath_stiff.stiffness.contract import Effect
+from toolpath_stiff.stiffness.contract import SETUP, Effect
 from toolpath_stiff.units import min_from_s
 
 Pair = tuple[str, str]  # names of two rivals
@@ -54,8 +54,8 @@ INDICATORS = {
     "struts": "along a strut, from end to end",
     "frame": "between a frame vertex and the floor",
     "table": "between the table and the floor",
-    "geometry": "none: measure the length or radius itself",
-    "instrument": "none: compare the gauge with a second one, and watch the indicator without load",
+    "geometry": "none: the length or radius measured by itself",
+    "instrument": "none: a second gauge beside this one, and an indicator watched without load",
 }
 
 
@@ -309,7 +309,7 @@ def percent(share: float) -> str:
 
 
 def plan_measurements(
-    machine: Hexapod,
+    machine: MachineTool,
     rivals: Sequence[Rival],
     noise_relative: float | tuple[float, float],
     n: int = 6,
@@ -354,7 +354,7 @@ def plan_measurements(
         notes.append(f"planned for a noise of {100 * LEAST:g} % a reading: nobody measures better")
     menu = menu or Menu()
     visits = possible_visits(machine, menu, matters(ranked), np.random.default_rng(seed))
-    if menu.indicators:
+    if menu.indicators and isinstance(machine, Hexapod):
         visits = with_indicators(machine, visits, loops_between(ranked), repeat)
     forecasts, good, scatter = forecast_all(machine, ranked, visits.readings, effect_files, strut_spread)
     usable = np.logical_and.reduceat(good[visits.members], visits.starts)
@@ -412,6 +412,6 @@ def matters(rivals: Sequence[Rival]) -> set[str]:
     columns = {column for active in actives for column in active.effect.needs}
     if any(active.effect.load_dependent for active in actives):
         columns.add("force_N")
-    if any(p.kind == "text" for active in actives for p in active.effect.parameters):  # the set-up that it acts on
+    if any(p.name == SETUP for active in actives for p in active.effect.parameters):  # that it acts on
         columns.add("setup")
     return columns

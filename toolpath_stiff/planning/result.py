@@ -20,10 +20,12 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.judgement import Judgement, judge
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.elements import turns
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.planning.campaign import Campaign, first_campaign
+from toolpath_stiff.planning.forecasts import Rival
 from toolpath_stiff.planning.menu import Menu
-from toolpath_stiff.planning.plan import RivalPlan, plan_measurements
+from toolpath_stiff.planning.plan import MOST_RIVALS, RivalPlan, plan_measurements
 from toolpath_stiff.planning.rivals import errors_so_far, fitted_rivals, rivals_of, unfitted_rivals
 from toolpath_stiff.planning.visits import AXES, Visits
 from toolpath_stiff.readings.measurements import Readings
@@ -57,7 +59,7 @@ class Plan(FolderResult):
     command: ClassVar[str] = "plan"
     shown_by: ClassVar[str] = "plan"
 
-    machine: Hexapod
+    machine: MachineTool
     data: Readings | None
     choice: RivalPlan | Campaign
     effect_files: tuple[str | Path, ...]
@@ -171,8 +173,15 @@ def plan_csv(rows: Sequence[PlanRow]) -> str:
     return csv_text(rows[0], cells)
 
 
+def elements_apart(machine: MachineTool) -> list[str]:
+    """Rivals of a first campaign on a machine of elements: each of its joints that turn soft, else its elements."""
+    turn = [f"joint_torsion:{element.name}" for element in machine.elements if turns(element)]
+    soft = [f"weak_element:{element.name}" for element in machine.elements if not turns(element)]
+    return [*turn, *soft][:MOST_RIVALS]
+
+
 def plan(
-    machine: Hexapod,
+    machine: MachineTool,
     data: Readings | None = None,
     menu: Menu | None = None,
     *,
@@ -183,6 +192,7 @@ def plan(
     effect_files: Sequence[str | Path] = (),
     seed: int = 0,
     judgement: Judgement | None = None,
+    rivals: Sequence[Rival] = (),
 ) -> Plan:
     """Plan what to measure next, after some measurements; or first.
 
@@ -200,6 +210,8 @@ def plan(
         As in `diagnose`; without data, a noise of `CAMPAIGN_NOISE` is assumed.
     judgement
         What a diagnosis of these data came to already (`Diagnosis.main`): it is not made again.
+    rivals
+        Of a machine of elements: what its pulls leave, fitted to them.
 
     Raises
     ------
@@ -213,16 +225,25 @@ def plan(
     >>> len(found.choice.chosen), found.choice.separable
     (2, True)
     """
-    menu, effects = menu or Menu.of(data), known_effects(effect_files)
+    menu, effects = menu or Menu.of(data), known_effects(effect_files, machine.kind)
+    if not isinstance(machine, Hexapod):
+        menu = replace(menu, setups=("",))  # no rival belongs to one
+        if np.isnan(machine.reference_tool_length):
+            menu = replace(menu, tool_extensions=(0.0,))
+        if not between and not rivals:
+            between, n = elements_apart(machine), CAMPAIGN_POSES if n is None else n
     planned_for: float | tuple[float, float] = CAMPAIGN_NOISE if noise is None else noise
-    if data is None and not between:
+    if isinstance(machine, Hexapod) and data is None and not between:
         poses = CAMPAIGN_POSES if n is None else n
         campaign = first_campaign(machine, poses, menu, seed, effects, planned_for, effect_files)
         return Plan(machine, data, campaign, tuple(effect_files), seed)
     verdict, errors = "", dict[str, float]()
-    if data is None:
+    notes = list[str]()
+    if rivals:
+        notes.append(f"noise of a reading: {100 * np.hypot.reduce(np.atleast_1d(planned_for)):.2g} %")
+    elif data is None or not isinstance(machine, Hexapod):
         rivals = unfitted_rivals(between, effects, setup=menu.setups[-1])
-        notes = ["no data: the rivals are taken at their usual sizes"]
+        notes += ["no data: the rivals are taken at their usual sizes"]
         notes += [] if noise is not None else [f"noise of a reading: {100 * CAMPAIGN_NOISE:g} % assumed"]
     else:
         # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.

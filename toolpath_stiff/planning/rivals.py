@@ -15,7 +15,7 @@ from toolpath_stiff.inference.judgement import NONE, Judgement
 from toolpath_stiff.planning.forecasts import Rival
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
-from toolpath_stiff.stiffness.contract import Effect
+from toolpath_stiff.stiffness.contract import ELEMENT, Effect
 
 LEAST_WEIGHT = 0.02  # probability below which an explanation is no rival
 UNKNOWN_SIZE = 0.5  # relative sd of a size that nothing has been measured of; assumed
@@ -104,7 +104,8 @@ def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: 
         if name == NONE:
             rivals.append(Rival(NONE, (0.0, 0.0), (), np.diag([LAW_PRIOR**2] * 2)))
             continue
-        effect = effects[name]
+        plain, _, element = name.partition(":")
+        effect = effects[plain]
         sizes = [usual_size(Component.of(p)) for p in effect.parameters if not p.discrete]
         values: dict[str, Any] = {}
         discrete = sum(parameter.discrete for parameter in effect.parameters)
@@ -114,6 +115,8 @@ def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: 
                 values[parameter.name] = component.value(usual_size(component))
             elif parameter.kind == "integer":  # 0 means all: with other choices beside it that is no effect at all
                 values[parameter.name] = max(int(parameter.bounds[0]), int(discrete > 1))
+            elif parameter.name == ELEMENT:
+                values[ELEMENT] = element
             else:
                 values[parameter.name] = setup if discrete == 1 else ""
         covariance = np.diag([LAW_PRIOR**2] * 2 + [(UNKNOWN_SIZE * size) ** 2 for size in sizes])
@@ -147,5 +150,31 @@ def _check(names: Sequence[str], effects: Mapping[str, Effect]) -> None:
     if len(set(names)) != len(names) or len(names) < 2:
         raise InputError(f"--between {','.join(names)}", expected="two or more different effects, or none")
     for name in names:
-        if name != NONE and name not in effects:
+        if name != NONE and name.partition(":")[0] not in effects:
             find_effect(name)  # says what there is
+            raise InputError(f"--between {name}: it holds on hexapods only", expected=f"one of {', '.join(effects)}")
+
+
+def rivals_on_elements(fits: Sequence[Fit], standing: Sequence[Fit], between: Sequence[str]) -> list[Rival]:
+    """Explanations of pulls, likeliest first, as rivals: those named, else those that stand, and what comes next.
+
+    Weights are as of equally likely explanations, none below `LEAST_WEIGHT`. Raises `InputError` for one that changes
+    nothing there.
+    """
+    by_name = {rival_name(fit): fit for fit in fits}
+    if missing := [name for name in between if name not in by_name]:
+        mistake = f"--between {missing[0]}: fitted to these data it comes out at nothing"
+        raise InputError(mistake, expected=f"some of {', '.join(by_name)}")
+    chosen = [by_name[name] for name in between] or [*standing, *(fit for fit in fits if fit not in standing)]
+    chosen = chosen[: max(len(between) or len(standing), 2)]
+    best = max(fit.log_posterior for fit in chosen)
+    weights = [max(float(np.exp(fit.log_posterior - best)), LEAST_WEIGHT) for fit in chosen]
+    return [rival_of_fit(rival_name(fit), fit, weight) for fit, weight in zip(chosen, weights, strict=True)]
+
+
+def rival_name(fit: Fit) -> str:
+    """As `--between` has it: "joint_torsion:joint 3", "none"."""
+    if not fit.candidates:
+        return NONE
+    element = dict(fit.candidates[-1].choice).get(ELEMENT)
+    return f"{fit.names[-1]}:{element}" if element else fit.names[-1]

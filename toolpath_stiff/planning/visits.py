@@ -14,9 +14,8 @@ from numpy.random import Generator
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.limits import reach, solved, working_box
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.planning.menu import MINUTE, Menu
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.rotations import rotation_matrices
@@ -125,7 +124,7 @@ class Visits:
         return sum(float(self.further_minutes(chosen[:k])[visit]) for k, visit in enumerate(chosen))
 
 
-def possible_visits(machine: Hexapod, menu: Menu, matters: Collection[str], rng: Generator) -> Visits:
+def possible_visits(machine: MachineTool, menu: Menu, matters: Collection[str], rng: Generator) -> Visits:
     """Every visit that a plan may choose from; of load, set-up and time only those columns vary that matter.
 
     Each place is offered with every choice of directions, loads and rounds. X, Y, Z are always read: what the rivals do
@@ -244,7 +243,7 @@ def visits_of(
     )
 
 
-def draw_poses(machine: Hexapod, menu: Menu, count: int, rng: Generator) -> FloatArray:
+def draw_poses(machine: MachineTool, menu: Menu, count: int, rng: Generator) -> FloatArray:
     """(m, 6) round, reachable poses with the reference tool, m <= count; a quarter of them with a vertical spindle."""
     levels = np.array(menu.heights or axis_levels(machine))
     drawn: list[FloatArray] = []
@@ -258,29 +257,31 @@ def draw_poses(machine: Hexapod, menu: Menu, count: int, rng: Generator) -> Floa
         lean = np.stack([tilt * np.cos(about), tilt * np.sin(about)], axis=1)
         place = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth)], axis=1)
         poses = np.zeros((count, 6))
-        poses[:, :2] = np.trunc(place / ROUND) * ROUND + 0.0
+        poses[:, :2] = np.trunc(place / ROUND) * ROUND + middle_of(machine)
         poses[:, 2] = rng.choice(levels, count)
         poses[:, 3:5] = np.trunc(lean / ROUND_ANGLE + 1e-9 * np.sign(lean)) * ROUND_ANGLE + 0.0
         if batch == 0:
-            poses[: len(levels)] = np.outer(levels, np.arange(6) == 2)[:count]
+            poses[: len(levels)] = _upright(machine, levels)[:count]
         drawn += list(poses[reachable(machine, poses, 0.0)])
         if len(drawn) >= count:
             break
     return np.array(drawn[:count]).reshape(-1, 6)
 
 
-def axis_levels(machine: Hexapod) -> tuple[float, ...]:
+def axis_levels(machine: MachineTool) -> tuple[float, ...]:
     """Five heights in m, from the lowest to the highest that the tip reaches on the machine's axis, its base frame's Z.
 
     They begin a tenth of the way from each end.
     """
     low, high = machine.limits.workspace[:, 2]
-    if not np.isfinite(high - low):
+    if not isinstance(machine, Hexapod):
+        low, high = working_box(machine)[:, 2]
+    elif not np.isfinite(high - low):
         middle, size = machine.limits.neutral_pose[2], float(np.ptp(machine.frame_joints[:, 2]))
         size = max(size, 0.2 * float(np.abs(machine.frame_joints[:, :2]).max()))
         low, high = middle - size, middle + size
     tries = np.linspace(low, high, 200)
-    good = tries[reachable(machine, np.outer(tries, np.arange(6) == 2), 0.0)]
+    good = tries[reachable(machine, _upright(machine, tries), 0.0)]
     if not len(good):
         raise InputError(
             f"machine {machine.name} reaches no pose on its axis with a vertical spindle",
@@ -290,12 +291,26 @@ def axis_levels(machine: Hexapod) -> tuple[float, ...]:
     return tuple((np.round(np.linspace(*ends, 5) / (2.0 * ROUND)) * 2.0 * ROUND).tolist())
 
 
-def reachable(machine: Hexapod, pose: FloatArray, tool_extension: float, margin: float = MARGIN) -> BoolArray:
+def _upright(machine: MachineTool, levels: FloatArray) -> FloatArray:
+    """(n, 6) poses above one another with the spindle upright."""
+    poses = np.outer(levels, np.arange(6) == 2)
+    poses[:, :2] += middle_of(machine)
+    return poses
+
+
+def reachable(machine: MachineTool, pose: FloatArray, tool_extension: float, margin: float = MARGIN) -> BoolArray:
     """(n,) whether the machine takes poses (n, 6) with such a tool, clear of its limits and of a strut law at zero."""
     rotation = rotation_matrices(pose[:, 3:])
-    struts = solve_struts(machine, pose[:, :3], rotation, machine.reference_tool_length + tool_extension)
-    stiff = (machine.strut_law.stiffness(struts.lengths) > 0.0).all(axis=1)
-    return np.asarray(stiff & (reach(machine, pose[:, :3], struts, rotation).margin >= margin))
+    stance = solved(machine, pose[:, :3], rotation, machine.reference_tool_length + tool_extension)
+    good = reach(machine, pose[:, :3], stance, rotation).margin >= margin
+    if isinstance(machine, Hexapod):
+        good &= (machine.strut_law.stiffness(stance.joints) > 0.0).all(axis=1)
+    return np.asarray(good)
+
+
+def middle_of(machine: MachineTool) -> FloatArray:
+    """(2,) m, X and Y about which poses are drawn: a hexapod's axis, of other machines where program zero sits."""
+    return np.zeros(2) if isinstance(machine, Hexapod) else np.array(machine.default_origin[:2])
 
 
 def tilts(pose: FloatArray) -> FloatArray:

@@ -9,14 +9,15 @@ over the constants of a shape, so that no link is preferred for having many term
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.portrait.columns import Ground
 from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Term
 
@@ -25,6 +26,7 @@ ONCE = ("constant", "direction")  # variables whose every place stands in the di
 ALL_STRUTS, ALL_VERTICES = (None, 1, 2, 3, 4, 5, 6), (None, 1, 2, 3)
 ALONE = ("coupling", "joint offset")  # actions that depend on nothing
 SIDE = 0.2  # prior weight of what a link could do by a way round: a frame does not feel where the tip is
+MOST_HELD = 8_000_000  # numbers of columns that are kept, 64 MB; the others are made again when they are asked for
 NOTHING = 1e-4  # rms change of stiffness by the largest size below which a term does nothing to these readings
 
 
@@ -140,8 +142,9 @@ class Dictionary:
     ----------
     terms
         Without sizes.
-    columns
-        (N, n) change of compliance over the compliance, scaled to an rms of 1.
+    blocks
+        Columns of some terms at a time, in their order, (m, n) each, or what makes them: of many readings all together
+        take more memory than a computer has to spare.
     log_prior
         (N,) weights.
     signed
@@ -149,36 +152,48 @@ class Dictionary:
     """
 
     terms: tuple[Term, ...]
-    columns: FloatArray
+    blocks: tuple[FloatArray | Callable[[], FloatArray], ...]
     log_prior: FloatArray
     signed: NDArray[np.bool_]
+
+    def columns(self) -> Iterator[FloatArray]:
+        """Change of compliance over the compliance, scaled to an rms of 1: (m, n) of some terms at a time, in order."""
+        return (block() if callable(block) else block for block in self.blocks)
 
 
 def dictionary_of(ground: Ground) -> Dictionary:
     """Every term that does something to these readings."""
-    terms, blocks, logs = list[Term](), list[FloatArray](), list[float]()
+    terms, blocks, logs, held = list[Term](), list[FloatArray | Callable[[], FloatArray]](), list[float](), 0
     for local, priors in place_priors(ground):
         plain = local.term("constant", "offset", ())
-        share = ground.share(plain)
         for variable in local.variables:
             columns = columns_of(variable, ground, local.link == "joints")
             for column in columns:
                 named, values = ground.shapes(variable, column, plain.signed, local.where)
-                if not named:
-                    continue
-                blocks.append(ground.columns(plain, share, values))
-                terms += [local.term(variable, shape, constants, column) for shape, constants in named]
+                relative = _relative(ground, plain, values)
+                scale = np.sqrt((relative**2).mean(axis=1))
+                shaped = [local.term(variable, shape, constants, column) for shape, constants in named]
+                limits = np.array([max(map(abs, term.bounds)) * term.si for term in shaped])
+                # A term that changes every reading alike is the strut law's affair.
+                kept = np.flatnonzero((scale * limits > NOTHING) & (relative.std(axis=1) > 1e-6 * scale))
+                block = partial(_relative, ground, plain, values, kept, scale)
+                blocks.append(block() if held < MOST_HELD else block)
+                held += len(kept) * relative.shape[1]
                 kinds = Counter(shape for shape, _ in named)
                 log = priors[variable] - float(np.log(len(kinds) * len(columns)))
-                logs += [log - float(np.log(kinds[shape])) for shape, _ in named]
-    relative = np.concatenate(blocks) / ground.compliance
-    scale = np.sqrt((relative**2).mean(axis=1))
-    limits = np.array([max(map(abs, term.bounds)) * term.si for term in terms])
-    # A term that changes every reading alike is the strut law's affair.
-    kept = np.flatnonzero((scale * limits > NOTHING) & (relative.std(axis=1) > 1e-6 * scale))
-    chosen = tuple(terms[i] for i in kept.tolist())
-    signed = np.array([term.signed for term in chosen], dtype=bool)
-    return Dictionary(chosen, relative[kept] / scale[kept, None], np.array(logs)[kept], signed)
+                terms += [shaped[i] for i in kept]
+                logs += [log - float(np.log(kinds[named[i][0]])) for i in kept]
+    signed = np.array([term.signed for term in terms], dtype=bool)
+    return Dictionary(tuple(terms), tuple(blocks), np.array(logs), signed)
+
+
+def _relative(
+    ground: Ground, plain: Term, values: FloatArray, kept: IntArray | None = None, scale: FloatArray | None = None
+) -> FloatArray:
+    """(s, n) change of compliance over the compliance by a link with shapes (s, n), some of them over their scale."""
+    if kept is None or scale is None:
+        return ground.columns(plain, ground.share(plain), values) / ground.compliance
+    return ground.columns(plain, ground.share(plain), values[kept]) / ground.compliance / scale[kept, None]
 
 
 def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:

@@ -194,19 +194,20 @@ class Selection:
     @cached_property
     def _squares(self) -> FloatArray:
         """(N,) information of each term by itself under the base fit's scatter."""
-        return np.asarray(self.base.scatter.precision.squares(self.dictionary.columns))
+        return np.concatenate([self.base.scatter.precision.squares(part) for part in self.dictionary.columns()])
 
     def _gains(self, residuals: FloatArray, before: Description) -> FloatArray:
         """(s, N) twice the gain in log likelihood for residuals (s, n), where the size goes to an allowed side.
 
         Beside a description each term has the information A - A J (J^T A J + prior)^-1 J^T A leaves of it.
         """
-        projected, columns = before.fit.projected, self.dictionary.columns
-        slope = -set_wild_aside(projected.times(residuals), projected)[0] @ columns.T
+        projected = before.fit.projected
+        weights = set_wild_aside(projected.times(residuals), projected)[0]
         weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
         root = inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
-        alone = self._squares
-        information = alone - ((columns @ (weighted.T @ root)) ** 2).sum(axis=1)
+        alone, taken = self._squares, weighted.T @ root
+        parts = [(weights @ part.T, ((part @ taken) ** 2).sum(axis=1)) for part in self.dictionary.columns()]
+        slope, information = -np.hstack([of for of, _ in parts]), alone - np.concatenate([of for _, of in parts])
         allowed = self.dictionary.signed | (slope > 0.0)
         seen = information > 1e-6 * alone
         return np.asarray(np.where(allowed & seen, slope**2 / np.where(seen, information, 1.0), 0.0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from importlib import resources
@@ -152,8 +152,13 @@ class Readings:
 
     def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
         """Effects that these data cannot test -> the columns that they lack."""
-        lacking = {effect.name: tuple(c for c in effect.needs if c in self.missing) for effect in effects}
-        return {name: columns for name, columns in lacking.items() if columns}
+        return lacking_columns(effects, self.missing)
+
+
+def lacking_columns(effects: Iterable[Effect], missing: Collection[str]) -> dict[str, tuple[str, ...]]:
+    """Effects that need columns which are missing -> these columns."""
+    lacking = {effect.name: tuple(c for c in effect.needs if c in missing) for effect in effects}
+    return {name: columns for name, columns in lacking.items() if columns}
 
 
 def read_measurements(

@@ -2,30 +2,37 @@
 
 A row is a pull: where the machine stands (pose of the tip, or values of its joints, or both, held against each other),
 the force on the tool (its vector, or the tension of a cable and the pulley that it runs to), what moved (components, or
-a dial's reading). All in base axes; where the force acts and what is read may lie off the tip, in tip axes.
+a dial's reading). All in base axes, components also in axes turned against these (roll, pitch, yaw); where the force
+acts and what is read may lie off the tip, in tip axes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
+from typing import ClassVar
 
 import numpy as np
 
-from toolpath_stiff.arrays import ArrayColumns, FloatArray, IntArray, TextArray
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputErrors, MeasurementError
-from toolpath_stiff.machine.elements import LoadRows, Spring, Stance
+from toolpath_stiff.machine.elements import Stance
+from toolpath_stiff.machine.joint_values import joint_margin
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.readings.mapping import mapped_table
-from toolpath_stiff.readings.measurements import read_measurements
+from toolpath_stiff.readings.measurements import lacking_columns, read_measurements
 from toolpath_stiff.readings.rows import ANGLES, COLUMNS, POSITION, number, optional_number, parsed_rows
 from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_mm, m_from_um, mm_from_m, rad_from_deg
 
 FORCE, MOVED, DIAL = ("fx_N", "fy_N", "fz_N"), ("ux_um", "uy_um", "uz_um"), ("dial_x", "dial_y", "dial_z")
 TENSION, CABLE = "tension_N", ("cable_x_mm", "cable_y_mm", "cable_z_mm")
 PULL, TARGET = (tuple(f"{what}_d{axis}_mm" for axis in "xyz") for what in ("pull", "target"))
+FORCE_AXES, MOVED_AXES = (tuple(f"{what}_axes_{axis}_deg" for axis in "abc") for what in ("force", "sensor"))
+NOT_READ = ("nan", "n/a", "na", "-")  # cells that say so, as empty ones do
+SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
 SAME_PLACE = m_from_mm(1.0)  # by which a pose and the joints beside it may differ: both are rounded
 
 
@@ -59,8 +66,45 @@ class Pulls(ArrayColumns):
     line: IntArray
     component: TextArray
 
+    missing: ClassVar[tuple[str, ...]] = ("setup", "time_min", "temperature_C", "tool_extension_mm", "sd_N_per_mm")
+
     def __len__(self) -> int:
         return len(self.value)
+
+    @cached_property
+    def size(self) -> FloatArray:
+        """(m,) m, length of the displacement that each reading is a component of."""
+        pull = np.unique(np.char.add(self.file, self.line.astype(str)), return_inverse=True)[1].reshape(-1)
+        return np.asarray(np.maximum(np.sqrt(np.bincount(pull, self.value**2)), SMALLEST)[pull])
+
+    @property
+    def setup(self) -> TextArray:
+        """(m,) no set-up is named."""
+        return np.full(len(self), "")
+
+    @property
+    def point(self) -> TextArray:
+        """(m,) label of the pose."""
+        return self.pose.astype(str)
+
+    @property
+    def tip(self) -> BoolArray:
+        """(m,) every reading is of the tip."""
+        return np.ones(len(self), dtype=bool)
+
+    @property
+    def of_tip(self) -> "Pulls":
+        """All of them."""
+        return self
+
+    @property
+    def direction(self) -> FloatArray:
+        """(m, 3) along which each was read."""
+        return self.along[:, :3]
+
+    def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
+        """Effects that pulls cannot test -> the columns that they lack."""
+        return lacking_columns(effects, self.missing)
 
 
 def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> Pulls:
@@ -83,8 +127,19 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
 
 def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> list[Table]:
     """The files that give forces as vectors or by cables, as tables; the others give stiffnesses along directions."""
-    further = (*FORCE, *MOVED, *DIAL, TENSION, *CABLE, *PULL, *TARGET, *_joint_columns(machine))
-    known = Columns((*COLUMNS.numbers, *further), COLUMNS.texts)
+    further = (
+        *FORCE,
+        *MOVED,
+        *DIAL,
+        TENSION,
+        *CABLE,
+        *PULL,
+        *TARGET,
+        *FORCE_AXES,
+        *MOVED_AXES,
+        *_joint_columns(machine),
+    )
+    known = Columns((*COLUMNS.numbers, *further, *_joint_columns(machine)), COLUMNS.texts)
     tables = [mapped_table(name, "measurements", known, mapping) for name in files]
     return [table for table in tables if not {FORCE[0], TENSION}.isdisjoint(table.heading)]
 
@@ -108,6 +163,7 @@ class _Pull:
     @classmethod
     def of(cls, file: str, joints: Mapping[str, tuple[int, bool]], line: int, record: Mapping[str, str]) -> "_Pull":
         """A row of a file. Raises `MeasurementError`."""
+        record = {name: "" if cell.strip().lower() in NOT_READ else cell for name, cell in record.items()}
 
         def mm(names: Sequence[str]) -> tuple[float, ...]:
             return tuple(m_from_mm(number(record, name)) if record.get(name) else 0.0 for name in names)
@@ -122,10 +178,13 @@ class _Pull:
             raise MeasurementError("neither a pose nor all joints", expected=expected)
         angles = tuple(rad_from_deg(number(record, name)) if record.get(name) else 0.0 for name in ANGLES)
         tension = optional_number(record, TENSION)
-        force = tuple(number(record, name) for name in FORCE) if FORCE[0] in record else (np.nan,) * 3
+        by_vector = FORCE[0] in record and not (record.get(TENSION) and not any(record[name] for name in FORCE))
+        force = (
+            tuple(_turn(record, FORCE_AXES) @ [number(record, name) for name in FORCE]) if by_vector else (np.nan,) * 3
+        )
         if np.isnan(tension) == np.isnan(force[0]) or (not np.isnan(tension) and not record.get(CABLE[0])):
             raise MeasurementError("no force", expected=f"{', '.join(FORCE)}; or {TENSION} and {', '.join(CABLE)}")
-        axes = zip("xyz", np.eye(3).tolist(), MOVED, strict=True)
+        axes = zip("xyz", _turn(record, MOVED_AXES).T.tolist(), MOVED, strict=True)
         moved = [(c, tuple(axis), m_from_um(number(record, name))) for c, axis, name in axes if record.get(name)]
         if record.get("displacement_um") and record.get(DIAL[0]):
             dial = np.array([number(record, name) for name in DIAL])
@@ -137,6 +196,12 @@ class _Pull:
         pose = (*mm(POSITION), *angles) if placed else (np.nan,) * 6
         pulley, sd = mm(CABLE), m_from_um(optional_number(record, "sd_um"))
         return cls(pose, tuple(values), force, tension, pulley, tuple(moved), mm(PULL), mm(TARGET), sd, file, line)
+
+
+def _turn(record: Mapping[str, str], names: Sequence[str]) -> FloatArray:
+    """(3, 3) axes in which components are given, as columns in base axes."""
+    angles = [rad_from_deg(number(record, name)) if record.get(name) else 0.0 for name in names]
+    return np.asarray(rotation_matrices(np.array(angles)))
 
 
 def _joint_columns(machine: MachineTool) -> dict[str, tuple[int, bool]]:
@@ -179,56 +244,25 @@ def _of_rows(rows: Sequence[_Pull], machine: MachineTool) -> Pulls:
 def _stances(machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: Sequence[_Pull]) -> Stance:
     """At the joints where they are given, else at the pose. Raises `InputErrors` for rows that cannot be."""
     by_joints, errors = ~np.isnan(joints).any(axis=1), []
-    position, rotation = pose[:, :3].copy(), rotation_matrices(pose[:, 3:])
+    position, rotation, joints = pose[:, :3], rotation_matrices(pose[:, 3:]), joints.copy()
+    apart = np.full(len(rows), np.nan)
     if by_joints.any():
-        there, turn = machine.forward(joints[by_joints])
-        apart = np.linalg.norm(there - position[by_joints], axis=1)
-        for row, off in zip(np.flatnonzero(by_joints).tolist(), apart.tolist(), strict=True):
-            if not off > SAME_PLACE:
-                continue
-            text = f"pose and joints are {mm_from_m(off):.1f} mm apart"
-            errors.append(MeasurementError(text, file=rows[row].file, line=rows[row].line))
-        position[by_joints], rotation[by_joints] = there, turn
-    stances = [machine.solve(position, rotation, configuration=i) for i in range(len(machine.configurations))]
-    best = machine.solve(position, rotation)
-    chosen = best.configuration.copy()
-    for i, stance in enumerate(stances):
-        off = np.abs(np.exp(1j * stance.joints) - np.exp(1j * joints)).max(axis=1)
-        chosen[by_joints & (off < 1e-6)] = i
-    for row in np.flatnonzero(np.isnan(best.joints).any(axis=1)).tolist():
+        apart[by_joints] = np.linalg.norm(machine.forward(joints[by_joints])[0] - position[by_joints], axis=1)
+    for row in np.flatnonzero(apart > SAME_PLACE).tolist():
+        text = f"pose and joints are {mm_from_m(float(apart[row])):.1f} mm apart"
+        errors.append(MeasurementError(text, file=rows[row].file, line=rows[row].line))
+    if not by_joints.all():  # one configuration for all poses: of those that reach most, that farthest from limits
+        alone = position[~by_joints], rotation[~by_joints]
+        tried = [machine.solve(*alone, configuration=i).joints for i in range(len(machine.configurations))]
+        room = [joint_margin(values.T, machine.joint_limits) for values in tried]
+        kept = max(range(len(tried)), key=lambda i: (int((room[i] >= 0.0).sum()), float(room[i].min())))
+        missed = np.isnan(tried[kept]).any(axis=1, keepdims=True)
+        joints[~by_joints] = np.where(missed, machine.solve(*alone).joints, tried[kept])
+    for row in np.flatnonzero(np.isnan(joints).any(axis=1)).tolist():
         errors.append(MeasurementError("no joint values lead to the pose", file=rows[row].file, line=rows[row].line))
     if errors:
         raise InputErrors(errors)
-    order = np.argsort(np.concatenate([np.flatnonzero(chosen == i) for i in range(len(stances))]))
-    return _joined([stance.take(np.flatnonzero(chosen == i)) for i, stance in enumerate(stances)]).take(order)
-
-
-def _joined(parts: Sequence[Stance]) -> Stance:
-    """Stances one after the other, in whatever configuration."""
-
-    def whole(values: Sequence[FloatArray | None], *inner: int) -> FloatArray:
-        full = [np.eye(3) if value is None else value for value in values]
-        return np.concatenate([np.broadcast_to(v, (len(s), *inner)) for v, s in zip(full, parts, strict=True)])
-
-    joined: list[Spring | LoadRows] = []
-    for loads in zip(*(part.loads for part in parts), strict=True):
-        k = loads[0].compliance.shape[-1]
-        compliance = whole([load.compliance for load in loads], k)
-        springs = [load for load in loads if isinstance(load, Spring)]
-        if springs:
-            axes = whole([spring.axes for spring in springs], 3, 3)
-            joined.append(Spring(whole([spring.place for spring in springs], 3), axes, compliance))
-        else:
-            rows = [load.loads for load in loads if isinstance(load, LoadRows)]
-            joined.append(LoadRows(whole(rows, k, 6), compliance))
-    return Stance(
-        joints=np.concatenate([part.joints for part in parts]),
-        position=np.concatenate([part.position for part in parts]),
-        rotation=whole([part.rotation for part in parts], 3, 3),
-        work_axes=whole([part.work_axes for part in parts], 3, 3),
-        configuration=np.concatenate([part.configuration for part in parts]),
-        loads=tuple(joined),
-    )
+    return machine.standing(joints)
 
 
 def _of_stiffnesses(files: Sequence[str], machine: MachineTool, mapping: Mapped) -> Pulls:

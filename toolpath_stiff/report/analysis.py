@@ -2,13 +2,15 @@
 
 import textwrap
 from collections.abc import Iterator, Sequence
-from functools import partial
+
+import numpy as np
 
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import sample_columns
+from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.column_files import check_parquet, csv_pieces, parquet_pieces
 from toolpath_stiff.documents import Document
-from toolpath_stiff.path.table import PATH_COLUMNS
+from toolpath_stiff.path.table import LENGTH_DECIMALS, PATH_COLUMNS
 from toolpath_stiff.report import analysis_page, cut, cut_files
 from toolpath_stiff.report.analysis_tables import (
     TITLES,
@@ -24,7 +26,7 @@ from toolpath_stiff.report.tables import LABEL
 from toolpath_stiff.report.words import WIDTH, labelled
 from toolpath_stiff.results import one_of
 
-# Of `samples.csv`, Parquet and the DataFrame, with their decimals; those of joints have 6.
+# Of `samples.csv`, Parquet and the DataFrame, with their decimals; of joints those of lengths, or 6.
 COLUMNS: dict[str, int | None] = {
     **PATH_COLUMNS,
     "stiffness_N_per_mm": 4,
@@ -32,6 +34,7 @@ COLUMNS: dict[str, int | None] = {
     "margin": 6,
     **dict.fromkeys(("margin_limit", "operation", "cut")),
 }
+ROUNDED = 1e-9  # m: a move of half a step is not a shorter one, whatever rounding does
 MOST_OPERATIONS = 12  # on the terminal; all are in summary.json
 
 
@@ -43,15 +46,27 @@ def unwritten(table: str, cut: bool) -> tuple[str, ...]:
     return others if cut else (*others, *OF_CUT)
 
 
+def table_rows(analysis: Analysis) -> IntArray:
+    """Samples of `samples.csv`: all, but of a move shorter than half a step that has two the last one alone."""
+    samples = analysis.samples
+    last = np.flatnonzero(np.diff(samples.move, append=-1))
+    first = np.append(0, last[:-1] + 1)[: len(last)]
+    short = (last - first == 1) & (samples.s[last] - samples.s[first] < 0.5 * analysis.step - ROUNDED)
+    return np.delete(np.arange(len(samples)), first[short])
+
+
 def samples_csv(analysis: Analysis) -> Iterator[bytes]:
     """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
-    decimals = {name: COLUMNS.get(name, 6) for name in sample_columns(analysis, slice(0))}
-    return csv_pieces(partial(sample_columns, analysis), len(analysis.samples), decimals)
+    names = sample_columns(analysis, slice(0))
+    decimals = {name: COLUMNS.get(name, LENGTH_DECIMALS if name.endswith("_mm") else 6) for name in names}
+    rows = table_rows(analysis)
+    return csv_pieces(lambda some: sample_columns(analysis, rows[some]), len(rows), decimals)
 
 
 def samples_parquet(analysis: Analysis) -> Iterator[bytes]:
     """`samples.parquet` in pieces, full precision. A value that does not exist is null."""
-    return parquet_pieces(partial(sample_columns, analysis), len(analysis.samples))
+    rows = table_rows(analysis)
+    return parquet_pieces(lambda some: sample_columns(analysis, rows[some]), len(rows))
 
 
 DATA = {

@@ -24,12 +24,13 @@ from toolpath_stiff.report.colours import error_colours, page_colours
 from toolpath_stiff.report.curves import beyond_scale, cutting_box, extremes_by_column, profile_curve, scale_limits
 from toolpath_stiff.report.cut import cut_tables
 from toolpath_stiff.report.pages import Part, markup, part, render
+from toolpath_stiff.report.scene import machine_scene
 from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
-SCRIPTS = ("stage.js", "viewer.js", "profile.js", "analysis.js")
+SCRIPTS = ("stage.js", "viewer.js", "solids.js", "machine.js", "profile.js", "analysis.js")
 
 
 def page(analysis: Analysis, drawn: Mapping[str, bytes], *, show_plunges: bool = False) -> Iterator[str]:
@@ -127,6 +128,7 @@ def page_data(analysis: Analysis) -> Document:
     kind = samples.motion + OUT_OF_REACH * ~evaluation.reachable[rows] + PLUNGE * analysis.set_aside[rows]
     return {
         "machine": plain(analysis.machine.name),
+        "scene": machine_scene(analysis.machine, np.concatenate([samples.position, samples.abc], axis=1)),
         "source": list(analysis.program.source),
         "count": len(rows),
         "samples": len(analysis.samples),

@@ -59,4 +59,5 @@ def surface_vtk(analysis: Analysis) -> Iterator[str]:
 
 def _rows(values: AnyArray, form: str) -> Iterator[str]:
     for start in range(0, len(values), VTK_BLOCK):
-        yield "".join([form % tuple(row) for row in values[start : start + VTK_BLOCK].tolist()])
+        part = values[start : start + VTK_BLOCK]
+        yield form * len(part) % tuple(part.ravel().tolist())

@@ -23,7 +23,6 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
 
 text = words.text  # what a terminal shows
 PAGE = "report.html"
-ALIKE, MOST_PAIRS = 0.5, 12  # of effects; the whole matrix is in diagnose.json
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
     "ladder.png": (
@@ -66,7 +65,6 @@ def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
         ("What the fits say", _candidates(diagnosis)),
         ("How the readings vote", *_votes(diagnosis)),
         "before_after.png",
-        ("What can these data not tell apart?", *_alike(diagnosis)),
         ("What could be there unseen?", *_unseen(diagnosis)),
         loops_section(diagnosis.loops),
         ("What to measure or do next", hints(next_steps(diagnosis)), _next_readings(diagnosis)),
@@ -149,25 +147,6 @@ def _sized(sized: Sized, part: str) -> list[str]:
     change = percent(json_number(100.0 * sized.rms, 3))
     kind = f"{term.variable} ({term.shape})"
     return [term_words(term), term.link, kind, f"{size} {term.unit} ({low} to {high})", change, part]
-
-
-def _alike(diagnosis: Diagnosis) -> list[Part]:
-    given = diagnosis.confounding
-    pairs = sorted(
-        (
-            (float(given.matrix[i, j]), f"{first}, {given.names[j]}")
-            for i, first in enumerate(given.names)
-            for j in range(i)
-        ),
-        reverse=True,
-    )
-    rows = [(names, f"{alike:.2f}") for alike, names in pairs[:MOST_PAIRS] if alike > ALIKE]
-    remark = (
-        "How alike two effects make these readings change, the strut law refitted: near 1 no fit can tell which of the "
-        "two it is, whatever the noise. Other poses, loads or tools can."
-    )
-    sets = [f"one set: {', '.join(members)}" for members in given.sets]
-    return [sets, ShownTable(("effects", ">alike"), rows), remark if rows else ""]
 
 
 def _unseen(diagnosis: Diagnosis) -> list[Part]:

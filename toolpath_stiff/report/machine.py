@@ -5,10 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.limits import Reach
 from toolpath_stiff.machine.model import Hexapod, MachineTool, StrutLaw
 from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.report.machine_elements import Row, element_rows
+from toolpath_stiff.report.pages import markup, part, render
+from toolpath_stiff.report.scene import machine_scene, reach_boundary
+from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m
 
 
@@ -80,6 +84,26 @@ def _hexapod_rows(machine: Hexapod) -> list[Row]:
         ("limits.joint_angle", "platform joint angle up to", platform_angle, "deg"),
         ("limits.joint_angle", "neutral pose of the joints", _numbers(pose_in_mm(limits.neutral_pose)), "mm, deg"),
     ]
+
+
+def page(machine: MachineTool, pose: FloatArray, stand: Reach) -> str:
+    """The machine at a pose (6,), m and rad, to be turned, with its reach and its figures."""
+    at = pose_in_mm(pose.tolist())
+    where = "drawn at X{:g} Y{:g} Z{:g} mm, A{:g} B{:g} C{:g} deg".format(*at)
+    data = {"scene": {**machine_scene(machine, pose[None]), "reach": reach_boundary(machine)}, "pose": at}
+    figures = ShownTable(("figure", "value", "unit", "origin", "remark"), machine_figures(machine))
+    return "".join(
+        render(
+            "machine.html",
+            styles=["viewer.css", "sections.css", "map.css"],
+            scripts=["stage.js", "viewer.js", "solids.js", "machine.js", "show.js"],
+            data=data,
+            title=machine.title,
+            about=machine.source,
+            status=f"{where}: {stand.describe(0)}",
+            figures=markup("<section>{}</section>", part(figures)),
+        )
+    )
 
 
 def text(machine: MachineTool, stand: Reach) -> str:

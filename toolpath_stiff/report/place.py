@@ -7,7 +7,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.documents import number
-from toolpath_stiff.placement.result import COLUMNS, Placement, PlacementRow, Written
+from toolpath_stiff.placement.result import Placement, PlacementRow, Written
 from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.place_path import drawn_path
@@ -32,6 +32,7 @@ def facts(placed: Placement) -> list[tuple[str, str]]:
     best, present, blocks = placed.chosen, placed.present, placed.offsets
     which = f"(objective {placed.task.rules.objective})"
     zero = f"X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees {which}"
+    turned = f"the tool turned about its axis by {best.tool_turn_deg:.3f} degrees" if best.tool_turn_deg else ""
     tilt = f"set-up tilted by A{best.a_deg:.3f} B{best.b_deg:.3f} degrees"
     mean, now = best.plunge_mean_N_per_mm, f", before {number(present.plunge_mean_N_per_mm)}" if present else ""
     margin = min(1.0, float(placed.best.at.reach.margin.min()))  # of moves too that do not follow the work
@@ -43,6 +44,7 @@ def facts(placed: Placement) -> list[tuple[str, str]]:
         ("program", f"{placed.best.program.name} on {machine_text(placed.machine_stated)}, load {placed.best.load}"),
         ("recommended", zero),
         *([("", tilt)] if best.a_deg or best.b_deg else []),
+        *([("", turned)] if turned else []),
         ("  stiffness", _figures_words(best)),
         ("  before", _figures_words(present) if present else f"out of reach: {placed.present_reason}"),
         *([("  plunges", f"mean {number(mean)}{now} N/mm, along the tool axis, not counted above")] if mean else []),
@@ -78,7 +80,8 @@ def _written(written: Written) -> list[tuple[str, str]]:
 
 
 def _table(placed: Placement) -> str:
-    return csv_text(COLUMNS, ([_cell(value) for value in vars(row).values()] for row in placed.front))
+    rows = [row.cells for row in placed.front]
+    return csv_text(rows[0], ([_cell(value) for value in row.values()] for row in rows))
 
 
 def _cell(value: float | None) -> str:
@@ -92,9 +95,9 @@ def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
     best, present = placed.best, placed.present
     path, note = drawn_path(placed, [*placed.front, *([present] if present else [])])
     data = {
-        "front": [vars(row) for row in placed.front],
+        "front": [row.cells for row in placed.front],
         "recommended": (placed.chosen.number or 0) - 1,
-        "before": vars(present) if present else None,
+        "before": present.cells if present else None,
         "before_reason": plain(placed.present_reason),
         "force": best.force,
         "keepouts": [
@@ -107,7 +110,7 @@ def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
     return render(
         "place.html",
         styles=["viewer.css", "place.css"],
-        scripts=["stage.js", "viewer.js", "profile.js", "place.js"],
+        scripts=["stage.js", "elements.js", "viewer.js", "solids.js", "machine.js", "profile.js", "place.js"],
         data=data,
         title=f"Placements of {placed.best.program.name}",
         about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",

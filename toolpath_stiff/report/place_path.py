@@ -15,6 +15,7 @@ from toolpath_stiff.documents import Document, number
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.placement.paths import placed_path
 from toolpath_stiff.placement.result import Placement, PlacementRow
+from toolpath_stiff.report.scene import machine_scene
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
@@ -53,6 +54,7 @@ def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[Documen
     for row, column in np.argwhere(np.isnan(stiffness)):
         values[row][column] = None
     data = {
+        "machine": machine_scene(best.machine, np.concatenate([position, abc], axis=1)),
         "position": np.round(mm_from_m(few.position), 3).tolist(),
         "axis": np.round(axis, 5).tolist() if (axis[:, 2] < 1.0 - 1e-12).any() else None,
         "s": np.round(mm_from_m(few.s), 2).tolist(),

@@ -47,7 +47,7 @@ def page(update: Update, drawn: Mapping[str, bytes]) -> str:
         *QUESTIONS,
         ("Errors by direction", _by_direction(update), f"Bias: mean of {DEVIATION}, {MINUS_IS_SOFTER}."),
         ("What was fitted", _fitted(update)),
-        ("Do the data support it?", _support(update)),
+        ("Do the data support it?", support_table(update)),
         ("What to do next", hints(update.next)),
         ("Where it comes from", record),
         ("Assumptions", [*document["assumptions"], *document["notes"]]),
@@ -67,11 +67,9 @@ def _headline(update: Update) -> str:
 
 
 def _figures(update: Update) -> list[tuple[str, str]]:
-    last, by_likelihood = update.steps[-1], update.task.objective == "likelihood"
-    figures = [(_percent(update.steps[0].error), "mean error as given")]
-    if by_likelihood:
-        figures.append((_percent(update.refitted.error), "mean error, strut law refitted"))
-    if last.fit.names or not by_likelihood:
+    last, figures = update.steps[-1], [(_percent(update.steps[0].error), "mean error as given")]
+    figures.append((_percent(update.refitted.error), "mean error, strut law refitted"))
+    if last.fit.names or update.search:
         figures.append((_percent(last.error), f"mean error {last.title}" if last.fit.names else last.name))
     figures.append((_percent(last.held.mean_error), "the same at left-out points"))
     figures.append((percent(update.noise.floor_percent, 2), "would be left by scatter alone"))
@@ -123,7 +121,8 @@ def _fitted(update: Update) -> ShownTable:
     return ShownTable(("effect", "parameter", ">value", ">95 % interval, or sd"), rows)
 
 
-def _support(update: Update) -> ShownTable:
+def support_table(update: Update) -> ShownTable:
+    """What speaks for and against each effect."""
     rows = [
         (
             support.effect,

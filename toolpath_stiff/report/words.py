@@ -51,6 +51,8 @@ def duration(seconds: float) -> str:
 
 def plain(text: str) -> str:
     """Text from a program or a file name without control characters: it cannot steer a terminal."""
+    if text.isprintable():  # nearly all; a picture in a page has a hundred thousand characters
+        return text
     return "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text)
 
 

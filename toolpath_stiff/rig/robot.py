@@ -25,7 +25,9 @@ RIGID = 1e12, 1e11  # N/m and N m/rad of what does not give way: a thousandth of
 LIMITS = np.deg2rad([[-170, 170], [-60, 80], [-150, 60], [-300, 300], [-120, 120], [-350, 350]])
 POSES, LOADS = 24, (300.0, 600.0)  # pulled at, N along X, Y and Z
 NOISE_FLOOR = 1e-6  # m, of an indicator, beside its relative noise
-MASSES = (160.0, 120.0)  # kg of upper arm and forearm with what hangs on them, at their middles; assumed
+# kg of upper arm, forearm and spindle with what hangs on them, at their middles (assumed), and how well one knows them.
+MASSES, KNOWN = (160.0, 120.0, 45.0), 0.05
+HANGING = ((1, 2), (2, 3), (5, 6))  # joints, and the tip, between which these hang
 GRAVITY = 9.81
 SHARES = 0.08, 0.25  # by which a fault moves the readings, root mean square
 TOOL = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])  # its x along the flange's z, its z against x
@@ -48,6 +50,8 @@ class Robot:
         (3,) m/N in the axes of the tool.
     gap
         (6,) rad of lost turn in the joints' gears, either way.
+    masses
+        (3,) kg.
     balancer
         N m/rad of a spring beside joint 2.
     crosstalk
@@ -64,6 +68,7 @@ class Robot:
     arms: FloatArray
     spindle: FloatArray
     gap: FloatArray
+    masses: FloatArray
     balancer: float = 0.0
     crosstalk: float = 0.0
     creep: float = 0.0
@@ -84,7 +89,7 @@ class RobotFault:
     largest: float
 
 
-JOINTS, UPRIGHT = tuple(range(6)), (0, 3, 4, 5)  # the weight holds a gap in joints 2 and 3 closed: nobody sees it
+JOINTS = tuple(range(6))
 FAULTS: dict[str, RobotFault] = {
     "joint_torsion": RobotFault(("joint_torsion", "weak_element"), JOINTS, _soft("torsion", 6), 30.0),
     "joint_bending": RobotFault(("joint_bending", "weak_element"), JOINTS[:3], _soft("bending", 6), 30.0),
@@ -96,7 +101,7 @@ FAULTS: dict[str, RobotFault] = {
         ("spindle_compliance", "weak_element"), (0,), lambda r, i, s: {"spindle": r.spindle * (1.0 + s)}, 100.0
     ),
     "backlash": RobotFault(
-        ("gear_backlash",), UPRIGHT, lambda r, i, s: {"gap": r.gap + 1e-4 * s * (np.arange(6) == i)}, 30.0
+        ("gear_backlash",), JOINTS, lambda r, i, s: {"gap": r.gap + 1e-4 * s * (np.arange(6) == i)}, 30.0
     ),
     "balancer": RobotFault((), (0,), lambda r, i, s: {"balancer": 1e6 * s}, 30.0),
     "crosstalk": RobotFault((), (0,), lambda r, i, s: {"crosstalk": s}, 0.5),
@@ -124,6 +129,7 @@ def invented(rng: Generator) -> Robot:
         arms=np.stack([about(1900.0, 11.0, 6.5), about(1200.0, 5.0, 3.8)]) * 1e6,
         spindle=about(14.0, 14.0, 5.0) * 1e-9,
         gap=np.zeros(6),
+        masses=np.array(MASSES) * np.exp(rng.normal(0.0, KNOWN, 3)),
     )
 
 
@@ -156,6 +162,10 @@ def machine_text(robot: Robot, name: str) -> str:
         parts.append(row("[[element]]", name=arm, type="beam", frame=frame, **place, **stiff))
     give = {"translation_nm_per_N": spindle, "rotation_nrad_per_Nm": np.zeros(3)}
     parts.append(row("[[element]]", name="spindle", type="spring", at="tip", **give))
+    middles = [*(0.5 * ends), 0.5 * mm_from_m(robot.tip)]
+    hanging = zip(("upper arm", "forearm", "spindle"), ("J2", "J3", "J6"), MASSES, middles, strict=True)
+    for what, frame, mass, centre in hanging:
+        parts.append(row("[[mass]]", name=what, kg=mass, frame=frame, centre_mm=np.round(centre, 9)))
     return "\n\n".join(parts) + "\n"
 
 
@@ -184,7 +194,7 @@ def pulled(robot: Robot, joints: FloatArray, force: FloatArray) -> FloatArray:
     z, arms = axes[:, :6, :, 2], origins[:, 6:7] - origins[:, :6]
     torque = (z * np.cross(arms, force[:, None])).sum(axis=-1)
     weight = np.zeros_like(torque)
-    for first, last, mass in ((1, 2, MASSES[0]), (2, 3, MASSES[1])):
+    for (first, last), mass in zip(HANGING, robot.masses, strict=True):
         centre = 0.5 * (origins[:, first] + origins[:, last])
         pull = np.cross(centre[:, None] - origins[:, : first + 1], [0.0, 0.0, -mass * GRAVITY])
         weight[:, : first + 1] += (z[:, : first + 1] * pull).sum(axis=-1)
@@ -246,11 +256,12 @@ def robot_case(seed: int, hidden: str | None, noise: float) -> tuple[str, Table,
             moved = np.linalg.norm(pulled(true, joints, force) - sound) / np.linalg.norm(sound)
             low, high = (size, high) if moved < share else (low, size)
         where = {"element": ELEMENTS[name].format(part + 1)} if name in ELEMENTS else {}
-        effects = [
-            {"effect": name, "names": list(fault.names), "parameters": {**where, "by": size}, "size": float(moved)}
-        ]
+        fault_keys = {"effect": name, "names": list(fault.names), "parameters": {**where, "by": size}}
+        effects = [fault_keys | {"size": float(moved)}]
     moved_by = pulled(true, joints, force)
     sd = np.maximum(noise * np.linalg.norm(moved_by, axis=1), NOISE_FLOOR)
+    for effect in effects:  # whitened length of what it does to the readings: little where weight holds a gap closed
+        effect["detectability"] = float(np.linalg.norm((moved_by - sound) / sd[:, None]))
     read = moved_by + sd[:, None] * streams[3].standard_normal(moved_by.shape)
     table: Table = {f"joint_{i + 1}_deg": np.round(deg_from_rad(joints[:, i]), 9) for i in range(6)}
     table |= {f"f{axis}_N": force[:, i] for i, axis in enumerate("xyz")}

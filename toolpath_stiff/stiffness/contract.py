@@ -37,6 +37,7 @@ HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry"
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
 SETUP = "setup"  # the condition, and the name of every parameter that names a set-up
+ELEMENT = "element"  # the name of every parameter that names an element of the machine
 EXPERIENCE = "engineering experience, no source"
 IDLE = 1e-3  # N in a strut: below, powers of the force would diverge, and the strut adds nothing that shows
 
@@ -114,7 +115,7 @@ def setup_parameter(meaning: str) -> Parameter:
 
 def element_parameter(meaning: str) -> Parameter:
     """The parameter that names an element of the machine."""
-    return Parameter("element", "", 1.0, (0, 0), (0, 0), source="machine file", meaning=meaning, kind="text")
+    return Parameter(ELEMENT, "", 1.0, (0, 0), (0, 0), source="machine file", meaning=meaning, kind="text")
 
 
 def compliance(name: str, largest: float, typical: tuple[float, float], source: str, meaning: str) -> Parameter:
@@ -188,6 +189,11 @@ class LoadPath(ArrayColumns):
         """(n, r) nothing added to any load of the elements."""
         assert isinstance(self.stance, Stance)
         return np.zeros((len(self), sum(load.compliance.shape[-1] for load in self.stance.loads)))
+
+    def weight_loads(self) -> FloatArray:
+        """(n, r) loads of the elements under the machine's own weight; 0 where its file has no masses."""
+        assert isinstance(self.stance, Stance)
+        return self.machine_tool.weight_loads(self.stance)
 
     @property
     def machine(self) -> Hexapod:

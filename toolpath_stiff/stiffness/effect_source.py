@@ -10,8 +10,8 @@ from toolpath_stiff.stiffness.contract import Effect
 
 def is_foreign(effect: Effect) -> bool:
     """Whether the effect comes from a user's file or another package."""
-    packages = tuple(f"toolpath_stiff.stiffness.{name}." for name in ("effects", "element_effects"))
-    return not type(effect).__module__.startswith(packages)
+    packaged = tuple(f"toolpath_stiff.stiffness.{name}" for name in ("effects.", "element_effects.", "as_built"))
+    return not type(effect).__module__.startswith(packaged)
 
 
 def file_of(effect: Effect) -> str:

@@ -25,8 +25,9 @@ from toolpath_stiff.machine.limits import solved
 from toolpath_stiff.machine.model import EffectEntry, Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 from toolpath_stiff.stiffness.active import ActiveEffect, read_parameters
+from toolpath_stiff.stiffness.as_built import as_built
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
-from toolpath_stiff.stiffness.contract import SETUP, Conditions, LoadPath
+from toolpath_stiff.stiffness.contract import ELEMENT, SETUP, Conditions, LoadPath
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
@@ -127,16 +128,17 @@ def build_model(
     actives = [_activate(machine, kind, entry, files) for kind, entries in kinds for entry in entries]
     if isinstance(machine, Hexapod) and np.isfinite(machine.platform_bar_stiffness):
         actives.insert(0, ActiveEffect(PlatformFlexibility(), {"bar_stiffness": machine.platform_bar_stiffness}))
+    actives += [as_built(machine.as_built)] if isinstance(machine, Hexapod) and machine.as_built is not None else []
     actives += extra
-    names = [active.effect.name for active in actives]
+    keys = [(active.effect.name, active.values.get(ELEMENT)) for active in actives]  # each once, or once an element
     beside = "elements" if isinstance(machine, Hexapod) else "hexapods"
     for active in actives:
         if active.effect.holds_for == beside:
             only = "hexapods" if beside == "hexapods" else "machines of elements"
             mistake = f"effect {active.effect.name} holds on {only} only, {machine.name} is of kind {machine.kind}"
             raise EffectError(mistake, hint="leave it out")
-    for name in names:
-        if names.count(name) > 1:
+    for name, element in keys:
+        if keys.count((name, element)) > 1:
             hint = "keep one of them (finite platform bars count as platform_flexibility)"
             raise EffectError(f"machine {machine.name}: effect {name} is given twice", hint=hint)
     return _assembled(machine, actives, conditions or Conditions(machine.setup, machine.temperature))

@@ -10,8 +10,8 @@ from toolpath_stiff.report.pages import asset, json_pieces, script_hash
 from toolpath_stiff.studio.picture import document
 from toolpath_stiff.studio.session import Session
 
-SHARED = ("stage.js", "viewer.js", "profile.js")  # of the static pages
-OWN = ("solids.js", "machine.js", "panels.js", "studio.js")
+SHARED = ("stage.js", "elements.js", "viewer.js", "solids.js", "machine.js", "profile.js")  # of the static pages
+OWN = ("scene.js", "panels.js", "studio.js")
 
 
 def page() -> str:

@@ -9,12 +9,15 @@ from contextlib import suppress
 import numpy as np
 
 import toolpath_stiff as tps
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
-from toolpath_stiff.poses import pose_in_mm
+from toolpath_stiff.poses import pose_in_mm, pose_in_si
+from toolpath_stiff.readings.measurements import reading_columns
+from toolpath_stiff.report.scene import machine_scene, reach_boundary
 from toolpath_stiff.studio.session import Session
 
-MERIDIANS, PARALLELS = 36, 9  # of the reach boundary
+POSE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 MOST_LINES = 400_000  # of a program's text in the page
 
 
@@ -53,26 +56,23 @@ def result(session: Session, kind: str) -> Document | None:
 def machine(session: Session) -> Document:
     """What the drawing of the machine needs, and the boundary of its reach with the tool as it stands at rest."""
     on, state = session.machine, session.case.state
+    model, key, analysis = on.model.machine, (state.machine, state.effects), session.found("analyze")
+    tables = [*([session.readings()] if state.data else []), *([analysis.path] if analysis else [])]
+
+    def poses() -> FloatArray:
+        """At the origin, at each reading, along the path: where a machine that is no hexapod is drawn."""
+        rows = [np.array([table[name] for name in POSE]).T for table in tables]
+        return np.array([pose_in_si(row) for row in np.concatenate([[on.origin_mm_deg], *rows]).tolist()])
+
     return {
-        "title": on.model.machine.title,
+        "title": model.title,
         "effects": on.effects,
-        "joints": on.joints_mm,
+        "scene": {
+            **session.once("scene", (key, state.data, id(analysis)), lambda: machine_scene(model, poses())),
+            "reach": session.once("reach", key, lambda: reach_boundary(model)),
+        },
         "origin": list(on.origin_mm_deg),
-        "reach": session.once("reach", (state.machine, state.effects), lambda: _boundary(on)),
     }
-
-
-def _boundary(on: tps.Machine) -> list[list[list[float]]]:
-    """(parallels, meridians, 3) mm: how far the tip goes from the default origin along rays."""
-    centre = on.origin_mm_deg[:3]
-    heights = np.radians(np.linspace(-90.0, 90.0, PARALLELS))[:, None]
-    azimuths = 2.0 * np.pi * np.arange(MERIDIANS) / MERIDIANS
-    level = np.cos(heights)
-    parts = np.broadcast_arrays(level * np.cos(azimuths), level * np.sin(azimuths), np.sin(heights))
-    rays = np.stack(parts, axis=-1).reshape(-1, 3)
-    lengths = np.asarray(on.reach_mm(centre, rays.tolist()))[:, None]
-    boundary = np.round(np.array(centre) + lengths * rays, 1).reshape(PARALLELS, MERIDIANS, 3)
-    return boundary.tolist()  # type: ignore[no-any-return]
 
 
 def readings(session: Session) -> Document:
@@ -96,6 +96,7 @@ def gauge(session: Session) -> Document:
     )
     diagnosed, fitted = session.document("diagnose"), session.document("update") if session.is_fitted else None
     floor = left_out = None
+    error = session.errors()["mean_abs_error_percent"]
     if diagnosed:
         rows = [{"effect": row["effect"], **_sizes(row)} for row in diagnosed["candidates"]]
         on = [{"effect": name, **keys} for name, keys in state.on.items()]
@@ -104,9 +105,9 @@ def gauge(session: Session) -> Document:
             left_out = diagnosed["baseline"]["as_given"]["held_out_error_percent"]
         elif len(on) == 1 and on[0] in rows:
             left_out = diagnosed["candidates"][rows.index(on[0])]["held_out_error_percent"]
-    if fitted:
-        left_out, floor = fitted["steps"][-1]["held_out_error_percent"], fitted["noise_floor_percent"]
-    error = session.errors()["mean_abs_error_percent"]
+    if fitted:  # what it wrote, form of the machine included
+        last, floor = fitted["steps"][-1], fitted["noise_floor_percent"]
+        error, left_out = last["mean_abs_error_percent"], last["held_out_error_percent"]
     return {"as_given": as_given, "refitted": refitted, "now": error, "left_out": left_out, "floor": floor}
 
 
@@ -165,8 +166,8 @@ def _setups(session: Session) -> list[str]:
     """Names of set-ups in the readings, in their order."""
 
     def make() -> list[str]:
-        frame = session.case.data.to_frame(session.machine)
-        return sorted(set(frame["setup"]) - {""}) if "setup" in frame else []
+        columns = reading_columns(session.case.data.on(session.machine))
+        return sorted({*columns.get("setup", ())} - {""})
 
     return session.once("setups", session.case.state.judged, make) if session.case.state.data else []
 

@@ -14,10 +14,12 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
 from toolpath_stiff.studio.server import Studio
 from toolpath_stiff.studio.session import Session
+from toolpath_stiff.studio.work import prepared
 
 
 def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise: int | None) -> Case:
     """The case of a folder, or a new one. Raises `InputError` where machine or exercise are of a case that is there."""
+    prepared()  # while the case is read
     there = is_file(Path(folder) / CASE_FILE)
     if there and (machine is not None or exercise is not None):
         name = "machine" if machine is not None else "exercise"

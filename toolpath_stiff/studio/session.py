@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, TypeVar
 
+import numpy as np
+
 import toolpath_stiff as tps
 from toolpath_stiff.case.case import Case
 from toolpath_stiff.case.state import Step, call
 from toolpath_stiff.documents import Document
+from toolpath_stiff.readings.measurements import reading_columns
 from toolpath_stiff.studio.work import Job, Reply
 
 READING = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz", "stiffness_N_per_mm", "force_N")
@@ -95,8 +98,7 @@ class Session:
         """What the analysis of the program hangs on."""
         state = self.case.state
         fitted = bool(state.on) and self.is_fitted  # a fit knows how well it knows: its machine has a band
-        on = state.judged if state.on else (state.machine, state.effects)
-        return (on, str(state.on), fitted, self.program_key, state.origin, state.require, state.cut)
+        return (self.key("place"), fitted, state.origin, state.require, state.cut)
 
     @property
     def program_key(self) -> tuple[str, str]:
@@ -128,7 +130,10 @@ class Session:
 
     def trial(self) -> tps.PlacementTrial:
         """The program that can be put anywhere."""
-        return self.once("trial", self.key("place"), lambda: tps.try_placement(self.case.program, self.machine))
+        case = self.case
+        return self.once(
+            "trial", self.key("place"), lambda: tps.try_placement(case.program, case.machine_with(case.state.on))
+        )
 
     def readings(self) -> Mapping[str, list[Any]]:
         """All readings of the case, those set aside too, as columns."""
@@ -136,9 +141,9 @@ class Session:
 
         def make() -> Mapping[str, list[Any]]:
             names = {self.case.path(name): name for name in state.data}
-            frame = tps.Measurements(list(names)).to_frame(self.machine).round(4)
-            columns = {name: frame[name].tolist() for name in ("line", "point", *READING)}
-            return {"file": frame["file"].map(names).tolist(), **columns}
+            read = reading_columns(tps.Measurements(list(names)).on(self.machine))
+            numbers = {name: np.round(read[name], 4).tolist() for name in ("line", *READING)}
+            return {"file": [names[file] for file in read["file"]], **numbers}
 
         return self.once("readings", (state.machine, state.data), make)
 
@@ -176,7 +181,8 @@ class Session:
         """What the state holds of that on which this kind of result hangs."""
         state = self.case.state
         if kind in ("place", "set_up"):
-            return (state.machine, state.effects, self.program_key, state.origin if kind == "set_up" else ())
+            on = state.judged if state.on else (state.machine, state.effects)
+            return (on, str(state.on), self.program_key, state.origin if kind == "set_up" else ())
         return self.path_key if kind in OF_PATH else state.judged
 
     def queue(self, kind: str, **given: Any) -> None:

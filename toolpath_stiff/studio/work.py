@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
 from pathlib import Path
@@ -41,7 +42,7 @@ class Job:
     def __init__(self, folder: Path, kind: str, result: str, given: Document, key: object, first: str) -> None:
         self.kind, self.given, self.key = kind, given, key
         self.progress: tuple[str, int, int] = (kind, 0, 0)
-        context: Any = _context()
+        context: Any = prepared()
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=work, args=(folder, kind, result, given, first, theirs), daemon=True)
         self._process.start()
@@ -72,12 +73,13 @@ class Job:
         self._process.kill()
 
 
-def _context() -> BaseContext:
-    """Processes that begin with the libraries loaded where the system can do that, from scratch elsewhere."""
+def prepared() -> BaseContext:
+    """Processes that begin with the libraries loaded, from now on, where the system can do that; else from scratch."""
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["pandas", *(f"toolpath_stiff.{name}" for name in PRELOADED)])
+    forkserver.ensure_running()
     return context
 
 

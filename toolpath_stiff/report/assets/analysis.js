@@ -89,7 +89,7 @@ function point(i, stage) {
     if (stage) stage.tell(stage === view ? path.at(i) : stage.at(i), text);
     showLine(line[i]);
   }
-  view.drawOverlay();
+  if (machineBox.checked) view.redraw(); else view.drawOverlay();
   profile.drawOverlay();
   part?.drawOverlay();
 }
@@ -111,7 +111,9 @@ function step(by) {
   point(i, view);
 }
 // The path in 3-D.
+const body = new MachineBody(data.scene), machineBox = document.getElementById("machine");
 const scene = {
+  beside: 90,
   paths: [path],
   heavy: n > 20000,
   // The box of the cuts: of all, or of the operation that is looked at.
@@ -125,6 +127,9 @@ const scene = {
     return box[0][0] <= box[0][1] ? box : data.box;
   },
   draw(g, viewer) {
+    const i = here < 0 ? kind.findIndex((v) => (v & 7) !== RAPID) : here;
+    if (machineBox.checked) paint(g, viewer, body.items(viewer, [...xyz, ...(angles ?? [])].map((of) => of[i] ?? 0)
+      .concat(0, 0, 0).slice(0, 6), { work: data.box, close: true }), true);
     if (chosenOperation >= 0) {
       g.globalAlpha = 0.13;
       this.drawPath(g, viewer, 0, n);
@@ -204,7 +209,6 @@ const model = {
     { holds: (i) => cutting(i) && kind[i] & OUT, colour: ink["bad-soft"] },
   ],
   rings: () => data.weakest,
-  tools: data.tools,
   operations: { count: operations.length, range: operationRange, name: operationName, chosen: () => chosenOperation },
   marked() {
     if (!chosenLine || !firstOf.has(chosenLine)) return null;
@@ -285,9 +289,7 @@ profile = new Profile(document.getElementById("profile"), model, {
 view.resize();
 profile.resize();
 retheme();
-rapidsBox.addEventListener("change", () => view.redraw());
-for (const button of document.querySelectorAll("[data-view]"))
-  button.addEventListener("click", () => view.turnTo(button.dataset.view));
+for (const box of [rapidsBox, machineBox]) box.addEventListener("change", () => view.redraw());
 for (const button of document.querySelectorAll("button.place")) button.addEventListener("click", () => {
   chosenLine = Number(button.dataset.line);
   point(Number(button.dataset.sample), view);

@@ -89,5 +89,3 @@ view = new Viewer($("view"), scene, {
 });
 view.resize();
 retheme();
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click",
-  () => view.turnTo(button.dataset.view));

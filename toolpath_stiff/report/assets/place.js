@@ -1,55 +1,42 @@
 // Placements: where the work sits, and what that brings.
 const d = JSON.parse(document.getElementById("data").textContent), $ = (id) => document.getElementById(id);
 const coloursNow = () => (theme.dark ? d.colours_dark : d.colours), CLASSES = d.colours.length;
-function make(parent, name, attributes, text) {
-  const node = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const k in attributes) node.setAttribute(k, attributes[k]);
-  if (text !== undefined) node.textContent = text;
-  return parent.appendChild(node);
-}
 // The front is as wide as its element, so that letters keep their size.
 const widthOf = (svg) => Math.max(280, svg.clientWidth || 400);
-// Placing: p' = o + Q p, Q = Rz(C) Ry(B) Rx(A).
-function turnOf(row) {
-  const [a, b, c] = [row.a_deg, row.b_deg, row.rotation_deg].map((v) => v * Math.PI / 180), [sa, ca, sb, cb, sc, cc] =
-    [a, b, c].flatMap((v) => [Math.sin(v), Math.cos(v)]);
-  return [[cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa], [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca
-    - cc * sa], [-sb, cb * sa, cb * ca]];
-}
-const times = (q, p) => q.map((r) => r[0] * p[0] + r[1] * p[1] + r[2] * p[2]);
-// Where the path and program zero are, the program's axes there, and the tool's direction where it leans.
+// Where the path and program zero are (p' = o + Q p), the program's axes there, the tool's direction where it leans.
 function placed(row, stiffness) {
-  const q = turnOf(row), zero = [row.x_mm, row.y_mm, row.z_mm], points = d.position.map((p) => times(q, p)
-    .map((v, i) => v + zero[i]));
-  const leans = d.axis !== null || row.a_deg !== 0 || row.b_deg !== 0;
-  const tools = leans ? d.position.map((_, i) => times(q, d.axis ? d.axis[i] : [0, 0, 1])) : null;
-  return { row, zero, stiffness, xyz: [0, 1, 2].map((k) => Float32Array.from(points, (p) => p[k])), axes: [0, 1, 2]
-    .map((k) => q.map((r) => r[k])), tools };
+  const zero = [row.x_mm, row.y_mm, row.z_mm], q = turnOf([...zero, row.a_deg, row.b_deg, row.rotation_deg]);
+  const points = d.position.map((p) => moved(zero, q, p)), leans = d.axis !== null || row.a_deg || row.b_deg;
+  const tools = leans ? d.position.map((_, i) => moved([0, 0, 0], q, d.axis ? d.axis[i] : [0, 0, 1])) : null;
+  const xyz = [0, 1, 2].map((k) => Float32Array.from(points, (p) => p[k]));
+  return { row, zero, stiffness, points, xyz, axes: [0, 1, 2].map((k) => q.map((r) => r[k])), tools };
+}
+// The machine with its tip at a point of the path.
+const body = new MachineBody(d.machine);
+function poseOf({ points, tools }, i) {
+  const [x, y, z] = tools?.[i] ?? [0, 0, 1];
+  return [...points[i], ...[-Math.asin(y), Math.atan2(x, z), 0].map((v) => v * 180 / Math.PI)];
 }
 let chosen = d.recommended;
 const places = d.front.map((row, i) => placed(row, d.stiffness[i]));
 const before = d.before ? placed(d.before, d.stiffness[d.stiffness.length - 1]) : null;
 const n = d.position.length;
-// Boxes that are shown: [low, high] of each axis.
-const join = (boxes) => [0, 1, 2].map((k) => [Math.min(...boxes.map((b) => b[k][0])),
-  Math.max(...boxes.map((b) => b[k][1]))]);
 const around = ({ xyz }) => xyz.map((axis) => axis.reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)],
   [Infinity, -Infinity]));
-const everywhere = join([...places, ...(before ? [before] : [])].map(around));
-everywhere[0] = [Math.min(0, everywhere[0][0]), Math.max(0, everywhere[0][1])];  // the machine's axis is in sight
-everywhere[1] = [Math.min(0, everywhere[1][0]), Math.max(0, everywhere[1][1])];
-const workspace = [0, 1, 2].map((k) => [0, 1].map((end) => d.workspace[end][k] ?? everywhere[k][end]));
-const bounded = d.workspace.flat().some((v) => v !== null);
-const zoomed = () => document.querySelector("input[name=zoom]:checked").value;
-// About the middle of what is shown; both placements get boxes of one size, so that they are drawn to one scale.
+const workspace = d.workspace[0].map((low, k) => [low, d.workspace[1][k]]);
+const bounded = d.workspace.flat().every((v) => v !== null);
+const whole = () => document.querySelector("input[name=zoom]:checked").value !== "path";
+// Of the path about its middle: both placements get boxes of one size, so that they are drawn to one scale.
 function boxOf(place) {
-  if (zoomed() !== "path") return zoomed() === "all" ? everywhere : join([workspace, everywhere]);
+  if (whole()) return endsOf(outlineOf(place));
   const sizes = [place, ...(before ? [before] : [])].map(around), own = around(place);
   return own.map(([low, high], k) => {
     const half = Math.max(...sizes.map((box) => box[k][1] - box[k][0])) / 2;
     return [(low + high) / 2 - half, (low + high) / 2 + half];
   });
 }
+const outlineOf = (place) => (whole() ? [...body.outline(poseOf(place, 0)), ...(bounded ? cornersOf(workspace) : [])]
+  : place.points);
 // A placement in the viewer.
 const classOf = (v) => classAt(v, d.scale, CLASSES);
 let here = -1;  // the point of the path that is pointed at, in both placements
@@ -60,7 +47,11 @@ function sceneOf(placeNow) {
     paths: [path],
     path,
     heavy: false,
+    beside: 40,
+    get frame() { return !whole(); },
+    get iso() { return whole() ? body.iso : VIEWS.iso; },
     box: () => boxOf(placeNow()),
+    outline: () => outlineOf(placeNow()),
     take() {
       const place = placeNow();
       path.move(place.xyz);
@@ -68,13 +59,12 @@ function sceneOf(placeNow) {
         CLASSES);
     },
     draw(g, viewer) {
-      const place = placeNow(), reach = Math.max(...viewer.box.map(([low, high]) => high - low));
-      if (bounded && zoomed() === "workspace") viewer.edges(g, workspace, ink.muted, 1, [6, 4]);
+      const place = placeNow(), reach = Math.max(...viewer.box.map(([low, high]) => high - low)), close = !whole();
+      paint(g, viewer, body.items(viewer, poseOf(place, Math.max(here, 0)), { work: around(place), close,
+        floor: viewer.box[2][0] }), close);
+      if (bounded && whole()) viewer.edges(g, workspace, ink.muted, 1, [6, 4]);
       for (const { name, box } of d.keepouts) this.keepOut(g, viewer, name, [0, 1, 2]
         .map((k) => [box[0][k], box[1][k]]));
-      // the machine's axis
-      viewer.segment(g, [0, 0, viewer.box[2][0]], [0, 0, viewer.box[2][1]], ink.muted, 1, [12, 3, 2, 3]);
-      if (place.tools) this.drawTools(g, viewer, place, 0.08 * reach);
       for (let c = CLASSES - 1; c >= 0; c--) path.stroke(g, c, coloursNow()[c], 2.2);
       place.axes.forEach((axis, k) => {
         const tip = place.zero.map((z, m) => z + 0.09 * reach * axis[m]), [x, y] = viewer.project(tip),
@@ -85,17 +75,6 @@ function sceneOf(placeNow) {
         aligned(g, "center", "middle");
         g.fillText("XYZ"[k], x + 6, y - 6);
       });
-    },
-    // Thin lines from the path along the tool.
-    drawTools(g, viewer, place, length) {
-      g.beginPath();
-      for (let i = 0; i < n; i += Math.max(1, Math.ceil(n / 40))) {
-        const foot = place.xyz.map((axis) => axis[i]), tip = viewer.project(foot.map((c, k) => c
-          + length * place.tools[i][k]));
-        g.moveTo(...path.at(i));
-        g.lineTo(tip[0], tip[1]);
-      }
-      stroke(g, ink.muted, 1);
     },
     keepOut(g, viewer, name, box) {
       viewer.edges(g, box, ink.bad, 1.5);
@@ -116,13 +95,12 @@ const span = (values) => { const a = Math.min(...values), b = Math.max(...values
 const meanSpan = span(rowsShown.map((r) => r.mean_N_per_mm)), rangeSpan = span(rowsShown.map((r) => r.range_N_per_mm));
 function grid(svg, { values, digits }, vertical, map, a, b) {
   for (const v of values) {
-    make(svg, "line", vertical ? { x1: map(v), x2: map(v), y1: a, y2: b, class: "grid" } : { x1: a, x2: b, y1: map(v),
-      y2: map(v), class: "grid" });
-    make(svg, "text", vertical ? { x: map(v), y: b + 16, "text-anchor": "middle" } : { x: a - 6, y: map(v) + 4,
-      "text-anchor": "end" }, group(v, digits));
+    const [x, y] = [map(v), b + 16];
+    svg.append(h("line", vertical ? { x1: x, x2: x, y1: a, y2: b, class: "grid" } : { x1: a, x2: b, y1: x, y2: x,
+      class: "grid" }), h("text", vertical ? { x, y, "text-anchor": "middle" } : { x: a - 6, y: x + 4,
+      "text-anchor": "end" }, group(v, digits)));
   }
 }
-const title = (node, text) => make(node, "title", {}, text);
 const weakest = rowsShown.map((r) => r.min_N_per_mm), weakEnds = [Math.min(...weakest), Math.max(...weakest)];
 const weakColour = (v) => coloursNow()[classAt(v, weakEnds, CLASSES)];
 const nameOf = (row, i) =>
@@ -137,20 +115,17 @@ function drawFront() {
   front.replaceChildren(); front.setAttribute("viewBox", `0 0 ${W} ${H}`); front.setAttribute("height", H);
   grid(front, ticks(...meanSpan, W > 340 ? 5 : 3), true, X, T, H - B); grid(front, ticks(...rangeSpan, 4), false, Y, L,
     W - R);
-  make(front, "text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" },
-    "mean stiffness, N/mm (more is better)");
-  make(front, "text", { x: 4, y: 14 }, "range, N/mm (less is better)");
-  if (d.before) title(make(front, "rect", { x: X(d.before.mean_N_per_mm) - 6, y: Y(d.before.range_N_per_mm) - 6,
-    width: 12, height: 12, fill: weakColour(d.before.min_N_per_mm), stroke: "currentColor", "stroke-width": 2 }),
-    "present placement, weakest " + group(d.before.min_N_per_mm) + " N/mm");
-  dots = d.front.map((row, i) => {
-    const dot = make(front, "circle", { cx: X(row.mean_N_per_mm), cy: Y(row.range_N_per_mm), r: 5, class: "dot",
-      fill: weakColour(row.min_N_per_mm), role: "radio", "aria-label": nameOf(row, i) });
-    title(dot, nameOf(row, i)); dot.addEventListener("click", () => choose(i, true)); return dot;
-  });
-  const best = d.front[d.recommended];
-  make(front, "text", { x: X(best.mean_N_per_mm), y: Y(best.range_N_per_mm) - 8, "text-anchor": "middle",
-    class: "star" }, "\u2605");
+  dots = d.front.map((row, i) => h("circle", { cx: X(row.mean_N_per_mm), cy: Y(row.range_N_per_mm), r: 5, class: "dot",
+    fill: weakColour(row.min_N_per_mm), role: "radio", "aria-label": nameOf(row, i), onclick: () => choose(i, true) },
+    h("title", {}, nameOf(row, i))));
+  const best = d.front[d.recommended], now = d.before;
+  front.append(h("text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" },
+    "mean stiffness, N/mm (more is better)"), h("text", { x: 4, y: 14 }, "range, N/mm (less is better)"),
+    now ? h("rect", { x: X(now.mean_N_per_mm) - 6, y: Y(now.range_N_per_mm) - 6, width: 12, height: 12,
+      fill: weakColour(now.min_N_per_mm), stroke: "currentColor", "stroke-width": 2 },
+      h("title", {}, `present placement, weakest ${group(now.min_N_per_mm)} N/mm`)) : "", ...dots,
+    h("text", { x: X(best.mean_N_per_mm), y: Y(best.range_N_per_mm) - 8, "text-anchor": "middle", class: "star" },
+      "\u2605"));
   markChosen(); if (focused) dots[chosen].focus();
 }
 function markChosen() {
@@ -208,17 +183,11 @@ function drawFacts(row) {
     figure("b_deg", 3)]);
   if (row.extrapolated_share !== undefined) rows.push(["strut law extrapolated, % of samples", columns
     .map((r) => group(100 * r.extrapolated_share, 1))]);
-  table.replaceChildren();
-  const line = (parent, name, cells, tag) => { const tr = parent.appendChild(document.createElement("tr"));
-    const th = tr.appendChild(document.createElement("th")); th.textContent = name; th.scope = "row";
-    for (const c of cells) tr.appendChild(document.createElement(tag)).textContent = c; return tr; };
-  line(table.createTHead(), "", d.before ? ["shown", "present"] : ["shown"], "th");
-  const body = table.createTBody(); for (const [name, cells] of rows) line(body, name, cells, "td");
-  const origin = document.createElement("code"), last = body.appendChild(document.createElement("tr")).appendChild(
-    document.createElement("th"));
-  last.colSpan = columns.length + 1; origin.textContent = "--origin " + [row.x_mm, row.y_mm, row.z_mm, row.a_deg,
-    row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6)).join(",");
-    last.appendChild(origin);
+  const line = (name, cells, tag) => h("tr", {}, h("th", { scope: "row" }, name), cells.map((v) => h(tag, {}, v)));
+  const origin = [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6));
+  table.replaceChildren(h("thead", {}, line("", d.before ? ["shown", "present"] : ["shown"], "th")), h("tbody", {},
+    rows.map(([name, cells]) => line(name, cells, "td")), h("tr", {}, h("th", { colspan: columns.length + 1 },
+    h("code", {}, `--origin ${origin.join(",")}`)))));
 }
 // What is pointed at, in both drawings and the profile.
 function point(i, stage) {
@@ -232,7 +201,8 @@ function point(i, stage) {
     if (stage !== profile) lines.push(place.xyz.map((axis, k) => `${"XYZ"[k]}${axis[i].toFixed(2)}`).join(" "));
     stage.tell(stage === profile ? profile.at(rowOf.get(i)) : stage.scene.path.at(i), lines);
   }
-  for (const one of [...views, profile]) one.drawOverlay();
+  for (const view of views) view.redraw();
+  profile.drawOverlay();
 }
 const step = (by) => point(Math.max(0, Math.min(n - 1, here + by)), profile);
 // Choosing.
@@ -281,9 +251,8 @@ const chosenView = viewerOf("chosen", () => places[chosen]), beforeView = before
 const views = [chosenView, ...(beforeView ? [beforeView] : [])];
 const profile = new Profile($("profile"), model, { point: (row) => point(rows[row], profile), step });
 for (const stage of [...views, profile]) stage.resize();
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click",
-  () => { for (const view of views) view.turnTo(button.dataset.view); });
-for (const radio of document.querySelectorAll("input[name=zoom]")) radio.addEventListener("change", refit);
+for (const radio of document.querySelectorAll("input[name=zoom]")) radio.addEventListener("change",
+  () => { for (const view of views) view.turnTo("iso"); });
 addEventListener("hashchange", fromAddress);
 addEventListener("resize", drawFront);
 ready = true;

@@ -5,7 +5,7 @@
 //   beside()       { k, colour } of rows that do not set the axis, or null
 //   levels()       [{ value, colour, dash, held }]; those held are on the axis always
 //   ends()         of the axis where nothing is in sight
-// and, where there is such a thing: shades() [{ holds(i), colour }], rings() rows, tools [[row, number]], marked()
+// and, where there is such a thing: shades() [{ holds(i), colour }], rings() rows, marked()
 // [first, last] row, here() row, operations { count, range(k), name(k), chosen() }.
 // It calls on.point(i), on.step(by) and on.operation(i).
 
@@ -53,12 +53,10 @@ class Profile extends Stage {
         g.setLineDash([2, 2]);
         this.curve(g, model.s, beside.k, beside.colour);
         g.setLineDash([]);
-        this.drawBeyond(g, beside, top, bottom);
       }
       for (const { s, k, colour } of model.curves()) this.curve(g, s, k, colour);
       for (const i of model.rings?.() ?? []) mark(g, ...this.at(i), 5, ink.ink, 1.6);
     });
-    this.drawTools(g, left, right, top);
     if (this.strip) this.drawOperations(g, left, right, top);
   }
   setHeights() {
@@ -78,24 +76,6 @@ class Profile extends Stage {
     const pad = Math.max((high - low) * 0.1, high * 0.002);
     this.low = low - pad;
     this.high = high + pad;
-  }
-  // An arrow wherever what stands beside leaves the axis.
-  drawBeyond(g, { k, colour }, top, bottom) {
-    const { s } = this.model;
-    g.fillStyle = colour;
-    const side = (i) => i < s.length && s[i] <= this.to ? (k[i] > this.high) - (k[i] < this.low) : 0;
-    for (let i = rowAt(s, this.from); i < s.length && s[i] <= this.to; i++) {
-      const which = side(i), start = i;
-      if (which === 0) continue;
-      while (side(i + 1) === which) i++;
-      const x = (this.x(s[start]) + this.x(s[i])) / 2;
-      const [tip, tail] = which > 0 ? [top + 1, top + 9] : [bottom - 1, bottom - 9];
-      g.beginPath();
-      g.moveTo(x, tip);
-      g.lineTo(x - 4, tail);
-      g.lineTo(x + 4, tail);
-      g.fill();
-    }
   }
   shade(g, holds, colour, top, bottom) {
     const { s } = this.model;
@@ -126,25 +106,6 @@ class Profile extends Stage {
     g.fillText(this.model.unit?.() ?? "N/mm", 4, top - 2);
     g.textAlign = "right";
     g.fillText("path length, mm (rapids included)", right, this.height - 2);
-  }
-  drawTools(g, left, right, top) {
-    const { s } = this.model;
-    g.setLineDash([2, 3]);
-    g.lineWidth = 1;
-    g.strokeStyle = g.fillStyle = ink.muted;
-    aligned(g, "left", "bottom");
-    let last = -Infinity;
-    for (const [start, number] of this.model.tools ?? []) {
-      const x = this.x(s[start]);
-      if (x < left || x > right) continue;
-      g.beginPath();
-      g.moveTo(x, top);
-      g.lineTo(x, this.height - this.pad.bottom);
-      if (start > 0) g.stroke();
-      if (number && x - last > 28 && x > left + 40 && x < right - 20) { g.fillText(`T${number}`, x, top - 2
-        - this.strip); last = x; }
-    }
-    g.setLineDash([]);
   }
   drawOperations(g, left, right, top) {
     const { s, operations } = this.model;

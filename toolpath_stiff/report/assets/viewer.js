@@ -5,6 +5,8 @@
 //   box()                [low, high] of X, Y and Z that the view is fitted to
 //   outline()            points that it is fitted to instead (where there are any)
 //   paths                `Path`s, which the viewer projects before anything is drawn
+//   iso                  yaw and pitch of its slanting view (VIEWS.iso where it is absent)
+//   room                 pixels above and below what it is fitted to; beside: at both sides together
 //   squeeze              factor on heights (1 where it is absent)
 //   draw(g, viewer)      whatever it draws, below the axes
 //   overlay(g, viewer)   what changes with the pointer
@@ -19,7 +21,9 @@ class Viewer extends Stage {
     super(element);
     this.scene = scene;
     this.on = on;
-    [this.yaw, this.pitch] = VIEWS.iso;
+    [this.yaw, this.pitch] = scene.iso ?? VIEWS.iso;
+    for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click",
+      () => this.turnTo(button.dataset.view));
     this.listen();
   }
   // Unit vectors to the right and up on the screen, and towards whoever looks.
@@ -43,15 +47,16 @@ class Viewer extends Stage {
     const seen = (this.scene.outline?.() ?? cornersOf(this.box)).map((corner) => this.project(corner));
     const [[left, right], [top, bottom]] = [0, 1].map((k) => [Math.min(...seen.map((p) => p[k])),
       Math.max(...seen.map((p) => p[k]))]), wide = right - left, tall = bottom - top;
-    const beside = Math.min(this.scene.beside ?? 90, 0.45 * this.width), above = this.scene.frame === false ? 24 : 70;
+    const beside = Math.min(this.scene.beside ?? 90, 0.45 * this.width), [above, below] = this.scene.room
+      ?? (this.scene.frame === false ? [12, 12] : [35, 35]);
     this.zoom = Math.max(1e-6, Math.min((this.width - beside) / Math.max(wide, 1e-3),
-      (this.height - above) / Math.max(tall, 1e-3)));
+      (this.height - above - below) / Math.max(tall, 1e-3)));
     this.cx = this.width / 2 - this.zoom * (left + right) / 2;
-    this.cy = this.height / 2 - this.zoom * (top + bottom) / 2;
+    this.cy = (this.height + above - below) / 2 - this.zoom * (top + bottom) / 2;
   }
   resized() { this.fit(); }
   turnTo(name) {
-    if (name in VIEWS) [this.yaw, this.pitch] = VIEWS[name];
+    if (name in VIEWS) [this.yaw, this.pitch] = name === "iso" && this.scene.iso || VIEWS[name];
     this.fit();
     this.redraw();
     this.on.moved?.(this);
@@ -66,8 +71,9 @@ class Viewer extends Stage {
     if (!this.middle) return;
     const g = this.clear(this.base);
     for (const path of this.scene.paths ?? []) path.project(this);
-    if (this.scene.frame !== false) this.drawBox(g);
+    if (this.scene.frame !== false) this.edges(g, this.box, ink.line, 1);
     this.scene.draw(g, this);
+    if (this.scene.frame !== false) this.drawBox(g);
     this.drawTriad(g);
     this.scene.label?.(g, this);
   }
@@ -76,7 +82,6 @@ class Viewer extends Stage {
     if (this.middle) this.scene.overlay?.(g, this);
   }
   drawBox(g) {
-    this.edges(g, this.box, ink.line, 1);
     const flat = ["top", "front", "side"].find((name) => VIEWS[name][0] === this.yaw && VIEWS[name][1] === this.pitch);
     g.fillStyle = ink.muted;
     aligned(g, "left", "top");

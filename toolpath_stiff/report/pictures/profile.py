@@ -12,20 +12,15 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import number
 from toolpath_stiff.report.colours import INK, MUTED, ORANGE, RED, SLATE
 from toolpath_stiff.report.curves import extremes_by_column, profile_band, profile_curve
-from toolpath_stiff.report.pictures.labels import CHARACTER, add_heading, add_legend, label_places
-from toolpath_stiff.report.pictures.style import DPI, POINTS, Look, new_figure, panel
+from toolpath_stiff.report.pictures.labels import add_heading, add_legend, label_places
+from toolpath_stiff.report.pictures.style import Look, new_figure, panel
 from toolpath_stiff.report.words import plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 WIDTH, HEIGHT = 14.0, 6.2  # inches
 LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
 STEPS = (1, 2, 2.5, 5, 10)  # between ticks
-STRIP = 0.22  # height of the operations above the frame
-OPERATION_COLOURS = ("#ebeff4", "#d9e0e8")  # in turn
-NAME_SIZE, INSET = 8.5, 4.0  # points; pixels before a name
 CURVE_BLUE = "#2b59c3"
-MOST_LINES = 60  # where operations begin
-MOST_OPERATIONS = 200  # boxes above the frame; more would be narrower than seven pixels
 
 
 def profile(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
@@ -34,10 +29,8 @@ def profile(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
     With `show_plunges` the axis holds the plunges beside the headline, and they belong to the curve; else they are
     grey.
     """
-    strip = STRIP if 1 < len(analysis.operations.rows) <= MOST_OPERATIONS else 0.0
     figure = new_figure(WIDTH, HEIGHT)
-    frame = HEIGHT - TOP - BOTTOM - strip
-    axes = panel(figure, LEFT, BOTTOM, WIDTH - LEFT - RIGHT, frame)
+    axes = panel(figure, LEFT, BOTTOM, WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM)
     s, k = profile_curve(analysis, show_plunges)
     band = profile_band(analysis, show_plunges)
     _set_limits(axes, analysis, band, show_plunges)
@@ -50,9 +43,7 @@ def profile(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
         _draw_band(axes, s, band, columns)
     _curve(axes, analysis, columns, (CURVE_BLUE, SLATE, 4), "plunges", show_plunges)
     _levels(axes, analysis)
-    if strip:
-        _operations(axes, analysis, strip / frame)
-    _line_numbers(axes, analysis, 1.0 + strip / frame)
+    _line_numbers(axes, analysis)
     places = analysis.weakest_rows
     spots = [(float(s[row]), float(k[row])) for row in places]
     label_places(axes, spots, [f"line {analysis.samples.line[row]}" for row in places], below=True)
@@ -135,48 +126,21 @@ def _levels(axes: Axes, analysis: Analysis) -> None:
     axes.axhline(level, color=RED, linewidth=1.3, zorder=5, label=f"required {number(level)} N/mm")
 
 
-def _operations(axes: Axes, analysis: Analysis, height: float) -> None:
-    """Named boxes above the frame, `height` of its height; lines where they begin, while these can be told apart."""
-    rows = analysis.operations.rows
-    first = np.searchsorted(analysis.samples.move, [row.first_move for row in rows])
-    edges = mm_from_m(np.append(analysis.samples.s[first], analysis.samples.s[-1]))
-    spans = list(zip(edges[:-1].tolist(), np.diff(edges).tolist(), strict=True))
-    across = axes.get_xaxis_transform()
-    if len(rows) <= MOST_LINES:
-        axes.vlines(edges[1:-1], 0, 1, transform=across, color=MUTED, linewidth=0.9, linestyle=":", zorder=2)
-    for which, colour in enumerate(OPERATION_COLOURS):
-        box: Look = {"facecolor": colour, "edgecolor": "none", "transform": across, "clip_on": False}
-        axes.broken_barh(spans[which::2], (1.0, height), zorder=2, **box)
-    pixels = float(axes.get_window_extent().width) / float(edges[-1] or 1.0)
-    inset = INSET / DPI * POINTS
-    for row, (start, length) in zip(rows, spans, strict=True):
-        letters = int((length * pixels - 2.0 * INSET) / CHARACTER)  # a name of four letters and less tells nothing
-        text = f"{row.number} {plain(row.name)}"
-        text = (
-            shortened(text, letters) if letters > len(str(row.number)) + 4 or len(text) <= letters else str(row.number)
-        )
-        if len(text) <= letters:
-            axes.annotate(
-                text, (start, 1.0 + height / 2.0), (inset, 0.0), xycoords=across, textcoords="offset points",
-                fontsize=NAME_SIZE, va="center", zorder=6, annotation_clip=False,
-            )  # fmt: skip
-
-
-def _line_numbers(axes: Axes, analysis: Analysis, height: float) -> None:
+def _line_numbers(axes: Axes, analysis: Analysis) -> None:
     end = float(analysis.samples.s[-1])
     where = np.linspace(0.0, end, 13)[:-1] + end / 24.0
     rows = np.minimum(np.searchsorted(analysis.samples.s, where), len(analysis.samples) - 1)
     across = axes.get_xaxis_transform()
     places = mm_from_m(where)
     axes.plot(
-        places, np.full(len(places), height), linestyle="none", marker=TICKUP, markersize=3.5, color=MUTED,
+        places, np.ones(len(places)), linestyle="none", marker=TICKUP, markersize=3.5, color=MUTED,
         markeredgewidth=0.8, transform=across, clip_on=False, zorder=2,
     )  # fmt: skip
     words: Look = {"fontsize": 9.0, "color": MUTED, "ha": "center"}
     words |= {"textcoords": "offset points", "annotation_clip": False}
     for place, row in zip(places.tolist(), rows.tolist(), strict=True):
-        axes.annotate(str(analysis.samples.line[row]), (place, height), (0.0, 7.0), xycoords=across, **words)
-    axes.annotate("program line", (0.5, height), (0.0, 20.0), xycoords="axes fraction", **words)
+        axes.annotate(str(analysis.samples.line[row]), (place, 1.0), (0.0, 7.0), xycoords=across, **words)
+    axes.annotate("program line", (0.5, 1.0), (0.0, 20.0), xycoords="axes fraction", **words)
 
 
 def _legend(figure: Figure, axes: Axes) -> None:

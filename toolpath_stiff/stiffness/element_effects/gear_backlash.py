@@ -9,14 +9,19 @@ TYPICAL = (
     "between both sides 1 to 1.5 arcmin in RV reducers of robots (zhygear.com, Analysis and Control of Backlash in RV "
     "Reducers); worn ones more: engineering experience, no source"
 )
+CLOSED = (
+    "lost motion is stated between -3 and 3 % of the rated moment, of 58 to 4410 N m (Nabtesco, RV-E series, RV-6E to "
+    "RV-450E)"
+)
 SMALLEST = 1e-3  # N m in a joint: below, the gap adds nothing that shows
 
 
 class GearBacklash(Effect):
     """Lost turn g of a joint under load: a displacement that does not grow with the load.
 
-    Secant compliance: the joint gives g + c |M| under the moment M about its axis. The arm's weight, which may hold the
-    gap closed on one side, is left out: the gap is taken up in full by any load.
+    Under the moment M about its axis the joint gives g h(M) + c M, h(M) = M / sqrt(M^2 + M0^2): all of the gap once M
+    is well above the moment M0 that closes it (0: any load does). It counts from the moment W of the weight, where the
+    machine file has masses: one that holds the gap closed on one side hides it. Secant compliance.
     """
 
     name = "gear_backlash"
@@ -24,13 +29,14 @@ class GearBacklash(Effect):
     link = "joints"
     holds_for = "elements"
     load_dependent = True
-    equation = "c_z += g / |M|, M the moment about the joint's axis"
-    source = "secant through a gap"
+    equation = "c_z += g (h(W + M) - h(W)) / M, h(M) = M / sqrt(M^2 + M0^2), M about the joint's axis, W of the weight"
+    source = "secant through a gap that closes gradually"
     needs = ("force_N",)
     clause = "{element} turns by about {gap} arcsec before its gear carries"
     parameters = (
         element_parameter("which joint, by its name in `tps machine show`"),
         Parameter("gap", "arcsec", np.pi / 648000.0, (0.0, 3600.0), (10.0, 90.0), TYPICAL, meaning="turn to one side"),
+        Parameter("closing", "N m", 1.0, (0.0, 500.0), (2.0, 130.0), CLOSED, meaning="moment that closes the gap"),
     )
 
     def element_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
@@ -38,5 +44,8 @@ class GearBacklash(Effect):
         if path.element_loads is None:
             return None
         more, torsion = path.element_zeros(), path.element(p["element"])[0].start + 5
-        more[:, torsion] = p["gap"] / np.maximum(np.abs(path.element_loads[:, torsion]), SMALLEST)
+        weight, moment = path.weight_loads()[:, torsion], path.element_loads[:, torsion]
+        moment = np.where(np.abs(moment) < SMALLEST, SMALLEST, moment)
+        share = [m / np.hypot(m, max(p["closing"], SMALLEST)) for m in (weight + moment, weight)]
+        more[:, torsion] = p["gap"] * (share[0] - share[1]) / moment
         return more

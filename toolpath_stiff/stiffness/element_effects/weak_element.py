@@ -20,7 +20,7 @@ class WeakElement(Effect):
     source = "a loose bolt, worn bearing, lost preload"
     parameters = (
         element_parameter("which element, by its name in `tps machine show`"),
-        Parameter("factor", "", 1.0, (0.1, 1.0), (0.4, 0.9), EXPERIENCE, 1.0, MEANING),
+        Parameter("factor", "", 1.0, (0.005, 1.0), (0.4, 0.9), EXPERIENCE, 1.0, MEANING),
     )
 
     def element_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:

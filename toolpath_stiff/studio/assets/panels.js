@@ -1,17 +1,4 @@
 // The panels beside the machine. Each is a function of the state that gives elements; text is never taken for HTML.
-function h(tag, attributes = {}, ...children) {
-  const element = SVG.has(tag) ? document.createElementNS("http://www.w3.org/2000/svg", tag)
-    : document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (value === null || value === undefined || value === false) continue;
-    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (name === "value" || name === "checked" || name === "disabled") element[name] = value;
-    else element.setAttribute(name, value === true ? "" : value);
-  }
-  element.append(...children.flat(9).filter((c) => c !== null && c !== undefined && c !== false));
-  return element;
-}
-const SVG = new Set(["svg", "path", "circle", "line", "text", "g", "polyline", "polygon", "title", "rect"]);
 const percent = (v, digits = 2) => (v === null || v === undefined ? "\u2013" : `${v.toFixed(digits)} %`);
 const chance = (p) => (p > 0.99 ? "> 99 %" : p < 0.01 ? "< 1 %" : `${Math.round(100 * p)} %`);
 const short = (v) => (typeof v !== "number" ? String(v) : Math.abs(v) >= 1e5 ? group(Number(v.toPrecision(4)))
@@ -46,14 +33,15 @@ function gaugeOf(state) {
 // Effects.
 function effectsPanel(state, act) {
   if (!state.effects.length) return h("p", {}, "All effects of the catalogue are in the machine.");
-  const sets = state.verdict?.confounding.sets ?? [], done = new Set(), rows = [];
+  const sets = state.verdict?.entries ?? [], done = new Set(), rows = [], folded = [];
   for (const effect of state.effects) {
     if (done.has(effect.name)) continue;
     const set = sets.find((names) => names.includes(effect.name)) ?? [effect.name];
     const members = state.effects.filter((one) => set.includes(one.name));
     members.forEach((one) => done.add(one.name));
     const drawn = members.map((one) => effectRow(one, act));
-    rows.push(members.length > 1 ? h("fieldset", { class: "together" },
+    const matters = !state.verdict || rows.length < 2 || members.some((one) => one.on || one.probability >= 0.01);
+    (matters ? rows : folded).push(members.length > 1 ? h("fieldset", { class: "together" },
       h("legend", {}, "these data cannot tell these apart"), drawn) : drawn);
   }
   const on = state.effects.some((one) => one.on), fit = state.fit;
@@ -71,9 +59,12 @@ function effectsPanel(state, act) {
     state.verdict ? null : h("p", { class: "muted" }, state.readings ? "The ranking comes with the diagnosis."
       : "Without readings nothing is ranked."),
     rows,
+    folded.length ? h("details", { id: "unlikely", open: unfolded, ontoggle: (e) => { unfolded = e.target.open; } },
+      h("summary", {}, "further effects, each less likely than 1 %"), folded) : null,
     ownEffects(state, act),
   ];
 }
+let unfolded = false; // the unlikely effects
 // What one does first, until it is put away.
 const GUIDE = ["Read the verdict above: what is off, how sure that is, how large the error is against the noise.",
   "Switch an effect on and move its slider: bars and dots show at once what it would explain.",
@@ -269,13 +260,11 @@ function programPanel(state, act) {
 function placementPanel(state, act) {
   const p = state.placement;
   if (!p) return [h("h2", {}, "Placement"), h("p", {}, "Open a program first.")];
-  const at = act.origin, rows = [["X", 0, -750, 750], ["Y", 1, -750, 750], ["Z", 2, 0, 1700], ["C", 5, -180, 360]];
+  const at = act.origin, ends = endsOf(state.machine.scene.reach.flat());
+  const rows = [...["X", "Y", "Z"].map((name, k) => [name, k, ...ends[k].map(Math.round)]), ["C", 5, -180, 360]];
   return [
     h("h2", {}, "Where the work sits"),
     placementFigures(p.now, state, "pl"),
-    state.effects.some((one) => one.on) ? h("p", { class: "muted", id: "pl-without" },
-      "These figures are of the machine file, without the effects that are switched on: "
-        + "accept the fit to place the work on the machine that carries them.") : null,
     dragMap(state, act),
     h("div", { class: "place live" }, rows.map(([name, axis, low, high]) => {
       const number = h("input", { type: "number", id: `o-${name}n`, "aria-label": `${name} of program zero`,
@@ -341,15 +330,17 @@ function outline(reach, z) {
     for (let i = 1; i < reach.length; i++) {
       const [a, b] = [reach[i - 1][k], reach[i][k]];
       if ((a[2] - z) * (b[2] - z) > 0 || a[2] === b[2]) continue;
-      const p = between(a, b, (z - a[2]) / (b[2] - a[2])), far = Math.hypot(p[0], p[1]);
-      if (!best || far > best[2]) best = [p[0], p[1], far];
+      const [x, y] = between(a, b, (z - a[2]) / (b[2] - a[2]));
+      const far = Math.hypot(x - reach[0][0][0], y - reach[0][0][1]);
+      if (!best || far > best[2]) best = [x, y, far];
     }
     if (best) found.push([best[0], best[1]]);
   }
   return found;
 }
 function dragMap(state, act) {
-  const reach = outline(state.machine.reach, act.origin[2]), size = 880, path = state.program?.path;
+  const reach = outline(state.machine.scene.reach, act.origin[2]), path = state.program?.path;
+  const [[left, right], [near, far]] = endsOf(state.machine.scene.reach.flat()), pen = (right - left) / 300;
   const points = [];
   if (path) {
     const from = state.program.origin, c = Math.cos(-from[5] * Math.PI / 180), s = Math.sin(-from[5] * Math.PI / 180);
@@ -358,19 +349,20 @@ function dragMap(state, act) {
       path.y_mm[i] - from[1]]; points.push([c * x - s * y, s * x + c * y]); }
   }
   const work = h("g", {}, h("polyline", { points: points.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" "),
-    fill: "none", stroke: "var(--blue)", "stroke-width": 5 }), h("circle", { r: 12, fill: "var(--pink)" }),
-    h("line", { x1: 0, y1: 0, x2: 90, y2: 0, stroke: "var(--pink)", "stroke-width": 5 }));
+    fill: "none", stroke: "var(--blue)", "stroke-width": pen }), h("circle", { r: 2.4 * pen, fill: "var(--pink)" }),
+    h("line", { x1: 0, y1: 0, x2: 18 * pen, y2: 0, stroke: "var(--pink)", "stroke-width": pen }));
   const put = () => work.setAttribute("transform",
     `translate(${act.origin[0]} ${act.origin[1]}) rotate(${act.origin[5]})`);
   put();
   act.put = put;
-  const svg = h("svg", { viewBox: `${-size} ${-size * 0.94} ${2 * size} ${1.88 * size}`, class: "drag live", id: "drag",
+  const viewBox = [left - 9 * pen, -far - 9 * pen, right - left + 18 * pen, far - near + 18 * pen].join(" ");
+  const svg = h("svg", { viewBox, class: "drag live", id: "drag",
     role: "application", tabindex: "0",
     "aria-label": "Work over the reach boundary, from above. Drag or use arrow keys to move, Shift to turn." },
     h("g", { transform: "scale(1 -1)" }, h("polygon", { points: reach.map((p) => p.map((v) => v.toFixed(0)).join(","))
-      .join(" "), fill: "var(--soft)", stroke: "var(--muted)", "stroke-width": 4 }),
-      h("line", { x1: -60, x2: 60, y1: 0, y2: 0, stroke: "var(--muted)", "stroke-width": 3 }),
-      h("line", { y1: -60, y2: 60, x1: 0, x2: 0, stroke: "var(--muted)", "stroke-width": 3 }), work));
+      .join(" "), fill: "var(--soft)", stroke: "var(--muted)", "stroke-width": pen }),
+      [[12 * pen, 0], [0, 12 * pen]].map(([x, y]) => h("line", { x1: -x, x2: x, y1: -y, y2: y, stroke: "var(--muted)",
+        "stroke-width": pen / 2 })), work));
   const where = (e) => { const m = svg.getScreenCTM().inverse(), p = new DOMPoint(e.clientX, e.clientY).matrixTransform(
     m); return [p.x, -p.y]; };
   let last = null;
@@ -421,9 +413,7 @@ function exercisePanel(state, act) {
 function historyPanel(state, act) {
   const copy = (text) => button("copy", (e) => { navigator.clipboard?.writeText(text); e.target.textContent = "copied";
     }, { "aria-label": `copy ${text.slice(0, 40)}` });
-  // broken between words alone
-  const words = (text) => text.split(" ").flatMap((word, k) => [k ? " " : "", h("span", {}, word)]);
-  const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, words(text)), copy(text)) : null);
+  const line = (text) => (text ? h("div", { class: "line" }, h("code", {}, text), copy(text)) : null);
   const step = (one) => h("div", { class: "step" }, h("b", {}, one.stops > 1 ? `${one.text} (${one.stops} stops)`
     : one.text), line(one.command), line(one.python));
   return [h("h2", {}, "What was done"), h("p", { class: "muted" },

@@ -53,6 +53,19 @@ const hand = latest((on) => post("/do", JSON.stringify({ do: "hand", on })), (fo
   $("gauge").replaceChildren(gaugeOf(state));
   view.redraw();
 });
+// The path where the work would lie with program zero elsewhere.
+function carry(origin) {
+  const { path: p, origin: from } = state.program, [q, r] = [turnOf(from), turnOf(origin)], [path] = scene.paths;
+  if (!path) return;
+  const xyz = [0, 1, 2].map(() => new Float32Array(path.n));
+  for (let i = 0; i < path.n; i++) {
+    const d = minus([p.x_mm[i], p.y_mm[i], p.z_mm[i]], from);
+    moved(origin, r, [0, 1, 2].map((k) => dot3(q.map((row) => row[k]), d))).forEach((v, k) => { xyz[k][i] = v; });
+  }
+  path.move(xyz);
+  if (here < 0) scene.pose = [...origin.slice(0, 3), 0, 0, 0];
+  view.redraw();
+}
 const placed = latest((origin) => post("/do", JSON.stringify({ do: "at", origin })), (found) => {
   state.placement.now = found;
   $("pl")?.replaceWith(placementFigures(found, state, "pl"));
@@ -66,6 +79,7 @@ Object.assign(act, {
     if (!Number.isFinite(value)) return;
     act.origin[axis] = axis === 5 ? ((value % 360) + 360) % 360 : value;
     act.put();
+    carry(act.origin);
     for (const name of ["X", "Y", "Z", "C"]) { const k = { X: 0, Y: 1, Z: 2, C: 5 }[name];
       for (const id of [`o-${name}`, `o-${name}n`]) if ($(id) && document.activeElement !== $(id)) $(id).value =
       Number(act.origin[k].toFixed(1)); }
@@ -253,7 +267,7 @@ function drawLegend() {
     `softer -${scene.scale} %`,
     h("span", { class: "ramp",
     style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }),
-    `+${scene.scale} % stiffer than modelled`));
+    `+${scene.scale} % stiffer`));
   if (state.program?.path) { const [unit, digits] = layer(); parts.push(h("div", {},
     `path ${group(scene.ends[0], digits)}`, h("span", { class: "ramp", style: `background:${ramp(coloursNow())}` }),
     `${group(scene.ends[1], digits)} ${unit}`)); }
@@ -288,16 +302,26 @@ $("tabs").addEventListener("keydown", (e) => {
   if (by) { e.preventDefault(); open(names[(names.indexOf(panel) + by + names.length) % names.length]); }
   if (e.key === "Home" || e.key === "End") { e.preventDefault(); open(names.at(e.key === "Home" ? 0 : -1)); }
 });
+// While a finger or the mouse holds something of the panel, it is not drawn anew.
+let held = false, late = false;
+$("panel").addEventListener("pointerdown", () => { held = true; });
+for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => {
+  held = false;
+  if (late) draw();
+});
 function draw() {
-  scene.state = state;
+  late = held;
+  if (held) return;
+  scene.take(state, state.effects.filter((one) => one.on).map((one) => ({ link: one.link,
+    name: one.on.strut ? `strut ${one.on.strut}` : one.on.element })));
   const r = state.readings, v = state.verdict;
   scene.deviation = r?.deviation ?? [];
   const sizes = scene.deviation.filter((d) => d !== null).map(Math.abs).sort((a, b) => a - b);
   if (!scene.scaled && sizes.length) { scene.scale = Math.max(5,
     5 * Math.ceil(sizes[Math.floor(0.95 * sizes.length)] / 5)); scene.scaled = true; }
-  scene.lit = state.effects.filter((one) => one.on).map((one) => ({ link: one.link, number: one.on.strut }));
   if (scene.selected >= (r?.line.length ?? 0)) scene.selected = -1;
-  if (scene.selected < 0 && here < 0) scene.pose = [...state.machine.origin];
+  const rest = (state.program?.origin ?? state.machine.origin).slice(0, 3);
+  if (scene.selected < 0 && here < 0) scene.pose = [...rest, 0, 0, 0];
   if (!pending) act.origin = [...(state.program?.origin ?? state.machine.origin)];
   $("title").textContent = state.case;
   $("machine-name").textContent =
@@ -306,8 +330,9 @@ function draw() {
   document.title = `${state.case}: toolpath_stiff studio`;
   const waiting = r && !v ? "Judging the readings" : r ? "" : "What does the machine do, and does the model say so?";
   $("sentence").classList.toggle("waiting", Boolean(waiting));
-  $("sentence").replaceChildren(...(waiting ? [waiting] : [`${v.sentence}.`,
-    h("small", {}, v.text.slice(v.sentence.length + 2))]));
+  const [, said, name] = v?.sentence.match(/^(.*) \(([^()]*)\)$/) ?? [0, v?.sentence, ""];
+  $("sentence").replaceChildren(...(waiting ? [waiting] : [`${said}.`,
+    h("small", {}, `${name ? `${name}. ` : ""}${v.text.slice(v.sentence.length + 2)}`)]));
   $("gauge").replaceChildren(gaugeOf(state));
   if ($("undo")) $("undo").disabled = !state.history[1];
   scene.paths = [];
@@ -316,7 +341,7 @@ function draw() {
   drawProfile();
   drawLegend();
   drawPanel();
-  if (view.width) { if (!scene.fitted) { scene.fitted = true; view.fit(); } view.redraw(); }
+  if (view.width) { if (!scene.fitted) { scene.fitted = true; view.turnTo("iso"); } view.redraw(); }
 }
 let began = { of: "", at: 0, done: 0 };  // the work that runs, when it was first seen, how far it was then
 function drawJob(job) {
@@ -345,15 +370,14 @@ async function refresh() {
   await asking;
 }
 // Controls.
-for (const one of document.querySelectorAll("[data-view]")) one.addEventListener("click",
-  () => view.turnTo(one.dataset.view));
 for (const one of document.querySelectorAll("[data-focus]")) one.addEventListener("click", () => {
   scene.focus = one.dataset.focus;
   for (const other of document.querySelectorAll("[data-focus]")) other.setAttribute("aria-pressed",
     String(other === one));
   view.turnTo("fit");
 });
-$("show-reach").addEventListener("change", (e) => { scene.showReach = e.target.checked; view.redraw(); });
+$("show-reach").addEventListener("click", (e) => { scene.showReach = !scene.showReach;
+  e.target.setAttribute("aria-pressed", String(scene.showReach)); view.redraw(); });
 $("scrub").addEventListener("input", (e) => goTo(Number(e.target.value)));
 $("play").addEventListener("click", () => {
   if (playing) cancelAnimationFrame(playing);

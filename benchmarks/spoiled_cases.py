@@ -1,4 +1,4 @@
-"""Blind cases of `benchmarks.several`: two and three effects at once, wild readings, a wrong noise, mistyped rows."""
+"""Blind cases of `benchmarks.spoiled`: wild readings, a wrong noise, mistyped rows."""
 
 import json
 import re
@@ -14,9 +14,8 @@ from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.hidden import Nuisances
 from toolpath_stiff.rig.slips import SLIPS, slipped_case, with_stated_noise
 
-GROUPS = ("pair", "three", "outliers", "stated", "slip")
-SIZES = {"pair": (0.10, 0.05), "three": (0.10, 0.07, 0.05), "one": None, "none": None}
-HIDDEN = {"pair": "two", "three": "three", "one": "one", "none": "none"}
+GROUPS = ("outliers", "stated", "slip")
+PAIR_SIZES = (0.10, 0.05)  # rms change of ln k of the two
 FEW_OUTLIERS, MANY_OUTLIERS = 0.02, 0.10
 FACTORS = (0.5, 1.0, 2.0)
 # Layout and way in which a noise is stated; the tilted one has repeats, the paper's has none.
@@ -26,7 +25,7 @@ GROUP_SEEDS = 10_000  # distance of the seeds of groups
 
 @dataclass(frozen=True)
 class Job:
-    """One case: of `GROUPS` and a key of `HIDDEN`; the share of wild readings; a slip's kind.
+    """One case: of `GROUPS`; `none`, `one` or `two` hidden effects; the share of wild readings; a slip's kind.
 
     `way` says how a noise is stated (`option`: `--noise`; `column`: `sd_N_per_mm`), `factor` times the true one.
     """
@@ -43,25 +42,23 @@ class Job:
 
 
 def make_jobs(first_seed: int, cases: int, groups: Sequence[str] = GROUPS, built: str = "springs") -> list[Job]:
-    """All cases: `cases` pairs, half as many of three effects and of each kind with outliers, a tenth of the rest.
+    """All cases: `cases` of each kind with outliers and without a slip, a fifth of each stated noise and slip.
 
     Cases that are compared with each other share their seed. More cases leave the first ones as they were.
     """
-    half, tenth = max(cases // 2, 1), max(cases // 10, 1)
+    fifth, jobs = max(cases // 5, 1), list[Job]()
     start = {group: first_seed + GROUP_SEEDS * number for number, group in enumerate(GROUPS)}
-    jobs = [Job("pair", "tilted", start["pair"] + k, "pair") for k in range(cases)]
-    jobs += [Job("three", "tilted", start["three"] + k, "three") for k in range(half)]
-    for number, hidden in enumerate(("none", "one", "pair")):
-        for k in range(half):
+    for number, hidden in enumerate(("none", "one", "two")):
+        for k in range(cases):
             seed = start["outliers"] + 1000 * number + k
             jobs += [Job("outliers", "tilted", seed, hidden, share) for share in (FEW_OUTLIERS, MANY_OUTLIERS)]
     for number, (layout, way) in enumerate(WAYS):
-        for k in range(tenth):
+        for k in range(fifth):
             for other, hidden in enumerate(("none", "one")):
                 seed = start["stated"] + 1000 * number + 500 * other + k
                 jobs += [Job("stated", layout, seed, hidden, way=way, factor=factor) for factor in FACTORS]
     for number, slip in enumerate(("", *SLIPS)):
-        for k in range(tenth if slip else half):
+        for k in range(fifth if slip else cases):
             # Alternately on a sound machine and on one that hides an effect.
             jobs.append(Job("slip", "tilted", start["slip"] + 1000 * number + k, "one" if k % 2 else "none", slip=slip))
     return [replace(job, built=built) for job in jobs if job.group in groups]
@@ -75,8 +72,8 @@ def run(job: Job) -> dict[str, Any]:
 def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     """Draw, disturb, diagnose, and what the document says of noise and rows."""
     nuisances = Nuisances(outliers=job.outliers)
-    hidden, size = HIDDEN[job.hidden], SIZES[job.hidden]
-    case = rig.draw_case(job.seed, job.layout, hidden, size=size, noise=nuisances, built=job.built)
+    size = PAIR_SIZES if job.hidden == "two" else None
+    case = rig.draw_case(job.seed, job.layout, job.hidden, size=size, noise=nuisances, built=job.built)
     rows, truth, stated = case.rows, case.truth, {}
     more: dict[str, Any] = {}
     if job.way == "column":

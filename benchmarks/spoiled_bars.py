@@ -1,11 +1,11 @@
-"""Figures of `benchmarks.several`, each against its bar."""
+"""Figures of `benchmarks.spoiled`, each against its bar."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from benchmarks.bars import JUST_SEEN, Figure, Record, holds_truth, mean, named, share
-from benchmarks.several_cases import FACTORS, MANY_OUTLIERS, WAYS
+from benchmarks.bars import Figure, Record, holds_truth, mean, named, share
+from benchmarks.spoiled_cases import FACTORS, MANY_OUTLIERS, WAYS
 from toolpath_stiff.rig.slips import VISIBLE
 
 COST_OF_OUTLIERS = 3.0  # percentage points
@@ -20,27 +20,6 @@ def false_name(record: Record) -> bool:
 def told(verdict: str) -> Test:
     """Whether a record has that verdict."""
     return lambda record: bool(record["verdict"] == verdict)
-
-
-def all_show(record: Record) -> bool:
-    """Whether each hidden effect, alone, shows beside strut law and nuisances."""
-    return all(effect["detectability"] >= JUST_SEEN for effect in record["effects"])
-
-
-def one_alone(record: Record) -> bool:
-    """`identified`, and only a part of what was hidden."""
-    return record["verdict"] == "identified" and set(record["plausible"]) < set(record["truth"])
-
-
-def held_or_listed(record: Record) -> bool:
-    """Whether all that was hidden is in `plausible`, or told as neither shown nor excluded."""
-    return set(record["truth"]) <= {*record["plausible"], *record["not_excluded"]}
-
-
-def strongest_right(record: Record, count: int = 2) -> bool:
-    """Whether the strongest effects by the size they have are in `plausible`, and nothing false is named."""
-    ordered = sorted(record["effects"], key=lambda effect: -effect["size"])
-    return {effect["effect"] for effect in ordered[:count]} <= set(record["plausible"]) and not false_name(record)
 
 
 def named_rows(record: Record) -> set[int]:
@@ -74,7 +53,7 @@ def _meant_in(record: Record, slip: dict[str, Any]) -> bool:
 
 def figures(records: Sequence[Record]) -> list[Figure]:
     """Every figure, of the groups that were run."""
-    groups = {"pair": _pairs, "three": _three, "outliers": _outliers, "stated": _stated, "slip": _slips}
+    groups = {"outliers": _outliers, "stated": _stated, "slip": _slips}
     return [
         figure
         for group, count in groups.items()
@@ -88,21 +67,6 @@ def _each(records: Sequence[Record], what: str, test: Test, where: Test | None =
     return share("tilted", what, [test(r) for r in records if where is None or where(r)], **bars)
 
 
-def _pairs(records: Sequence[Record]) -> list[Figure]:
-    of = partial(_each, records)
-    return [
-        of("pairs: both in `plausible`", holds_truth, at_least=0.90),
-        of(f"the same, both with a detectability of {JUST_SEEN:g} or more", holds_truth, all_show),
-        of("pairs: both in `plausible` or `not_excluded`", held_or_listed),
-        *_listed("pairs", records),
-        of("pairs: `identified`, both", named),
-        of("pairs: `identified`, a name that is not hidden", false_name, at_most=0.04),
-        of("pairs: `identified`, one of them alone", one_alone),
-        of("pairs: `unexplained`", told("unexplained")),
-        of("pairs: at most four names in `plausible`", lambda r: len(r["plausible"]) <= 4),
-    ]
-
-
 def _listed(what: str, records: Sequence[Record]) -> list[Figure]:
     """How many effects are told as not excluded, how often one of them is there, and how likely each was said to be."""
     listed = [(name in r["truth"], chance) for r in records for name, chance in r["not_excluded"].items()]
@@ -113,19 +77,6 @@ def _listed(what: str, records: Sequence[Record]) -> list[Figure]:
     ]
 
 
-def _three(records: Sequence[Record]) -> list[Figure]:
-    of = partial(_each, records)
-    return [
-        of("three: the strongest two in `plausible`, nothing false named", strongest_right, at_least=0.80),
-        of(f"the same, all with a detectability of {JUST_SEEN:g} or more", strongest_right, all_show),
-        of("three: all in `plausible`", holds_truth),
-        of("three: all in `plausible` or `not_excluded`", held_or_listed),
-        *_listed("three", records),
-        of("three: `identified`, a name that is not hidden", false_name, at_most=0.05),
-        of("three: `unexplained`", told("unexplained")),
-    ]
-
-
 def _outliers(records: Sequence[Record]) -> list[Figure]:
     """What many wild readings cost on the same machines, in percentage points."""
     tests: list[tuple[str, str, Test]] = [
@@ -133,8 +84,8 @@ def _outliers(records: Sequence[Record]) -> list[Figure]:
         ("one", "truth in `plausible`", holds_truth),
         ("one", "`identified` and right", named),
         ("one", "no false name", lambda r: not false_name(r)),
-        ("pair", "both in `plausible`", holds_truth),
-        ("pair", "no false name", lambda r: not false_name(r)),
+        ("two", "both in `plausible`", holds_truth),
+        ("two", "no false name", lambda r: not false_name(r)),
     ]
     made = []
     for hidden, what, test in tests:

@@ -1,5 +1,5 @@
-// Solids with light and shade on a 2-D canvas: cylinders, balls, prisms. Each is { depth, paint(g) }, sorted by whoever
-// draws them; lengths in mm, true to scale. The light comes from above the left shoulder of whoever looks.
+// Solids with light and shade on a 2-D canvas: cylinders, balls, prisms, beams. Each is { depth, paint(g) }, sorted by
+// whoever draws them; lengths in mm, true to scale. The light comes from above the left shoulder of whoever looks.
 const LIGHT = [-0.45, 0.6, 0.66];  // to the right, up, towards the eye
 const minus = (a, b) => a.map((v, i) => v - b[i]), dot3 = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross3 = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -75,4 +75,10 @@ function prism(view, lower, upper, colour, alpha = 1) {
 function block(view, box, colour, alpha = 1) {
   const ring = (z) => [[0, 0], [1, 0], [1, 1], [0, 1]].map(([i, j]) => [box[0][i], box[1][j], z]);
   return prism(view, ring(box[2][0]), ring(box[2][1]), colour, alpha);
+}
+function beam(view, a, b, half, colour, alpha = 1) {
+  const along = unit(minus(b, a)), aside = Math.abs(along[2]) > 0.7 ? [0, 1, 0] : [0, 0, 1];
+  const u = unit(cross3(along, aside)).map((v) => half * v), v = cross3(along, u);
+  const ring = (p) => [[1, 1], [-1, 1], [-1, -1], [1, -1]].map(([i, j]) => p.map((c, k) => c + i * u[k] + j * v[k]));
+  return prism(view, ring(a), ring(b), colour, alpha);
 }

@@ -1,0 +1,58 @@
+"""Where struts and joints most likely are, by what an update leaves of the readings.
+
+Every fit counts struts that are not alike and joints off their places as scatter that all readings share (`noise`).
+What they scatter by on this machine the readings tell, as far as they can: of offsets u of prior covariance 1 with
+columns S, in residuals r of covariance V, the likeliest are S^T V^-1 r (Rasmussen and Williams 2006, Gaussian Processes
+for Machine Learning, 2.1). With law and sizes alone even an effect of exactly the true form leaves as much along a path
+as unlike struts and joints make.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.correction.steps import LadderStep
+from toolpath_stiff.correction.task import UpdateTask
+from toolpath_stiff.inference.covariances import Groups
+from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.left_out import HeldOut, held_out
+from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.error_model import GEOMETRY
+from toolpath_stiff.machine.model import Hexapod
+
+AS_BUILT = "struts and joints as read"
+FURTHEST = 3.0  # standard deviations from which on an offset is no tolerance: the model lacks something else
+DIGITS = 9  # of ln and m, on which all processors agree
+
+
+def as_built(task: UpdateTask, before: LadderStep) -> tuple[Hexapod, LadderStep] | None:
+    """The machine with the likeliest offsets, and the step that this is; None where left-out points ask for none."""
+    fit, noise = before.fit, task.noise_model
+    known = fit.scatter.covariance.shared[:GEOMETRY]
+    pull = fit.scatter.precision.times(known)
+    likely = pull @ fit.residual
+    held = _held_out(fit, known, pull, held_out(fit, task.data.point))
+    if np.abs(likely).max() > FURTHEST or not held.of_readings(task.data.tip).mean_error < before.held.mean_error:
+        return None
+    sd = np.repeat([noise.strut_spread, noise.joint_error], [6, GEOMETRY - 6])
+    earlier = np.zeros(GEOMETRY) if task.machine.as_built is None else task.machine.as_built
+    machine = task.machine.with_changes(
+        as_built=np.round(earlier + sd * likely, DIGITS), origins={**task.machine.origins, "as_built": "fitted"}
+    )
+    modelled = Predictor(machine, task.data, task.effect_files).log_stiffness(fit.law, fit.effects)
+    residual = task.problem.observed - modelled
+    return machine, LadderStep.of(AS_BUILT, replace(fit, residual=residual), task.data, held)
+
+
+def _held_out(fit: Fit, known: FloatArray, pull: FloatArray, held: HeldOut) -> HeldOut:
+    """Residuals at left-out points, law, sizes and offsets by the others: `known` (42, n), `pull` known V^-1.
+
+    With A = V^-1, V_ss^-1 r_s of the readings that stay is A r with r_o less A_oo^-1 (A r)_o (Schur's complement).
+    """
+    residual, precision = held.residual.copy(), fit.scatter.precision
+    for move, out in zip(held.moves, Groups.by(held.point).members(), strict=True):
+        left = fit.residual - fit.jacobian @ move
+        foretold = np.linalg.solve(precision.block(out), precision.times(left)[out])
+        residual[out] -= known[:, out].T @ (pull @ left - pull[:, out] @ foretold)
+    return replace(held, residual=residual)
