@@ -154,8 +154,11 @@ class ParametricRun(ProgramRun):
             return None
         if row in self._structure.faults:
             raise self._structure.faults[row]
-        act = self._step(steering.kind)
+        act, depth = self._step(steering.kind), len(self._levels)
         to = act(self, row, steering) if act else None
+        if to is not None and to <= row and len(self._levels) == depth:  # else a call, or its end
+            variables = self.variables
+            self._check_loop(row, to, (variables.levels, variables.common, self._repeats, self._levels))
         return row + 1 if to is None else self._jump(row, to)
 
     def _ends_before(self, row: int) -> bool:
@@ -167,12 +170,7 @@ class ParametricRun(ProgramRun):
         return STEPS.get(kind)
 
     def _jump(self, row: int, to: int) -> int:
-        if to == row + 1:
-            return to
-        if to <= row:
-            variables = self.variables
-            self._check_loop(row, to, (variables.levels, variables.common, self._repeats, self._levels))
-        return super()._jump(row, to) if max(row, to) < self._main_lines else to
+        return super()._jump(row, to) if to != row + 1 and max(row, to) < self._main_lines else to
 
     def _return(self, row: int, flow: Flow | GoTo) -> int | None:
         """M99; with P it goes on at that block of the caller, wherever that is."""
