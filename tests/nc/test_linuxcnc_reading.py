@@ -357,3 +357,19 @@ def test_user_codes_are_nothing_with_a_warning():
     program = parse_program("F100\nG1 X1\nM150 P1 Q2\nG1 X2 M101\nM2\n", interpreter="linuxcnc")
     assert [(remark.line, remark.text[:4]) for remark in program.warnings] == [(3, "M150"), (4, "M101")]
     assert (program.moves.end[:, 0] * 1e3).round(6).tolist() == [1, 2]
+
+
+@needs_rs274
+def test_subprograms_of_a_folder_are_read_as_by_the_built_in_reader(tmp_path):
+    (tmp_path / "slot.ngc").write_text(
+        "(of a file)\no<slot> sub\nG1 X#1 Y#2 F100\nM110 P2\no<deep> call [#1]\no<slot> endsub\nM2\n"
+    )
+    (tmp_path / "deep.ngc").write_text("o<deep> sub\nG1 Z-[#1] F50\nG2 X0 Y0 R50\nG0 Z5\no<deep> endsub\n")
+    text = "%\nG21 G90 G17\nG0 X0 Y0 Z5\no<slot> call [10] [20]\n\no<slot> call [30] [5]\nM111\nG1 X1\nM2\n%\n"
+    control = Controller(subprograms=str(tmp_path))
+    other, own = (parse_program(text, controller=control, interpreter=name) for name in ("linuxcnc", "builtin"))
+    assert other.moves.end == pytest.approx(own.moves.end, abs=1e-8)
+    assert other.moves.line.tolist() == [3, 4, 4, 4, 4, 4, 4, 4, 4, 8]  # of the first call
+    assert [(w.line, w.text[:4]) for w in other.warnings] == [(7, "M111"), (4, "M110")]
+    with pytest.raises(InputError, match=r"O<SLOT> is not in the program.*--subprograms"):
+        parse_program(text, interpreter="linuxcnc")

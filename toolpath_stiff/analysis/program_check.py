@@ -83,8 +83,6 @@ class ProgramCheck(Result):
         Of cuts, of rapids, together; dwells among the times.
     fastest_strut
         Largest speed of a strut in a cut with its line; empty without a machine.
-    modal_start, modal_end
-        The modes in force before the first block and after the last one.
 
     Examples
     --------
@@ -116,8 +114,6 @@ class ProgramCheck(Result):
     lengths_mm: dict[str, float]
     times_s: dict[str, float]
     fastest_strut: dict[str, float]
-    modal_start: dict[str, str]
-    modal_end: dict[str, str]
 
     def to_dict(self) -> Document:
         """The JSON document of the command."""
@@ -186,6 +182,4 @@ def check_program(request: Request, machine: MachineTool | None, step: float = d
         findings=in_order(findings),
         **figures,
         fastest_strut=speed,
-        modal_start=checked.start,
-        modal_end=checked.end,
     )

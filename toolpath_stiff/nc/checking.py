@@ -6,7 +6,7 @@ With `--interpreter linuxcnc`, what LinuxCNC's interpreter says of the program, 
 import copy
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.code import code_name
@@ -18,7 +18,7 @@ from toolpath_stiff.nc.languages import CUTTER_LOCATION_FILE, foreign_program, r
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
-from toolpath_stiff.nc.program_run import MOST_ERRORS, ProgramRun
+from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.reader import (
     INTERPRETERS,
     LANGUAGE_RUNS,
@@ -30,9 +30,8 @@ from toolpath_stiff.nc.reader import (
     run_of,
 )
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.run_records import Tally
-from toolpath_stiff.nc.state import START, State
-from toolpath_stiff.nc.tables import WORK_OFFSETS
+from toolpath_stiff.nc.run_records import MOST_ERRORS, Tally
+from toolpath_stiff.nc.state import START
 
 CODE = re.compile(r"([GM])(\d+\.?\d*)")
 ERROR, WARNING, NOTE = "error", "warning", "note"
@@ -83,8 +82,6 @@ class Checked:
         Codes in the order of their first appearance.
     findings
         In the order of lines.
-    start, end
-        Modal state before the first block and after the last one, names to words.
     language
         What the program is written in, and the sign by which that is recognised.
     """
@@ -93,8 +90,6 @@ class Checked:
     complete: bool
     used: tuple[UsedCode, ...]
     findings: tuple[Finding, ...]
-    start: dict[str, str] = field(default_factory=dict)
-    end: dict[str, str] = field(default_factory=dict)
     language: str = ""
 
     @property
@@ -182,7 +177,7 @@ def _checked(request: Request, language: str) -> Checked:
 
 
 def _check_built_in(request: Request, run: ProgramRun) -> Checked:
-    start, g_code = modal_state(run.state), type(run) is ProgramRun
+    g_code = type(run) is ProgramRun
     errors, ending = _run_to_the_end(run, g_code)
     if errors and g_code and uses_variables(request.lines):  # once more with their values, from the start
         run = run_of(PARAMETRIC)(request, Tally())
@@ -204,8 +199,6 @@ def _check_built_in(request: Request, run: ProgramRun) -> Checked:
         complete=not errors,
         used=_used_codes(tally, run.meaning),
         findings=findings_of(errors, program),
-        start=start,
-        end=modal_state(state),
     )
 
 
@@ -218,7 +211,7 @@ def _run_to_the_end(run: ProgramRun, g_code: bool) -> tuple[list[InputError], li
         try:
             warnings = run.run()
         except InputError as error:
-            if error not in errors:
+            if str(error) not in map(str, errors):
                 errors.append(error)
         suspects = errors if g_code else ()
         foreign = next((f for e in suspects if (f := foreign_program(lines, name, e.line)) is not None), None)
@@ -235,7 +228,7 @@ def _used_codes(tally: Tally, meaning: Callable[[str], str] = code_meaning) -> t
 
 def _check_cutter_location(request: Request) -> Checked:
     state = CutterLocationState(request.name, copy.deepcopy(request.controller.tools), request.controller.feed)
-    start, errors = cutter_location.in_force(state), cutter_location.run(state, request.lines, MOST_ERRORS)
+    errors = cutter_location.run(state, request.lines, MOST_ERRORS)
     program = cutter_location.program_of(state, request)
     return Checked(
         program=program,
@@ -244,33 +237,7 @@ def _check_cutter_location(request: Request) -> Checked:
             UsedCode(line, 1, word, meaning_of(word), NOTE, count) for word, (line, count) in state.used_words.items()
         ),
         findings=findings_of(errors, program),
-        start=start,
-        end=cutter_location.in_force(state),
     )
-
-
-def modal_state(state: State) -> dict[str, str]:
-    """What is in force, as codes and words."""
-    frames, feed = state.frames, state.feed
-    standard = len(WORK_OFFSETS)
-    offset = WORK_OFFSETS[frames.active] if frames.active < standard else f"G54.1 P{frames.active - standard + 1}"
-    return {
-        "motion": state.motion or "none",
-        "plane": state.plane,
-        "distance": "G90" if state.absolute else "G91",
-        "arc centres": "G90.1" if state.arc_absolute else "G91.1",
-        "units": "G20" if state.inch else "G21",
-        "feed mode": state.feed_mode,
-        "feed": "none" if feed is None else f"F{feed / state.feed_scale:g}",
-        "spindle": f"S{state.speed:g}",
-        "tool": f"T{state.tool}",
-        "tool length": "G49" if state.tool_length != state.tool_length else f"{frames.tool:g} mm",
-        "work offset": offset,
-        "cycle return": state.retract or "none",
-        "polar": "G15" if state.polar is None else "G16",
-        "rotation": "G69" if frames.rotation is None else f"G68 R{frames.rotation[2]:g}",
-        "shift (G92, G52)": "none" if not any(frames.g92) else " ".join(f"{v:g}" for v in frames.g92),
-    }
 
 
 def _check_by_linuxcnc(request: Request, may_lack: bool = False) -> Checked:

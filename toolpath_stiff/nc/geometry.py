@@ -59,11 +59,9 @@ def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: boo
     >>> center_from_radius((0.0, 0.0), (20.0, 0.0), 10.0, clockwise=False)
     (10.0, 0.0)
     """
-    refuse_arc_if(
-        start == end, "an arc with R that ends where it starts", "another end point, or I, J, K for a full circle"
-    )
+    chord, other = math.dist(start, end), "another end point, or I, J, K for a full circle"
+    refuse_arc_if(not chord, "an arc with R that ends where it starts", other)
     refuse_arc_if(radius == 0.0, "an arc of radius 0", "R other than 0")
-    chord = math.dist(start, end)
     half, size = chord / 2.0, abs(radius)
     if half - size > RADIUS_FORMAT_TOLERANCE:
         problem = f"an arc whose radius {size:g} mm cannot reach its end {chord:.4f} mm away"

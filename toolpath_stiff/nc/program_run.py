@@ -14,7 +14,6 @@ from typing import TypeVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.registry import code_meaning
-from toolpath_stiff.nc.codes.saved import leave_call
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Jump, Remark
@@ -23,14 +22,13 @@ from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
-from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, Then
-from toolpath_stiff.nc.words import Block, Word, read_block
+from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
+from toolpath_stiff.nc.words import Block, read_block
 
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
 MOST_BLOCKS = 1_000_000  # that run, all repeats counted; a count beyond is a slip in a number of repeats
 MOST_IDLE = 100_000  # of loops that run without a move between; a program that works out values needs far fewer
 MOST_REPEATS = 9999
-MOST_ERRORS = 100  # beyond, a file is not a program for this reader
 SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.ASCII)
 HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
 REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
@@ -55,6 +53,7 @@ class ProgramRun:
     def __init__(self, request: Request, tally: Tally | None = None, fast: bool = True) -> None:
         state, lines, name = request.start(), request.lines, request.name
         self.state, self.lines, self.name = state, lines, name
+        state.keep = tally.keep if tally is not None else None
         self.switches, self.tally = request.controller.switches, tally
         self._plain = PlainRun(state, lines, name) if fast else None
         self._levels: list[Subprogram] = []
@@ -121,9 +120,7 @@ class ProgramRun:
         except InputError as error:
             if self.tally is None:
                 raise
-            self.tally.errors.append(error)
-            if len(self.tally.errors) >= MOST_ERRORS:
-                raise
+            self.tally.keep(error)
             return instead
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
@@ -254,7 +251,6 @@ class ProgramRun:
                 column=column,
             )
         self._levels.append(level)
-        self.state.saved.append(None)
 
     def _jump(self, row: int, to: int) -> int:
         self.jumps.append(Jump(len(self.state.recorder), row + 1, to))
@@ -286,7 +282,7 @@ class ProgramRun:
         to = self._block_numbered(row, "M99 P goes to", flow.number, flow.column)
         if not self._levels:
             return to if to > row else None
-        level = self._pop_level(row)
+        level = self._levels.pop()
         if level.again or to < level.back:
             raise self._fail(
                 row,
@@ -301,12 +297,8 @@ class ProgramRun:
         if level.again:
             level.again -= 1
             return level.first
-        self._pop_level(row)
+        self._levels.pop()
         return level.back
-
-    def _pop_level(self, row: int) -> Subprogram:
-        leave_call(self.state, CurrentBlock(self.name, Block(row + 1, (Word("M", 99.0, 1, "the end of the call"),))))
-        return self._levels.pop()
 
     def _target(self, row: int, call: Call) -> tuple[int, int]:
         """Program number and repeats of a call."""

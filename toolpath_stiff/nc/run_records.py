@@ -10,6 +10,8 @@ from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.words import Block
 
+MOST_ERRORS = 100
+
 
 @dataclass
 class Subprogram:
@@ -41,8 +43,17 @@ class Tally:
     """What a check gathers while a program runs: its errors, and of each code its first place and how often it runs."""
 
     errors: list[InputError] = field(default_factory=list)
+    met: int = 0  # errors, repeated ones too
     first: dict[str, tuple[int, int]] = field(default_factory=dict)
     count: Counter[str] = field(default_factory=Counter)
+
+    def keep(self, error: InputError) -> None:
+        """Keep an error, once; it is raised where a file has so many that it is not a program for this reader."""
+        self.met += 1
+        if str(error) not in map(str, self.errors):
+            self.errors.append(error)
+        if self.met >= MOST_ERRORS:
+            raise error
 
     def add(self, block: Block) -> None:
         """Count the codes of a block."""

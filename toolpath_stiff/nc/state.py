@@ -30,7 +30,7 @@ Group = Literal[
     "units", "feed mode", "F", "S", "T", "M tool change", "dwell", "plane", "polar", "tool length", "M subprogram",
     "work offset", "path control", "exact stop", "look-ahead", "dynamic offset", "spindle mode", "distance",
     "arc distance", "cycle return", "cutter compensation", "lathe diameter", "scaling", "mirror image", "stroke check",
-    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M saved modes", "M rigid tapping",
+    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M rigid tapping",
     "rotation", "non-modal", "M stop", "motion", "corner",
 ]  # fmt: skip
 STEPS: dict[Group, int] = {group: place for place, group in enumerate(get_args(Group))}
@@ -294,6 +294,8 @@ class State:
         What makes the program look like a lathe's, with its line.
     plain
         What controls with words of their own keep besides.
+    keep
+        What a check does with an error after which the run can go on; None: it is raised.
     """
 
     name: str
@@ -335,8 +337,8 @@ class State:
     beside: list[float] | None = None
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
-    saved: list[tuple[str, "State", int, float] | None] = field(default_factory=lambda: [None])
     plain: Conversational = field(default_factory=Conversational)
+    keep: Callable[[InputError], None] | None = None
 
     def __post_init__(self) -> None:
         self.arc_absolute, self.retract = self.dialect.arc_absolute, self.dialect.retract
@@ -355,6 +357,12 @@ class State:
     def spindle(self) -> float:
         """1/min of the spindle, below 0 after M4; nan: not known."""
         return math.nan if self.turn and self.surface_speed else self.turn * self.speed
+
+    def fault(self, error: InputError) -> None:
+        """Raise an error, unless a check keeps it and goes on."""
+        if self.keep is None:
+            raise error
+        self.keep(error)
 
     def note(self, line: int, word: Word, reason: str) -> None:
         """List a word that is not acted upon."""

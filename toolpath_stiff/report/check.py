@@ -9,7 +9,7 @@ def text(check: ProgramCheck) -> str:
     if check.kinematics:
         lines[0] += f", posted for {check.kinematics}"
     if check.interpreter != "builtin":
-        lines.append("read by LinuxCNC's interpreter: codes are counted where they stand, modal states are not known")
+        lines.append("read by LinuxCNC's interpreter: codes are counted where they stand")
     if not check.complete:
         lines.append("NOT READ TO ITS END AS IT STANDS: figures are those of the blocks that could be read")
     lines.append(f"language: {check.language}")
@@ -38,9 +38,6 @@ def text(check: ProgramCheck) -> str:
         ],
         "extents of cuts": extents,
         "lengths and times": lengths,
-        "modal state at the start, at the end": [
-            f"{key:<18} {value:<10} {check.modal_end[key]}" for key, value in check.modal_start.items()
-        ],
     }
     for title, rows in sections.items():
         if rows:

@@ -62,9 +62,9 @@ def _diameter(state: State, block: CurrentBlock, code: str) -> float:
     tool = number or state.tool  # D0: of the tool in the spindle
     entry = (state.tools or {}).get(tool)
     if entry is None or math.isnan(entry.diameter):
-        raise block.fail(
-            word, f"needs the diameter of tool {tool}", hint="give it in a tool table (--tools FILE), or G41.1 D"
-        )
+        hint = "give it in a tool table (--tools FILE), or G41.1 D"
+        state.fault(block.fail(word, f"needs the diameter of tool {tool}", hint=hint))
+        return 0.0
     return entry.diameter
 
 

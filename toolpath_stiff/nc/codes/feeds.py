@@ -84,7 +84,7 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
         if state.feed * state.speed < SLOWEST:
             raise block.fail(None, f"feed per revolution (G95) with the spindle at S{state.speed:g}", "S above 0")
         return state.feed * state.speed
-    return state.feed if length_of_move(start, end, arc) else rotary_feed(state, state.feed)
+    return state.feed if arc is not None or start[:3] != end[:3] else rotary_feed(state, state.feed)
 
 
 def rotary_feed(state: State, feed: Numbers) -> Numbers:

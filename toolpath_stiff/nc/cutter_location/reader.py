@@ -150,18 +150,3 @@ def _conclude(state: CutterLocationState) -> None:
         text = "the tool turns back where this arc begins, and no arc of the file begins smoothly: "
         remark = Remark(f"{text}check that the arcs turn the right way about their axes", state.turning_back[0])
         state.warnings.append(remark)
-
-
-def in_force(state: CutterLocationState) -> dict[str, str]:
-    """The modes in force, names to words."""
-    feed = "none" if state.feed is None else f"{state.feed:g} mm/{'rev' if state.per_revolution else 'min'}"
-    return {
-        "units": "mm" if state.scale == 1.0 else "inch",
-        "tool axis": "not given" if state.next_axis is None else "{:g} {:g} {:g}".format(*state.next_axis),
-        "MULTAX": {None: "not given", True: "on", False: "off"}[state.multax],
-        "feed": feed,
-        "spindle": f"{state.speed:g} rpm",
-        "tool": str(state.tool),
-        "tool length": "reference" if math.isnan(state.tool_length) else f"{state.tool_length:g} mm",
-        "cycle": "off" if state.hole is None else "on",
-    }

@@ -1,8 +1,8 @@
 """APPR and DEP: how a contour is approached and left, LT, LN, CT and LCT, by X and Y or polar (PLT ...). mm.
 
-HEIDENHAIN, user's manuals of the TNC 426, the iTNC 530 and the TNC 640, "Contour approach and departure". Lines and arcs
-are those of the tool's centre: the manuals' examples approach with R5 and a tool of R10 (linear and circular movements),
-and with R2 and a tool of R5 (helix). The compensation begins, and ends, beside the contour's first and last point.
+HEIDENHAIN, user's manuals of the TNC 426, the iTNC 530 and the TNC 640, "Contour approach and departure". Lines and
+arcs are those of the tool's centre: the manuals' examples approach with R5 and a tool of R10 (linear and circular
+movements), and with R2 and a tool of R5 (helix). The compensation begins, and ends, beside the contour's ends.
 """
 
 import cmath

@@ -72,9 +72,13 @@ def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> No
 def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
     """The tool beside the contour from the next move on, by its radius in the tool table or TOOL DEF and its DR."""
     radius = state.plain.radius
-    table, own = "give it in a tool table (--tools FILE)", f", or TOOL DEF {state.tool} L.. R.."
-    hint = table + own * (state.dialect.name == "heidenhain")
-    block.refuse_if(math.isnan(radius), side, f"needs the radius of tool {state.tool}", hint=hint)
+    if math.isnan(radius):
+        name = next((name for name, number in state.plain.names.items() if number == state.tool), "")
+        tool, own = f'"{name}"' if name else f"{state.tool}", f", or TOOL DEF {state.tool} L.. R.."
+        of_name = ", as that of the tool with this remark" if name else own * (state.dialect.name == "heidenhain")
+        hint = f"give it in a tool table (--tools FILE){of_name}"
+        state.fault(block.fail(side, f"needs the radius of tool {tool}", hint=hint))
+        radius = 0.0
     state.assume(COMPENSATED)
     scale = state.plain.scale
     turned = SIDES[side] if radius >= 0.0 else -SIDES[side]
@@ -102,6 +106,7 @@ def go(
     block.refuse_if(any(abs(v) > LARGEST_MM for v in there.values()), None, "leads beyond 100 m")
     if center is not None:
         off = abs(abs(begin - center) - abs(end - center))
+        block.refuse_if(abs(begin - center) < ON_CIRCLE_MM, None, "begins at its circle centre", "another CC")
         block.refuse_if(off > ON_CIRCLE_MM, None, f"ends {off:.4f} mm off its circle", f"at most {ON_CIRCLE_MM} mm")
     if plain.held is not None:
         _cut_corner(state, block, (begin, end, center, turn), there, rapid)
@@ -124,8 +129,8 @@ def move(
     rapid: bool = False,
 ) -> None:
     """Record a straight move or an arc from where the tool stands, as G0 to G3 do."""
-    frames, plain = state.frames, state.plain
-    here = frames.to_program(frames.position) if plain.held or plain.approach else present(state)
+    frames = state.frames
+    here = frames.to_program(frames.position)
     control = frames.to_control([there.get(axis, value) for axis, value in enumerate(here)])
     if not frames.rotated:  # an axis that is not named keeps its number to the last digit
         control = [control[axis] if axis in there else value for axis, value in enumerate(frames.position)]
@@ -233,8 +238,6 @@ def circle(state: State, block: CurrentBlock, code: str) -> None:
         turns = max(1, math.ceil(abs(step.value) / 360.0 - 1e-9))
     with plane_of_pole(state, block) as center:
         there = polar(state, block, center) if code == "CP" else named(state, block)
-        at_center = abs(in_plane(state, present(state)) - center) < ON_CIRCLE_MM
-        block.refuse_if(at_center, None, "begins at its circle centre", "another CC")
         _round(state, block, there, center, turn, turns)
 
 

@@ -9,7 +9,7 @@ PLAIN = re.compile(
     re.IGNORECASE,
 )
 EMPTY = re.compile(r"\s*\d*\s*(?:[;*%].*)?")
-CORNER = re.compile(r"\s*/?\s*(?:N?\d+\s)?\s*(?:RND|CHF)\b", re.IGNORECASE)
+CORNER = re.compile(r"[\s/\dN]*(?:RND|CHF)\b", re.IGNORECASE)
 INCH = re.compile(r"\s*(?:N?\d+\s+)?BEGIN\s+PGM\b.*\bINCH\s*(?:;.*)?$", re.IGNORECASE)
 
 
@@ -20,9 +20,11 @@ def in_inches(lines: Sequence[str]) -> bool:
 
 def corner_follows(lines: Sequence[str], row: int) -> bool:
     """Whether the next statement from a line on (from 0) is a corner (RND, CHF)."""
-    while row < len(lines) and EMPTY.fullmatch(lines[row]):
+    while row < len(lines) and not CORNER.match(lines[row]):
+        if not EMPTY.fullmatch(lines[row]):
+            return False
         row += 1
-    return row < len(lines) and CORNER.match(lines[row]) is not None
+    return row < len(lines)
 
 
 def as_g_code(lines: Sequence[str]) -> list[str]:

@@ -44,6 +44,7 @@ class HeidenhainRun(ProgramRun):
         super().__init__(request, tally, fast=False)
         self._plain = self._lexer = PlainRun(self.state, as_g_code(self.lines), self.name)
         self._statements: dict[int, PlainStatement] = {}
+        self._has_labels = any("LBL" in line.upper() for line in self.lines)  # without any no statement runs again
         self._labels: dict[int, dict[str, list[int]]] = {}  # by the first line of their program
         self._repeats: dict[tuple[int, int], int] = {}
         self._locals: list[dict[str, float]] = [{}]  # QL, by the programs that run
@@ -63,6 +64,8 @@ class HeidenhainRun(ProgramRun):
 
     def _statement(self, row: int) -> PlainStatement:
         if row not in self._statements:
+            if not self._has_labels:
+                self._statements.clear()
             self._statements[row] = read_statement(self.lines, row, self.name)
         return self._statements[row]
 
@@ -136,9 +139,10 @@ class HeidenhainRun(ProgramRun):
         head = Word("", 0.0, statement.column, statement.head)
         block = CurrentBlock(self.name, Block(line, (head, *words), optional=statement.optional))
         for word in words:
-            block.refuse_if(word.letter in block.values, word, "repeats a word of its statement", "each word once")
-            largest = LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD
-            block.refuse_if(abs(word.value) > largest, word, "is beyond 100 m, or any number of a control")
+            if word.letter in block.values:
+                raise block.fail(word, "repeats a word of its statement", "each word once")
+            if abs(word.value) > (LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD):
+                raise block.fail(word, "is beyond 100 m, or any number of a control")
             block.values[word.letter] = word
         block.free = set(block.values)
         return block

@@ -133,8 +133,8 @@ def _words(words: list[Word], computed: dict[int, str], text: str, position: int
             if flag
             else key or parameter or (f"{axis}!" if axis else "TABLE" if table else "#" if bare else '"')
         )
-        written = "".join((value or given or bare or (table or "")[1:]).split()).replace(",", ".")
-        if sum(map(str.isdigit, written)) > 2 * MOST_DIGITS:
+        written = (value or given or bare or (table or "")[1:]).replace(" ", "").replace(",", ".")
+        if len(written) > 2 * MOST_DIGITS and sum(map(str.isdigit, written)) > 2 * MOST_DIGITS:
             raise place.fail(f"a number of {len(written)} characters", "", "", column)
         if key == "M":
             key = f"M{written.lstrip('+0') or '0'}"

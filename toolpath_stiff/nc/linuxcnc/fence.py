@@ -7,11 +7,14 @@ Python would not run even if it passed.
 """
 
 import re
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.nc.linuxcnc.inputs import NAMED, Line
+from toolpath_stiff.nc.lines import read_lines
+from toolpath_stiff.nc.linuxcnc.inputs import NAMED, Line, split
 from toolpath_stiff.nc.place import Place
 
 # `py,`, `pyrun`, `pyreload`, and `py` alone or before anything but a letter or digit, whatever blanks are in between;
@@ -20,6 +23,7 @@ PYTHON = re.compile(r"[(;][\s(;]*p\s*y(?:\s*(?:[^\w\s]|$|r\s*u\s*n|r\s*e\s*l\s*o
 # Of all functions, operators and O words only MOD has an M in it.
 M_WORD = re.compile(r"M(?!OD)([+-]?[0-9.]+)?", re.ASCII)
 SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
+ENDS = re.compile(r"(?:END)?SUB")
 M98 = re.compile(r"M[+]?0*98(?!\d)")
 NUMBER_ONLY = re.compile(r"O(\d+)$")
 
@@ -39,6 +43,28 @@ def without_user_codes(line: Line) -> Line:
     return replace(line, words=words, columns=columns, user_codes=tuple(match[0] for match in codes))
 
 
+def called_files(lines: list[Line], folder: str | None) -> tuple[list[Line], dict[int, int]]:
+    """The subs of a folder's files (`name.ngc`) that a program calls, numbered on from it, and who calls each line."""
+    subs, callers = list[Line](), dict[int, int]()
+    defined = {_key(match[1]) for line in lines if (match := SUBPROGRAM.match(line.words)) and match[2] == "SUB"}
+    queue = deque(lines if folder is not None else ())
+    while queue:
+        line = queue.popleft()
+        called = SUBPROGRAM.match(line.words)
+        if called is None or called[2] != "CALL" or "/" in called[1] or _key(called[1]) in defined:
+            continue
+        defined.add(_key(called[1]))
+        file = Path(folder or "") / f"{_key(called[1]).strip('<>').lower()}.ngc"
+        inside = split(read_lines(file), file.name) if file.is_file() else []
+        kept = [row for row, text in enumerate(inside) if text.words.startswith("O") and ENDS.search(text.words)]
+        for text in inside[kept[0] : kept[-1] + 1] if kept else ():
+            number = len(lines) + len(subs) + 1
+            callers[number] = callers.get(line.number, line.number)
+            subs.append(without_user_codes(replace(text, number=number)))
+            queue.append(subs[-1])
+    return subs, callers
+
+
 def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
     """Raise `InputError`, with the line, for a program that must not be given to `rs274`."""
     calls: list[tuple[str, int]] = []
@@ -53,8 +79,8 @@ def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
         if key not in defined:
             raise Place(name, number).fail(
                 f"subprogram O{key} is not in the program",
-                "subprograms in the same file",
-                "copy it into the program; other files are not read",
+                "subprograms in the same file, or as name.ngc in a folder",
+                "--subprograms FOLDER",
             )
 
 

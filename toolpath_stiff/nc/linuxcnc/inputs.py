@@ -108,11 +108,12 @@ def numbered(lines: Iterable[Line], name: str, *, block_delete: bool, prefix: Se
         else:
             started = started or bool(line.words)
             words = "" if line.optional and block_delete else line.words
-            copy.append(_numbered_line(line, words, Place(name, line.number)))
+            copy.append(numbered_line(line, words, Place(name, line.number)))
     return "\n".join([*copy, "M2", ""])
 
 
-def _numbered_line(line: Line, words: str, place: Place) -> str:
+def numbered_line(line: Line, words: str, place: Place) -> str:
+    """A line of the copy, with its number."""
     if words.startswith(BARE_NUMBER):
         raise place.fail(f"a block that begins with a number: {words[:20]!r}", "a letter before each number")
     comment = "" if words[:1] in ("", "O") else f"({line.number})"  # after an O word some forms take no comment

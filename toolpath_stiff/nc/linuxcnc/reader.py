@@ -3,16 +3,20 @@
 import copy
 import re
 from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import LISTED
 from toolpath_stiff.nc.linuxcnc.canon import Follower
-from toolpath_stiff.nc.linuxcnc.fence import refuse_other_programs, without_user_codes
+from toolpath_stiff.nc.linuxcnc.fence import called_files, refuse_other_programs, without_user_codes
 from toolpath_stiff.nc.linuxcnc.inputs import (
     Line,
     first_offset,
     numbered,
+    numbered_line,
     parameter_file,
     split,
     tool_file,
@@ -20,6 +24,7 @@ from toolpath_stiff.nc.linuxcnc.inputs import (
 )
 from toolpath_stiff.nc.linuxcnc.runner import Run, find_rs274, run_rs274
 from toolpath_stiff.nc.moves import ReadProgram, Remark, Unsupported
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START
 from toolpath_stiff.nc.tables import tool_of
@@ -43,21 +48,25 @@ def read(request: Request) -> ReadProgram:
     InputError
         The fence, or the interpreter, refuses the program, or a limit was exceeded.
     """
-    return _Session(request, fenced(request.lines, request.name)).read()
+    return _Session(request, *fenced(request.lines, request.name, request.controller.subprograms)).read()
 
 
-def fenced(source: Sequence[str], name: str) -> list[Line]:
-    """The lines of a program. Raises `InputError` for one that the interpreter is not started on."""
+def fenced(source: Sequence[str], name: str, folder: str | None = None) -> tuple[list[Line], dict[int, int]]:
+    """The lines of a program, then those of the files that it calls, with the line of the call of each.
+
+    Raises `InputError` for a program that the interpreter is not started on.
+    """
     lines = [without_user_codes(line) for line in split(source, name)]
-    refuse_other_programs(lines, name)
-    return lines
+    subs, callers = called_files(lines, folder)
+    refuse_other_programs([*lines, *subs], name)
+    return [*lines, *subs], callers
 
 
 class _Session:
     """A program being read, as often as it takes to know its zero."""
 
-    def __init__(self, request: Request, lines: list[Line]) -> None:
-        self.request, self.lines = request, lines
+    def __init__(self, request: Request, lines: list[Line], callers: dict[int, int]) -> None:
+        self.request, self.lines, self.callers = request, lines, callers
         self.rs274 = find_rs274(request.rs274, request.unconfined)
         self.offsets = copy.deepcopy(request.work_offsets)
         self.tool_numbers = tool_numbers(request.controller.tools, lines)
@@ -80,24 +89,30 @@ class _Session:
             place, source = origin, "option"
         if shift == NO_SHIFT and self._uses(MACHINE_CODES) and place != g54:
             raise self._machine_error()
+        moves, shown = follower.recorder.moves(), len(request.lines)
+        called = np.array([*range(shown + 1), *self.callers.values()])  # moves of a file are those of its call's line
         return ReadProgram(
             name=request.name,
             path=request.path,
             source=request.lines,
-            moves=follower.recorder.moves(),
+            moves=replace(moves, line=called[moves.line]),
             origin=pose_in_si(place),
             origin_source=source,
             unsupported=tuple(self._unsupported()),
             warnings=(
                 *([ORIGIN_WINS] if source == "option" and given else ()),
-                *(Remark(USER.format(code), line.number) for line in self.lines for code in line.user_codes),
+                *(
+                    Remark(USER.format(code), int(called[line.number]))
+                    for line in self.lines
+                    for code in line.user_codes
+                ),
                 *(Remark(WAITING, line.number) for line in self.lines if WAITS.search(line.plain)),
             ),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program"),
             tools=tuple(tool_of(request.controller.tools, number) for number in follower.used_tools),
             interpreter="linuxcnc",
             dialect="linuxcnc",
-            jumps=tuple(follower.jumps),
+            jumps=tuple(jump for jump in follower.jumps if max(jump.left, jump.after) <= shown),
         )
 
     def _uses(self, codes: re.Pattern[str]) -> bool:
@@ -141,8 +156,10 @@ class _Session:
             x, y, z = shift
             prefix += [f"N0G21G90G53G0X{x:.6f}Y{y:.6f}Z{z:.6f}", "N0G80"]
         lines = [Line(line.number, "", "M2") if line.number == until else line for line in self.lines]
+        main = len(lines) - len(self.callers)
+        prefix += [numbered_line(line, line.words, Place(name, line.number)) for line in lines[main:]]
         return run_rs274(
-            numbered(lines, name, block_delete=bool(self.request.controller.switches), prefix=prefix),
+            numbered(lines[:main], name, block_delete=bool(self.request.controller.switches), prefix=prefix),
             parameter_file(self.offsets, shift, active),
             tool_file(self.tool_numbers, self.request.controller.tools),
             rs274=self.rs274,
@@ -160,7 +177,7 @@ class _Session:
         )
         follower.follow(run.canon)
         if run.refusal:
-            raise ProgramError(run.refusal, file=request.name, line=run.line)
+            raise ProgramError(run.refusal, file=request.name, line=self.callers.get(run.line or 0, run.line))
         return follower
 
     def _first_g54(self, run: Run, first_motion: int, shift: Sequence[float]) -> tuple[list[float], bool]:

@@ -49,7 +49,6 @@ class ParametricRun(ProgramRun):
         self._at = 0  # the block that runs
         self._began = False  # a variable was set, or the flow steered
         self._repeats: dict[tuple[int, int], int] = {}  # left of a loop, by the calls that run and its line
-        self._marks: dict[str, int] = {}  # lines of BREAK and CONTINUE that LinuxCNC's interpreter has not forgotten
 
     def _statement(self, row: int) -> Statement:
         if row not in self._statements:
@@ -154,8 +153,11 @@ class ParametricRun(ProgramRun):
             return None
         if row in self._structure.faults:
             raise self._structure.faults[row]
-        act = self._step(steering.kind)
+        act, depth = self._step(steering.kind), len(self._levels)
         to = act(self, row, steering) if act else None
+        if to is not None and to <= row and len(self._levels) == depth:  # else a call, or its end
+            variables = self.variables
+            self._check_loop(row, to, (variables.levels, variables.common, self._repeats, self._levels))
         return row + 1 if to is None else self._jump(row, to)
 
     def _ends_before(self, row: int) -> bool:
@@ -167,12 +169,7 @@ class ParametricRun(ProgramRun):
         return STEPS.get(kind)
 
     def _jump(self, row: int, to: int) -> int:
-        if to == row + 1:
-            return to
-        if to <= row:
-            variables = self.variables
-            self._check_loop(row, to, (variables.levels, variables.common, self._repeats, self._levels))
-        return super()._jump(row, to) if max(row, to) < self._main_lines else to
+        return super()._jump(row, to) if to != row + 1 and max(row, to) < self._main_lines else to
 
     def _return(self, row: int, flow: Flow | GoTo) -> int | None:
         """M99; with P it goes on at that block of the caller, wherever that is."""
@@ -200,13 +197,8 @@ class ParametricRun(ProgramRun):
         if start is None and true:
             return None
         if start is None:
-            self._marks.pop("CONTINUE", None)
             return self._structure.end[row] + 1
-        if true:
-            self._refuse_after("BREAK", row, "would not run this loop again")
-            return start + 1
-        self._marks.pop("BREAK", None)
-        return None
+        return start + 1 if true else None
 
     def _back(self, row: int, steering: Steering) -> int | None:
         return self._structure.start[row]
@@ -225,40 +217,7 @@ class ParametricRun(ProgramRun):
         """Where a repeat goes on, from its beginning and from its end."""
         left = self._repeats.get((len(self._levels), start), 0)
         self._repeats[len(self._levels), start] = left - 1
-        if left > 0:
-            return start + 1
-        self._refuse_after("CONTINUE", start, "would run this repeat once more, all of it")
-        return self._structure.end[start] + 1
-
-    def _break(self, row: int, steering: Steering) -> int | None:
-        start = self._structure.start[row]
-        if self._kind(start) == "WHILE":
-            self._refuse_after("CONTINUE", row, "would go on with this loop")
-            self._marks["BREAK"] = row
-        return self._structure.end[start] + 1
-
-    def _continue(self, row: int, steering: Steering) -> int | None:
-        start = self._structure.start[row]
-        if self._kind(start) == "WHILE":
-            self._marks.pop("CONTINUE", None)
-            return start
-        self._marks["CONTINUE"] = row
-        return self._structure.end[start]
-
-    def _kind(self, row: int) -> str:
-        steering = self._statement(row).steering
-        return steering.kind if steering is not None else ""
-
-    def _refuse_after(self, leave: str, row: int, what: str) -> None:
-        """Refuse what LinuxCNC's interpreter does otherwise after a `break` or `continue`, whose mark it keeps.
-
-        interp_o_word.cc: only the end of a do forgets a break, only that of a while or a repeat a continue, whatever
-        loop they were for.
-        """
-        if leave in self._marks:
-            line = self._place(self._marks[leave]).line
-            problem = f"after the {leave.lower()} in line {line} LinuxCNC's interpreter {what}"
-            raise self._fail(row, problem, "if and endif in place of it")
+        return start + 1 if left > 0 else self._structure.end[start] + 1
 
     def _sub(self, row: int, steering: Steering) -> int | None:
         return self._structure.end[row] + 1
@@ -342,7 +301,6 @@ STEPS: dict[str, Step] = {
     "IF": ParametricRun._if, "ELSEIF": ParametricRun._else, "ELSE": ParametricRun._else,
     "WHILE": ParametricRun._while, "ENDWHILE": ParametricRun._back,
     "REPEAT": ParametricRun._repeat, "ENDREPEAT": ParametricRun._end_repeat,
-    "BREAK": ParametricRun._break, "CONTINUE": ParametricRun._continue,
     "SUB": ParametricRun._sub, "ENDSUB": ParametricRun._return_sub, "RETURN": ParametricRun._return_sub,
     "CALL": ParametricRun._call_sub,
     "IF GOTO": ParametricRun._if_goto, "IF THEN": ParametricRun._if_then, "GOTO": ParametricRun._goto,

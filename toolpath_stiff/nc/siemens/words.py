@@ -76,6 +76,9 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
         if name == "DEF":
             _declare(scanner, define)
             continue
+        if name == "EXTERN":  # which says what a subprogram takes: its PROC does too
+            scanner.position = len(scanner.text)
+            return [*words, Word(name, 0.0, column, name)]
         index = scanner.index()
         if scanner.begins("==") or not scanner.sign("="):
             words += _named(scanner, name, column)
