@@ -53,6 +53,41 @@ def test_never_another_path_than_linuxcnc(seed, tmp_path):
     assert outcome is None or outcome.verdict != OTHER, outcome
 
 
+CONTINUED = "#1=0\no2 do\n#1=[#1+1]\no2 continue\no2 while [#1 LT 2]\n"
+BROKEN = "#1=0\no2 while [1]\n#1=[#1+1]\no2 break\no2 endwhile\n"
+REPEAT, WHILE = "o3 repeat [2]\nG91 G1 X1\no3 endrepeat\n", "o6 while [#1 LT 9]\n#1=[#1+1]\nG1 X#1\no6 endwhile\n"
+DO, BREAK = (
+    "o4 do\nG1 X#1\n#1=[#1+1]\no4 while [#1 LT 5]\n",
+    "o3 while [#1 LT 9]\n#1=[#1+1]\nG1 X#1\no3 break\no3 endwhile\n",
+)
+
+
+@pytest.mark.skipif(not rs274.AVAILABLE, reason="LinuxCNC's rs274 is not installed")
+@pytest.mark.parametrize(
+    ("text", "moves", "line"),
+    [
+        (CONTINUED + REPEAT, 4, 7),  # and not 2
+        (CONTINUED + BREAK, 2, 10),  # and not 1
+        (BROKEN + DO, 1, 10),  # and not 4
+        (CONTINUED + WHILE, 7, None),
+        (CONTINUED + WHILE + REPEAT, 9, None),
+        (BROKEN + REPEAT, 2, None),
+        (BROKEN + DO.replace("5", "1") + DO.replace("o4", "o5"), 4, None),
+    ],
+)
+def test_marks_of_break_and_continue_that_linuxcnc_keeps(text, moves, line, tmp_path):
+    """It runs a repeat again after the `continue` of a do, and a do but once after the `break` of a while."""
+    file = tmp_path / "part.ngc"
+    file.write_text(f"G21 F100\n{text}M2\n")
+    theirs = rs274.run(file, tmp_path).moves
+    assert len(theirs) == moves
+    if line is None:
+        assert np.allclose(ends(file.read_text(), LINUXCNC), [end[:3] for _, _, end, _ in theirs])
+    else:
+        error = refusal(file.read_text(), LINUXCNC)
+        assert error.line == line and "LinuxCNC's interpreter would" in error.found
+
+
 @pytest.mark.parametrize(
     ("expression", "expected"),
     [
@@ -260,7 +295,7 @@ def test_return_to_a_block_of_the_caller():
         ("GOTO 5\n", FANUC, 1, "N5, which no block has"),
         ("WHILE[1 EQ 1]DO1\nEND2\n", FANUC, 1, "WHILE DO1 (line 1) has no end"),
         ("G1 F9\nEND2\n", FANUC, 2, "END2 does not belong"),
-        ("o1 repeat [2]\no1 break\no1 endrepeat\n", LINUXCNC, 2, "o1 break is not supported"),
+        ("o1 repeat [2]\no1 break\no1 endrepeat\n", LINUXCNC, 2, "o1 break does not belong"),
     ],
 )  # fmt: skip
 def test_refused_with_line_and_reason(text, controller, line, says):
@@ -273,7 +308,7 @@ def test_refused_with_line_and_reason(text, controller, line, says):
 def test_check_goes_on_behind_a_loop_without_its_end(loop, leave):
     text = f"F100\nG0 X0\no10 {loop}\no10 {leave}\nG1 X1\nM2"
     findings = check(Request(tuple(text.splitlines()), "p.nc", controller=LINUXCNC)).findings
-    assert [(f.line, "has no end" in f.text) for f in findings if f.severity == "error"] == [(3, True), (4, False)]
+    assert [(f.line, "has no end" in f.text) for f in findings if f.severity == "error"] == [(3, True), (4, True)]
 
 
 @pytest.mark.parametrize(

@@ -94,3 +94,20 @@ def test_what_may_hide_a_move_is_refused(line):
 def test_a_long_pause_is_doubted():
     program = parse_program("G21 F100\nG1 X1\nG4 P500\nG1 X2\n", "p.nc")
     assert program.moves.dwell.sum() == 500.0 and "milliseconds" in program.warnings[0].text
+
+
+SAVED = {
+    "M70 and M72": "G21 G90 F612.37\nG0 X0 Y0 Z5\nM70\nG20 G91 F5 G55\nG1 X1\nM72\nG1 X0\nM2\n",
+    "M73 in a subprogram": "G21 G90 F600\nG0 Z5\nM98 P100\nG1 X5\nM2\nO100\nM73\nG91 F100 G20\nG1 X1\nM99\n",
+    "M73 in a sub": "o<x> sub\nM73\nG91 G18 F9\nG1 X3\no<x> endsub\nG21 G90 F600\nG0 Z5\no<x> call\nG2 X13 I5 J0\nM2\n",
+    "M73, M72": "G21 G90 F600\nG0 Z5\nM73\nG91 G55 F100\nG1 X5\nM72\nG1 X50\nM71\nG1 X1\nM2\n",
+}
+SAVED_ENDS = {"M70 and M72": (0.0, 612.4), "M73 in a subprogram": (5.0, 600.0), "M73 in a sub": (13.0, 600.0),
+              "M73, M72": (1.0, 600.0)}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SAVED)
+def test_modes_saved_and_restored_as_linuxcnc_restores_them(name):
+    """Ends and feeds are those of rs274 2.9 for these programs."""
+    moves = parse_program(SAVED[name], "p.ngc").moves
+    assert (moves.end[-1, 0] * 1e3, moves.feed[-1] * 6e4) == pytest.approx(SAVED_ENDS[name])

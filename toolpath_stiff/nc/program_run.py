@@ -14,6 +14,7 @@ from typing import TypeVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.registry import code_meaning
+from toolpath_stiff.nc.codes.saved import leave_call
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.lines import read_lines
 from toolpath_stiff.nc.moves import Jump, Remark
@@ -22,8 +23,8 @@ from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
-from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
-from toolpath_stiff.nc.words import Block, read_block
+from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, Then
+from toolpath_stiff.nc.words import Block, Word, read_block
 
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
 MOST_BLOCKS = 1_000_000  # that run, all repeats counted; a count beyond is a slip in a number of repeats
@@ -251,6 +252,7 @@ class ProgramRun:
                 column=column,
             )
         self._levels.append(level)
+        self.state.saved.append(None)
 
     def _jump(self, row: int, to: int) -> int:
         self.jumps.append(Jump(len(self.state.recorder), row + 1, to))
@@ -282,7 +284,7 @@ class ProgramRun:
         to = self._block_numbered(row, "M99 P goes to", flow.number, flow.column)
         if not self._levels:
             return to if to > row else None
-        level = self._levels.pop()
+        level = self._pop_level(row)
         if level.again or to < level.back:
             raise self._fail(
                 row,
@@ -297,8 +299,12 @@ class ProgramRun:
         if level.again:
             level.again -= 1
             return level.first
-        self._levels.pop()
+        self._pop_level(row)
         return level.back
+
+    def _pop_level(self, row: int) -> Subprogram:
+        leave_call(self.state, CurrentBlock(self.name, Block(row + 1, (Word("M", 99.0, 1, "the end of the call"),))))
+        return self._levels.pop()
 
     def _target(self, row: int, call: Call) -> tuple[int, int]:
         """Program number and repeats of a call."""

@@ -30,7 +30,7 @@ Group = Literal[
     "units", "feed mode", "F", "S", "T", "M tool change", "dwell", "plane", "polar", "tool length", "M subprogram",
     "work offset", "path control", "exact stop", "look-ahead", "dynamic offset", "spindle mode", "distance",
     "arc distance", "cycle return", "cutter compensation", "lathe diameter", "scaling", "mirror image", "stroke check",
-    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M rigid tapping",
+    "speed watch", "polar interpolation", "M spindle", "M coolant", "M overrides", "M saved modes", "M rigid tapping",
     "rotation", "non-modal", "M stop", "motion", "corner",
 ]  # fmt: skip
 STEPS: dict[Group, int] = {group: place for place, group in enumerate(get_args(Group))}
@@ -337,6 +337,7 @@ class State:
     beside: list[float] | None = None
     named_length: float | None = None
     turning: dict[str, int] = field(default_factory=dict)
+    saved: list[tuple[str, "State", int, float] | None] = field(default_factory=lambda: [None])
     plain: Conversational = field(default_factory=Conversational)
     keep: Callable[[InputError], None] | None = None
 

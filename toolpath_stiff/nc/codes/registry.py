@@ -6,7 +6,7 @@ Codes and modal groups follow LinuxCNC (its manual, "G-Code Overview", modal gro
 the results are compared with; polar words and rotation, which it does not have, follow Fanuc's controls.
 """
 
-from toolpath_stiff.nc.codes.code import FANUC, HAAS, Code, Refused, g_codes, m_codes
+from toolpath_stiff.nc.codes.code import FANUC, HAAS, Code, Refused, g_codes
 from toolpath_stiff.nc.codes.coordinates import COORDINATE_CODES
 from toolpath_stiff.nc.codes.corner import CORNER_CODES
 from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
@@ -16,11 +16,12 @@ from toolpath_stiff.nc.codes.flow import FLOW_CODES
 from toolpath_stiff.nc.codes.modes import MODE_CODES
 from toolpath_stiff.nc.codes.motion import MOTION_CODES
 from toolpath_stiff.nc.codes.passive import PASSIVE_CODES
+from toolpath_stiff.nc.codes.saved import SAVED_CODES
 from toolpath_stiff.nc.codes.tools import TOOL_CODES
 
 UNDERSTOOD = (
     *MOTION_CODES, *DRILLING_CODES, *MODE_CODES, *COORDINATE_CODES, *FEED_CODES, *TOOL_CODES, *FLOW_CODES,
-    *CUTTER_CODES, *PASSIVE_CODES, *CORNER_CODES,
+    *CUTTER_CODES, *PASSIVE_CODES, *CORNER_CODES, *SAVED_CODES,
 )  # fmt: skip
 CODES: dict[str, Code] = {code.name: code for code in UNDERSTOOD}
 LISTED = {code.name: code.listed for code in UNDERSTOOD if code.listed}
@@ -61,7 +62,6 @@ REFUSED: dict[str, Refused] = {
         ("G88", "boring with manual feed out", _MOVES, g_codes("G88")),
         ("G101", "mirror image", _AS_CUT, f"{HAAS}, G101"),
         ("G107", "cylindrical mapping", "post X, Y, Z, A of the tool tip", f"{HAAS}, G107"),
-        ("M70 M71 M72 M73", "modes saved and restored", "--interpreter linuxcnc reads it", m_codes("M70 - M73")),
         ("G150", "a pocket cycle around a subprogram's contour", _LINES_AND_ARCS, f"{HAAS}, G150"),
     )
     for name in names.split()

@@ -49,6 +49,7 @@ class ParametricRun(ProgramRun):
         self._at = 0  # the block that runs
         self._began = False  # a variable was set, or the flow steered
         self._repeats: dict[tuple[int, int], int] = {}  # left of a loop, by the calls that run and its line
+        self._marks: dict[str, int] = {}  # lines of BREAK and CONTINUE that LinuxCNC's interpreter has not forgotten
 
     def _statement(self, row: int) -> Statement:
         if row not in self._statements:
@@ -197,8 +198,13 @@ class ParametricRun(ProgramRun):
         if start is None and true:
             return None
         if start is None:
+            self._marks.pop("CONTINUE", None)
             return self._structure.end[row] + 1
-        return start + 1 if true else None
+        if true:
+            self._refuse_after("BREAK", row, "would not run this loop again")
+            return start + 1
+        self._marks.pop("BREAK", None)
+        return None
 
     def _back(self, row: int, steering: Steering) -> int | None:
         return self._structure.start[row]
@@ -217,7 +223,40 @@ class ParametricRun(ProgramRun):
         """Where a repeat goes on, from its beginning and from its end."""
         left = self._repeats.get((len(self._levels), start), 0)
         self._repeats[len(self._levels), start] = left - 1
-        return start + 1 if left > 0 else self._structure.end[start] + 1
+        if left > 0:
+            return start + 1
+        self._refuse_after("CONTINUE", start, "would run this repeat once more, all of it")
+        return self._structure.end[start] + 1
+
+    def _break(self, row: int, steering: Steering) -> int | None:
+        start = self._structure.start[row]
+        if self._kind(start) == "WHILE":
+            self._refuse_after("CONTINUE", row, "would go on with this loop")
+            self._marks["BREAK"] = row
+        return self._structure.end[start] + 1
+
+    def _continue(self, row: int, steering: Steering) -> int | None:
+        start = self._structure.start[row]
+        if self._kind(start) == "WHILE":
+            self._marks.pop("CONTINUE", None)
+            return start
+        self._marks["CONTINUE"] = row
+        return self._structure.end[start]
+
+    def _kind(self, row: int) -> str:
+        steering = self._statement(row).steering
+        return steering.kind if steering is not None else ""
+
+    def _refuse_after(self, leave: str, row: int, what: str) -> None:
+        """Refuse what LinuxCNC's interpreter does otherwise after a `break` or `continue`, whose mark it keeps.
+
+        interp_o_word.cc: only the end of a do forgets a break, only that of a while or a repeat a continue, whatever
+        loop they were for.
+        """
+        if leave in self._marks:
+            line = self._place(self._marks[leave]).line
+            problem = f"after the {leave.lower()} in line {line} LinuxCNC's interpreter {what}"
+            raise self._fail(row, problem, "if and endif in place of it")
 
     def _sub(self, row: int, steering: Steering) -> int | None:
         return self._structure.end[row] + 1
@@ -301,6 +340,7 @@ STEPS: dict[str, Step] = {
     "IF": ParametricRun._if, "ELSEIF": ParametricRun._else, "ELSE": ParametricRun._else,
     "WHILE": ParametricRun._while, "ENDWHILE": ParametricRun._back,
     "REPEAT": ParametricRun._repeat, "ENDREPEAT": ParametricRun._end_repeat,
+    "BREAK": ParametricRun._break, "CONTINUE": ParametricRun._continue,
     "SUB": ParametricRun._sub, "ENDSUB": ParametricRun._return_sub, "RETURN": ParametricRun._return_sub,
     "CALL": ParametricRun._call_sub,
     "IF GOTO": ParametricRun._if_goto, "IF THEN": ParametricRun._if_then, "GOTO": ParametricRun._goto,

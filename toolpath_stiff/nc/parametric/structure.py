@@ -16,7 +16,7 @@ BELONGS = {
     "ELSEIF": ("IF",), "ELSE": ("IF",), "ENDIF": ("IF",), "ENDSUB": ("SUB",), "ENDWHILE": ("WHILE",), "WHILE": ("DO",),
     "ENDREPEAT": ("REPEAT",), "END": MACRO_LOOPS, "ENDFOR": ("FOR",), "ENDLOOP": ("LOOP",), "UNTIL": ("DO UNTIL",),
 }  # fmt: skip
-LEAVES = ("BREAK", "CONTINUE")  # LinuxCNC's interpreter remembers them beyond their loops
+LEAVES = {"BREAK": ("WHILE", "DO"), "CONTINUE": ("WHILE", "DO")}  # LinuxCNC refuses them in a repeat
 
 
 @dataclass
@@ -58,6 +58,7 @@ def structure_of(
         if row in files:
             labels = [set()]
         start, last = opened[-1] if opened else (row, None)
+        loops = [first for first, word in opened if word.label == label and word.kind in LEAVES.get(kind, ())]
         if last is not None and last.label == label and last.kind in BELONGS.get(kind, ()):
             structure.start[row] = start
             structure.branches.setdefault(start, []).append(row)
@@ -66,18 +67,15 @@ def structure_of(
                 opened.pop()
             if kind == "ENDSUB":
                 labels.pop()
-        elif kind in LEAVES:
-            hint = "--interpreter linuxcnc reads it"
-            structure.faults[row] = fail(
-                row, f"{steering.shown} is not supported", "if and endif", hint, steering.column
-            )
+        elif loops:
+            structure.start[row] = loops[-1]
         elif kind in MACRO_LOOPS or (kind in OPENS and not (label and label in labels[-1])):
             opened.append((row, steering))
             labels[-1].add(label)
             if kind == "SUB":
                 structure.subs[label] = row
                 labels.append(set())
-        elif kind in OPENS or kind in BELONGS:
+        elif kind in OPENS or kind in BELONGS or kind in LEAVES:
             fault = "has a label that is there already" if kind in OPENS else "does not belong to what is open before"
             structure.faults[row] = fail(row, f"{steering.shown} {fault}", column=steering.column)
     for start, steering in opened:
