@@ -437,7 +437,7 @@ def as_hexapod(machine: MachineTool, asking: str) -> Hexapod:
     if isinstance(machine, Hexapod):
         return machine
     mistake = f"{asking} knows machines of six struts only: {machine.name} is of kind {machine.kind}"
-    raise InputError(mistake, expected="a hexapod; other kinds are analyzed, mapped, placed, compared and diagnosed")
+    raise InputError(mistake, expected="a hexapod")
 
 
 @dataclass(frozen=True)
