@@ -91,7 +91,7 @@ def test_the_centre_keeps_the_radius_from_the_contour(seed):
         ("G41.1 D6\nG1 X10\nX[#5420 + 1]", 4, "cutter compensation"),
         ("G41.1 D6\nG1 X10\nG40\nG2 X20 I5", 5, "first move after cutter compensation"),
         ("G19\nG41.1 D6", 3, "G19"),
-        ("M72", 2, "modes saved and restored"),
+        ("M72", 2, "none are saved"),
         ("G33 Z5 K1", 2, "synchronised"),
         ("G71.1 Q1", 2, "lathe cycle"),
         ("G12.1", 2, "polar coordinates"),

@@ -223,7 +223,7 @@ def diagnose(
     >>> import toolpath_stiff as tps
     >>> found = tps.diagnose("nist-table1", "nist", noise_percent=20)
     >>> found.verdict, found.plausible[:2], found.best
-    ('adequate', ['none', 'joint_moment_stiffness'], 'joint_moment_stiffness')
+    ('ambiguous', ['none', 'joint_moment_stiffness'], 'joint_moment_stiffness')
     >>> found.to_frame()[["effect", "probability", "mean_abs_error_percent"]].shape
     (16, 3)
     >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
