@@ -3,7 +3,7 @@
     python programs/make_robot.py
 
 An invented arm of the rig, for tutorial 4. The URDF file holds what a maker would give: joints, limits, speeds, masses;
-the machine file is what `tps machine from-urdf` makes of it, with the compliances filled in; the arm that is pulled hides
+the machine file is what `tps machine from-urdf` makes of it, with the compliances filled in; the arm that is pulled has
 a fault.
 """
 
