@@ -227,7 +227,7 @@ def diagnose(
     >>> found.to_frame()[["effect", "probability", "mean_abs_error_percent"]].shape
     (16, 3)
     >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
-    (['diagnose.json', 'residuals.csv'], 7)
+    (['diagnose.json', 'residuals.csv'], 3)
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     if not isinstance(question.model, Hexapod):
