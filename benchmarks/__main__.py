@@ -4,11 +4,10 @@ One core: the thread pools are limited before numpy loads. Rounds interleave the
 its round, the medians are printed. Absolute times depend on the machine; the ratios hardly do.
 """
 
-import argparse
 import sys
 from importlib.util import find_spec
 
-from benchmarks.pages import write_page
+from benchmarks.pages import page_parser, tell
 from benchmarks.processes import describe_machine
 from benchmarks.routes import measure_routes
 from benchmarks.whole_commands import measure_commands, measure_many, measure_pictures
@@ -16,9 +15,8 @@ from benchmarks.whole_commands import measure_commands, measure_many, measure_pi
 
 def main() -> int:
     """Measure and print; `--out FILE` also writes the table."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser = page_parser("benchmarks", __doc__)
     parser.add_argument("--rounds", type=int, default=7, help="interleaved rounds (default: 7)")
-    parser.add_argument("--out", help="write the page to this file as well")
     args = parser.parse_args()
     missing = [name for name in ("numba", "openseespy") if find_spec(name) is None]
     if missing:
@@ -28,11 +26,8 @@ def main() -> int:
     measured = [measure_routes(args.rounds), measure_commands(args.rounds), measure_many(1), measure_pictures()]
     lines = [line for part, _ in measured for line in (*part, "")]
     bars = "A bar that is not cleared is marked; the exit code is then 1."
-    text = "\n".join(["# Benchmark", "", describe_machine(), "", *lines, bars, ""])
-    print(text)
-    if args.out:
-        write_page(args.out, f"{text}\nMade by `python -m benchmarks --out {args.out}`.")
-    return 0 if all(passed for _, passed in measured) else 1
+    text = "\n".join(["# Benchmark", "", describe_machine(), "", *lines, bars])
+    return tell(text, args, "python -m benchmarks", all(passed for _, passed in measured))
 
 
 if __name__ == "__main__":

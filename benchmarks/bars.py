@@ -3,8 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import NormalDist, fmean, median, stdev
+from statistics import NormalDist, median
 from typing import Any
+
+from scipy.stats import binomtest
 
 from benchmarks.pages import table
 
@@ -18,13 +20,7 @@ def wilson(count: int, of: int) -> tuple[float, float]:
 
     Score interval without continuity correction (Wilson 1927, Journal of the American Statistical Association 22, 209).
     """
-    if of < 1:
-        return 0.0, 1.0
-    share, squared = count / of, NORMAL_95**2
-    middle = (share + squared / (2 * of)) / (1.0 + squared / of)
-    reach = NORMAL_95 / (1.0 + squared / of) * math.sqrt(share * (1.0 - share) / of + squared / (4 * of**2))
-    # At a share of 0 or 1 the end is exact; rounding must not leave it a hair off.
-    return (0.0 if count == 0 else middle - reach), (1.0 if count == of else middle + reach)
+    return tuple(binomtest(count, of).proportion_ci(method="wilson")) if of else (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -56,29 +52,16 @@ def share(
     return Figure(layout, what, value, f"{100 * low:.1f} to {100 * high:.1f} %", bar, cleared)
 
 
-def mean(layout: str, what: str, values: Sequence[float], at_most: float | None = None) -> Figure:
-    """A mean with its normal 95 % interval."""
-    reach = NORMAL_95 * stdev(values) / math.sqrt(len(values)) if len(values) > 1 else math.inf
-    middle = fmean(values) if values else math.nan
-    return _at_most(layout, what, middle, (middle - reach, middle + reach), at_most, "")
-
-
 def middle_of(layout: str, what: str, values: Sequence[float], at_most: float | None = None, unit: str = "") -> Figure:
     """A median with the 95 % interval between order statistics (normal approximation of the sign test)."""
-    ordered, n = sorted(values) or [math.nan], len(values)
+    bar = "" if at_most is None else f"at most {at_most:g}{unit}"
+    if not values:
+        return Figure(layout, what, "no cases", "", bar, None)
+    ordered, n, middle = sorted(values), len(values), median(values)
     reach = NORMAL_95 * math.sqrt(n) / 2.0
     low, high = max(math.floor(n / 2 - reach), 0), max(min(math.ceil(n / 2 + reach), n - 1), 0)
-    return _at_most(layout, what, median(ordered), (ordered[low], ordered[high]), at_most, unit)
-
-
-def _at_most(
-    layout: str, what: str, value: float, interval: tuple[float, float], most: float | None, unit: str
-) -> Figure:
-    bar = "" if most is None else f"at most {most:g}{unit}"
-    if math.isnan(value):
-        return Figure(layout, what, "no cases", "", bar, None)
-    ends = f"{interval[0]:.2f} to {interval[1]:.2f}{unit}"
-    return Figure(layout, what, f"{value:.2f}{unit}", ends, bar, None if most is None else value <= most)
+    ends = f"{ordered[low]:.2f} to {ordered[high]:.2f}{unit}"
+    return Figure(layout, what, f"{middle:.2f}{unit}", ends, bar, None if at_most is None else middle <= at_most)
 
 
 def bars_table(figures: Sequence[Figure]) -> list[str]:

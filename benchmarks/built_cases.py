@@ -19,10 +19,12 @@ from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text, read_plan
+from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.fem_path import path_truth
 from toolpath_stiff.rig.nominal import load_nominal
 
-GROUPS = ("sound", "single", "pair", "outside")
+JUDGED = ("sound", "single", "pair", "outside")
+GROUPS = (*JUDGED, "known", "draft")
 BUILT = ("fem", "springs")
 POSES = (12, 28)  # fewest and most of a campaign
 PAIR_SIZES = (0.10, 0.05)  # rms change of ln k of the two
@@ -33,7 +35,11 @@ PLANNED = 6  # visits of a plan
 
 @dataclass(frozen=True)
 class Job:
-    """One case; `hidden` are names of the rig, with commas, or `none`."""
+    """One case; `hidden` are names of the rig, with commas, or `none`.
+
+    Of the group `known` what is hidden need not be found: it is added by its name, to judge the bands alone. Of the
+    group `draft` it lies outside the catalogue; what is read off half of a tilted campaign is put to the other half.
+    """
 
     built: str
     group: str
@@ -48,10 +54,13 @@ def make_jobs(first_seed: int, counts: Mapping[str, int], built: Sequence[str]) 
         named, outside = kinds_of(way)
         rng = np.random.default_rng([first_seed, number])
         for place, group in enumerate(GROUPS):
-            kinds = rng.permutation(outside if group == "outside" else named).tolist()
+            kinds = rng.permutation(outside if group in ("outside", "draft") else named).tolist()
+            if group == "known":  # a fault of an instrument is none of the machine
+                kinds = [kind for kind in kinds if "instrument" not in links_of(kind, way)]
             for k in range(counts[group]):
                 pair = ",".join(rng.choice(named, size=2, replace=False))
                 hidden = {"sound": "none", "pair": pair}.get(group, kinds[k % len(kinds)])
+                hidden = "none" if group == "known" and k % 2 else hidden
                 jobs.append(Job(way, group, first_seed + 100_000 * number + 10_000 * place + k, hidden))
     return jobs
 
@@ -80,26 +89,54 @@ def run(job: Job) -> Record:
 
 
 def _judged(job: Job, folder: Path) -> Record:
+    if job.group == "draft":
+        return drafted(job, folder)
     plan = small_campaign(job.seed)
     size = PAIR_SIZES if job.group == "pair" else None
     case = rig.draw_case(job.seed, "campaign", job.hidden, plan=plan, size=size, built=job.built)
     file = folder / "measurements.csv"
     file.write_text(csv_text(case.rows))
-    start = time.process_time()
-    diagnosis = tps.diagnose(file)
-    cpu = time.process_time() - start
     truths = [truth_of(effect, job.built) for effect in case.truth["effects"]]
+    record: Record = {"truths": truths, "poses": len(np.unique(plan["point"])), "readings": len(plan["point"])}
     rows, rng = rig.rows_of(plan), np.random.default_rng(job.seed)
     path = case.truth.get("path") or path_truth(case.nominal, case.machine, rows, rng)
-    after = {}
+    if job.group == "known":
+        names = [truth["names"][0] for truth in truths]
+        return record | along_path(tps.update(file, add=names, strut_law=True, force=True), path)
+    start = time.process_time()
+    diagnosis = tps.diagnose(file)
+    record["cpu"] = round(time.process_time() - start, 2)
     if diagnosis.verdict == "ambiguous" and job.group == "single":
         more = planned(diagnosis, file, case, np.random.default_rng([job.seed, 5]))
         again = tps.diagnose([file, *more])
-        after = {"planned": answer_of(again) | along_path(again, [file, *more], path, folder)}
-    return {
-        "truths": truths, "poses": len(np.unique(plan["point"])), "readings": len(plan["point"]), "cpu": round(cpu, 2),
-        **answer_of(diagnosis), **after, **along_path(diagnosis, [file], path, folder),
-    }  # fmt: skip
+        record["planned"] = answer_of(again) | along_path(updated(again, [file, *more], folder), path)
+    return record | answer_of(diagnosis) | along_path(updated(diagnosis, [file], folder), path)
+
+
+def drafted(job: Job, folder: Path) -> Record:
+    """Effects that are drafted of every other clamping of a tilted campaign, and whether all readings name one of them.
+
+    `same`: the other clampings are of the same machine. `gone`: of that machine without what the draft was read off.
+    """
+    case = rig.draw_case(job.seed, "tilted", job.hidden, built=job.built)
+    sound = rig.draw_case(job.seed, "tilted", "none", built=job.built)  # the same poses, struts, joints and scatter
+    old, file, draft_file = np.asarray(case.rows["clamp"]) % 2 == 0, folder / "readings.csv", folder / "missing.toml"
+    file.write_text(csv_text({name: np.asarray(values)[old] for name, values in case.rows.items()}))
+    draft = tps.draft_effect(file, file=draft_file)
+    record: Record = {
+        "truths": [truth_of(effect, job.built) for effect in case.truth["effects"]],
+        "drafted": draft.effects,
+    }
+    if not draft.text:
+        return record
+    draft_file.write_text(draft.text)
+    for what, rows in (("same", case.rows), ("gone", sound.rows)):
+        mixed = {name: np.where(old, np.asarray(case.rows[name]), np.asarray(rows[name])) for name in case.rows}
+        file.write_text(csv_text(mixed))
+        said = tps.diagnose(file, tps.Machine.load("nist", effects=[draft_file])).to_dict()
+        named = any(name in words for name in draft.effects for words in said["explanations"])
+        record[what] = said["verdict"] == "identified" and named
+    return record
 
 
 def planned(diagnosis: tps.Diagnosis, file: Path, case: rig.DrawnCase, rng: np.random.Generator) -> list[Path]:
@@ -115,9 +152,14 @@ def truth_of(effect: Mapping[str, Any], built: str) -> dict[str, Any]:
     """Names of the catalogue that are right, links that are, and size, of a hidden effect."""
     name = effect["effect"]
     right = list(effect["names"]) if built == "fem" else [name] if name in CATALOGUE else []
-    links = set(effect.get("links", ())) or {links_of_effects()[name]}
+    links = set(effect.get("links", ())) or links_of(name, built)
     links |= SERIES if links & SERIES else set()
     return {"hidden": name, "names": right, "links": sorted(links), "size": effect["size"]}
+
+
+def links_of(name: str, built: str) -> set[str]:
+    """Links of a fault of elements, or the link of an effect of the catalogue."""
+    return set(FAULTS[name].links) if built == "fem" else {links_of_effects()[name]}
 
 
 @cache
@@ -139,14 +181,13 @@ def answer_of(diagnosis: tps.Diagnosis) -> Record:
     }
 
 
-def along_path(diagnosis: tps.Diagnosis, files: Sequence[Path], path: Mapping[str, Any], folder: Path) -> Record:
-    """Mean error (%) along the path before and after what the verdict proposes, and how often bands hold."""
+def along_path(update: tps.Update | None, path: Mapping[str, Any]) -> Record:
+    """Mean error (%) along the path before and after an update, if there is one, and how often bands hold."""
     near = np.array(path["measured_near"])
     true = np.column_stack([path[f"{axis}_N_per_mm"] for axis in "xyz"])
     given = tps.Machine.load("nist")
     before = stiffness_along(given, path)[0]
     error = {"before": _percent(before, true, near)}
-    update = updated(diagnosis, files, folder)
     if update is None or not update.accepted:
         return {**error, "after": error["before"], "updated": ""}
     there, sd = stiffness_along(update.machine.under(setup=DEFAULT_SETUP), path)

@@ -83,7 +83,7 @@ def sound(records: Sequence[Record], order: Callable[[Record], Any]) -> list[Rec
 
 def document(
     title: str,
-    what: str,
+    about: str | None,
     figures: Sequence[Figure],
     parts: Sequence[tuple[str, Sequence[str]]],
     records: Sequence[Record],
@@ -91,8 +91,10 @@ def document(
 ) -> tuple[str, bool]:
     """A page in markdown, and whether all bars are cleared and no case broke.
 
-    What fails in a sentence, the cases that broke, the bars, parts under their headings, and the command.
+    What the benchmark's docstring (`about`) says after its first sentence, what fails, the cases that broke, the bars,
+    parts under their headings, and the command.
     """
+    what = " ".join((about or "").partition("\n\n")[2].split())
     broken = [
         f"- {' '.join(str(r[key]) for key in ('layout', 'group', 'hidden', 'seed') if key in r)}: "
         f"`{r['error'].strip().splitlines()[-1]}`"

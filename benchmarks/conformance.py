@@ -9,7 +9,6 @@ refuse with file and line; never another path. Both take the program for LinuxCN
 if one differs.
 """
 
-import argparse
 import subprocess
 import sys
 import tempfile
@@ -21,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from benchmarks.pages import table, write_page
+from benchmarks.pages import page_parser, table, tell
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
@@ -182,10 +181,8 @@ def page(rows: list[Row]) -> str:
         f"{len(rows)} programs, of which `rs274` runs {len(ran)} to the end: "
         f"{counts[SAME]} same feed path, {counts[NONE]} without a feed path for both, {counts[REFUSED]} refused by the "
         f"built-in reader, {counts[OTHER]} with another path. Within {TOLERANCE} mm and degrees, in both directions.",
-        "", *table("program | verdict | LinuxCNC's interpreter | built-in reader", cells), "",
-        "Made by `python -m benchmarks.conformance linuxcnc-*/ --out benchmarks/conformance.md` after `apt-get source "
-        "linuxcnc` (Debian 12: 2.9.0~pre1): every program of LinuxCNC's repository. *Not checked*: LinuxCNC's "
-        "interpreter refuses what the built-in reader takes (user M codes, which that lists with a warning).", "",
+        "*Not checked*: LinuxCNC's interpreter refuses what the built-in reader takes (user M codes, which that lists "
+        "with a warning).", "", *table("program | verdict | LinuxCNC's interpreter | built-in reader", cells),
     ])  # fmt: skip
 
 
@@ -205,21 +202,17 @@ def measure(files: Iterable[Path], folder: Path, rs274: str | None = None) -> li
 
 def main() -> int:
     """Print the table; the exit code is 1 if a path differs."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.conformance", description=__doc__)
+    parser = page_parser("benchmarks.conformance", __doc__)
     parser.add_argument("programs", nargs="*", metavar="FILE|FOLDER", help="default: those of Debian's linuxcnc-uspace")
     parser.add_argument("--rs274", metavar="PATH", help="LinuxCNC's interpreter, if it is not on PATH")
-    parser.add_argument("--out", help="write the table to this file as well")
     args = parser.parse_args()
     files = list(programs_of(args.programs)) if args.programs else installed_programs()
     if not files:
         parser.error(f"no programs; install {PACKAGE}, or name files")
     with tempfile.TemporaryDirectory() as folder:
         rows = measure(files, Path(folder), args.rs274)
-    text = page(rows)
-    print(text)
-    if args.out:
-        write_page(args.out, text)
-    return 1 if any(row.verdict == OTHER for row in rows) else 0
+    command = f"python -m benchmarks.conformance {' '.join(args.programs)}".rstrip()
+    return tell(page(rows), args, command, all(row.verdict != OTHER for row in rows))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,39 +10,27 @@ import numpy as np
 from toolpath_stiff.diagnosis.diagnose import diagnose
 from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.file import load_machine
-from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case as case_module
 from toolpath_stiff.rig import exercise
-from toolpath_stiff.rig.fem_faults import FAULTS, faults
-from toolpath_stiff.rig.unknowns import UNKNOWNS
+from toolpath_stiff.rig.exercise import NUMBERS, TEXTS
 
-NOT_IN_PAPER = frozenset(("force_N", "time_min", "temperature_C"))  # columns that the paper's layout lacks
-
-
-def kinds_of(built: str, layout: str = "tilted") -> tuple[list[str], list[str]]:
-    """What can be hidden in and outside the catalogue that a layout has the columns for."""
-    lacking = NOT_IN_PAPER if layout == "paper" else frozenset()
-    if built == "fem":
-        known, beyond = ({name: FAULTS[name] for name in faults(in_catalogue=inside)} for inside in (True, False))
-        inside = [name for name, fault in known.items() if lacking.isdisjoint(fault.columns)]
-    else:
-        inside, beyond = list(case_module.effects_of_layout(layout)), UNKNOWNS
-    return inside, [name for name, kind in beyond.items() if lacking.isdisjoint(kind.columns)]
+COLUMNS = {*NUMBERS, *TEXTS}  # of a tilted campaign
 
 
-@cache
-def machine() -> Hexapod:
-    """The machine as the model has it."""
-    return load_machine("nist")
+def kinds_of(built: str) -> tuple[list[str], list[str]]:
+    """What can be hidden in and outside the catalogue, so that a tilted campaign shows it."""
+    inside, _, outside = case_module.hideable(COLUMNS, fem=built == "fem")
+    return inside, outside
 
 
 def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: Any) -> tuple[dict[str, Any], Document]:
     """Truth, verdict and probabilities of a case as a record, and the whole document; `stated` goes to `diagnose`."""
     file = folder / "measurements.csv"
     file.write_text(exercise.csv_text(rows), encoding="utf-8")
+    machine = load_machine("nist")
     start = time.process_time()
-    diagnosis = diagnose(machine(), read_measurements(file, machine()), **stated)
+    diagnosis = diagnose(machine, read_measurements(file, machine), **stated)
     found = diagnosis.to_dict()
     cpu = time.process_time() - start
     record = {
@@ -52,7 +39,6 @@ def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: 
         "effects": truth["effects"],
         "verdict": found["verdict"],
         "plausible": found["plausible"],
-        "not_excluded": {one["effect"]: one["probability"] for one in found["not_excluded"]},
         "cpu": round(cpu, 2),
     }
     return record, found

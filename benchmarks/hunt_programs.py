@@ -1,4 +1,4 @@
-"""Random programs for `benchmarks.hunt`: lines at odds with each other, zeros that move, and some as of CAM."""
+"""Random programs for `benchmarks.hunt`: lines at odds with each other, zeros that move, variables and flow."""
 
 # ruff: noqa: SIM905 (long lists of words are easier to read as one text)
 
@@ -227,84 +227,6 @@ class Harsh:
         lines += r.choice([["G1 X3 Y3 Z3"], ["G1 X3 Y3 Z3 F50"], ["G80", "G1 X4 Y4 F20", "Z3"], ["X4 Y5"], []])
         lines.append(self.one("M2", "M2", "M2", "M30", "%", "M2\n%", "M2\ngarbage here", "M30\n%\nX99"))
         return r.choice(["\n"] * 30 + ["\r\n"] * 3 + ["\n\n"]).join(lines) + "\n"
-
-
-class Cam(Harsh):
-    """Longer programs as CAM systems write them, with their headers, tool changes, homes and ends."""
-
-    def program(self) -> str:
-        """A program of two or three tools with an operation or more each."""
-        r = self.random
-        inch = self.often(0.3)
-        units, places = ("G20", 4) if inch else ("G21", 3)
-        size = 3.0 if inch else 80.0
-        numbered = r.choice([0, 0, 1, 10])
-
-        def value(low: float, high: float) -> str:
-            text = f"{r.uniform(low, high) * size:.{places}f}"
-            return text if self.often(0.5) else text.rstrip("0") if "." in text else text
-
-        lines = [self.one("%", ""), self.one("O1001", "(PART)", "O1001 (PART)")]
-        lines.append(
-            self.one(
-                f"{units} G90 G94 G17 G91.1", f"G17 {units} G40 G49 G80 G90", f"G00 {units} G17 G90 G40 G49 G80",
-                f"G90 {units}\nG17 G40\nG80 G94\nG64 P0.01", f"N5 G40 G80 G49 G90 {units}",
-            )
-        )  # fmt: skip
-        for tool in range(1, r.randint(2, 4)):
-            lines += r.choice(
-                [
-                    [f"T{tool} M6", f"S{r.randint(500, 9000)} M3", self.one("G54", "G55", "G54 G0")],
-                    ["M5", "M9", f"M6 T{tool}", "M3 S1000", "G54"],
-                    ["G28 G91 Z0", "G90", f"T{tool} M06", "G54", "S5000 M03"],
-                    ["G53 G0 Z0", f"T{tool} M6 (D=6)", "M8"],
-                    ["G49", f"T{tool} M6"],
-                ]
-            )
-            height = value(0.3, 0.6)
-            lines.append(f"G0 X{value(-1, 1)} Y{value(-1, 1)}")
-            lines.append(self.one(f"G43 Z{height} H{tool}", f"G43 H{tool}\nG0 Z{height}", f"G43 H{tool} Z{height} M8"))
-            for _ in range(r.randint(1, 3)):
-                lines += self.operation(value, inch)
-            lines += r.choice([[], ["M5", "M9"], [f"G0 Z{height}"], ["G28 G91 Z0", "G90"], ["G53 G0 Z0", "G49"]])
-        lines += r.choice([["M30"], ["G28 G91 Z0", "G28 X0 Y0", "M30", "%"], ["M2"], ["M5", "M9", "G17 G90", "M2"]])
-        if numbered:
-            lines = [
-                f"N{numbered * at} {line}" if line and line[0] not in "%O(N" and "\n" not in line else line
-                for at, line in enumerate(lines, 1)
-            ]
-        return "\n".join(lines) + "\n"
-
-    def operation(self, value: Callable[[float, float], str], inch: bool) -> list[str]:
-        """Milling, arcs, or a run of holes."""
-        r, lines = self.random, []
-        kind = r.randrange(4)
-        feed = f"F{r.choice([10, 12.5, 40]) if inch else r.choice([300, 450.0, 1200])}"
-        if kind == 0:
-            cycle = self.one("G81", f"G82 P{r.choice([0.5, 1])}", "G83 Q" + ("0.05" if inch else "2."), "G73 Q3", "G85")
-            place = f"X{value(-1, 1)} Y{value(-1, 1)}"
-            lines.append(f"{self.one('G98', 'G99')} {cycle} {place} Z-{value(0.05, 0.2)} R{value(0.02, 0.1)} {feed}")
-            lines += [
-                self.one(f"X{value(-1, 1)}", f"Y{value(-1, 1)}", f"X{value(-1, 1)} Y{value(-1, 1)}") for _ in range(5)
-            ]
-            return [*lines, self.one("G80", "G0 G80", f"G80 G0 Z{value(0.3, 0.6)}")]
-        lines.append(f"G1 Z-{value(0.01, 0.2)} {feed}")
-        if kind == 1:
-            arcs = []
-            for _ in range(r.randint(3, 12)):
-                (i, j), (a, b) = r.choice(POINTS), r.choice(POINTS)
-                scale = 0.1 if inch else 1.0
-                center = f"I{i * scale:.4f} J{j * scale:.4f}" if self.often(0.7) else f"R{5 * scale:.4f}"
-                end = f"X{(i + a) * scale:.4f} Y{(j + b) * scale:.4f}"
-                down = f" Z-{value(0.001, 0.01)}" if self.often(0.3) else ""
-                arcs.append(f"{self.one('G2', 'G3')} {end}{down} {center}")
-                arcs += [f"G1 X{value(-0.1, 0.1)}"] if self.often(0.2) else []
-            return [*lines, "G91", *arcs, "G90", f"G0 Z{value(0.3, 0.6)}"]
-        for _ in range(r.randint(5, 60)):
-            words = [f"{axis}{value(-1, 1)}" for axis in "XYZ" if self.often(0.6)]
-            words += [f"{axis}{r.uniform(-30, 30):.3f}" for axis in "ABC" if kind == 3 and self.often(0.5)]
-            lines.append(f"{self.one('', '', '', 'G1', 'G01', 'G0')} {' '.join(words)}".strip())
-        return [*lines, f"G0 Z{value(0.3, 0.6)}"]
 
 
 class Zeros(Harsh):

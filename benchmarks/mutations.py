@@ -24,7 +24,7 @@ from importlib import resources
 from pathlib import Path
 from types import FrameType
 
-from benchmarks.pages import table, write_page
+from benchmarks.pages import page_parser, table, tell
 from toolpath_stiff.api.effects import effect_template
 from toolpath_stiff.api.machines import machine_from_linuxcnc, machine_template
 from toolpath_stiff.api.poses import read_poses
@@ -284,13 +284,11 @@ def megabytes() -> float:
 
 def main() -> int:
     """Mutate, read, count, print."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.mutations", description=__doc__)
+    parser = page_parser("benchmarks.mutations", __doc__)
     parser.add_argument("--n", type=int, default=200_000, metavar="N", help="inputs (default: 200000)")
     parser.add_argument("--seed", type=int, default=1, metavar="N")
     parser.add_argument("--kind", metavar="WORDS", help="only kinds whose name has these words")
-    parser.add_argument("--out", metavar="FILE", help="write the table to this file as well")
     args = parser.parse_args()
-    out = Path(args.out).absolute() if args.out else None
     chance, counts = random.Random(args.seed), {kind.name: Counter[str]() for kind in kinds()}
     chosen = [kind for kind in kinds() if (args.kind or "") in kind.name]
     wrong, slowest, settled = [], 0.0, 0.0
@@ -315,11 +313,9 @@ def main() -> int:
                 sys.stderr.write(f"\r{number} of {args.n}")
     growth = megabytes() - settled
     text = page(args, {kind.name: counts[kind.name] for kind in chosen}, growth, slowest)
-    print("\n".join([text, *wrong[:40]]))
-    if out:
-        command = f"python -m benchmarks.mutations --n {args.n} --seed {args.seed}"
-        write_page(out, text + f"\nMade by `{command} --out {args.out}`.\n")
-    return int(bool(wrong) or growth > GROWTH_BAR)
+    print(*wrong[:40], sep="\n", file=sys.stderr)
+    command = f"python -m benchmarks.mutations --n {args.n} --seed {args.seed}"
+    return tell(text, args, command, not wrong and growth <= GROWTH_BAR)
 
 
 def page(args: argparse.Namespace, counts: dict[str, Counter[str]], growth: float, slowest: float) -> str:

@@ -1,5 +1,6 @@
-"""The pages that benchmarks write: what they found, the day and the commit."""
+"""The pages that benchmarks write: what they found, the command, the day and the commit."""
 
+import argparse
 import subprocess
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
@@ -49,3 +50,18 @@ def write_page(file: str | Path, text: str, *, of_records: bool = False) -> None
     what = "Tabulated anew from an earlier run's records" if of_records else "Run"
     day, name = STARTED
     write_atomically(file, f"{text.rstrip()}\n\n{what} on {day}, commit {name}.\n")
+
+
+def page_parser(name: str, about: str | None) -> argparse.ArgumentParser:
+    """The parser of `python -m name`, whose page goes to --out as well."""
+    parser = argparse.ArgumentParser(prog=f"python -m {name}", description=about)
+    parser.add_argument("--out", type=Path, metavar="FILE.md", help="write the page to this file as well")
+    return parser
+
+
+def tell(text: str, args: argparse.Namespace, command: str, passed: bool) -> int:
+    """Print a page, write it to --out with the command that made it; the exit code: 1 where a bar is not cleared."""
+    print(text)
+    if args.out:
+        write_page(args.out, f"{text.rstrip()}\n\nMade by `{command} --out {args.out}`.")
+    return 0 if passed else 1

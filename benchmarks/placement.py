@@ -8,14 +8,13 @@ placement of the grid dominates the recommended one (no worse in all three, bett
 Each end of the front is within 0.5 % of the best of 4,096 Sobol points with a local search on the whole path.
 """
 
-import argparse
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.pages import table, write_page
+from benchmarks.pages import page_parser, table, tell
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine.file import load_machine
@@ -192,8 +191,7 @@ def ends(program: ReadProgram) -> tuple[Row, bool]:
 
 def main() -> int:
     """Print the tables; `--out FILE` writes them too."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.placement", description=__doc__)
-    parser.add_argument("--out", help="write the tables to this file as well")
+    parser = page_parser("benchmarks.placement", __doc__)
     parser.add_argument("--random", type=int, default=50, metavar="N", help="random programs (default: 50)")
     args = parser.parse_args()
     names = sorted(path.name for path in PROGRAMS.iterdir() if path.suffix in (".nc", ".apt"))
@@ -209,13 +207,11 @@ def main() -> int:
         rows = []
         for case in cases:
             cells, clears = row_of(case)
-            print(*cells, sep=" | ", flush=True)
+            print(*cells, sep=" | ", file=sys.stderr, flush=True)
             rows.append(cells)
             passed &= clears
         lines += [*table(heading, rows), ""]
-    if args.out:
-        write_page(args.out, "\n".join([*lines, f"Made by `python -m benchmarks.placement --out {args.out}`."]))
-    return 0 if passed else 1
+    return tell("\n".join(lines), args, "python -m benchmarks.placement", passed)
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ class Job:
 
     seed: int
     hidden: str | None
+    stated: bool = True  # whether the readings say how they scatter
 
 
 def labels(effect: Record) -> set[str]:
@@ -48,7 +49,8 @@ def run(job: Job) -> Record:
     def work(folder: Path) -> Record:
         text, pulls, truth = robot_case(job.seed, job.hidden, NOISE)
         (folder / "robot.toml").write_text(text, encoding="utf-8")
-        (folder / "pulls.csv").write_text(csv_text(pulls), encoding="utf-8")
+        said = {name: column for name, column in pulls.items() if job.stated or name != "sd_um"}
+        (folder / "pulls.csv").write_text(csv_text(said), encoding="utf-8")
         verdict = tps.diagnose(folder / "pulls.csv", folder / "robot.toml").to_dict()
         effect = truth["effects"][0] if truth["effects"] else {"effect": "none", "names": [], "parameters": {}}
         return {
@@ -57,7 +59,7 @@ def run(job: Job) -> Record:
             "plausible": verdict["plausible"],
         }  # fmt: skip
 
-    return record_of({"seed": job.seed, "hidden": job.hidden}, work)
+    return record_of({"seed": job.seed, "hidden": job.hidden, "stated": job.stated}, work)
 
 
 def named(record: Record) -> bool:
@@ -88,8 +90,8 @@ def report(records: Sequence[Record], command: str) -> tuple[str, bool]:
     figures = [share("serial", what, [bool(rule(r)) for r in rows], *ends) for what, rows, rule, *ends in counted]
     kinds = Counter((r["effect"], r["part"], "right" if named(r) else r["verdict"]) for r in cases)
     rows = [(effect, part, verdict, n) for (effect, part, verdict), n in sorted(kinds.items())]
-    what = " ".join((__doc__ or "").split("\n\n", 1)[1].split())
     parts = [("Verdicts", table("hidden | where | verdict | cases:", rows))]
+    what = __doc__ if cases[0]["stated"] else __doc__.replace("noise that is stated", "noise that nobody states")
     return document("Robots", what, figures, parts, records, command)
 
 
@@ -100,8 +102,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--cases", type=int, default=200, help="default: 200")
     parser.add_argument("--hidden", choices=("none", "one", "outside", *FAULTS), help="drawn unless given")
 
+    parser.add_argument("--unstated", action="store_true", help="without the column that says how readings scatter")
+
     def jobs(args: argparse.Namespace) -> list[Job]:
-        return [Job(args.first_seed + k, args.hidden) for k in range(args.cases)]
+        return [Job(args.first_seed + k, args.hidden, not args.unstated) for k in range(args.cases)]
 
     return run_benchmark(parser, arguments, jobs, run, report, records=RECORDS)
 

@@ -6,7 +6,6 @@ of CPU and 1 GB with all its files (two samples a move: one at each end); a line
 10,000 (within 1.5).
 """
 
-import argparse
 import statistics
 import sys
 import tempfile
@@ -14,7 +13,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.pages import bar, table, write_page
+from benchmarks.pages import bar, page_parser, table, tell
 from benchmarks.processes import describe_machine, whole_command
 from benchmarks.size_programs import KINDS, program
 from toolpath_stiff.nc.reader import parse_program
@@ -94,19 +93,15 @@ def analyzing(lines: int) -> Measured:
 
 def main() -> int:
     """Measure and print; `--out FILE` also writes the table."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.size", description=__doc__)
+    parser = page_parser("benchmarks.size", __doc__)
     parser.add_argument("--lines", type=int, default=200_000, help="lines of the programs read (default: 200000)")
     parser.add_argument("--longest", type=int, default=1_000_000, help="lines of the longest (default: 1000000)")
     parser.add_argument("--rounds", type=int, default=3, help="interleaved rounds (default: 3)")
-    parser.add_argument("--out", help="write the table to this file as well")
     args = parser.parse_args()
     measured = [reading(args.lines, args.rounds), lengths(args.longest, args.rounds), analyzing(args.longest)]
     lines = [line for part, _ in measured for line in part]
     text = "\n".join(["# Size", "", describe_machine(), "", *lines, "A bar that is not cleared is marked."])
-    print(text)
-    if args.out:
-        write_page(args.out, f"{text}\n\nMade by `python -m benchmarks.size --out {args.out}`.")
-    return 0 if all(passed for _, passed in measured) else 1
+    return tell(text, args, "python -m benchmarks.size", all(passed for _, passed in measured))
 
 
 if __name__ == "__main__":

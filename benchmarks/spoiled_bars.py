@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from benchmarks.bars import Figure, Record, holds_truth, mean, named, share
+from benchmarks.bars import Figure, Record, holds_truth, named, share
 from benchmarks.spoiled_cases import FACTORS, MANY_OUTLIERS, WAYS
 from toolpath_stiff.rig.slips import VISIBLE
 
@@ -67,16 +67,6 @@ def _each(records: Sequence[Record], what: str, test: Test, where: Test | None =
     return share("tilted", what, [test(r) for r in records if where is None or where(r)], **bars)
 
 
-def _listed(what: str, records: Sequence[Record]) -> list[Figure]:
-    """How many effects are told as not excluded, how often one of them is there, and how likely each was said to be."""
-    listed = [(name in r["truth"], chance) for r in records for name, chance in r["not_excluded"].items()]
-    return [
-        mean("tilted", f"{what}: effects in `not_excluded`", [float(len(r["not_excluded"])) for r in records]),
-        share("tilted", f"{what}: one that is listed there is hidden", [there for there, _ in listed]),
-        mean("tilted", f"{what}: probability (%) that is given with it", [100.0 * chance for _, chance in listed]),
-    ]
-
-
 def _outliers(records: Sequence[Record]) -> list[Figure]:
     """What many wild readings cost on the same machines, in percentage points."""
     tests: list[tuple[str, str, Test]] = [
@@ -96,8 +86,6 @@ def _outliers(records: Sequence[Record]) -> list[Figure]:
             cost = 100.0 * (sum(few) / len(few) - sum(many) / len(many))
             of, bar = f"10 % wild cost, {hidden}: {what}", f"at most {COST_OF_OUTLIERS:g}"
             made.append(Figure("tilted", of, f"{cost:+.1f} points", "", bar, cost <= COST_OF_OUTLIERS))
-    for hidden in ("none", "one"):
-        made += _listed(f"{hidden} hidden", [r for r in records if r["hidden"] == hidden])
     return made
 
 

@@ -1,13 +1,10 @@
 """`python -m benchmarks.studio`: how quickly the studio answers, in a browser without a graphics card.
 
-    python -m benchmarks.studio --out benchmarks/studio.md
-
 A blind exercise of 288 readings, then a campaign of 5,000; a program of 10,000 samples and one of
 50,000 lines. Medians and the slowest of many, seen from the page: from the question until the answer is drawn, and
 from one frame to the next while the machine turns. Absolute times: they are what a hand at a slider feels.
 """
 
-import argparse
 import statistics
 import subprocess
 import sys
@@ -18,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.diagnosis_cases import campaign
-from benchmarks.pages import bar, table, write_page
+from benchmarks.pages import bar, page_parser, table, tell
 
 ANSWER_BAR, LARGE_BAR, FRAME_BAR = 30.0, 100.0, 50.0  # ms, medians
 ROUNDS = 40
@@ -118,9 +115,7 @@ def measure_one(
 
 def main() -> int:
     """Measure, print, exit with 1 where a bar is not cleared."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, metavar="FILE.md")
-    args = parser.parse_args()
+    args = page_parser("benchmarks.studio", __doc__).parse_args()
     from playwright.sync_api import sync_playwright
 
     from tests.browser import BROWSER
@@ -129,12 +124,9 @@ def main() -> int:
         browser = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
         rows = measure(browser, Path(folder))
         browser.close()
-    text = "\n".join(table("what | ms, median: | ms, slowest: | bar", [cells for cells, _ in rows])) + "\n"
-    print(text)
-    if args.out:
-        made = f"Made by `python -m benchmarks.studio --out {args.out}`."
-        write_page(args.out, f"# The studio's answers\n\n{text}\n{made}")
-    return 0 if all(clears for _, clears in rows) else 1
+    rows_of_table = table("what | ms, median: | ms, slowest: | bar", [cells for cells, _ in rows])
+    text = "\n".join(["# The studio's answers", "", *rows_of_table])
+    return tell(text, args, "python -m benchmarks.studio", all(clears for _, clears in rows))
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from toolpath_stiff.nc.heidenhain import vocabulary as plain_language
 from toolpath_stiff.nc.siemens import vocabulary as siemens
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.unknowns import UNKNOWNS
-from toolpath_stiff.stiffness.catalogue import packaged_effects
+from toolpath_stiff.stiffness.catalogue import effects_of_elements, packaged_effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect, Parameter
 
 DOCS = Path(__file__).parent
@@ -184,7 +184,10 @@ def effects_in_full() -> str:
 
 
 def _effects() -> list[Effect]:
-    return sorted(packaged_effects().values(), key=lambda effect: (LINKS.index(effect.link), effect.name))
+    return sorted(
+        {**packaged_effects(), **effects_of_elements()}.values(),
+        key=lambda effect: (LINKS.index(effect.link), effect.name),
+    )
 
 
 def _keys(effect: Effect) -> str:
@@ -206,6 +209,11 @@ def _effect(effect: Effect) -> str:
     for paragraph in further:
         lines += ["", " ".join(paragraph.split())]
     lines += ["", f"Equation: `{effect.equation}`. Source: {effect.source}."]
+    if effect.holds_for == "elements":
+        lines += [
+            "",
+            "It holds for [machines of elements](machines.md#other-kinds-of-machines): mills, deltas, robots.",
+        ]
     if effect.load_dependent:
         lines += ["", "It depends on the size of the load (`--force`); the stiffness is the secant one."]
     if effect.needs:

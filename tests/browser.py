@@ -7,7 +7,12 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+
+from toolpath_stiff.report.colours import CLASSES
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
@@ -23,6 +28,11 @@ for (const stage of document.querySelectorAll(".stage")) {
   stage.dataset.painted = [...rows].map((entry) => entry.join(":")).join(" ");
 }
 """
+
+
+def viridis(low: float, high: float) -> list[str]:
+    """Colours of the classes of a page's scale, weakest first, as matplotlib has them; on dark from 0.22 to 1."""
+    return [to_hex(colour) for colour in colormaps["viridis"](np.linspace(low, high, CLASSES))]
 
 
 def opened(address: str, folder: Path) -> subprocess.CompletedProcess[str]:

@@ -207,6 +207,7 @@ NO_EXAMPLE = {
         "unconfirmed",
         "predictor",
         "explanations",
+        "beside",
         "after",
     },
     "Plan": {"rows", "sentences", "notes", "visits"},

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from benchmarks import built
 from benchmarks.built_cases import GROUPS, make_jobs, run, small_campaign
 from benchmarks.case_loop import run_cases
+from benchmarks.pages import write_page
 
 TABLE = {"hidden": "floor_tilts", "names": [], "links": ["frame", "table"], "size": 0.1}
 STRUT = {"hidden": "strut_weak", "names": ["weak_strut"], "links": ["joints", "one strut", "struts"], "size": 0.1}
@@ -64,7 +67,7 @@ def test_campaigns_are_small_and_tell_their_noise():
 
 def test_jobs_have_seeds_of_their_own_and_turn_through_the_kinds():
     jobs = make_jobs(1000, dict.fromkeys(GROUPS, 40), ["fem", "springs"])
-    assert len({job.seed for job in jobs}) == len(jobs) == 320
+    assert len({job.seed for job in jobs}) == len(jobs) == 480
     singles = [job.hidden for job in jobs if (job.built, job.group) == ("fem", "single")]
     assert len(set(singles[: len(set(singles))])) == len(set(singles)) > 15
     assert all(len(set(job.hidden.split(","))) == 2 for job in jobs if job.group == "pair")
@@ -88,3 +91,24 @@ def test_a_run_goes_on_where_it_was_stopped(tmp_path):
 
 def _kept(job):
     return {"seed": job.seed}
+
+
+def test_every_page_names_the_day_and_the_commit_of_its_run(tmp_path):
+    write_page(tmp_path / "page.md", "# A page\n")
+    pages = [tmp_path / "page.md", *(Path(__file__).parents[1] / "benchmarks").glob("*.md")]
+    assert len(pages) > 8
+    for page in pages:
+        last = page.read_text(encoding="utf-8").splitlines()[-1]
+        assert re.fullmatch(
+            r"Run on 20\d\d-\d\d-\d\d.*, (committed as|commit) ([0-9a-f]{7,}(-dirty)?|unknown)\.", last
+        ), page
+
+
+def test_a_draft_is_put_to_readings_that_it_has_not_seen(tmp_path):
+    job = make_jobs(8_840_000, {**dict.fromkeys(GROUPS, 0), "draft": 1}, ["springs"])[0]
+    record = run(job)
+    assert "error" not in record, record["error"]
+    assert ("same" in record) == ("gone" in record) == bool(record["drafted"])
+    draft = {"built": "springs", "group": "draft", "seed": 1, "drafted": ["missing"], "same": True, "gone": True}
+    text, cleared = built.report([draft, {**draft, "seed": 2, "drafted": []}], "x")
+    assert "| springs | draft: named though gone | 100.0 % (1 of 1)" in text and not cleared

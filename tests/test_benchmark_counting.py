@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.bars import holds_truth, mean, middle_of, named, share, wilson
+from benchmarks.bars import holds_truth, middle_of, named, share, wilson
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.stiffness.catalogue import known_effects
@@ -39,7 +39,7 @@ def test_wilson_intervals_solve_the_score_equation(of: int, part: float) -> None
 def test_nothing_counted_says_nothing() -> None:
     assert wilson(0, 0) == (0.0, 1.0)
     assert share("tilted", "of no cases", [], at_least=0.9).cleared is None
-    assert mean("tilted", "of no cases", [], 1.6).cleared is None
+    assert middle_of("tilted", "of no cases", [], 1.6).cleared is None
 
 
 def test_medians_intervals_cover_the_median() -> None:

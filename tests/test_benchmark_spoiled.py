@@ -18,7 +18,7 @@ from benchmarks.spoiled_cases import GROUPS, make_jobs, noise_remarks, suspects_
 def record(truth: dict[str, float], verdict: str, plausible: list[str], **more: Any) -> dict[str, Any]:
     effects = [{"effect": name, "size": size, "detectability": 9.0} for name, size in truth.items()]
     return {"group": "outliers", "layout": "tilted", "seed": 1, "hidden": "two", "slip": "", "outliers": 0.02,
-            "truth": list(truth), "effects": effects, "verdict": verdict, "plausible": plausible, "not_excluded": {},
+            "truth": list(truth), "effects": effects, "verdict": verdict, "plausible": plausible,
             "suspects": [], **more}  # fmt: skip
 
 

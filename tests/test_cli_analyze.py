@@ -102,17 +102,6 @@ def test_a_weak_plunge_is_below_the_required_stiffness(part, capsys):
     assert re.search(below, capsys.readouterr().out)
 
 
-def test_plunges_can_be_put_on_the_axes_of_the_pictures(part):
-    (part.parent / "down.nc").write_text("G1 Z-4 F100\nG1 X40\n")
-    pictures = []
-    for options in ([], ["--show-plunges"]):
-        assert main(["analyze", "down.nc", "--out", "o", *options]) == 0
-        pictures.append(
-            [(part.parent / "o" / name).read_bytes() for name in ("path.png", "profile.png", "report.html")]
-        )
-    assert all(one != other for one, other in zip(*pictures, strict=True))
-
-
 def test_compare_with_another_machine(part, capsys):
     (part.parent / "soft.toml").write_text(
         _nist().replace("bar_stiffness_N_per_m = inf", "bar_stiffness_N_per_m = 3e8")

@@ -88,7 +88,7 @@ def test_what_the_data_leave_open_is_planned(here, capsys):
 def test_what_nothing_explains_is_written_and_tried(here, capsys):
     rows, _ = case.make_case(7, layout="paper", hidden="weak_strut", size=0.1)
     (here / "data.csv").write_text(exercise.csv_text(rows), encoding="utf-8")
-    asked = Asked(("data.csv",), effects=(), noise=0.03)
+    asked = Asked(("data.csv",), effects=(), stated=("--noise", "3"))
     said = SimpleNamespace(
         verdict="unexplained", best=None, main=SimpleNamespace(question=""), portrait=None, remarks=()
     )
@@ -162,7 +162,7 @@ def test_an_update_never_proposes_the_name_of_its_own_input():
 
 def test_options_that_were_left_alone_are_left_out_and_the_rest_is_quoted():
     assert Asked(("a b.csv", "c.csv")).command("plan") == "tps plan 'a b.csv' c.csv"
-    full = Asked(("a.csv",), "m.toml", ("x.py", "y z.py"), (0.02, 0.015), 0.02)
+    full = Asked(("a.csv",), "m.toml", ("x.py", "y z.py"), stated=("--noise", "2,1.5", "--strut-spread", "2"))
     assert full.command("update", "--auto") == (
         "tps update a.csv --machine m.toml --auto --effects x.py --effects 'y z.py' --noise 2,1.5 --strut-spread 2"
     )

@@ -100,7 +100,7 @@ def test_dome_is_what_its_script_writes_and_lies_on_its_sphere():
     np.testing.assert_allclose(np.linalg.norm(out, axis=1), script["RADIUS"], atol=1e-3)
     axes = rotation_matrices(moves.end[posted, 3:])[:, :, 2]
     np.testing.assert_allclose(axes, out / script["RADIUS"], atol=1e-5)
-    seconds = move_durations(moves)[np.isin(moves.line, moves.line[posted])].sum()
+    seconds = move_durations(moves, move_lengths(moves))[np.isin(moves.line, moves.line[posted])].sum()
     lengths = sum(
         np.linalg.norm(np.subtract(script["cutter_location"](i)[0], script["cutter_location"](i - 1)[0]))
         for i in range(1, script["POINTS"] + 1)

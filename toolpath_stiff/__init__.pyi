@@ -45,7 +45,7 @@ from toolpath_stiff.comparison.walls import WallComparison as WallComparison
 from toolpath_stiff.correction.draft import EffectDraft as EffectDraft
 from toolpath_stiff.correction.result import Update as Update
 from toolpath_stiff.cutting.compensation import Compensation as Compensation
-from toolpath_stiff.diagnosis.result import Diagnosis as Diagnosis
+from toolpath_stiff.diagnosis.examination import Diagnosis as Diagnosis
 from toolpath_stiff.errors import EffectError as EffectError
 from toolpath_stiff.errors import EffectFault as EffectFault
 from toolpath_stiff.errors import InputError as InputError

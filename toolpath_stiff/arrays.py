@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+IntArray = NDArray[np.signedinteger[Any]]  # of any width
 BoolArray = NDArray[np.bool_]
 TextArray = NDArray[np.str_]
 AnyArray = NDArray[Any]
@@ -23,6 +23,12 @@ def product(left: FloatArray, right: FloatArray) -> FloatArray:
     for i in range(1, left.shape[-1]):
         total += left[..., :, i, None] * right[..., None, i, :]
     return np.asarray(total)
+
+
+def norms(vectors: FloatArray) -> FloatArray:
+    """(n,) lengths of vectors (n, 3), to the last bit as numpy's norm has them, which takes five times as long."""
+    x, y, z = vectors.T
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
 def numbered(counts: IntArray) -> tuple[IntArray, IntArray]:

@@ -51,18 +51,17 @@ class Asked:
         Name or file.
     effects
         Files with the user's own effects.
-    noise, strut_spread
-        Relative sd of one reading, or of repeat and clamping, None if not given; of the struts' stiffnesses.
     columns
         Which columns the files call otherwise, as --columns has it.
+    stated
+        What is stated of the noise, as words of the command line.
     """
 
     data: tuple[str, ...]
     machine: str = defaults.MACHINE
     effects: tuple[str, ...] = ()
-    noise: float | tuple[float, float] | None = None
-    strut_spread: float = defaults.STRUT_SPREAD
     columns: str | None = None
+    stated: tuple[str, ...] = ()
 
     def command(self, name: str, *further: str, machine: str | None = None, effects: Sequence[str] = ()) -> str:
         """`tps name` on the same data with the same options; `further` words of that command come after the machine.
@@ -75,14 +74,9 @@ class Asked:
             *self.data,
             *options(columns=self.columns, machine=chosen if chosen != defaults.MACHINE else None),
             *further,
-            *options(effects=[*self.effects, *effects], noise=self._noise()),
-            *options(strut_spread=percent(self.strut_spread) if self.strut_spread != defaults.STRUT_SPREAD else None),
+            *options(effects=[*self.effects, *effects]),
+            *self.stated,
         )
-
-    def _noise(self) -> str | None:
-        if self.noise is None:
-            return None
-        return ",".join(percent(part) for part in (self.noise if isinstance(self.noise, tuple) else (self.noise,)))
 
     @property
     def updated_machine(self) -> str:
@@ -96,8 +90,3 @@ class Asked:
         taken = {PurePath(file).name for file in self.effects}
         names = (f"{stem}{f'_{number}' if number > 1 else ''}{ending}" for number in count(1))
         return next(name for name in names if name not in taken)
-
-
-def percent(share: float) -> str:
-    """A share as the per cent that options take."""
-    return f"{100.0 * share:.10g}"

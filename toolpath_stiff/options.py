@@ -178,6 +178,8 @@ def parameter_texts(function: Callable[..., Any]) -> dict[str, str]:
 
 def finite_number(text: str) -> float:
     """A finite number in plain digits."""
+    if "," in text:
+        raise ValueError("numbers with decimal points, several with spaces between them: 0 0 900")
     number = number_in(text)
     if not math.isfinite(number):
         raise ValueError("finite numbers")

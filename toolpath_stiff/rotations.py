@@ -79,7 +79,9 @@ def along_tool_axis(vector: FloatArray, abc: FloatArray) -> FloatArray:
     """(n,) components of vectors (n, 3) along the tool axis, the platform's z, at roll, pitch, yaw (n, 3) rad."""
     if not abc[:, :2].any():  # upright
         return vector[:, 2]
-    return np.asarray(np.einsum("ni,ni->n", vector, rotation_matrices(abc)[:, :, 2]))
+    (ca, cb, cc), (sa, sb, sc) = np.cos(abc).T, np.sin(abc).T
+    x, y, z = vector.T
+    return np.asarray(x * (cc * sb * ca + sc * sa) + y * (sc * sb * ca - cc * sa) + z * (cb * ca))
 
 
 def rotation_about_z(angle: ArrayLike) -> FloatArray:

@@ -31,7 +31,7 @@ WIDTH, COLOURS = 1000, 255  # pixels and palette of a committed picture: below 1
 
 # Picture in pictures/ -> the tutorial, the file in its folder, and how much of it is shown, from the top.
 PICTURES = {
-    "1_variables.png": ("1_named_at_once.md", "ex1/compare/variables.png", 0.186),
+    "1_variables.png": ("1_named_at_once.md", "ex1/compare/variables.png", 1.0),
     "1_ladder.png": ("1_named_at_once.md", "ex1/diagnose/ladder.png", 1.0),
     "1_before_after.png": ("1_named_at_once.md", "ex1/update/before_after.png", 1.0),
     "2_ladder.png": ("2_after_a_plan.md", "ex2/first/ladder.png", 1.0),

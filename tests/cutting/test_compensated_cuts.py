@@ -148,7 +148,7 @@ def test_a_compensated_wall_stepped_through_time(ae, ap, up):
     middle, shifted = (int(np.argmin(np.abs(c.samples.position[:, 0]) + 9.0 * (c.ae == 0.0))) for c in (cut, written))
     shift = (written.samples.position[shifted, 1] - cut.samples.position[middle, 1]) * 1e3  # mm, into the block
     samples = cut.samples.take(np.array([middle]))
-    axes = station_axes(np.arctan2(samples.tangent[:, 1], samples.tangent[:, 0]), ORIGIN)
+    axes = station_axes(samples, ORIGIN)
     machine = tip_compliances(MODEL, samples, ORIGIN, axes, cut.mean_force[[middle]])
     compliance = with_tools(machine, samples, cut.cutters)[0] * 1e3
     coefficients = (*(given.coefficients.values[:3] / 1e6), *(given.coefficients.values[3:] / 1e3))
@@ -192,3 +192,13 @@ def test_what_the_shift_does_not_belong_to_stays_as_it_stands():
     program = tps.Program.from_text(f"{head}{COMPENSATED}M2\n", dialect="linuxcnc")
     alone = tps.compensate(program, cut=setup(10, 30), step_mm=STEP)
     assert not alone.changed and left[start + 4] == pytest.approx(alone.lines["size_before_um"][0], rel=1e-6)
+
+
+def test_the_wall_of_a_tilted_tool_is_left_alone_and_the_other_is_shifted():
+    tilted = "G0 Z60\nG0 A-30\nG0 X-50 Y0 Z30\nZ1\nG1 X50\nG0 Z60\n"
+    compensated = tps.compensate(
+        tps.Program.from_text(HEAD + wall(0.5, 4, True, 10) + tilted + "M2\n", name="part.nc"), cut=setup(10, 30)
+    )
+    assert tilted in compensated.rewritten.text and compensated.changed
+    reasons = dict(zip(compensated.lines["line"], compensated.lines["left_alone"], strict=True))
+    assert reasons.pop(14).endswith("a tool aslant") and not any(reasons.values())

@@ -184,7 +184,6 @@ MISSING = {
     "teeth and helix": ("flutes = 3\nhelix_deg = 30\n", "", "M3", "flutes, helix_deg not known"),
     "tool": ("number = 1", "number = 2", "M3", "[[tool]] with number = 1"),
     "spindle": ("", "", "M5", "wall.nc:5: a cut while the spindle stands"),
-    "upright tool": ("", "", "M3\nG0 A5", "wall.nc:6: tilted tools"),
     "surface speed": ("", "", "M3 G96", "constant surface speed"),
 }
 
@@ -197,12 +196,14 @@ def test_what_is_missing_is_named_with_where_to_write_it(tmp_path, name):
     assert words in str(error.value) and "\n" not in str(error.value)
 
 
-def test_rapids_through_material_and_tilted_cuts_are_warned_of(tmp_path):
+def test_rapids_through_material_and_turning_tools_are_warned_of(tmp_path):
     lines = ["G21 G90", "T1 M6 S6000 M3", "G0 X-10 Y24 Z20", "G0 Z-3", "G1 X110 F900", "G0 X50 Y10", "G1 X60 A3", "M30"]
     cut = cut_of(parse_program("\n".join(lines), "wall.nc"), tmp_path)
     assert any(text.startswith("lines 6: rapids run into material") for text in cut.warnings)
-    assert any(text.startswith("lines 7: the tool is tilted") for text in cut.warnings)
+    assert any(text.startswith("lines 7: the tool turns") for text in cut.warnings)
     assert not cut.mean_force[cut.samples.line == 7].any() and cut.mean_force[cut.samples.line == 5].any()
+    with pytest.raises(InputError, match=r"wall\.nc:5: the tool turns"):
+        cut_of(parse_program("\n".join([*lines[:4], "G1 X110 A3 F900"]), "wall.nc"), tmp_path)
 
 
 def test_chords_shorter_than_a_tooth_s_feed_have_the_direction_of_the_path(tmp_path):

@@ -69,7 +69,7 @@ def test_the_strip_between_two_passes_is_halfway_to_the_neighbours(corner, slope
         f"G0 X-20 Y{y} Z25\nG1 Z{-3 + 20 * slope}\nX40 Z{-3 - 40 * slope}\nG0 Z25\n" for y in (0.0, over, 2.0 * over)
     )
     milling = Milling(HEAD + passes + "M30\n", corner=corner, low=(-30, -30, -20), high=(60, 60, 0))
-    middle = of_line(milling, final_strip(*milling.context), 8)[5] * 1e3
+    middle = of_line(milling, final_strip(*milling.context, np.full(len(milling.samples), True)), 8)[5] * 1e3
     np.testing.assert_allclose(middle, strip, atol=0.45)
 
 

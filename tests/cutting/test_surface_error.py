@@ -12,9 +12,9 @@ from toolpath_stiff.cutting.engagement import engage
 from toolpath_stiff.cutting.final_surface import walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force
 from toolpath_stiff.cutting.patches import Contact, Patches, of_stations
-from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import box_stock
 from toolpath_stiff.cutting.surface_error import STRIPS, floor_error, shares, wall_error
+from toolpath_stiff.cutting.tip import axes_at
 from toolpath_stiff.cutting.workpiece import stages_of
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path.sampling import sample_moves
@@ -120,15 +120,17 @@ def test_an_inner_corner_of_a_program():
     samples = sample_moves(program.moves, 0.1e-3)
     cutter = Cutter(1, 0.010, 0.0, 3, np.radians(30.0))
     stock = box_stock((-0.040, -0.010, -0.010), (0.010, 0.040, 0.0), "")
-    engaged = engage(stages_of(stock, program.moves, {1: cutter}), program.moves, samples, {1: cutter})
-    walls = walls_of_passes(engaged.work, samples, {1: cutter})[1]
+    engaged = engage(
+        stages_of(stock, program.moves, {1: cutter}, np.full(len(program.moves), True)),
+        program.moves,
+        samples,
+        {1: cutter},
+    )
+    walls = walls_of_passes([engaged.work], np.zeros(len(samples), int), samples, {1: cutter})[1]
     values = np.array(ALUMINIUM) * [1e6, 1e6, 1e6, 1e3, 1e3, 1e3]
     known = Coefficients(values[:3], values[3:], np.zeros((6, 6)))
-    heading, count = headings(samples), len(samples)
-    turned = np.zeros((count, 3, 3))  # rows: the axes of the stations
-    turned[:, 0, 0] = turned[:, 1, 1] = np.cos(heading)
-    turned[:, 0, 1], turned[:, 1, 0], turned[:, 2, 2] = np.sin(heading), -np.sin(heading), 1.0
-    compliance = turned @ (SLIM / 1e3) @ turned.swapaxes(1, 2)
+    turned, count = axes_at(samples), len(samples)
+    compliance = turned.swapaxes(1, 2) @ (SLIM / 1e3) @ turned
     patches, feed = of_stations(engaged.patches, engaged.source), np.tile([[8e-5, 0.0]], (count, 1))
     error, _, _ = wall_error(Contact(patches, cutter, known, feed, np.ones(count)), compliance, walls)
     mean, spread = 1e6 * error[:, 1] @ shares()[1], 1e6 * np.ptp(error[:, 1], axis=1)
@@ -138,7 +140,7 @@ def test_an_inner_corner_of_a_program():
         if not -4.5 < past < 3.5:
             continue
         at_hand = (np.hypot(x - min(past, 0.0), y - max(past, 0.0)) < 0.06) & np.isfinite(mean)
-        at_hand &= (np.abs(heading) < 0.1) == (past < 0.0)
+        at_hand &= (turned[:, 0, 0] > 0.99) == (past < 0.0)
         if at_hand.any():
             compared += 1
             assert mean[at_hand].mean() == pytest.approx(left, rel=0.10, abs=0.5), past

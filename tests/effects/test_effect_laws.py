@@ -17,6 +17,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import parse_machine
 from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.active import ActiveEffect
+from toolpath_stiff.stiffness.catalogue import effects_of_elements
 from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.stiffness.model import build_model, load_path
 
@@ -171,8 +172,9 @@ def test_choices_are_never_fitted():
 def test_the_catalogue_page_lists_every_effect_parameter_and_bound():
     page = (Path(__file__).parents[2] / "docs" / "effects_catalogue.md").read_text("utf-8")
     rows = {line.split("`")[1]: line for line in page.splitlines() if line.startswith("| [`")}
-    assert set(rows) == set(CATALOGUE)
-    for name, effect in all_effects().items():
+    every = {**all_effects(), **effects_of_elements()}
+    assert set(rows) == set(every)
+    for name, effect in every.items():
         assert rows[name].split(" | ")[1] == effect.link
         for p in effect.parameters:
             low, high = (f"{bound:g}".replace("e+0", "e") for bound in p.bounds)

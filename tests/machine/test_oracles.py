@@ -1,4 +1,4 @@
-"""Compliance of serial machines as pinocchio, MuJoCo and OpenSees have it; a thousand poses: `benchmarks.oracles`."""
+"""Compliance of serial machines as pinocchio, MuJoCo and OpenSees have it."""
 
 from __future__ import annotations
 
@@ -16,4 +16,4 @@ SERIAL = ("robot200", "mill5", "mill3", "head", "table", "rail", "offset wrist")
 def test_compliance_is_that_of_another_program(oracle: str, name: str) -> None:
     pytest.importorskip(oracle)
     machine = soft(KINDS[name])
-    assert apart(oracle, machine, drawn(machine, np.random.default_rng(1), 3)) < 1e-10
+    assert apart(oracle, machine, drawn(machine, np.random.default_rng(1), 10)) < 1e-10

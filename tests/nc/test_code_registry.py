@@ -58,7 +58,6 @@ def test_the_controls_of_a_row_are_those_of_the_dialects():
     assert set(EVERYWHERE) == {dialect.name for dialect in dialects}
     for name in ADDITIONAL_OFFSETS:
         assert set(CODES[name].controls) == {d.name for d in DIALECTS.values() if name in d.additional}
-    assert set(CODES["M97"].controls) == {d.name for d in DIALECTS.values() if d.local_calls}
     for name, more in (("G70", {"generic"}), ("G71", {"generic"}), ("G234", set())):
         assert set(CODES[name].controls) == {d.name for d in DIALECTS.values() if name in d.aliases} | more
     assert set(CODES["G43.4"].controls) == {d.name for d in dialects if "G234" not in d.aliases}

@@ -107,7 +107,7 @@ def test_g70_and_g71():
     assert ends_mm("G70 G1 F1. X1.", FANUC) == [[25.4, 0, 0]]
     assert ends_mm("N20 G70 G91.1\nG1 F1. X1.", PLAIN) == [[25.4, 0, 0]]  # Mach3's posts
     for controller, text, words in (
-        (PLAIN, "G71 P5", "on some controls"), (LINUXCNC, "G71", "lathe"), (HAAS, "G71", "pattern of holes"),
+        (PLAIN, "G71 P5", "on some controls"), (LINUXCNC, "G71", "dialect linuxcnc"), (HAAS, "G71", "dialect haas"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=words):
             moves_of(f"{text}\nG1 F1. X1.", controller)

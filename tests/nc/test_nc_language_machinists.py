@@ -109,8 +109,8 @@ def test_m97_calls_a_block_by_its_number():
 @pytest.mark.parametrize(
     ("text", "dialect", "message"),
     [
-        (LOCAL, "generic", r"2:1: M97 is Haas' call.*--dialect haas"),
-        (LOCAL, "linuxcnc", "M97 is Haas' call"),
+        (LOCAL, "generic", r"2:1: M97 is not a code .* haas. There it is call by line number.*--dialect"),
+        (LOCAL, "linuxcnc", "M97 is not a code of the dialect linuxcnc"),
         (LOCAL.replace("P100", "P300"), "haas", "no block has"),
         (LOCAL.replace("N200", "N100"), "haas", "lines 5, 8"),
         (LOCAL.replace("P200", "P100"), "haas", "more than 10 subprograms within each other, N100"),

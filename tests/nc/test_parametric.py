@@ -280,7 +280,7 @@ def test_return_to_a_block_of_the_caller():
         ("#3000=1 (NO TOOL)\n", FANUC, 1, "alarm 1"),
         ("G1 F9 X#5161\n", LINUXCNC, 1, "#5161 is a parameter of the control"),
         ("G1 F9 X#<nothing>\n", LINUXCNC, 1, "#<nothing> is read before it is set"),
-        ("G65 P1\n", LINUXCNC, 1, "macro call of Fanuc's and Haas' controls"),
+        ("G65 P1\n", LINUXCNC, 1, "not a code of the dialect linuxcnc"),
         ("G1 F9 X[1/0]\n", LINUXCNC, 1, "division by zero"),
         ("G1 F9 X[SQRT[-1]]\n", LINUXCNC, 1, "SQRT cannot be worked out"),
         ("G1 F9 X[TAN[90]]\n", LINUXCNC, 1, "the angle is 90 degrees"),

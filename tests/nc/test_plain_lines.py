@@ -12,6 +12,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc import frames, geometry, plain_lines, plain_words
 from toolpath_stiff.nc.checking import check
 from toolpath_stiff.nc.codes import feeds, increments
+from toolpath_stiff.nc.codes.code import EVERYWHERE
 from toolpath_stiff.nc.controller import DIALECTS, Controller
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.program_run import ProgramRun
@@ -65,7 +66,7 @@ def assert_same(lines, dialect="generic"):
 
 
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda path: path.name)
-@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("dialect", EVERYWHERE)
 def test_programs(program, dialect):
     lines = read_lines(program)[: 8000 if dialect == "generic" else 2000]  # longer runs: across chunks, below
     assert assert_same(lines, dialect) > 0 or not DIALECTS[dialect].semicolon  # whose blocks end at `;`
@@ -138,7 +139,7 @@ modal = st.sampled_from(
 @settings(max_examples=60, deadline=None)
 @given(
     st.lists(st.one_of(plain(), plain(), plain(), arc(), modal), min_size=1, max_size=30),
-    st.sampled_from(sorted(DIALECTS)),
+    st.sampled_from(sorted(EVERYWHERE)),
 )
 @example(["G1X1F1", "X10.", "Y2"], "generic")
 @example(["G93", "G1 X1 F2", "X2"], "generic")

@@ -127,7 +127,7 @@ REFUSALS = {
     "CYCLE84(10,0,2,-5)": "without a pitch",
     "CYCLE81(10,0,2,-5,,0,10)": "from a diameter",
     "HOLES2(0,0,10,0,0,3)": "without a cycle",
-    "G4": "without its time",
+    "G4": "needs its time",
     "X1 Q5": "not used by any code",
 }  # fmt: skip
 

@@ -158,7 +158,7 @@ def test_turn_about_z_turns_path_and_tool_axis_but_a_vertical_platform_never_yaw
         [{"end": [0.1, 0, 0]}, {"end": [0.1, 0.1, 0, 0.2, -0.1]}, {"start": [0.1, 0.1, 0], "end": [0.1, 0.2, 0]}]
     )
     plain = sample_moves(moves, step=0.05)
-    turned = sample_moves(place(moves, origin), step=0.05, origin=origin)
+    turned = sample_moves(moves, step=0.05, origin=origin)
     about_z = rotation_about_z(turn)
     np.testing.assert_allclose(turned.position, plain.position @ about_z.T + shift, atol=ROUNDING)
     np.testing.assert_allclose(turned.tangent, plain.tangent @ about_z.T, atol=ROUNDING)
@@ -171,7 +171,7 @@ def test_turn_about_z_turns_path_and_tool_axis_but_a_vertical_platform_never_yaw
 def test_tilted_set_up_tilts_path_and_tool_axis():
     origin = (0.0, 0.0, 0.8, 0.0, np.deg2rad(10), np.deg2rad(90))
     moves = make_moves([{"end": [0.1, 0, 0]}])
-    samples = sample_moves(place(moves, origin), step=0.1, origin=origin)
+    samples = sample_moves(moves, step=0.1, origin=origin)
     # x of the set-up: down by 10 degrees about y, then turned to y.
     expected = [0.0, 0.1 * np.cos(np.deg2rad(10)), 0.8 - 0.1 * np.sin(np.deg2rad(10))]
     np.testing.assert_allclose(samples.position[-1], expected, atol=ROUNDING)
@@ -200,7 +200,7 @@ def test_a_rigid_turn_keeps_lengths_times_and_weights(shift, turn, points):
         ]
     )
     origin = (*shift, *turn)
-    plain, turned = sample_moves(moves, 0.05), sample_moves(place(moves, origin), 0.05, origin=origin)
+    plain, turned = sample_moves(moves, 0.05), sample_moves(moves, 0.05, origin=origin)
     # A length next to a whole number of steps may gain or lose one by rounding; the totals may not.
     assert turned.weight.sum() == pytest.approx(plain.weight.sum(), rel=1e-12)
     assert turned.s[-1] == pytest.approx(plain.s[-1], rel=1e-12)
@@ -222,7 +222,7 @@ def test_where_a_plunge_becomes_a_cut_the_cut_has_a_sample(move, borders, origin
     if "center" in move:
         move.setdefault("sweep", np.pi / 2)
     moves = make_moves([move])
-    samples = sample_moves(place(moves, origin), 1e-3, origin=origin)
+    samples = sample_moves(moves, 1e-3, origin=origin)
     axis = rotation_matrices(samples.abc)[:, :, 2]
     lean = np.degrees(np.arccos(np.clip(np.abs(np.sum(axis * samples.tangent, axis=1)), 0.0, 1.0)))
     assert np.count_nonzero((lean > 5.0) & (lean < 5.0 + 1e-8)) == borders

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.browser import needs_browser, opened, painted
+from tests.browser import needs_browser, opened, painted, viridis
 from tests.placement.test_placement_search import headline_figures
 from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
@@ -157,5 +157,5 @@ def test_both_placements_and_the_profile_are_painted(tilted, tmp_path):
     """What the canvases show: the classes' colours in both drawings, the curve's in the profile."""
     found = painted((tilted[0] / "report.html").read_text(encoding="utf-8"), tmp_path)
     for name in ("chosen", "before"):
-        assert len(found[name].keys() & {*tilted[1]["colours"], *tilted[1]["colours_dark"]}) > 3
+        assert len(found[name].keys() & {*viridis(0.0, 0.93), *viridis(0.22, 1.0)}) > 3
     assert found["profile"]

@@ -274,19 +274,6 @@ def test_a_long_path_is_climbed_on_what_decides(monkeypatch):
     assert (long.best_figures.objectives >= long.present.objectives).all()
 
 
-def test_a_search_asks_no_compiled_kernel(monkeypatch):
-    """It amplifies the last digit: with and without numba it has to be the same kernel."""
-    from toolpath_stiff.stiffness import core
-
-    def never(*_, **__):
-        raise AssertionError("compiled")
-
-    monkeypatch.setattr(core, "compiled_columns", never)
-    monkeypatch.setattr("toolpath_stiff.stiffness.core.COMPILED_FROM", 200)
-    here = np.array(PRESENT)
-    searched(program_of("inch_bracket"), Bounds(here, here + 0.1 * np.eye(6)[2]))
-
-
 def test_a_climb_ends_no_lower_than_nelder_mead():
     """An independent way up, scipy's simplex search from the same place: each may end on another kink, within 1 %."""
     from scipy.optimize import minimize

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.text import Text
 
 import toolpath_stiff as tps
-from tests.browser import needs_browser, painted
+from tests.browser import needs_browser, painted, viridis
 from tests.report.factory import short
 from tests.stiffness.cases import nist
 from tests.updating.cases import VERDICTS, diagnosed
@@ -24,7 +24,6 @@ from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.report import folder
 from toolpath_stiff.report.analysis import page
 from toolpath_stiff.report.batch.index import batch_page
-from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.diagnose import page as diagnose_html
 from toolpath_stiff.report.map import page as map_page
 from toolpath_stiff.report.pages import asset
@@ -172,7 +171,7 @@ def test_all_pages_have_one_style_sheet_with_a_dark_half(mapped):
         assert "Content-Security-Policy" in text, name
         # Every colour that a rule names is declared.
         used, declared = set(re.findall(r"var\((--[a-z-]+)", text)), set(re.findall(r"(--[a-z-]+):", text))
-        assert used <= declared | {"--natural", "--digits"}, name
+        assert used <= declared | {"--natural", "--digits", "--scale"}, name
 
 
 @needs_browser
@@ -181,7 +180,7 @@ def test_surfaces_of_a_map_stand_above_their_planes(tmp_path):
     one = map_stiffness(build_model(nist()), (-0.1, 0.1), (-0.1, 0.1), [0.8], parse_load("radial"), 9)
     front = "document.querySelector('[data-view=front]').click()"
     rows = painted("".join(map_page(one, {})), tmp_path, front)["view"]
-    ramp = [rows[colour] for colour in page_colours()["colours"] if colour in rows]  # softest first
+    ramp = [rows[colour] for colour in viridis(0.0, 0.93) if colour in rows]  # softest first
     assert len(ramp) > 5
     assert ramp[-1] < ramp[0] - 50
 

@@ -248,37 +248,11 @@ def test_a_browser_draws_the_page_without_complaint(make, tmp_path):
     assert "plunges 1" in done.stdout or make is not spiral  # the legend is filled by the script
 
 
-def test_the_page_knows_which_samples_are_set_aside_and_both_scales(analysis, parsed):
+def test_the_page_knows_which_samples_are_set_aside_and_the_scale(analysis, parsed):
     data = parsed.data
     assert np.array_equal((column(data["kind"], "u1") & PLUNGE) > 0, analysis.set_aside) and analysis.set_aside.any()
-    headline, every = (analysis.at.stiffness[rows] / 1e3 for rows in (analysis.headline, analysis.counted))
+    headline = analysis.at.stiffness[analysis.headline] / 1e3
     assert data["scale"]["ends"] == pytest.approx([headline.min(), headline.max()])
-    assert data["scale_with_plunges"]["ends"] == pytest.approx([every.min(), every.max()])
-    assert Page(render(short())).data["scale_with_plunges"] is None
-    (switch,) = [attrs for _, attrs in parsed.elements if attrs.get("id") == "plunges"]
-    assert "checked" not in switch
-    shown = "".join(page(analysis, {}, show_plunges=True))
-    (switch,) = [attrs for _, attrs in Page(shown).elements if attrs.get("id") == "plunges"]
-    assert "checked" in switch
-
-
-@needs_browser
-def test_the_switch_puts_the_plunges_on_the_scale(tmp_path):
-    analysis = spiral()
-    legends = []
-    for click in ("", "document.getElementById('plunges').click()"):
-        done = run_in(render(analysis), click, tmp_path)
-        assert "CONSOLE" not in done.stderr
-        dom = Page(done.stdout)
-        legends.append(
-            next(
-                text
-                for (_, attrs), text in zip(dom.elements, dom.texts, strict=True)
-                if attrs.get("id") == "legend-high"
-            )
-        )
-    ends = [float(analysis.at.stiffness[rows].max()) / 1e3 for rows in (analysis.headline, analysis.counted)]
-    assert [float(re.sub(r"\D", "", legend)) for legend in legends] == pytest.approx(ends, abs=0.5)
 
 
 @needs_browser

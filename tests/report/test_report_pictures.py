@@ -15,7 +15,7 @@ from matplotlib.image import imread
 
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.report.colours import CLASSES, SLATE
-from toolpath_stiff.report.curves import extremes_by_column, scale_limits
+from toolpath_stiff.report.curves import extremes_by_column, profile_curve, scale_limits
 from toolpath_stiff.report.pictures import path as path_module
 from toolpath_stiff.report.pictures.files import picture_file
 from toolpath_stiff.report.pictures.path import UNREACHABLE, path, segment_classes
@@ -138,31 +138,19 @@ def test_few_far_out_values_do_not_take_the_contrast_but_ordinary_ends_stay_on_t
     assert (low, high) == (ordinary.min(), ordinary.max())
 
 
-def test_plunges_are_on_the_scale_when_asked_for(analysis):
-    stiffness = analysis.at.stiffness[analysis.counted] / 1e3
-    assert scale_limits(analysis, show_plunges=True) == (stiffness.min(), stiffness.max())
-
-
-def test_plunges_are_grey_unless_asked_for(analysis):
+def test_plunges_are_grey(analysis):
     slate = tuple(int(SLATE[i : i + 2], 16) for i in (1, 3, 5))
-    hidden, shown = (count_colour(path_picture(analysis, show_plunges=show), slate) for show in (False, True))
-    assert hidden > 20 > shown
-    for show in (False, True):
-        lines = {line.get_label(): line.get_color() for line in profile(analysis, show_plunges=show).axes[0].lines}
-        assert lines.get("plunges") == (None if show else SLATE)
+    assert count_colour(path_picture(analysis), slate) > 20
+    lines = {line.get_label(): line.get_color() for line in profile(analysis).axes[0].lines}
+    assert lines["plunges"] == SLATE
 
 
 def test_the_axis_of_the_profile_is_that_of_the_headline(analysis):
-    (low, high), (_, all_high) = (axis_of(analysis, show) for show in (False, True))
-    headline, plunges = (analysis.at.stiffness[rows] / 1e3 for rows in (analysis.headline, analysis.set_aside))
-    assert low <= headline.min() and headline.max() <= high < plunges.min() < all_high
-
-
-def axis_of(analysis, show_plunges):
-    """Ends of the axis of stiffness that the profile gets."""
     axes = new_figure(5.0, 3.0).add_subplot()
-    _set_limits(axes, analysis, None, show_plunges)
-    return axes.get_ylim()
+    _set_limits(axes, analysis, [profile_curve(analysis)[1]])
+    low, high = axes.get_ylim()
+    headline, plunges = (analysis.at.stiffness[rows] / 1e3 for rows in (analysis.headline, analysis.set_aside))
+    assert low <= headline.min() and headline.max() <= high < plunges.min()
 
 
 def test_classes_cover_the_scale_in_order():

@@ -9,13 +9,13 @@ import pytest
 
 from tests.conftest import seeds
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.rig.case import clamp_of, draw_case, effects_of_layout, make_case, rows_of
+from toolpath_stiff.rig.case import clamp_of, draw_case, hideable, make_case, rows_of
 from toolpath_stiff.rig.effects import CATALOGUE
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import Nuisances, disturb_readings
 from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
+from toolpath_stiff.rig.oddities import ODDITIES
 from toolpath_stiff.rig.sizes import whitened_length
 
 NIST = load_nominal("nist")
@@ -59,7 +59,7 @@ def test_tilted_poses_are_within_the_machines_limits(seed):
     assert reachable(NIST, rows.position, rows.angles, rows.extension).all()
 
 
-@pytest.mark.parametrize("name", [*CATALOGUE, *ODDITIES, *ODDITIES_IN_TIME])
+@pytest.mark.parametrize("name", [*CATALOGUE, *ODDITIES])
 def test_every_effect_shows_at_the_size_asked_for(name):
     """A change of 5 % rms, or less where the effect's bound is nearer; the data do change."""
     rows, truth = make_case(2, "tilted", name, size=0.05, noise=Nuisances.none())
@@ -95,7 +95,7 @@ def test_two_effects_and_blind_draws():
 
 
 def test_the_paper_layout_hides_nothing_that_its_columns_cannot_show():
-    assert "thermal_drift" not in effects_of_layout("paper")
+    assert "thermal_drift" not in hideable(make_case(1, "paper", "none")[0], fem=False)[0]
     with pytest.raises(InputError, match="time_min"):
         make_case(1, "paper", "thermal_drift")
 

@@ -21,6 +21,7 @@ from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.fem_path import pulled, reference_rows
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.kinematics import rotations
+from toolpath_stiff.rig.loops import displacements
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.sizes import Scale
 
@@ -207,15 +208,15 @@ def test_the_weight_closes_a_play_until_the_load_opens_it():
 def test_indicators_beside_the_tip_add_up():
     machine = dataclasses.replace(SOUND, joint=3e-9, riser=1e-9, bearings=np.full(3, 1e-9))
     loops = ["tip", "spindle", "platform", "table", "strut 2", "joint 2", "frame 1"]
-    read = {loop: fem.displacements(NIST, machine, COMPLETE, [loop] * 72, np.full(72, np.nan)) for loop in loops}
+    read = {loop: displacements(NIST, machine, COMPLETE, [loop] * 72, np.full(72, np.nan)) for loop in loops}
     assert read["tip"] == pytest.approx(1.0 / machine.stiffness(NIST, COMPLETE), rel=1e-12)
     assert read["spindle"] + read["platform"] == pytest.approx(read["tip"], rel=1e-12)
     stiff = dataclasses.replace(machine, riser=0.0)
-    rest = fem.displacements(NIST, stiff, COMPLETE, ["table"] * 72, np.full(72, np.nan))
+    rest = displacements(NIST, stiff, COMPLETE, ["table"] * 72, np.full(72, np.nan))
     riser = np.tile([1e-9, 1e-9, 0.0], 24)
     assert read["table"] - rest == pytest.approx(riser, rel=1e-9, abs=1e-18)
     assert read["tip"] - 1.0 / stiff.stiffness(NIST, COMPLETE) == pytest.approx(riser, rel=1e-6, abs=1e-15)
-    alone = fem.displacements(NIST, machine, COMPLETE, ["strut 2 alone"] * 72, np.full(72, 2.5616))
+    alone = displacements(NIST, machine, COMPLETE, ["strut 2 alone"] * 72, np.full(72, 2.5616))
     assert alone == pytest.approx(1.0 / 46.5e6, rel=1e-9)
     assert 0.0 < np.abs(read["joint 2"]).min() < np.abs(read["strut 2"]).min()
     assert np.all(np.abs(read["frame 1"]) < 1e-9)

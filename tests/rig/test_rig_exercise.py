@@ -48,7 +48,7 @@ def test_the_sealed_truth_is_no_text_and_its_size_tells_nothing(blind, tmp_path)
     assert not any(name.encode() in body for name in (*CATALOGUE, *OUTSIDE))
     counts = np.bincount(np.frombuffer(body, dtype=np.uint8), minlength=256)
     assert counts.max() < 4 * counts.mean()  # padding and JSON would pile up on a few bytes
-    for hidden in ("none", "two", "screw_pitch_error"):
+    for hidden in ("none", "two", "screw_lead"):
         folder = tmp_path / hidden
         assert main(["rig", "new", "--seed", "9", "--layout", "paper", "--out", str(folder), "--hidden", hidden]) == 0
         assert len((folder / "sealed.bin").read_bytes()) == len(sealed)

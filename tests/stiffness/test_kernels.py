@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
-import sys
 import tracemalloc
-from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,8 +16,6 @@ from toolpath_stiff.stiffness import closed_form, core
 from toolpath_stiff.stiffness.model import build_model
 
 NIST = load_machine("nist")
-needs_numba = pytest.mark.skipif(find_spec("numba") is None, reason="numba is not installed (extra: fast)")
-ROUTES = ["closed_form", pytest.param("compiled", marks=needs_numba)]
 
 
 def poses(n: int, seed: int = 0, tilt: float = 0.35):
@@ -44,12 +36,11 @@ def by_equilibrium(machine: Hexapod, position, rotation) -> np.ndarray:
     return np.swapaxes(force, 1, 2) @ (force / k[..., None])
 
 
-def along(route, kernel, position, direction, rotation):
-    """`compliance_along` of a route with poses first: compliance, determinant, lengths (n, 6), good."""
+def along(kernel, position, direction, rotation):
+    """`compliance_along_columns` with poses first: compliance, determinant, lengths (n, 6), good."""
     columns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
     p, d = np.ascontiguousarray(position.T), np.ascontiguousarray(direction.T)
-    kernels = {"closed_form": closed_form.compliance_along_columns, "compiled": core.compiled_columns}
-    compliance, determinant, lengths, good = kernels[route](kernel, p, d, columns)
+    compliance, determinant, lengths, good = closed_form.compliance_along_columns(kernel, p, d, columns)
     return compliance, determinant, lengths.T, good
 
 
@@ -58,7 +49,7 @@ def tensors(machine: Hexapod, position, rotation, tool_length: float = np.nan):
     kernel, (x, y, z), compliance, good = closed_form.prepare(machine, tool_length), np.eye(3), {}, True
     for name, direction in (("xx", x), ("yy", y), ("zz", z), ("xy", x + y), ("xz", x + z), ("yz", y + z)):
         there = np.broadcast_to(direction, (len(position), 3))
-        compliance[name], _, _, sure = along("closed_form", kernel, position, there, rotation)
+        compliance[name], _, _, sure = along(kernel, position, there, rotation)
         good = good & sure
     tensor = np.empty((len(position), 3, 3))
     for i, a in enumerate("xyz"):
@@ -184,13 +175,12 @@ def unit_vectors(n: int) -> np.ndarray:
     return direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
-@pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize("tilted", [False, True])
-def test_compliance_along_with_lengths_and_determinant(route, tilted):
+def test_compliance_along_with_lengths_and_determinant(tilted):
     n = closed_form.BLOCK + 100  # a whole block and a part of one
     position, rotation = poses(n, seed=9)
     direction, turn = unit_vectors(n), rotation if tilted else None
-    found, determinant, lengths, good = along(route, closed_form.prepare(NIST), position, direction, turn)
+    found, determinant, lengths, good = along(closed_form.prepare(NIST), position, direction, turn)
     tensor = core.tip_compliance(build_model(NIST), position, turn)
     np.testing.assert_allclose(found, np.einsum("ni,nij,nj->n", direction, tensor, direction), rtol=1e-12)
     struts = solve_struts(NIST, position, turn)
@@ -200,15 +190,14 @@ def test_compliance_along_with_lengths_and_determinant(route, tilted):
     assert good.all()
 
 
-@pytest.mark.parametrize("route", ROUTES)
-def test_compliance_along_of_random_machines_is_right_wherever_it_is_called_good(route):
+def test_compliance_along_of_random_machines_is_right_wherever_it_is_called_good():
     rng = np.random.default_rng(12)
     doubtful = 0
     for _ in range(60):
         machine = random_machine(rng)
         position = rng.uniform(-0.3, 0.3, (200, 3))
         rotation, direction = rotation_matrices(rng.uniform(-0.6, 0.6, (200, 3))), unit_vectors(200)
-        found, _, _, good = along(route, closed_form.prepare(machine), position, direction, rotation)
+        found, _, _, good = along(closed_form.prepare(machine), position, direction, rotation)
         tensor = by_equilibrium(machine, position, rotation)
         expected = np.einsum("ni,nij,nj->n", direction, tensor, direction)
         # An error in the forces is an error relative to the tensor's size, of which a direction may see little.
@@ -234,31 +223,17 @@ def test_check_values():
     np.testing.assert_allclose(stiffness, expected, rtol=0, atol=0.51)  # half of the last digit printed
 
 
-@pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize("tilted", [False, True])
-def test_only_the_doubtful_poses_are_given_up(route, tilted):
+def test_only_the_doubtful_poses_are_given_up(tilted):
     position, rotation = poses(500, seed=4)
     turn = rotation if tilted else None
     position[7] = [0.0, 0.0, -3.0]  # struts of some 6 m; the law ends at 4.7 m
     position[11] = np.nan
     expected = ~np.isin(np.arange(500), [7, 11])
     kernel, direction = closed_form.prepare(NIST), unit_vectors(500)
-    np.testing.assert_array_equal(along(route, kernel, position, direction, turn)[3], expected)
+    np.testing.assert_array_equal(along(kernel, position, direction, turn)[3], expected)
     some, turn = (position[expected], direction[expected]), None if turn is None else turn[expected]
-    assert along(route, closed_form.prepare(NIST, 0.6), *some, turn)[3].all()
-
-
-@needs_numba
-@pytest.mark.skipif(os.name != "posix", reason="numba's cache folder is found otherwise")
-def test_compiled_loops_load_where_nothing_can_be_written(tmp_path):
-    shutil.copy(Path(core.__file__).with_name("compiled_loops.py"), tmp_path)
-    (tmp_path / "__pycache__").write_text("a file where numba wants a folder")
-    (tmp_path / "home").write_text("likewise")
-    hidden = ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")
-    environment = {name: value for name, value in os.environ.items() if name not in hidden}
-    package = str(Path(closed_form.__file__).parents[2])
-    environment |= {"HOME": str(tmp_path / "home"), "PYTHONPATH": os.pathsep.join([str(tmp_path), package])}
-    subprocess.run([sys.executable, "-c", "import compiled_loops"], env=environment, cwd=tmp_path, check=True)
+    assert along(closed_form.prepare(NIST, 0.6), *some, turn)[3].all()
 
 
 def test_tools_of_several_lengths():
@@ -284,12 +259,10 @@ def test_a_strut_law_beyond_zero_is_refused():
         core.tip_compliance(build_model(NIST), np.array([[0.0, 0.0, -3.0]]))  # struts of 6 m; the law ends at 4.7 m
 
 
-def test_routes_are_chosen_by_number_and_physics():
+def test_the_closed_form_is_for_struts_on_a_rigid_platform():
     plain, soft = build_model(NIST), build_model(NIST.with_changes(platform_bar_stiffness=1e9))
-    assert core.choose_route(plain, 10) == "exact"
-    assert core.choose_route(plain, 10_000) == "closed_form"
-    assert core.choose_route(plain, 10_000_000) in ("compiled", "closed_form")
-    assert core.choose_route(soft, 10_000_000) == "exact"
+    assert core.is_closed_form(plain)
+    assert not core.is_closed_form(soft)
 
 
 def test_memory_does_not_grow_with_the_poses():
@@ -308,9 +281,8 @@ def test_memory_does_not_grow_with_the_poses():
     assert large < 1.2 * small + 2 * 36 * closed_form.BLOCK  # and what says where it may be trusted
 
 
-@pytest.mark.parametrize("route", ROUTES)
-def test_no_poses(route):
+def test_no_poses():
     empty, turns = np.empty((0, 3)), np.empty((0, 3, 3))
     for turn in (None, turns):
         assert core.tip_compliance(build_model(NIST), empty, turn).shape == (0, 3, 3)
-        assert [len(a) for a in along(route, closed_form.prepare(NIST), empty, empty, turn)] == [0, 0, 0, 0]
+        assert [len(a) for a in along(closed_form.prepare(NIST), empty, empty, turn)] == [0, 0, 0, 0]

@@ -254,7 +254,7 @@ def test_a_case_from_elsewhere_runs_nothing_until_this_user_agrees(from_elsewher
     try:
         state = studio.idle()
         assert marker.exists() and "my_screw" in [one["name"] for one in state["effects"]]
-        assert [one["file"] for one in state["own_effects"]] == ["effects/my_screw.py"] and state["program"]["path"]
+        assert "my_screw" in [one["name"] for one in state["effects"]] and state["program"]["path"]
     finally:
         studio.end()
     Running(folder).end()  # from now on
@@ -278,34 +278,30 @@ def test_a_broken_effect_is_told_with_its_line(running):
     assert running.state()["history"][-1]["kind"] != "effects"
 
 
-def test_own_effects_are_edited_beside_the_page(running, browser, tmp_path):
+def test_an_own_effect_that_is_dropped_again_is_replaced(running, browser, tmp_path):
     text = tps.effect_template("my_screw").text
-    (tmp_path / "my_screw.py").write_text(text)
+    title = re.search(r'title = "([^"]*)"', text)[1]
     tab = Tab(browser, running.address)
     page = tab.page
     page.wait_for_selector("#sw-table_compliance", state="attached")
-    page.set_input_files("#file", tmp_path / "my_screw.py")
-    page.wait_for_selector("#ask[open]")
-    page.click("#yes")
-    page.wait_for_selector("#sw-my_screw")
-    page.click("#own-edit-0")
-    page.wait_for_selector("#own-0")
-    # In the page: a fault is told with its line, and the effect stays as it was.
-    page.fill("#own-0", text.replace("link =", "link = = ", 1))
-    page.click("#own-save-0")
-    page.wait_for_selector("#own-fault-0")
-    line = 1 + text[: text.index("link =")].count("\n")
-    assert f"{line}" in tab.text("#own-fault-0")
-    assert running.state()["own_effects"][0]["file"] == "effects/my_screw.py"
-    title = re.search(r'title = "([^"]*)"', text)[1]
-    page.fill("#own-0", text.replace(title, "the screws of the shop give way"))
-    page.click("#own-save-0")
-    tab.until("document.querySelector('label[for=sw-my_screw]').textContent.includes('screws of the shop')")
-    assert page.locator("#own-fault-0").count() == 0
+    label = "document.querySelector('label[for=sw-my_screw]')"
+    versions = (
+        (text, f"{label}?.textContent.includes({json.dumps(title)})"),
+        (text.replace("link =", "link = = ", 1), "document.querySelector('#message').textContent.includes('syntax')"),
+        (text.replace(title, "the screws of the shop give way"), f"{label}.textContent.includes('screws of the shop')"),
+    )
+    for folder, (written, seen) in enumerate(versions):
+        file = tmp_path / f"{folder}" / "my_screw.py"
+        file.parent.mkdir()
+        file.write_text(written)
+        page.set_input_files("#file", file)
+        page.wait_for_selector("#ask[open]")
+        page.click("#yes")
+        tab.until(seen)
     assert tps.Case.open(running.folder).state.effects == ("effects/my_screw-2.py",)
     # Undone, the first one is back, and gone.
     page.click("#undo")
-    tab.until(f"document.querySelector('label[for=sw-my_screw]').textContent.includes({json.dumps(title)})")
+    tab.until(f"{label}.textContent.includes({json.dumps(title)})")
     page.click("#undo")
     tab.until("document.querySelector('#sw-my_screw') === null")
     assert tab.faults == []

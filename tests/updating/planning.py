@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from tests.effects.cases import neutral_values
 from tests.stiffness.cases import nist
-from toolpath_stiff.inference.candidates import Component
+from toolpath_stiff.inference.candidates import Candidate, Component
 from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.planning.forecasts import Rival
@@ -51,14 +51,15 @@ def table_1_design() -> Readings:
 
 def active(name: str, sizes: FloatArray | list[float]) -> ActiveEffect:
     """An effect with these sizes from neutral."""
+    return candidate(name).active(sizes)
+
+
+def candidate(name: str) -> Candidate:
+    """An effect with what it acts on."""
     effect = find_effect(name)
-    values = neutral_values(effect) | CHOICES.get(name, {})
-    if name == "frame_compliance":
-        values["vertex"] = 0
-    components = [Component.of(p) for p in effect.parameters if not p.discrete]
-    for component, size in zip(components, sizes, strict=True):
-        values[component.parameter.name] = component.value(float(size))
-    return ActiveEffect(effect, values)
+    values = neutral_values(effect) | CHOICES.get(name, {}) | ({"vertex": 0} if name == "frame_compliance" else {})
+    choice = tuple((p.name, values[p.name]) for p in effect.parameters if p.discrete)
+    return Candidate(effect, choice, tuple(Component.of(p) for p in effect.parameters if not p.discrete))
 
 
 def rival(name: str, observed: FloatArray) -> Rival:
@@ -75,8 +76,8 @@ def rival(name: str, observed: FloatArray) -> Rival:
     prior = np.diag([1.0 / 0.2**2] * 2 + [0.0] * len(start))
     covariance = scaled_inverse(found.jac.T @ found.jac + prior) * np.outer(scale, scale)
     values = found.x * scale
-    effects = () if name == "none" else (active(name, values[2:]),)
-    return Rival(name, values[:2], effects, covariance)
+    candidates, sizes = ((), ()) if name == "none" else ((candidate(name),), (values[2:],))
+    return Rival(name, values[:2], candidates, sizes, covariance)
 
 
 @cache

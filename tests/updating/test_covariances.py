@@ -144,10 +144,8 @@ def test_features_of_a_form_are_those_of_its_covariance():
 # -- the scatter of a comparison ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("wide", [60, 3])  # every group of more than 3 readings, or none, as one more shared column
-def test_residuals_are_weighed_as_by_the_whole_covariance(wide, monkeypatch):
+def test_residuals_are_weighed_as_by_the_whole_covariance():
     """By t = x' V^-1 r / sqrt(x' V^-1 x) with V = S + tau^2 Z Z' written out; x free of a column found before."""
-    monkeypatch.setattr("toolpath_stiff.comparison.structure.WIDE", wide)
     rng = np.random.default_rng(4)
     n = 24
     clamp, place = np.repeat(np.arange(6), 4).astype(str), np.tile(np.repeat(np.arange(6), 2), 2)
@@ -156,13 +154,15 @@ def test_residuals_are_weighed_as_by_the_whole_covariance(wide, monkeypatch):
     columns, base = rng.normal(size=(5, n)), rng.normal(size=(2, n))
     fit = _Fit(scattering, columns, base)
     residual = 0.01 * rng.normal(size=(1, n))
+    rows = fit._weighed(residual)
     for grid in (0, 7, 23):
         inverse = np.linalg.inv(dense(covariance) + EXCESSES[grid] ** 2 * (place[:, None] == place))
         free = columns.T - base.T @ np.linalg.solve(base @ inverse @ base.T, base @ inverse @ columns.T)
         expected = free.T @ inverse @ residual[0] / np.sqrt(np.einsum("ni,nm,mi->i", free, inverse, free))
-        assert scattering.turned(residual) @ fit.columns(grid)[2] == pytest.approx(expected[None], rel=1e-8, abs=1e-10)
+        found = fit._with_columns(rows, grid) @ fit.free(grid)[0]
+        assert found == pytest.approx(expected[None], rel=1e-8, abs=1e-10)
         left = residual[0] - base.T @ np.linalg.solve(base @ inverse @ base.T, base @ inverse @ residual[0])
-        assert fit._squares(scattering.turned(residual), grid) == pytest.approx([left @ inverse @ left], rel=1e-8)
+        assert fit._squares(rows, grid) == pytest.approx([left @ inverse @ left], rel=1e-8)
 
 
 def test_ten_thousand_readings_need_no_matrix_of_their_size():
@@ -174,4 +174,4 @@ def test_ten_thousand_readings_need_no_matrix_of_their_size():
     mean = np.full(n, 1.0 / n)
     assert covariance.squares(mean) == pytest.approx(1e-4 + 1e-4 + 4e-4 / n)
     assert 1.0 / covariance.precision.squares(np.ones(n)) == pytest.approx(1e-4 + 1e-4 + 4e-4 / n)
-    assert scattering.turn.nnz == n
+    assert scattering.of_places.shape == (1, n)

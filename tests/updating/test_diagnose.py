@@ -15,6 +15,7 @@ from tests.stiffness.cases import nist
 from tests.updating import cases
 from tests.updating.cases import campaign, diagnosed, examined, readings_by_hand, table_1
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.inference.judgement import TAKEN_UP
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.stiffness.catalogue import find_effect
 
@@ -136,14 +137,16 @@ def test_the_law_in_the_document_is_the_law_of_the_fit():
     assert shown[0]["length_mm"] == pytest.approx(1e3 * law.length_1)
 
 
-def test_where_nothing_is_missing_the_detectable_sizes_are_named():
+def test_where_nothing_is_missing_it_is_said_how_far_each_effect_may_go():
     back = found("adequate")
-    assert {entry["effect"] for entry in back["detectable"]} == {entry["effect"] for entry in back["candidates"]}
-    for entry in back["detectable"]:
-        assert (entry["size"] is not None) == entry["detectable"] and entry["rms_percent"] > 0.0
-    weak = next(entry for entry in back["detectable"] if entry["effect"] == "weak_strut")
-    # Two of the rig's 2 % readings out of 42 lie on any one strut: some per cent of change are seen, not tenths.
-    assert weak["detectable"] and 1.0 < weak["rms_percent"] < 10.0
+    assert {entry["effect"] for entry in back["bounds"]} == {entry["effect"] for entry in back["candidates"]}
+    weak = next(entry for entry in back["bounds"] if entry["effect"] == "weak_strut")
+    # Two of the rig's 2 % readings out of 42 lie on any one strut: some per cent of change are excluded, not tenths.
+    assert 0.5 < weak["rms_percent"] < 10.0 and weak["left_percent"] <= weak["rms_percent"]
+    most = max(entry["left_percent"] for entry in back["bounds"] if entry["effect"] not in TAKEN_UP)
+    assert f"Up to {most:g} % are not excluded" in back["text"] and {one["effect"] for one in back["not_excluded"]} <= {
+        one["effect"] for one in back["bounds"]
+    }
 
 
 @pytest.mark.parametrize("verdict", CASES)

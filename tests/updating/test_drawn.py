@@ -161,4 +161,4 @@ def test_the_verdict_of_several_noise_models(verdicts, said):
     from types import SimpleNamespace
 
     found = common_verdict([SimpleNamespace(verdict=one, plausible=(name,)) for one, name in verdicts])
-    assert found[0] == said
+    assert found == said

@@ -20,7 +20,7 @@ from toolpath_stiff.report.update import residuals_csv
 from toolpath_stiff.rig.case import draw_case
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import HiddenMachine
-from toolpath_stiff.rig.loops import true_displacements
+from toolpath_stiff.rig.loops import displacements
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.stiffness import exact
@@ -104,7 +104,7 @@ def test_a_loop_reads_what_the_assembled_elements_move(case, name, at_poses):
     model = model_of(effects)
     loop = measuring_loop(name)
     found = loop_compliance(model, measured_path(model, at_poses), DIRECTIONS, [loop], np.zeros(3, dtype=int))
-    true = true_displacements(load_nominal("nist"), HiddenMachine(**hidden), rows(), [name] * 3, np.full(3, np.nan))
+    true = displacements(load_nominal("nist"), HiddenMachine(**hidden), rows(), [name] * 3, np.full(3, np.nan))
     # The rig's joints have unknowns of their own along each strut; secant iteration settles to 1e-11.
     assert found == pytest.approx(true, rel=1e-6, abs=2e-13)
 

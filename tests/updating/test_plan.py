@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from tests.stiffness.cases import nist
-from tests.updating.planning import READING_SD, active, rival, rivals, table_1_design
+from tests.updating.planning import READING_SD, candidate, rival, rivals, table_1_design
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.judgement import NAMED
 from toolpath_stiff.inference.prediction import Predictor
@@ -109,7 +109,7 @@ def test_a_fit_that_differs_in_its_11th_digit_forecasts_the_same(pair):
 @pytest.mark.parametrize("scale", [0.02, -0.1])
 def test_a_gauge_off_by_a_known_factor(scale):
     """Readings along X, two a visit, differ by ln(1 + s), all others by nothing: sqrt(2 n) |ln(1 + s)| / (sqrt 2 r)."""
-    known = [Rival("none"), Rival("gauge_scale", effects=(active("gauge_scale", [scale]),))]
+    known = [Rival("none"), Rival("gauge_scale", candidates=(candidate("gauge_scale"),), sizes=(np.array([scale]),))]
     visits = possible_visits(nist(), menu(oblique=False), (), np.random.default_rng(0))
     forecasts, _, scatter = forecast_all(nist(), known, visits.readings, strut_spread=0.0, joint_error=0.0, rest=0.0)
     assert not scatter.any()
@@ -121,7 +121,7 @@ def test_a_gauge_off_by_a_known_factor(scale):
 def test_a_difference_that_refitting_closes_is_no_gap():
     """Strut laws 10 % apart but known to 20 % only: however exact the readings, |difference| / (sqrt 2 sd) at most."""
     loose = np.eye(2) * 0.2**2
-    pair = [Rival("one", (0.0, 0.0), (), loose), Rival("two", (0.1, 0.1), (), loose)]
+    pair = [Rival("one", covariance=loose), Rival("two", (0.1, 0.1), covariance=loose)]
     found = plan_measurements(nist(), pair, 1e-9, 6, menu=menu(), strut_spread=0.0)
     assert found.pairs[0].separation_sigma <= np.hypot(0.1, 0.1) / (np.sqrt(2.0) * 0.2) * 1.01
     assert any("nobody measures better" in note for note in found.notes)

@@ -165,22 +165,6 @@ def test_a_hose_that_holds_the_platform_is_recognised(folder):
     assert "1.3 times the noise, and link and variable may be wrong" in left["text"]
 
 
-def test_what_depends_on_two_variables_is_recognised(folder):
-    # A fixture of one set-up that gives sideways beyond the load that friction holds.
-    predictor = sound(1, folder)
-    data = predictor.data
-    sideways = (data.direction[:, :2] ** 2).sum(axis=1)
-    give = 1.2e-8 * np.maximum(1.0 - 1200.0 / data.force, 0.0) * (data.setup == "riser") * sideways
-    found = portrait_with(predictor, give)
-    (one,) = found.terms
-    assert set(one.term.variables) == {"setup", "load"}
-    assert one.term.direction == "horizontal"
-    assert found.held_out_rms < 1.3 * found.noise_floor
-    words = portrait_entry(found)["terms"][0]["words"]
-    assert "set-up riser" in words
-    assert "the load" in words
-
-
 def test_the_dictionary_speaks_the_agreed_words(folder):
     dictionary = dictionary_of(Ground(sound(1, folder), np.exp(-sound(1, folder).log_stiffness()), np.zeros(2)))
     terms = dictionary.terms
@@ -189,7 +173,7 @@ def test_the_dictionary_speaks_the_agreed_words(folder):
     assert {t.shape for t in terms} <= set(SHAPES)
     assert len({t.key for t in terms}) == len(terms)
     assert np.exp(dictionary.log_prior).sum() <= 1.0 + 1e-9
-    np.testing.assert_allclose(np.sqrt((np.concatenate([*dictionary.columns()]) ** 2).mean(axis=1)), 1.0)
+    np.testing.assert_allclose(np.sqrt((dictionary.columns**2).mean(axis=1)), 1.0)
 
 
 def test_what_can_only_give_has_no_negative_size_and_factors_leave_a_stiffness():

@@ -9,7 +9,10 @@ import pytest
 
 import toolpath_stiff as tps
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.readings.measurements import model_stiffness, read_measurements
+from toolpath_stiff.stiffness.element_sum import tip_compliance
+from toolpath_stiff.stiffness.model import StiffnessModel, build_model, parameter_slopes, path_of_stance
 
 ROBOT = Path(__file__).parents[1] / "machine" / "data" / "robot200.toml"
 MACHINE = tps.Machine.load(ROBOT).stated
@@ -97,7 +100,7 @@ def test_an_update_refits_the_joints_and_adds_what_is_missing(
     command = ["update", data, "--machine", str(ROBOT), "-o", str(new), "--out", str(tmp_path / "u")]
     assert main([*command, "--joints"]) == 0
     again = tps.Machine.load(new)
-    assert again.stated.text.count("torsion_nrad_per_Nm") == 1 and again.name == "robot200"
+    assert again.stated.text.count("torsion_nrad_per_Nm =") == 1 and again.name == "robot200"
     assert tps.diagnose(data, again).verdict == "adequate"
     one, two = (campaign(tmp_path / f"{kind}.csv", 7, kind, 1) for kind in ("bending", "none"))
     added = tps.update(one, ROBOT, auto=True)
@@ -187,7 +190,7 @@ def test_a_cable_off_the_tip_is_the_wrench_that_it_makes(tmp_path: Path) -> None
         ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um", "1800,0,900,1,2,inf,5", "fz_N"),
         ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um", "1800,0,900,1,2,3,", "nothing read"),
         ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um", "9800,0,900,1,2,3,5", "no joint values lead to the pose"),
-        ("joint_1_deg,fx_N,fy_N,fz_N,ux_um", "5,1,2,3,5", "neither a pose nor all joints"),
+        ("joint_1_deg,fx_N,fy_N,fz_N,ux_um", "5,1,2,3,5", "column joint_2_deg is missing"),
         (
             "x_mm,y_mm,z_mm,joint_1_deg,joint_2_deg,joint_3_deg,joint_4_deg,joint_5_deg,joint_6_deg,fx_N,fy_N,fz_N,ux_um",
             "1800,0,900,5,12,45,-30,-60,-165,1,2,3,5",
@@ -227,3 +230,78 @@ def test_a_plan_tells_elements_apart_on_every_kind(kind: str, tmp_path: Path) ->
     (tmp_path / "read.csv").write_text("\n".join([head, *map(",".join, filled)]), "utf-8")
     found = tps.diagnose(str(tmp_path / "read.csv"), machine, noise_percent=2)
     assert f"{effect}, {first}" == found.labels[0] and f"{effect}, {second}" not in found.labels
+
+
+def rows_of(path: str) -> tuple[list[str], np.ndarray]:
+    head, *rows = Path(path).read_text("utf-8").splitlines()
+    return head.split(","), np.array([[float(cell) for cell in row.split(",")] for row in rows])
+
+
+def written(path: Path, head: list[str], rows: np.ndarray) -> str:
+    path.write_text("\n".join([",".join(head), *(",".join(f"{v:.9g}" for v in row) for row in rows)]), "utf-8")
+    return str(path)
+
+
+def test_mistakes_that_people_make_lead_on(tmp_path: Path) -> None:
+    """Radians for degrees, mm for um, the force on the sensor for that on the tool."""
+    head, rows = rows_of(campaign(tmp_path / "a.csv", 9, "none", 0, 20))
+    (radians, reversed_), millimetres = rows.copy()[None].repeat(2, axis=0), rows.copy()
+    radians[:, :6] = np.radians(rows[:, :6])
+    with pytest.raises(tps.TpsError, match=r"degrees.*joint_1_deg:rad"):
+        tps.diagnose(written(tmp_path / "r.csv", head, radians), ROBOT)
+    millimetres[:, 9:] /= 1e3
+    found = tps.diagnose(written(tmp_path / "m.csv", head[:-1], millimetres[:, :-1]), ROBOT)
+    assert "Are the units right" in found.to_dict()["question"] and found.verdict == "unexplained"
+    reversed_[:, 6:9] *= -1.0
+    found = tps.diagnose(written(tmp_path / "s.csv", head, reversed_), ROBOT)
+    assert "reversed" in found.to_dict()["question"] and found.verdict == "unexplained"
+
+
+def test_other_honest_columns_say_the_same(tmp_path: Path) -> None:
+    """A force along a direction at joint values; components that are not there; a moment beside the force."""
+    head, rows = rows_of(campaign(tmp_path / "a.csv", 9, "none", 0, 20))
+    along_z = rows[np.abs(rows[:, 8]) > 100.0]
+    zeros, force, moved = np.zeros((len(along_z), 2)), along_z[:, 8:9], along_z[:, 11:12]
+    signed = np.hstack([along_z[:, :6], np.abs(force), zeros, np.ones_like(force), moved * np.sign(force)])
+    by_direction = written(tmp_path / "d.csv", [*head[:6], "force_N", "dx", "dy", "dz", "displacement_um"], signed)
+    only = np.hstack([along_z[:, :6], along_z[:, 8:9], along_z[:, 11:12]])
+    by_component = written(tmp_path / "z.csv", [*head[:6], "fz_N", "uz_um"], only)
+    models = [tps.compare(file, ROBOT, noise_percent=5).problem for file in (by_component, by_direction)]
+    stance = MACHINE.standing(np.radians(along_z[:, :6]))
+    expected = stance.tip_compliance()[:, 2, 2] * along_z[:, 8]
+    np.testing.assert_allclose(models[0].predicted, expected, rtol=1e-6)
+    np.testing.assert_allclose(np.abs(models[1].predicted), np.abs(expected), rtol=1e-6)
+    arm = np.hstack([only[:, :7], np.full((len(only), 1), 40.0), only[:, 7:]])
+    found = tps.compare(written(tmp_path / "m.csv", [*head[:6], "fz_N", "mx_Nm", "uz_um"], arm), ROBOT, noise_percent=5)
+    np.testing.assert_allclose(found.problem.predicted, expected + 40.0 * stance.tip_compliance()[:, 2, 3], rtol=1e-6)
+
+
+def test_errors_are_shown_as_vectors_and_by_component(tmp_path: Path) -> None:
+    found = tps.compare(campaign(tmp_path / "a.csv", 5, "torsion", 2, 20), ROBOT)
+    columns, document = found.vectors(), found.to_dict()
+    size = np.linalg.norm([columns[f"u{axis}_um"] for axis in "xyz"], axis=0)
+    error = np.linalg.norm([columns[f"error_{axis}_um"] for axis in "xyz"], axis=0)
+    np.testing.assert_allclose(columns["error_percent"], 100.0 * error / size)
+    assert len(size) == 20 and (columns["angle_deg"] < 90.0).all()
+    total = sum(part["error_rms_um"] ** 2 for part in document["components"])
+    assert total == pytest.approx(float((error**2).mean()))
+    assert "vectors.csv" in found.files(plots=False)
+
+
+def test_bands_hold_what_refitted_joints_leave_open(tmp_path: Path) -> None:
+    """The band of a pose's stiffness is that of the torsions' covariance: sd of d^T C d by the joints' rows."""
+    data = campaign(tmp_path / "a.csv", 5, "torsion", 2, 20)
+    machine = tps.update(data, ROBOT, joints=True).machine.stated
+    known = machine.uncertainty
+    assert known.names[2] == "joint 3.torsion_nrad_per_Nm" and len(known.names) == 6
+    model = build_model(machine)
+    stance = machine.standing(joints(np.random.default_rng(3), 1))
+    rows = screws(stance.joints, "z")[0][:, 1]  # along Y
+    slopes = parameter_slopes(model, lambda m: np.array([_along_y(m, stance)]), np.array([_along_y(model, stance)]))
+    found = np.array([slopes[i][0] for i in range(6)])
+    np.testing.assert_allclose(found, 1e-9 * known.sd * rows**2, rtol=1e-6)
+
+
+def _along_y(model: StiffnessModel, stance: Stance) -> float:
+    """Compliance of the tip along Y, m/N."""
+    return float(tip_compliance(model, path_of_stance(model, stance))[0, 1, 1])

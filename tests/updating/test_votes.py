@@ -57,8 +57,9 @@ def test_entries_put_together_what_sits_at_one_place_and_reads_alike():
     found = diagnosed(7, "paper", "table_compliance", STRONG)
     fits = {family.name: family.best for family in found.main.families} | found.main.fits
     named = [[c for name in names for c in fits[name].candidates if c.name != SERIES] for names in found.entries]
-    places = [{place_of(candidate.effect) for candidate in candidates} for candidates in named]
-    assert all(len(place) == 1 for place in places)
+    # One place, but for a stand that gives as a frame does: the same to every reading of the tip.
+    places = [{place_of(c.effect) for c in candidates if c.name != "stand_compliance"} for candidates in named]
+    assert all(len(place) <= 1 for place in places)
     assert [name for names in found.entries for name in names] == [*found.explanations]
     problem = found.main.problem
     assert entries(problem, fits, ["table_compliance", "none", "frame_sway", "x"])[1:] in (

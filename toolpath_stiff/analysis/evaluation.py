@@ -14,7 +14,7 @@ from toolpath_stiff.machine.limits import Extremes, Reach, machine_limits, reach
 from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.path.turning import room_to_wind, unwound
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness import core, element_sum
+from toolpath_stiff.stiffness import closed_form, core, element_sum
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
@@ -76,7 +76,7 @@ class Evaluation:
         configuration = ", then ".join(part.configuration for part in parts)
         return cls(**whole(OF_POSES, parts), reach=stand, configuration=configuration)
 
-    def put(self, rows: IntArray, part: "Evaluation") -> None:
+    def put(self, rows: IntArray | slice, part: "Evaluation") -> None:
         """Enter the figures of some rows."""
         for name in OF_POSES:
             getattr(self, name)[rows] = getattr(part, name)
@@ -128,32 +128,36 @@ def evaluate(
         return _by_elements(model, (position, abc, tangent), tool_length, load, force, progress)
     lengths = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
     corner = corners(position, abc, lengths)
-    route = core.choose_route(model, n - int(np.count_nonzero(corner)))
-    stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(model.machine))
+    many = n - int(np.count_nonzero(corner)) >= core.CLOSED_FORM_FROM
+    directed = many and load.kind != "softest" and core.is_closed_form(model)
+    stand = Reach(np.empty(n), np.zeros(n, dtype=np.int8), np.empty(n), machine_limits(model.machine))
     substituted, extrapolated = np.zeros((2, n), dtype=bool)
     result = Evaluation(np.empty(n), substituted, np.empty((n, 6)), extrapolated, stand)
     for start in range(0, n, BLOCK):
-        block = np.arange(start, min(start + BLOCK, n))
-        for tool, some in core.rows_of_tools(lengths[block]):
+        stop = min(start + BLOCK, n)
+        block = np.arange(start, stop)
+        for tool, some in core.rows_of_tools(lengths[start:stop]):
             rows = block[some]
-            if route != "exact" and load.kind != "softest":
-                last = corner[rows] & (rows < block[-1])
-                first = rows[~np.append(False, last[:-1])]
-                ends = (first, first + corner[first] * (first < block[-1])) if last.any() else (first,)
+            if directed:
+                last = corner[rows] & (rows < stop - 1)
+                ends: tuple[IntArray | slice, ...] = (rows if len(rows) < len(block) else slice(start, stop),)
+                if last.any():
+                    first = rows[~np.append(False, last[:-1])]
+                    ends = first, first + corner[first] * (first < stop - 1)
                 loads, left = [tangent[part] for part in ends], []
-                fast = _by_closed_form(model, load, loads, _poses(position, abc, tool, first), route)
+                fast = _by_closed_form(model, load, loads, _poses(position, abc, tool, ends[0]))
                 for part, (evaluated, sure) in zip(ends, fast, strict=True):
                     result.put(part, evaluated)
-                    left.append(part[~sure])
+                    left.append((block if isinstance(part, slice) else part)[~sure])
                 rows = np.unique(np.concatenate(left))
             if len(rows):
                 result.put(rows, _by_solution(model, load, tangent[rows], _poses(position, abc, tool, rows), force))
         if progress:
-            progress(int(block[-1]) + 1, n)
+            progress(stop, n)
     return result
 
 
-def _poses(position: FloatArray, abc: FloatArray, tool: float, rows: IntArray) -> Poses:
+def _poses(position: FloatArray, abc: FloatArray, tool: float, rows: IntArray | slice) -> Poses:
     angles = abc[rows]
     return position[rows], rotation_matrices(angles) if angles.any() else None, tool
 
@@ -169,7 +173,7 @@ def corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolA
 
 
 def _by_closed_form(
-    model: StiffnessModel, load: Load, tangents: list[FloatArray], poses: Poses, route: str
+    model: StiffnessModel, load: Load, tangents: list[FloatArray], poses: Poses
 ) -> Iterator[tuple[Evaluation, BoolArray]]:
     """Struts on a rigid platform along loads that the geometry directs, for each of the tangents (n, 3) at the poses.
 
@@ -180,9 +184,8 @@ def _by_closed_form(
     directed = [geometric_directions(load, tip, rotation, tangent) for tangent in tangents]
     position, towards = np.ascontiguousarray(tip.T), np.stack([direction.T for direction, _ in directed])
     turns = None if rotation is None else np.ascontiguousarray(rotation.reshape(-1, 9).T)
-    compliance, determinant, lengths, good = core.compliance_along_columns(
-        machine, position, towards, turns, tool, route
-    )
+    kernel = closed_form.prepare(machine, tool)
+    compliance, determinant, lengths, good = closed_form.compliance_along_columns(kernel, position, towards, turns)
     extremes = Extremes(machine, position, lengths, determinant, turns, tool)
     stand, certain = extremes.reach()
     extrapolated = machine.strut_law.room_of(extremes.shortest, extremes.longest) < 0.0
@@ -278,7 +281,7 @@ def _by_elements(
     if follows and n and len(machine.configurations) > 1:
         few = tried_rows(n)
         kept = int(kept_configurations(machine, position[few], rotation_matrices(abc[few]), lengths[few])[0])
-    stand = Reach(np.empty(n), np.zeros(n, dtype=np.int64), np.empty(n), machine_limits(machine))
+    stand = Reach(np.empty(n), np.zeros(n, dtype=np.int8), np.empty(n), machine_limits(machine))
     substituted, extrapolated = np.zeros((2, n), dtype=bool)
     joints, name = np.empty((n, len(machine.joint_names))), machine.configurations[kept or 0] if follows else ""
     result = Evaluation(np.empty(n), substituted, joints, extrapolated, stand, name)

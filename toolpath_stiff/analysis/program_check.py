@@ -18,7 +18,6 @@ from toolpath_stiff.nc.checking import ERROR, WARNING, Finding, UsedCode, check,
 from toolpath_stiff.nc.courses import Extents
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import move_figures, sample_moves
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel
@@ -35,14 +34,8 @@ def machine_findings(program: ReadProgram, machine: MachineTool, step: float) ->
 
     The program sits where it was read for; `step` is the distance of the samples, m.
     """
-    moves, origin = place(program.moves, program.origin), program.origin
-    samples = sample_moves(
-        moves,
-        step=step,
-        rapid_feed=machine.rapid_feed,
-        origin=origin,
-        angles_of=machine.angles_of if program.native else None,
-    )
+    words = machine.angles_of if program.native else None
+    samples = sample_moves(program.moves, step, machine.rapid_feed, program.origin, words)
     poses = (samples.position, samples.abc, samples.tangent, samples.tool_length)
     there = evaluate(StiffnessModel(machine), *poses, Load("z"))
     lines, findings = np.unique(samples.line[~there.reachable]).tolist(), []

@@ -180,19 +180,17 @@ class Analysis(EvaluatedPath, FolderResult):
         mean, low = number(self.mean_N_per_mm), number(self.min_N_per_mm)
         return f"{self.program.name} on {self.machine.name}, mean {mean} N/mm, min {low} N/mm"
 
-    def plot(self, *, show_plunges: bool = False) -> Figure:
-        """The path in three views, coloured by stiffness; with `show_plunges` these set axes and colours too."""
-        return self._figure(show_plunges=show_plunges)
+    def plot(self) -> Figure:
+        """The path in three views, coloured by stiffness."""
+        return self._figure()
 
-    def plot_profile(self, *, show_plunges: bool = False) -> Figure:
+    def plot_profile(self) -> Figure:
         """Stiffness along the path."""
-        return self._figure("profile.png", show_plunges=show_plunges)
+        return self._figure("profile.png")
 
-    def files(
-        self, *, plots: bool = True, table: str = "csv", show_plunges: bool = False
-    ) -> Mapping[str, Content | Callable[[], Content]]:
+    def files(self, *, plots: bool = True, table: str = "csv") -> Mapping[str, Content | Callable[[], Content]]:
         """The files of `tps analyze`; samples as "csv" or "parquet"."""
-        return self._files(plots, self.view.unwritten(table, self.cut is not None), show_plunges=show_plunges)
+        return self._files(plots, self.view.unwritten(table, self.cut is not None))
 
 
 def analyze(
@@ -249,7 +247,7 @@ def analyze(
     direction = parse_load(load) if isinstance(load, str) else load
     place_at, source = _effective_origin(model.machine, program, origin)
     words = model.machine.angles_of if program.native else None
-    samples = sample_moves(place(program.moves, place_at), step, model.machine.rapid_feed, place_at, words)
+    samples = sample_moves(program.moves, step, model.machine.rapid_feed, place_at, words)
     choice, poses = None, (samples.position, samples.abc, samples.tangent, samples.tool_length)
     if turn == FIXED:
         there = evaluate(model, *poses, direction, force, progress)

@@ -84,12 +84,12 @@ class EvaluatedPath:
         """(n,) counted samples of plunges along the tool axis; none where the load does not follow the motion."""
         return np.asarray(self.counted & self.along_axis & (self.load.kind == "tangential"))
 
-    @property
+    @cached_property
     def headline(self) -> BoolArray:
         """(n,) counted samples that mean, range and weakest place are about: those of `headline_rows`."""
         return headline_rows(self.counted, self.plunging)
 
-    @property
+    @cached_property
     def set_aside(self) -> BoolArray:
         """(n,) plunges beside the headline; none of a program that only plunges."""
         return np.asarray(self.counted & ~self.headline)
@@ -112,7 +112,7 @@ class EvaluatedPath:
             rows = rows[(np.abs(s[rows] - s[weakest]) >= apart) & (line[rows] != line[weakest])]
         return chosen
 
-    @property
+    @cached_property
     def out_of_reach(self) -> BoolArray:
         """(n,) cutting samples that the machine cannot reach."""
         return np.asarray(self.samples.cutting & ~self.at.reachable)
@@ -207,7 +207,7 @@ def _parts(path: EvaluatedPath, of_move: IntArray, count: int) -> list[Document]
     """The figures of `count` parts of a program; `of_move` (n,) says to which each move belongs."""
     samples, moves = path.samples, path.program.moves
     length, rapid = move_lengths(moves), moves.motion == RAPID
-    duration = move_durations(moves, path.machine.rapid_feed) + moves.dwell
+    duration = move_durations(moves, length, path.machine.rapid_feed) + moves.dwell
     margin = np.where(samples.cutting & path.at.reachable, path.at.reach.margin, np.inf)
     parts: list[Document] = []
     for made, rows in zip(_rows_of(of_move, count), _rows_of(of_move[samples.move], count), strict=True):
@@ -230,6 +230,8 @@ def _parts(path: EvaluatedPath, of_move: IntArray, count: int) -> list[Document]
 
 def _rows_of(part: IntArray, count: int) -> list[IntArray]:
     """The rows of each of `count` parts, in order; `part` (n,) says in which each row is."""
+    if count == 1:
+        return [np.arange(len(part))]
     order = np.argsort(part, kind="stable")
     return np.split(order, np.searchsorted(part[order], np.arange(1, count)))[:count]
 

@@ -8,7 +8,7 @@ from typing import Annotated
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import KINDS
-from toolpath_stiff.machine.model import Hexapod, as_hexapod
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.options import Option, checked
 from toolpath_stiff.results import TextFile
 from toolpath_stiff.stiffness.catalogue import EffectCatalogue, effects_from_file, known_effects
@@ -62,9 +62,8 @@ def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> E
     True
     """
     on = machine_from(machine)
-    stated = as_hexapod(on.stated, "a check of effects")
-    known_effects([str(file)])  # names that are taken
-    trials = {name: try_effect(effect, stated) for name, effect in effects_from_file(str(file)).items()}
+    known_effects([str(file)], on.stated.kind)  # names that are taken
+    trials = {name: try_effect(effect, on.stated) for name, effect in effects_from_file(str(file)).items()}
     return EffectCheck(str(file), on.name, trials)
 
 

@@ -418,10 +418,9 @@ def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects
     given = load_machine(machine)
     model = build_model(given, files)
     effects = own_effects(model, files)
-    tried_on = given if isinstance(given, Hexapod) else as_hexapod(load_machine(), "a trial")
     if not allow_unchecked_effects:
-        refuse_failing(effects, tried_on, machine)
-    return replace(model, unchecked=tuple(failures(effects, tried_on)))
+        refuse_failing(effects, given, machine)
+    return replace(model, unchecked=tuple(failures(effects, given)))
 
 
 def machine_from(machine: Machine | str | Path) -> Machine:
@@ -459,7 +458,8 @@ def machine_template(
 
 @checked
 def machine_from_linuxcnc(
-    file: str | Path, units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None
+    file: Annotated[str | Path, Option("FILE.hal")],
+    units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None,
 ) -> TextFile:
     """The machine of the kinematics pins in a LinuxCNC HAL file.
 
@@ -498,7 +498,9 @@ def machine_from_linuxcnc(
 
 
 @checked
-def machine_from_urdf(file: str | Path, tip: Annotated[str, Option("--tip", "LINK")]) -> TextFile:
+def machine_from_urdf(
+    file: Annotated[str | Path, Option("FILE.urdf")], tip: Annotated[str, Option("--tip", "LINK")]
+) -> TextFile:
     """The robot of a URDF file, from its root link to a tip link; compliances are left to fill in.
 
     Parameters
@@ -527,7 +529,8 @@ def machine_from_urdf(file: str | Path, tip: Annotated[str, Option("--tip", "LIN
 
 @checked
 def machine_from_dh(
-    file: str | Path, convention: Annotated[str, Option("--convention", choices=("modified", "standard"))]
+    file: Annotated[str | Path, Option("TABLE")],
+    convention: Annotated[str, Option("--convention", choices=("modified", "standard"))],
 ) -> TextFile:
     """The robot of a table of Denavit-Hartenberg rows; compliances are left to fill in.
 
@@ -557,7 +560,8 @@ def machine_from_dh(
 
 @checked
 def machine_from_freecad(
-    file: str | Path, order: Annotated[Sequence[str], Option("--order", "X,Y,...", read=names)] = ()
+    file: Annotated[str | Path, Option("FILE.fcm")],
+    order: Annotated[Sequence[str], Option("--order", "X,Y,...", read=names)] = (),
 ) -> TextFile:
     """The mill of a FreeCAD machine (.fcm); compliances are left to fill in.
 

@@ -18,7 +18,7 @@ from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.api.inputs import origin_si
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table, analyze
+from toolpath_stiff.api.programs import Jobs, Table, analyze
 from toolpath_stiff.defaults import LOAD, usable_cpus
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, TpsError
@@ -105,7 +105,6 @@ def analyze_many(
     jobs: Jobs = None,
     plots: bool = True,
     table: Table = "csv",
-    show_plunges: ShowPlunges = False,
     replace: bool = False,
     progress: Progress | None = None,
     **options: Any,
@@ -130,7 +129,7 @@ def analyze_many(
     jobs
         Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for each
         available CPU.
-    plots, table, show_plunges, replace
+    plots, table, replace
         As of `Analysis.save`.
     progress
         Called with the program that is done, programs done, programs in all; first with 0 done, when all arguments
@@ -190,7 +189,7 @@ def analyze_many(
     tasks = []
     for program, report in zip(each, report_folders(listed), strict=True):
         own_rules = Rules(inputs=(*program.inputs, *shared), replace=replace)
-        save = partial(Analysis.save, rules=own_rules, plots=plots, table=table, show_plunges=show_plunges)
+        save = partial(Analysis.save, rules=own_rules, plots=plots, table=table)
         absolute = dataclasses.replace(program, file=program.file and str(Path(program.file).absolute()), _last=[])
         opens = (report.folder / ("report.html" if plots else "summary.json")).as_posix()
         tasks.append(Task(absolute, report, out.absolute(), opens, work, save))

@@ -13,10 +13,10 @@ from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, Turn, 
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD
+from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.options import Option, checked
-from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.path.table import SampledPath
 from toolpath_stiff.placement.case_study import MOST_REGIONS, CaseStudy, Region, run_case_study
@@ -25,7 +25,6 @@ from toolpath_stiff.units import m_from_mm, m_from_um, n_per_m_from_n_per_mm
 
 Jobs = Annotated[int | None, Option("--jobs", at_least=1)]
 Table = Annotated[str, Option("--format", choices=("csv", "parquet"))]
-ShowPlunges = Annotated[bool, Option("--show-plunges")]
 
 
 @checked
@@ -115,27 +114,22 @@ def analyze(
         raise InputError("--tolerance without a cut", hint="say --cut FILE, or --material and --stock")
     second = first.like(compare_with) if isinstance(compare_with, str | Path) else compare_with
 
+    asked: Document = {
+        "origin": origin, "load": load, "step": m_from_mm(step_mm), "force": force_N, "partial": partial, "turn": turn,
+    }  # fmt: skip
+
     def on(machine: Machine, other: Machine | None, progress: Callable[[int, int], None] | None) -> Analysis:
         model = machine.running(part, [other] if other else [])
-        read = part.moves(origin, model.machine.default_origin)
-        step = m_from_mm(step_mm)
-        return analyze_path(
-            model,
-            read,
-            origin=origin,
-            load=load,
-            step=step,
-            force=force_N,
-            partial=partial,
-            turn=turn,
-            progress=progress,
-        )
+        return analyze_path(model, part.moves(origin, model.machine.default_origin), progress=progress, **asked)
 
     analysis = on(first, second, counter(progress, f"{part.name}: samples"))
     cut_of = None
     if setup is not None:
-        at = (analysis.program, analysis.origin, setup, analysis.step)
-        cut_of = evaluate_cut(analysis.model, *at, progress)
+        at, model = (analysis.program, analysis.origin, setup, analysis.step), analysis.model
+        ways = model.machine.configurations
+        if len(ways) > 1 and analysis.at.configuration in ways:
+            model = replace(model, machine=model.machine.with_changes(only=ways.index(analysis.at.configuration)))
+        cut_of = evaluate_cut(model, *at, progress, analysis.samples)
     return replace(
         analysis,
         cut=cut_of,
@@ -174,7 +168,7 @@ def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, 
     origin = origin_si(origin_mm_deg)
     read = program_from(program).moves(origin)
     origin = origin or read.origin
-    samples = sample_moves(place(read.moves, origin), step=m_from_mm(step_mm), origin=origin)
+    samples = sample_moves(read.moves, step=m_from_mm(step_mm), origin=origin)
     left = [f"{read.name}:{word.line}:{word.column}: {word.word}: {word.reason}" for word in read.unsupported]
     return SampledPath(read.name, samples, list(map(str, read.warnings)), left)
 

@@ -21,8 +21,8 @@ from toolpath_stiff.correction.task import INSTRUMENT, LIKELIHOOD, MACHINE, MEAN
 from toolpath_stiff.correction.update import update as update_machine
 from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
+from toolpath_stiff.diagnosis.examination import Diagnosis
 from toolpath_stiff.diagnosis.on_elements import ElementDiagnosis, diagnose_elements, pull_problem
-from toolpath_stiff.diagnosis.result import Diagnosis
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.inference.element_fits import PullProblem
@@ -79,10 +79,11 @@ class Question:
         self.model = self.on.stated
         self.data = None if data is None else measurements_from(data, columns)
         files, said = (self.data.files, self.data.columns) if self.data else ((), None)
-        noise, spread = _noise(noise_percent), strut_spread_percent / 100.0
-        self.request = Asked(files, self.on.asked, self.on.effect_files, noise, spread, said)
+        stated = words_of(compare, {"noise_percent": noise_percent, "strut_spread_percent": strut_spread_percent})
+        self.request = Asked(files, self.on.asked, self.on.effect_files, said, tuple(stated))
         self.common: dict[str, Any] = {
-            "noise": noise, "strut_spread": spread, "seed": seed, "effect_files": self.on.effect_files,
+            "noise": _noise(noise_percent), "strut_spread": strut_spread_percent / 100.0, "seed": seed,
+            "effect_files": self.on.effect_files,
         }  # fmt: skip
         self.inputs = (*files, *self.on.inputs)
 
@@ -106,7 +107,7 @@ class Question:
     def pulls(self) -> tuple[PullProblem, bool]:
         """Pulls, or stiffnesses, on a machine of elements, and whether somebody states their scatter."""
         assert self.data is not None
-        noise = None if self.request.noise is None else float(np.hypot.reduce(np.atleast_1d(self.request.noise)))
+        noise = self.common["noise"] and float(np.hypot.reduce(np.atleast_1d(self.common["noise"])))
         spread, files = float(self.common["strut_spread"]), tuple(map(str, self.on.effect_files))
         return pull_problem(self.on.running(), self.data.files, self.data.columns, noise, spread, files)
 
@@ -227,7 +228,7 @@ def diagnose(
     >>> found.to_frame()[["effect", "probability", "mean_abs_error_percent"]].shape
     (16, 3)
     >>> list(found.files(plots=False)), len(found.to_dict()["plausible"])
-    (['diagnose.json', 'residuals.csv'], 3)
+    (['diagnose.json', 'residuals.csv'], 4)
     """
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     if not isinstance(question.model, Hexapod):

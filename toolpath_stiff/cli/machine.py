@@ -19,6 +19,7 @@ from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, command
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.options import Option, finite_number, numbers
+from toolpath_stiff.results import TextFile
 
 OUT_OF_REACH = NOT_GOOD = 1  # exit codes
 MOST_NAMED = 10
@@ -145,25 +146,21 @@ def new_machine(args: Namespace, file: Annotated[str, Option("FILE")]) -> int:
 Made = Annotated[str | None, Option("-o --out", "FILE", help="machine file to write (default: standard output)")]
 
 
-@command("machine from-linuxcnc", "machine_from_linuxcnc", REPLACE)
-def from_linuxcnc(args: Namespace, file: Annotated[str, Option("FILE.hal")], out: Made = None) -> int:
-    """Read the kinematics pins of a LinuxCNC HAL file."""
-    return run.made(args, tps.machine_from_linuxcnc(file, args.units), out)
+def _made_by(function: Callable[..., TextFile]) -> Callable[..., int]:
+    """A command that writes, or prints, what a public function makes of a file."""
+
+    def make(args: Namespace, out: Made = None) -> int:
+        made = run.call(args, function)
+        run.tell("note", made.notes)
+        if out:
+            return run.write_text(args, out, made.text, "next", "machine", "check", out)
+        sys.stdout.write(made.text)
+        return 0
+
+    make.__doc__ = function.__doc__
+    return make
 
 
-@command("machine from-urdf", "machine_from_urdf", REPLACE)
-def from_urdf(args: Namespace, file: Annotated[str, Option("FILE.urdf")], out: Made = None) -> int:
-    """Read a robot of a URDF file."""
-    return run.made(args, tps.machine_from_urdf(file, args.tip), out)
-
-
-@command("machine from-dh", "machine_from_dh", REPLACE)
-def from_dh(args: Namespace, file: Annotated[str, Option("TABLE")], out: Made = None) -> int:
-    """Read a robot of a table of Denavit-Hartenberg rows."""
-    return run.made(args, tps.machine_from_dh(file, args.convention), out)
-
-
-@command("machine from-freecad", "machine_from_freecad", REPLACE)
-def from_freecad(args: Namespace, file: Annotated[str, Option("FILE.fcm")], out: Made = None) -> int:
-    """Read a mill of FreeCAD."""
-    return run.made(args, tps.machine_from_freecad(file, args.order), out)
+for kind in ("linuxcnc", "urdf", "dh", "freecad"):
+    name = f"machine_from_{kind}"
+    command(f"machine from-{kind}", name, REPLACE)(_made_by(getattr(tps, name)))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import toolpath_stiff as tps
-from toolpath_stiff.api.programs import Jobs, ShowPlunges, Table
+from toolpath_stiff.api.programs import Jobs, Table
 from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FOLDER, JSON, PROGRAM, REPLACE, command
 from toolpath_stiff.errors import InputError
@@ -28,7 +28,6 @@ def analyze(
     args: Namespace,
     programs: Annotated[Sequence[str], Option("PROGRAM", count="+")],
     table: Table = "csv",
-    show_plunges: ShowPlunges = False,
     jobs: Jobs = None,
     cluster: Annotated[str | None, Option("--cluster", "ADDRESS", instead_of="jobs")] = None,
 ) -> int:
@@ -79,8 +78,6 @@ def analyze(
         NC program or cutter-location file, or a folder of them.
     table
         Format of the samples.
-    show_plunges
-        Let plunges along the tool axis set the axes and colours of the pictures too (the page has a switch).
     jobs
         Programs at a time, each in a process of this computer; 1: all in this process. Unless given, one for each
         available CPU.
@@ -93,7 +90,7 @@ def analyze(
     plots = not args.no_plots
     if counts or len(files) > 1 or cluster:
         options = run.given(args, tps.analyze, tps.Program.read)
-        options |= {"plots": plots, "table": table, "show_plunges": show_plunges, "jobs": jobs, "replace": args.replace}
+        options |= {"plots": plots, "table": table, "jobs": jobs, "replace": args.replace}
         executor = _executor(cluster) if cluster else None
         with run.progress_line() as progress:
             analyses = tps.analyze_many(
@@ -106,7 +103,7 @@ def analyze(
     file = files[0].file
     folder, rules = run.destination(args, tps.Analysis, [file], unwritten(table, bool(args.cut or args.material)))
     analysis = run.call(args, tps.analyze, program=tps.Program.read(file, **run.given(args, tps.Program.read)))
-    written = analysis.save(folder, plots=plots, rules=rules, table=table, show_plunges=show_plunges)
+    written = analysis.save(folder, plots=plots, rules=rules, table=table)
     missed = analysis.below_required or analysis.beyond_tolerance
     code = BELOW_REQUIRED if missed else 0 if analysis.complete else INCOMPLETE
     return run.show(args, analysis, run.written_text(written), code=code)

@@ -63,12 +63,11 @@ def new(
     if built == "serial":
         if at or layout != "tilted" or machine != "nist":
             raise InputError("--built serial with a layout, a plan or a machine", expected="--seed, --hidden, --noise")
-        count = new_robot(out, seed, hidden, noise / 100.0, run.rules_of(args, fresh=True))
-        print(f"{out}: {count} pulls, the nominal machine and the sealed truth", _diagnose(out), sep="\n")
-        return 0
-    case = blind_case(seed, layout, hidden, noise / 100.0, machine, at, built)
-    count = new_exercise(out, case, run.rules_of(args, fresh=True))
-    print(f"{out}: {count} measurements, the nominal machine and the sealed truth", _diagnose(out), sep="\n")
+        written = f"{new_robot(out, seed, hidden, noise / 100.0, run.rules_of(args, fresh=True))} pulls"
+    else:
+        case = blind_case(seed, layout, hidden, noise / 100.0, machine, at, built)
+        written = f"{new_exercise(out, case, run.rules_of(args, fresh=True))} measurements"
+    print(f"{out}: {written}, the nominal machine and the sealed truth", _diagnose(out), sep="\n")
     return 0
 
 

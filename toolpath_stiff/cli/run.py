@@ -21,7 +21,7 @@ from toolpath_stiff.errors import InputError, harmless
 from toolpath_stiff.files import Content, check_outputs, old_name, write_atomically
 from toolpath_stiff.hints import command_line, hint
 from toolpath_stiff.options import arguments_of
-from toolpath_stiff.results import FolderResult, Progress, TextFile, json_text
+from toolpath_stiff.results import FolderResult, Progress, json_text
 from toolpath_stiff.results_folder import Rules, check_folder
 from toolpath_stiff.workbooks import split_name
 
@@ -148,15 +148,6 @@ def write_text(args: Namespace, file: str, text: str, sentence: str, *words: str
     """Write a file, and say so and which command comes next; the exit code of success. Raises as `write_single`."""
     written = write_single(args, {Path(file): text}, fresh=fresh)
     print(written_text(written), hint(sentence, command_line(*words)), sep="\n")
-    return 0
-
-
-def made(args: Namespace, machine_file: TextFile, out: str | None) -> int:
-    """Write or print a machine file that was made from another description; the exit code of success."""
-    tell("note", machine_file.notes)
-    if out:
-        return write_text(args, out, machine_file.text, "next", "machine", "check", out)
-    sys.stdout.write(machine_file.text)
     return 0
 
 

@@ -18,17 +18,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
-from toolpath_stiff.inference.covariances import Covariance, Groups
+from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
+from toolpath_stiff.inference.covariances import Covariance, Groups, inverse_root
 from toolpath_stiff.inference.noise import Noise
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
 
 # tau: relative sd of the excess; 0, then 0.3 % to 100 % in steps of 30 %.
 EXCESSES = np.concatenate([[0.0], np.geomspace(0.003, 1.0, 23)])
@@ -38,7 +33,6 @@ MOST_PATTERNS = 8  # found one after the other
 ALIKE = 0.9  # correlation from which two patterns cannot be told apart in these data
 WILD = 3.0  # standard deviations at which a reading is drawn in
 FEWEST_REPEATED = 5  # readings beyond one a place from which the noise itself is checked
-WIDE = 60  # readings of a clamping or a place from which it counts as something that all readings share
 TIED = 1e-9  # share by which statistics differ that are one and the same: of patterns that cannot be told apart
 DEPENDENT = 1e-6  # of a column's square that is left after the patterns already found: less is nothing
 
@@ -103,11 +97,11 @@ class FoundPattern:
 
 
 class Scattering:
-    """The scatter of n readings, ready to be whitened and drawn.
+    """The scatter of n readings, S, beside an excess of their places, and simulated sets of it.
 
-    Readings hang together by clampings and by places in small blocks. In each, a basis is found in which the noise is
-    white and the excess of the places diagonal; the few nuisances that all readings share enter as columns, U, along
-    whose principal axes Q whitening shrinks what comes in: 1 - Q (1 - (1 + s^2)^-1/2) Q' for U = Q s P' (Woodbury).
+    With an excess tau the inverse covariance is, for Z' S^-1 Z = U diag(g) U' (Woodbury 1950),
+
+        V^-1 = S^-1 - W' diag(tau^2 / (1 + tau^2 g)) W,      W = U' Z' S^-1.
 
     Parameters
     ----------
@@ -117,6 +111,11 @@ class Scattering:
         (n,) labels: readings clamped together; readings that are mechanically the same.
     draws, seed
         Simulated sets of readings.
+
+    Attributes
+    ----------
+    of_places, taken
+        W (p, n); of each excess of the grid, (grid, p) what it takes off.
     """
 
     def __init__(
@@ -130,15 +129,10 @@ class Scattering:
     ) -> None:
         self.noise, self.covariance = noise, covariance
         self.places = Groups.by(place)
-        clamps, wide_clamps = _narrow(covariance.groups)
-        narrow, wide_places = _narrow(self.places)
-        self.turn, spread = _turn_blocks(covariance, clamps, narrow)
-        self.weights = 1.0 / np.sqrt(1.0 + EXCESSES[:, None] ** 2 * np.maximum(spread, 0.0))  # (g, n)
-        self._shared = self.turned(
-            np.concatenate([covariance.shared, np.sqrt(covariance.groups.spread(covariance.common)) * wide_clamps])
-        )
-        self._wide_places = self.turned(wide_places)
-        self.axes = cache(self._axes)
+        solved = covariance.precision.times(np.equal.outer(np.arange(self.places.count), self.places.of).astype(float))
+        weight, turn = np.linalg.eigh(self.places.sums(solved))
+        self.of_places = turn.T @ solved
+        self.taken = EXCESSES[:, None] ** 2 / (1.0 + EXCESSES[:, None] ** 2 * np.maximum(weight, 0.0))
         self.sd = np.sqrt(covariance.diagonal)
         # Wild readings included; how well the noise itself is known is not.
         self.square = covariance.diagonal + noise.repeat**2 * noise.outliers * (noise.outlier_width**2 - 1.0)
@@ -169,113 +163,72 @@ class Scattering:
         """(draws, n) simulated residuals with that excess."""
         return np.asarray(self._normal + excess * self._of_place)
 
-    def turned(self, rows: FloatArray) -> FloatArray:
-        """Rows (m, n) in the basis in which the noise is white, but for what all share, and the excess diagonal."""
-        return np.asarray((self.turn @ rows.T).T)
 
-    def _axes(self, grid: int) -> tuple[FloatArray, FloatArray]:
-        """Principal axes (n, q) of what all share at an excess of the grid, and how much of each is to be taken off."""
-        shared = np.concatenate([self._shared, EXCESSES[grid] * self._wide_places]) * self.weights[grid]
-        axes, size, _ = np.linalg.svd(shared.T, full_matrices=False)
-        return axes, 1.0 - 1.0 / np.sqrt(1.0 + size**2)
+@dataclass(frozen=True)
+class _Weighed(ArrayColumns):
+    """m rows of residuals under S: with themselves (m,), with k columns (m, k), with the places (m, p)."""
 
-    def shrunk(self, columns: FloatArray, grid: int) -> FloatArray:
-        """Columns (n, m), turned and weighted, white also in what all readings share."""
-        axes, share = self.axes(grid)
-        return np.asarray(columns - axes @ (share[:, None] * (axes.T @ columns)))
-
-
-def _narrow(groups: Groups) -> tuple[IntArray, FloatArray]:
-    """(n,) each reading's group, -1 in one of more than `WIDE` readings; (w, n) ones and noughts of those."""
-    wide = np.flatnonzero(np.bincount(groups.of) > WIDE)
-    return np.where(np.isin(groups.of, wide), -1, groups.of), (groups.of == wide[:, None]).astype(float)
-
-
-def _turn_blocks(covariance: Covariance, clamp: IntArray, place: IntArray) -> tuple[csr_array, FloatArray]:
-    """Turn (n, n) in which each reading's own scatter and its clamping's are white, and the variance of its place.
-
-    The readings of a block have a clamping or a place in common with each other; -1 is none.
-    """
-    from scipy.sparse import csr_array
-
-    spread, parts, clamping = np.zeros(len(clamp)), [], covariance.groups.spread(covariance.common)
-    for rows in _connected(clamp, place).members():
-        own_variance, of, place_of = covariance.own_variance[rows], clamp[rows], place[rows]
-        same = (of[:, None] == of) & (of >= 0)
-        inverse = np.linalg.inv(np.linalg.cholesky(np.diag(own_variance) + clamping[rows] * same))
-        spread[rows], turn = np.linalg.eigh(inverse @ ((place_of[:, None] == place_of) & (place_of >= 0)) @ inverse.T)
-        parts.append((turn.T @ inverse, np.repeat(rows, len(rows)), np.tile(rows, len(rows))))
-    data, row, column = (np.concatenate([np.ravel(part[k]) for part in parts]) for k in range(3))
-    return csr_array((data, (row, column)), shape=(len(clamp),) * 2), spread
-
-
-def _connected(clamp: IntArray, place: IntArray) -> Groups:
-    """Readings (n,) that hang together by their clampings and places; -1 is none."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    n, clamps = len(clamp), int(clamp.max()) + 1
-    columns = np.concatenate([n + clamp, n + clamps + place])
-    held = np.concatenate([clamp, place]) >= 0
-    links = (np.ones(held.sum()), (np.tile(np.arange(n), 2)[held], columns[held]))
-    size = n + clamps + int(place.max()) + 1
-    return Groups.by(connected_components(coo_array(links, shape=(size, size)), directed=False)[1][:n])
+    square: FloatArray
+    columns: FloatArray
+    places: FloatArray
 
 
 class _Fit:
-    """Patterns made free of those in `base`, for every excess of the grid.
+    """Patterns (count, n) made free of those in `base` (b, n), for every excess of the grid."""
 
-    Rows of residuals stay as they are turned; what they are multiplied with is whitened twice instead.
-    """
-
-    def __init__(self, scattering: Scattering, columns: FloatArray, base: FloatArray) -> None:
-        self.scattering, self.base = scattering, base
-        self._turned, self._fixed = scattering.turned(columns).T, scattering.turned(base).T
-        self.of_base, self.columns = cache(self._of_base), cache(self._columns)
-        white = scattering.shrunk(self._fixed * scattering.weights[0][:, None], 0)
-        # (n, b) from turned residuals to their share in each row of the base.
-        self._taken = scattering.shrunk(np.asarray(np.linalg.pinv(white).T), 0) * scattering.weights[0][:, None]
-        scatter = scattering.turned(self.tamed(scattering.draws(0.0)))
+    def __init__(self, scattering: Scattering, patterns: FloatArray, base: FloatArray) -> None:
+        self.scattering, self.base, self.count = scattering, base, len(patterns)
+        every = np.concatenate([patterns, base])
+        self._solved = scattering.covariance.precision.times(every)
+        self._places = every @ scattering.of_places.T
+        self._products = every @ self._solved.T
+        self.free = cache(self._free)
+        # (n, b) from residuals to their share in each row of the base.
+        self._share = self._solved[self.count :].T @ np.linalg.pinv(self._products[self.count :, self.count :])
+        scatter = self._weighed(self.tamed(scattering.draws(0.0)))
         self._target = float(np.median(self._squares(scatter, 0)))
         self._within = float(np.median(self._squares(scatter, -1)))
 
-    def _of_base(self, grid: int) -> tuple[FloatArray, FloatArray]:
-        """Orthonormal basis (n, b) of the white base; (n, q) what removes it and what all share from a square."""
-        axes, share = self.scattering.axes(grid)
-        weight = self.scattering.weights[grid][:, None]
-        left, singular, _ = np.linalg.svd(self.scattering.shrunk(self._fixed * weight, grid), full_matrices=False)
-        basis = left[:, singular > 1e-9 * max(float(singular.max(initial=0.0)), 1e-300)]
-        both = [axes * np.sqrt(1.0 - (1.0 - share) ** 2), self.scattering.shrunk(basis, grid)]
-        return basis, np.concatenate(both, axis=1) * weight
+    def _free(self, grid: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Of an excess: combinations (k, count) of all columns that are the patterns free of the base and of length 1.
 
-    def _columns(self, grid: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Patterns (n, patterns) white and of length 1; their lengths before; what gives turned residuals' share."""
-        weight, (basis, _) = self.scattering.weights[grid][:, None], self.of_base(grid)
-        x = self.scattering.shrunk(self._turned * weight, grid)
-        whole = np.einsum("ij,ij->j", x, x)
-        x = x - basis @ (basis.T @ x)
-        left = np.einsum("ij,ij->j", x, x)
+        Then the patterns' lengths before; their products (count, count); combinations (k, r) that are the base.
+        """
+        form = self._products - (self._places * self.scattering.taken[grid]) @ self._places.T
+        root = inverse_root(form[self.count :, self.count :]) if len(self.base) else np.zeros((0, 0))
+        of_base = np.concatenate([np.zeros((self.count, root.shape[1])), root])
+        combined = np.eye(len(form), self.count) - of_base @ (root.T @ form[self.count :, : self.count])
+        left, whole = np.diagonal(combined.T @ form @ combined), np.diagonal(form)[: self.count]
         size = np.sqrt(np.where(left > DEPENDENT * whole, left, np.inf))
-        x = x / size
-        return x, size, self.scattering.shrunk(x, grid) * weight
+        combined = combined / size
+        return combined, size, combined.T @ form @ combined, of_base
 
     def tamed(self, residuals: FloatArray) -> FloatArray:
         """Rows (m, n) of residuals beside the base, wild ones drawn in (Huber 1981, Robust Statistics, psi)."""
-        rest = residuals - (self.scattering.turned(residuals) @ self._taken) @ self.base
+        rest = residuals - (residuals @ self._share) @ self.base
         typical = np.median(np.abs(rest) / self.scattering.sd, axis=1, keepdims=True)
         # 0.6745: the median of the size of a standard normal variable.
         bound = WILD * np.maximum(typical / 0.6745, 1.0) * self.scattering.sd
         return np.asarray(np.clip(rest, -bound, bound))
 
-    def _squares(self, turned: FloatArray, grid: int) -> FloatArray:
-        whole = ((turned * self.scattering.weights[grid]) ** 2).sum(axis=1)
-        return np.asarray(whole - ((turned @ self.of_base(grid)[1]) ** 2).sum(axis=1))
+    def _weighed(self, rows: FloatArray) -> _Weighed:
+        squares = self.scattering.covariance.precision.squares(rows)
+        return _Weighed(squares, rows @ self._solved.T, rows @ self.scattering.of_places.T)
 
-    def _excess(self, turned: FloatArray, target: FloatArray) -> IntArray:
-        """(m,) index of the smallest excess that brings the sum of squares of rows (m, n) down to the target (m,)."""
-        chosen, left = np.full(len(turned), len(EXCESSES) - 1), np.arange(len(turned))
+    def _with_columns(self, rows: _Weighed, grid: int) -> FloatArray:
+        """(m, k) r' V^-1 x of each column x."""
+        return np.asarray(rows.columns - (rows.places * self.scattering.taken[grid]) @ self._places.T)
+
+    def _squares(self, rows: _Weighed, grid: int) -> FloatArray:
+        """(m,) r' V^-1 r beside the base."""
+        whole = rows.square - rows.places**2 @ self.scattering.taken[grid]
+        return np.asarray(whole - ((self._with_columns(rows, grid) @ self.free(grid)[3]) ** 2).sum(axis=1))
+
+    def _excess(self, rows: _Weighed, target: FloatArray) -> IntArray:
+        """(m,) index of the smallest excess that brings the sum of squares of rows down to the target (m,)."""
+        chosen, left = np.full(len(target), len(EXCESSES) - 1), np.arange(len(target))
         for grid in range(len(EXCESSES)):
-            good = self._squares(turned[left], grid) <= target[left]
+            good = self._squares(rows.take(left), grid) <= target[left]
             chosen[left[good]] = grid
             left = left[~good]
             if not len(left):
@@ -284,15 +237,14 @@ class _Fit:
 
     def statistics(self, residuals: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
         """Of rows (m, n) of residuals: (m, patterns) t, (m,) index of the excess, (m,) factor on the noise."""
-        turned = self.scattering.turned(self.tamed(residuals))
-        inflation = np.ones(len(turned))
+        rows = self._weighed(self.tamed(residuals))
+        inflation = np.ones(len(residuals))
         if len(residuals.T) - self.scattering.places.count >= FEWEST_REPEATED:
-            inflation = np.maximum(self._squares(turned, -1) / self._within, 1.0)
-        chosen = self._excess(turned, self._target * inflation)
-        t = np.zeros((len(turned), self._turned.shape[1]))
+            inflation = np.maximum(self._squares(rows, -1) / self._within, 1.0)
+        chosen = self._excess(rows, self._target * inflation)
+        t = np.zeros((len(residuals), self.count))
         for grid in np.unique(chosen).tolist():
-            rows = chosen == grid
-            t[rows] = turned[rows] @ self.columns(grid)[2]
+            t[chosen == grid] = self._with_columns(rows.take(chosen == grid), grid) @ self.free(grid)[0]
         factor = np.sqrt(inflation)
         return t / factor[:, None], chosen, factor
 
@@ -341,8 +293,8 @@ def find_structure(residual: FloatArray, patterns: list[Pattern], scattering: Sc
         left = float(EXCESSES[grid])
         drawn = np.abs(fit.statistics(scattering.draws(left))[0]).max(axis=1)
         p = (1.0 + (drawn[:, None] >= np.abs(t)[None, :] - 1e-12).sum(axis=0)) / (1.0 + len(drawn))
-        x, sizes, _ = fit.columns(int(grid))
-        coefficients, alike = t * float(factor) / sizes, np.abs(x.T @ x) > ALIKE
+        _, sizes, products, _ = fit.free(int(grid))
+        coefficients, alike = t * float(factor) / sizes, np.abs(products) > ALIKE
         np.fill_diagonal(alike, val=False)
         answers = [
             FoundPattern(pattern, float(t[i]), float(p[i]), float(coefficients[i]),

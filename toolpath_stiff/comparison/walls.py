@@ -17,7 +17,8 @@ from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.cutting.compensation import places_beside
 from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.cutting.cutters import radii_of
-from toolpath_stiff.cutting.passes import profile_at, walls_beside
+from toolpath_stiff.cutting.passes import profile_at
+from toolpath_stiff.cutting.tip import walls_beside
 from toolpath_stiff.documents import certain, records, without_nan
 from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.nc.moves import Moves
@@ -121,14 +122,9 @@ class WallComparison(FolderResult):
         factor, spread = self.factor
         sizes = {"measured": self.measured, "residual": self.measured - self.foretold}
         means = {f"mean_{name}_um": float(um_from_m(np.abs(values).mean())) for name, values in sizes.items()}
-        document: dict[str, Any] = {
-            "points": len(self.line),
-            "on_no_final_wall": self.others,
-            **means,
-            "factor": factor,
-        }
-        document |= {"factor_sd": spread, "lines": self.lines, "notes": list(self.notes)}
-        return dict(certain(without_nan(document)))
+        document = {"points": len(self.line), "on_no_final_wall": self.others, **means, "factor": factor}
+        further = {"factor_sd": spread, "lines": self.lines, "notes": list(self.notes)}
+        return dict(certain(without_nan(document | further)))
 
     def to_frame(self) -> pd.DataFrame:
         """A row a point: line, side, height on the wall (mm), measured and foretold error, its deviation (um)."""
@@ -147,15 +143,16 @@ def compare_walls(
 
     `moves` are the program's, in whose coordinates the points are. Raises `MeasurementError` where none lies on a wall.
     """
-    station, side = np.nonzero(np.isfinite(cut.wall_mean))
+    upright = (cut.samples.abc[:, :2] == 0.0).all(axis=1)
+    station, side = np.nonzero(np.isfinite(cut.wall_mean) & upright[:, None])
     samples, radius = cut.samples.take(station), radii_of(cut.cutters, cut.samples.tool[station])
     surface, into = walls_beside(cut.samples, cut.cutters, station, side)
     height = samples.position[:, 2, None] + cut.wall_heights[station, side] + np.array([-FARTHEST, FARTHEST])
     nearest = np.full(len(points), -1)
     for i, (point, towards) in enumerate(zip(points, normal, strict=True)):
-        beside = (into @ towards[:2] < -ALONG) & (height[:, 0] <= point[2]) & (point[2] <= height[:, 1])
+        beside = (into @ towards < -ALONG) & (height[:, 0] <= point[2]) & (point[2] <= height[:, 1])
         if beside.any():
-            away = np.where(beside, np.linalg.norm(surface - point[:2], axis=1), np.inf)
+            away = np.where(beside, np.linalg.norm(surface[:, :2] - point[:2], axis=1), np.inf)
             nearest[i] = int(np.argmin(away))
     row = samples.move[nearest]
     first = np.searchsorted(cut.samples.move, row)

@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from toolpath_stiff.correction.machines import data_hash
-from toolpath_stiff.diagnosis.result import Diagnosis
+from toolpath_stiff.diagnosis.examination import Diagnosis
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.judgement import NONE

@@ -11,12 +11,13 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.files import read_bytes
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.prediction import scaled_law
+from toolpath_stiff.machine.elements import TORSION
 from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.machine.file import parse_machine
 from toolpath_stiff.machine.model import EffectEntry, Hexapod, MachineTool, StrutLaw, Uncertainty
 from toolpath_stiff.machine.writer import elements_toml
 from toolpath_stiff.readings.measurements import NIST_TABLE_1
-from toolpath_stiff.stiffness.contract import SETUP
+from toolpath_stiff.stiffness.contract import ELEMENT, SETUP
 from toolpath_stiff.units import n_per_um_from_n_per_m
 from toolpath_stiff.workbooks import split_name
 
@@ -110,7 +111,7 @@ def fitted_elements(
     names = [entry.name for entry in (*effects, *instruments)]
     carrying = machine.with_changes(effects=effects, instruments=instruments)
     if len(set(names)) == len(names):  # else no name says which of two it is
-        known = uncertainty_of(machine, fit, fit, widened, None, first=len(torsions))
+        known = uncertainty_of(machine, fit, fit, widened, None, torsions=len(torsions))
         carrying = carrying.with_changes(uncertainty=known)
     return parse_machine(elements_toml(carrying, torsions, heading), machine.name)
 
@@ -127,19 +128,20 @@ def uncertainty_of(
     widened: float,
     errors: ErrorModel | None,
     law: StrutLaw | None = None,
-    first: int = 0,
+    torsions: int = 0,
 ) -> Uncertainty | None:
     """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already.
 
-    Of the fit's candidates from the `first` on.
+    The fit's first candidates are so many `torsions` of joints, in place of the file's.
     """
     names = list(law.parameters) if law and known.law_free else []
     slopes = [n_per_um_from_n_per_m(k) for k in ((law.stiffness_1, law.stiffness_2) if law else ())][: len(names)]
     rows = [0, 1][: len(names)]
     owners = [(i, candidate.name) for i, candidate in enumerate(fit.candidates) for _ in candidate.components]
     for index, ((owner, name), (component, size)) in enumerate(zip(owners, fit.parts, strict=True)):
-        if index in fit.free and owner >= first:
-            names.append(f"{name}.{component.parameter.key}")
+        if index in fit.free:
+            joint = str(dict(fit.candidates[owner].choice).get(ELEMENT))
+            names.append(joint + TORSION if owner < torsions else f"{name}.{component.parameter.key}")
             # value = 1 / size for a stiffness whose neutral value is infinite.
             slopes.append((-1.0 / size**2 if component.inverse else 1.0) / component.parameter.si)
             rows.append(2 + known.free.index(index))

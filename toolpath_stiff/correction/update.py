@@ -78,7 +78,7 @@ def update(task: UpdateTask, build: Callable[[Any], Update] | None = None) -> Up
     """
     task = replace(task, files=tuple(task.files) or tuple(dict.fromkeys(task.data.file.tolist())))
     effect_files = tuple(map(str, task.effect_files))
-    request = task.request or Asked(tuple(task.files), task.machine.name, effect_files, task.noise, task.strut_spread)
+    request = task.request or Asked(tuple(task.files), task.machine.name, effect_files)
     result = update_by_mean_error(task) if task.objective == MEAN_ERROR else (build or build_ladder)(task)
     of_struts = build is None and result.accepted and not (result.question or result.search)
     if of_struts and (built := as_built(task, result.last)):

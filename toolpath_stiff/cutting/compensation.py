@@ -285,7 +285,8 @@ def compensate_program(
     before = walls_of(cut, moves, np.arange(len(moves)), moves)
     if not len(before.row):
         raise ProgramError("no pass makes a wall of the finished part", file=program.name)
-    alone = {int(row): "a plunge, or an arc on edge" for row in np.unique(before.row[~movable_rows(moves)[before.row]])}
+    still = np.unique(before.row[~movable_rows(moves)[before.row]]).tolist()
+    alone = dict.fromkeys(still, "a plunge, an arc on edge, or a tool aslant")
     alone |= _too_far(before)
     fixed = shift_program(program, origin, {}, decimals=decimals, control=control)[2]
     alone |= {

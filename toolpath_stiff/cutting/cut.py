@@ -10,32 +10,35 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter, radii_of
-from toolpath_stiff.cutting.engagement import engage
 from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.passes import walls_of_all_passes
 from toolpath_stiff.cutting.patches import Contact, Patches, of_stations
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
-from toolpath_stiff.cutting.stations import headings
 from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
-from toolpath_stiff.cutting.sweeps import tilted_moves
+from toolpath_stiff.cutting.tilts import TURNING, engage_tilts, samples_seen, tilts_of
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
-from toolpath_stiff.cutting.workpiece import Workpiece, stages_of
+from toolpath_stiff.cutting.workpiece import Workpiece
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import Moves, ReadProgram
 from toolpath_stiff.path.sampling import Samples, sample_moves
 from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Progress
+from toolpath_stiff.rotations import along_tool_axis
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import per_min_from_rad_per_s
 
 BLOCK = 16_384  # stations at a time
+KEPT = np.float32  # precision of results
 MOST_NAMED = 5  # lines in a warning
+THIN = 0.1  # of the width of cut: an error of more changes what is cut
 OTHER = 0.1  # of the error of a wall: where a pass has less of it by itself, most is of an earlier one
 ROUNDED = 1e-12  # of a cosine
+# What samples with the same contact have alike.
+SHARED = ("ap", "ae", "entry", "exit", "mean_force", "peak_force", "deflection", "wall_force", "errors", "lowest",
+          "highest", "deviation", "wall_profiles")  # fmt: skip
 SAME_WALL = 1e-6  # m, ranges of height closer than this are one
 
 
@@ -44,7 +47,8 @@ class Cut:
     """What is cut at n samples of a program, and the error of the surface that they leave. SI.
 
     Vectors are in the station's frame: x along the horizontal feed, y to its left, z up; forces act on the tool. Errors
-    count out of the part: + material is left, - it is cut too deep. nan: there is no such thing at that sample.
+    count out of the part: + material is left, - it is cut too deep. nan: there is no such thing at that sample. Results
+    are in single precision: a million lines have two million samples.
 
     Attributes
     ----------
@@ -70,8 +74,7 @@ class Cut:
     deviation
         (n, 3) m, standard deviation of `errors`, from the coefficients and the machine.
     wall_profiles
-        (n, 2, HEIGHTS) m, errors of the left and right wall from its lower to its upper end, at `surface_error.shares`;
-        in single precision, they are most of what is kept.
+        (n, 2, HEIGHTS) m, errors of the left and right wall from its lower to its upper end, at `surface_error.shares`.
     assumptions, warnings
         Sentences.
     """
@@ -132,6 +135,7 @@ def evaluate_cut(
     setup: CutSetup,
     step: float,
     progress: Progress | None = None,
+    sampled: Samples | None = None,
 ) -> Cut:
     """The cut of a program whose zero sits at `origin` (m, rad), with samples at most `step` (m) apart.
 
@@ -140,60 +144,67 @@ def evaluate_cut(
     model
         The machine with its effects, under its conditions; those that depend on the load take the force that acts.
     program
-        As it was read; cuts with a tilted tool are left out, with a warning.
+        As it was read; cuts whose tool turns on the way are left out, with a warning.
     progress
         Called with what is being done, samples done, samples in all.
+    sampled
+        The same samples on the machine, whose columns are then held once.
 
     Raises
     ------
     InputError
-        Something is missing (which, and where to write it), every cut has a tilted tool, or joints leave a choice.
+        Something is missing (which, and where to write it), the tool turns in every cut, or joints leave a choice.
     """
-    turned, many = bool(program.moves.end[:, 3:].any()), len(model.machine.configurations) > 1
-    if not isinstance(model.machine, Hexapod) and (turned or many):
-        mistake = f"a cut on machine {model.machine.name}, whose joints stand in several ways or turn the work"
-        raise InputError(mistake, expected="an upright tool on a machine of one configuration, or no cut")
-    cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step)
+    if len(model.machine.configurations) > 1:
+        mistake = f"a cut on machine {model.machine.name}, whose joints stand in several ways"
+        raise InputError(mistake, expected="`tps analyze --cut`, which keeps one, or a machine of one configuration")
+    orient = model.machine.angles_of if program.native else np.asarray
+    cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step, angles_of=orient)
+    if sampled is not None:
+        samples = replace(sampled, **{name: getattr(samples, name) for name in ("position", "abc", "tangent")})
+    tilts, turns = tilts_of(program.moves, orient)
+    tilt = tilts[samples.move]
     spindle = spindle_of(setup, program, samples)
     feed_per_tooth = _feed_per_tooth(samples, cutters, spindle)
     samples = _along_teeth(samples, program.moves, feed_per_tooth)
     stock = stock_of(setup, program.moves, cutters)
+    seen = samples_seen(samples, tilt, turns)
     try:
-        engaged = engage(stages_of(stock, program.moves, cutters), program.moves, samples, cutters, progress)
+        engaged, works = engage_tilts(stock, program.moves, seen, cutters, tilts, turns, progress)
     except ProgramError as error:  # which knows no file
         raise error.in_line(program.name, error.line or 0) from None
-    walls, own = walls_of_passes(engaged.work, samples, cutters)
+    walls, own = walls_of_passes(works, tilt, seen, cutters)
     # Samples that share a contact are computed once, but where their walls differ.
     source = engaged.source.copy()
     apart = ~np.isclose(walls, walls[source], rtol=0.0, atol=SAME_WALL, equal_nan=True).all(axis=(1, 2))
     source[apart] = np.flatnonzero(apart)
     rows = np.unique(source)
-    strips = np.full((len(samples), 2), np.nan)
-    strips[rows] = final_strip(engaged.work, samples.take(rows), cutters)
+    strips = final_strip(works, tilt, seen, cutters, np.isin(np.arange(len(samples)), rows))
     patches = of_stations(engaged.patches, engaged.source[rows])
     patches = replace(patches, station=rows[patches.station])
     cut = _nothing_cut(samples, cutters, engaged.work, setup.coefficients, feed_per_tooth)
-    cut = replace(cut, removed=engaged.removed, wall_heights=walls)
+    cut, struck = replace(cut, removed=engaged.removed, wall_heights=walls), engaged.struck
+    del engaged
     made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
     for values in (cut.errors, cut.lowest, cut.highest, cut.deviation):
         values[made] = 0.0  # a pass that takes nothing off: no force, no error of its own
     cut.wall_profiles[made[:, :2]] = 0.0
     _note_engagement(cut, patches)
     cutting = np.unique(patches.station)
-    level = np.hypot(samples.tangent[:, 0], samples.tangent[:, 1])
-    feed = cut.feed_per_tooth[:, None] * np.stack([level, samples.tangent[:, 2]], axis=1)
+    level = np.hypot(seen.tangent[:, 0], seen.tangent[:, 1])
+    feed = cut.feed_per_tooth[:, None] * np.stack([level, seen.tangent[:, 2]], axis=1)
     for number, cutter in cutters.items():
         contact = Contact(patches, cutter, setup.coefficients, feed, np.sign(spindle))
-        some = cutting[samples.tool[cutting] == number]
-        for rows in (some[start : start + BLOCK] for start in range(0, len(some), BLOCK)):
+        those = cutting[samples.tool[cutting] == number]
+        for rows in (those[start : start + BLOCK] for start in range(0, len(those), BLOCK)):
             _evaluate(cut, model, origin, contact.of(rows), strips, rows)
-    for values in (cut.ap, cut.ae, cut.entry, cut.exit, cut.mean_force, cut.peak_force, cut.deflection, cut.wall_force):
-        values[:] = values[source]
-    for values in (cut.errors, cut.lowest, cut.highest, cut.deviation, cut.wall_profiles):
-        values[:] = values[source]
-    cut = _with_walls_of_all_passes(cut, own, step)
-    tilted = samples.cutting & tilted_moves(program.moves)[samples.move]
-    warnings = _warnings(cut, engaged.struck, tilted)
+    del patches, contact, strips, feed, level
+    for some in (slice(start, start + BLOCK) for start in range(0, len(source), BLOCK)):
+        for name in SHARED:
+            values = getattr(cut, name)
+            values[some] = values[source[some]]
+    cut = _with_walls_of_all_passes(cut, seen, tilt, own, step)
+    warnings = _warnings(cut, struck, samples.cutting & (tilt == TURNING))
     return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=warnings)
 
 
@@ -221,19 +232,22 @@ def _nothing_cut(
     samples: Samples, cutters: Mapping[int, Cutter], work: Workpiece, coefficients: Coefficients, feed: FloatArray
 ) -> Cut:
     """A cut to be filled in."""
-    n = len(samples)
+
+    def column(value: float, *shape: int) -> AnyArray:
+        return np.full((len(samples), *shape), value, KEPT)
+
     return Cut(
         samples=samples,
         cutters=cutters,
         work=work,
         coefficients=coefficients,
         feed_per_tooth=feed,
-        **{name: np.zeros(n) for name in ("ap", "ae", "entry", "exit", "removed")},
-        **{name: np.zeros((n, 3)) for name in ("mean_force", "peak_force", "deflection")},
-        wall_heights=np.full((n, 2, 2), np.nan),
-        wall_force=np.full((n, 2, 3), np.nan),
-        **{name: np.full((n, 3), np.nan) for name in ("errors", "lowest", "highest", "deviation")},
-        wall_profiles=np.full((n, 2, HEIGHTS), np.nan, dtype=np.float32),
+        **{name: column(0.0) for name in ("ap", "ae", "entry", "exit", "removed")},
+        **{name: column(0.0, 3) for name in ("mean_force", "peak_force", "deflection")},
+        wall_heights=column(np.nan, 2, 2),
+        wall_force=column(np.nan, 2, 3),
+        **{name: column(np.nan, 3) for name in ("errors", "lowest", "highest", "deviation")},
+        wall_profiles=column(np.nan, 2, HEIGHTS),
         assumptions=(),
         warnings=(),
     )
@@ -267,7 +281,7 @@ def _evaluate(
     samples = cut.samples.take(rows)
     mean = mean_force(contact)
     cut.mean_force[rows], cut.peak_force[rows] = mean, peak_force(contact)
-    axes = station_axes(headings(samples), origin)
+    axes = station_axes(samples, origin)
     machine = tip_compliances(model, samples, origin, axes, mean)
     whole = with_tools(machine, samples, cut.cutters)
     cut.deflection[rows] = product(whole, mean[:, :, None])[..., 0]
@@ -283,9 +297,9 @@ def _evaluate(
     cut.deviation[rows] = np.hypot(of_coefficients, share * cut.errors[rows])
 
 
-def _with_walls_of_all_passes(cut: Cut, own: FloatArray, step: float) -> Cut:
-    """The cut with each wall at the pass that owns it; `own` as `Cut.wall_heights`."""
-    walls_of_all_passes(cut.samples, cut.cutters, cut.wall_heights, own, cut.wall_profiles, step)
+def _with_walls_of_all_passes(cut: Cut, seen: Samples, tilt: IntArray, own: FloatArray, step: float) -> Cut:
+    """The cut with each wall at the pass that owns it; samples as seen by tilts (n,), `own` as `Cut.wall_heights`."""
+    walls_of_all_passes(seen, tilt, cut.cutters, cut.wall_heights, own, cut.wall_profiles, step)
     before, deviation = np.abs(cut.wall_mean), cut.deviation[:, :2].copy()
     share = deviation / np.where(before > 0.0, before, np.nan)  # the coefficients scatter all errors alike
     usual = float(np.median(share[np.isfinite(share)])) if np.isfinite(share).any() else 0.0
@@ -294,7 +308,7 @@ def _with_walls_of_all_passes(cut: Cut, own: FloatArray, step: float) -> Cut:
         _enter(cut, rows, slice(0, 2), cut.wall_profiles[rows] @ shares()[1], cut.wall_profiles[rows])
     after = np.abs(cut.wall_mean)
     cut.deviation[:, :2] = after * np.where(before > OTHER * after, share, usual)
-    return replace(cut, wall_heights=own)
+    return replace(cut, wall_heights=own.astype(KEPT))
 
 
 def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: FloatArray) -> None:
@@ -324,7 +338,7 @@ def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str,
     return tuple(sentences)
 
 
-def _warnings(cut: Cut, struck: BoolArray, tilted: BoolArray) -> tuple[str, ...]:
+def _warnings(cut: Cut, struck: BoolArray, turning: BoolArray) -> tuple[str, ...]:
     """What deserves a look, a sentence each."""
     samples, warnings = cut.samples, []
     if cut.machine_only:
@@ -336,12 +350,15 @@ def _warnings(cut: Cut, struck: BoolArray, tilted: BoolArray) -> tuple[str, ...]
     engaged = cut.ap > 0.0
     if not cut.removed.any():
         warnings.append("no cut meets the stock: corner_mm in [stock] and the program's zero say where both are")
-    plunges = (cut.removed > 0.0) & (np.abs(samples.tangent[:, 2]) >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
+    along = np.abs(along_tool_axis(samples.tangent, samples.abc))
+    plunges = (cut.removed > 0.0) & (along >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
+    large = (np.abs(np.nan_to_num(cut.wall_mean)).max(axis=1) > THIN * cut.ae) & (cut.ae > 0.0)
     for rows, words in (
+        (large, f"walls off by over {THIN:g} of the width of cut, foretold too large: the chip is not thinner for it"),
         (struck, "rapids run into material, which counts as still there afterwards"),
         (plunges, "plunges: cutting with the end is not modelled, no force is known there"),
-        (tilted, "the tool is tilted: no force is known there, and what these cuts take off counts as still there, so "
-         "that later cuts are foretold too heavy, never too light"),
+        (turning, "the tool turns on the way: no force is known there, and what these cuts take off counts as still "
+         "there, so that later cuts are foretold too heavy, never too light"),
     ):  # fmt: skip
         warnings += _lines_warning(samples, rows, words)
     chip = np.where(engaged, cut.feed_per_tooth, np.nan)

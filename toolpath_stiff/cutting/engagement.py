@@ -30,10 +30,11 @@ from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.results import Progress, counter
 
 AROUND = 33  # points of a ring, denser at the sides, where a light cut is
-LEVELS, CORNER_LAYERS = 12, 6  # layers of the cylinder; of a corner or ball
+LEVELS, PARTS = 12, 3  # layers of the cylinder; parts of each where the work has not levels alone
+CORNER_LAYERS, LOW, FEWER = 10, 0.8, 2.0  # of a corner or ball; so many fewer where it is in contact up to such a kappa
 COARSE = 3  # rings that look how high a corner or ball cuts
 END_POINTS = 200  # of the end of a cutter that descends
-HALVINGS = 14, 9  # of up to 9 degrees: 1e-5 rad; of up to 18 degrees round a corner or a ball: 6e-4 rad
+HALVINGS = 14, 7  # of up to 9 degrees: 1e-5 rad; of up to 18 degrees round a corner or a ball: 2.5e-3 rad
 # Stations that share a contact: turn, rad, and tilt of the feed from one to the next; relative difference of rate and
 # size of the contacts at the ends of a stretch, which has so many radii at most; stations that it may have.
 SAME, ALIKE, SPAN, STRIDES = 0.05, 0.05, 0.8, (16, 8, 4, 2, 1)
@@ -79,14 +80,15 @@ def engage(
     samples: Samples,
     cutters: Mapping[int, Cutter],
     progress: Progress | None = None,
+    seen: BoolArray | None = None,
 ) -> Engagement:
-    """The engagement of samples in the set-up frame, where `moves` are as read.
+    """The engagement of samples, or those `seen` (n,) upright, in the frame that `moves` are in.
 
     `stages` are those of `workpiece.stages_of` the moves, `cutters` by number of the tool.
     """
     count, parts, tell = len(samples), [NO_PATCHES], counter(progress, "engagement")
     source, removed, struck = np.arange(count), np.zeros(count), np.zeros(count, dtype=bool)
-    moving = np.flatnonzero((samples.tangent != 0.0).any(axis=1))
+    moving = np.flatnonzero((samples.tangent != 0.0).any(axis=1) & (True if seen is None else seen))
     regime = np.zeros(count, dtype=np.int64)  # changes of what forces hang on besides the path
     for column in (samples.tool, samples.feed, samples.spindle):
         regime[1:] += np.nan_to_num(column[1:]) != np.nan_to_num(column[:-1])
@@ -196,11 +198,12 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
     around = heights_around(work, stations[rows], wall, np.pi * SIDES[None, :], enough=low)
     beyond = (around[0] > low).any(axis=1)  # the corner
     rows, around = rows[beyond], (around[0][beyond], around[1][beyond])
-    borders = _levels(around, corner[rows, None], stations["longest"][rows, None])
+    borders = _levels(around, corner[rows, None], stations["longest"][rows, None], 1 if work.has_levels else PARTS)
     reached = np.full(len(stations), 0.5 * np.pi)
     below = np.setdiff1d(np.flatnonzero((corner > 0.0) & ~stations["end_alone"]), rows)
     reached[below] = _reached(work, stations[below], corner[below])
-    edges = corner[:, None] - corner[:, None] * np.cos(reached[:, None] * np.linspace(0.0, 1.0, CORNER_LAYERS + 1))
+    shares = np.linspace(0.0, 1.0, CORNER_LAYERS + 1) * np.where(reached < LOW, FEWER, 1.0)[:, None]
+    edges = corner[:, None] - corner[:, None] * np.cos(reached[:, None] * np.minimum(shares, 1.0))
     parts = []
     for some, levels, round_part in ((np.arange(len(stations)), edges, True), (rows, borders, False)):
         row, layer = np.nonzero((np.diff(levels, axis=1) > 0.0) & ~stations["end_alone"][some, None])
@@ -217,6 +220,8 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
         else:
             ring = np.broadcast_to(np.pi * SIDES, (len(row), AROUND))
             inside = (around[0][row] > height[:, None]) & (around[1][row] < height[:, None])
+            if work.others:  # which may leave gaps between
+                inside = _cuts(work, own, radius[:, None], ring, height[:, None])
         which, entry, exit_ = _arcs(work, own, radius, height, ring, inside, HALVINGS[round_part])
         parts.append(Patches(some[row][which], low[which], high[which], entry, exit_))
     patches = Patches.joined(parts)
@@ -226,7 +231,7 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
 
 def _cuts(work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray, height: FloatArray) -> BoolArray:
     """Whether material stands above points of the envelope."""
-    top, bottom = heights_around(work, stations, radius, angle, height + TOUCH, height)
+    top, bottom = heights_around(work, stations, radius, angle, height + TOUCH, height, at=True)
     return np.asarray((top > height) & (bottom < height))
 
 
@@ -245,14 +250,17 @@ def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatAr
     return reached
 
 
-def _levels(around: tuple[FloatArray, FloatArray], corner: FloatArray, longest: FloatArray) -> FloatArray:
-    """(n, LEVELS + 1) m above the tip, borders of layers in which heights (n, k) around the cylinder do not change.
+def _levels(around: tuple[FloatArray, FloatArray], corner: FloatArray, longest: FloatArray, parts: int) -> FloatArray:
+    """(n, LEVELS * parts + 1) m above the tip, borders of layers in which heights (n, k) around the cylinder are alike.
 
     From the corner or the underside of the stock: all, or evenly many of more.
     """
     top, bottom = around
     base = np.maximum(np.clip(bottom, 0.0, None).min(axis=1, keepdims=True), corner)
     heights = np.concatenate([base, np.maximum(np.minimum(top, longest), base)], axis=1)
+    below = np.where(top > bottom, np.clip(bottom, base, longest), base)
+    if (below > base).any():
+        heights = np.concatenate([heights, below], axis=1)
     heights = np.sort(heights, axis=1)
     rank = np.zeros(heights.shape, dtype=np.int64)
     rank[:, 1:] = np.cumsum(np.diff(heights, axis=1) > PLATEAU, axis=1)
@@ -262,7 +270,9 @@ def _levels(around: tuple[FloatArray, FloatArray], corner: FloatArray, longest: 
     levels[:, 0] = heights[:, 0]
     many = rank[:, -1] > LEVELS
     levels[many] = heights[many][:, np.round(np.linspace(0, heights.shape[1] - 1, LEVELS + 1)).astype(np.int64)]
-    return np.asarray(np.maximum.accumulate(levels, axis=1))
+    levels = np.maximum.accumulate(levels, axis=1)
+    finer = levels[:, :-1, None] + np.diff(levels, axis=1)[:, :, None] * np.arange(parts) / parts
+    return np.concatenate([finer.reshape(len(levels), LEVELS * parts), levels[:, -1:]], axis=1)
 
 
 def _arcs(

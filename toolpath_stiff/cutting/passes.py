@@ -10,8 +10,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
-from toolpath_stiff.cutting.cutters import Cutter, radii_of
+from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.surface_error import HEIGHTS, shares
+from toolpath_stiff.cutting.tip import walls_beside
 from toolpath_stiff.path.sampling import Samples
 
 BLOCK = 16_384  # walls at a time
@@ -22,6 +23,7 @@ SAME = 1e-7  # m, ranges of height closer than this are one
 
 def walls_of_all_passes(
     samples: Samples,
+    tilt: IntArray,
     cutters: Mapping[int, Cutter],
     made: FloatArray,
     own: FloatArray,
@@ -32,8 +34,8 @@ def walls_of_all_passes(
 
     Parameters
     ----------
-    samples, cutters, step
-        In the set-up frame, at most `step` (m) apart.
+    samples, tilt, cutters, step
+        In the frames of their tilts (n,), at most `step` (m) apart.
     made, own
         (n, 2, 2) m above the tip: walls that a pass makes, even if a later one comes as close; those that it owns.
     profiles
@@ -45,10 +47,12 @@ def walls_of_all_passes(
     apart = 2.0 * max(cutter.radius for cutter in cutters.values())
 
     def places(rows: IntArray, sides: IntArray) -> FloatArray:
-        parts = [np.empty((0, 4))]
+        parts = [np.empty((0, 5))]
         for begin in range(0, len(rows), BLOCK):
-            foot, into = walls_beside(samples, cutters, rows[begin : begin + BLOCK], sides[begin : begin + BLOCK])
-            parts.append(np.concatenate([foot, ALIKE * step * into], axis=1))  # walls with another normal are far
+            some, side = rows[begin : begin + BLOCK], sides[begin : begin + BLOCK]
+            foot, into = (of[:, :2] for of in walls_beside(samples, cutters, some, side))
+            # Walls with another normal are far, those of another tilt farther.
+            parts.append(np.column_stack([foot, ALIKE * step * into, tilt[some]]))
         return np.concatenate(parts)
 
     tree = None
@@ -85,12 +89,3 @@ def profile_at(profiles: AnyArray, ranges: FloatArray, heights: FloatArray) -> F
     first, second = (np.take_along_axis(profiles, at, axis=1) for at in (place, place + 1))
     within = np.abs(heights - low - 0.5 * span) <= 0.5 * span + SAME
     return np.where(within, first + np.clip(part, 0.0, 1.0) * (second - first), np.nan)
-
-
-def walls_beside(
-    samples: Samples, cutters: Mapping[int, Cutter], rows: IntArray, sides: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """(m, 2) m in plan, the foot of the wall beside samples (sides 0 left, 1 right), and its normal into the part."""
-    along = samples.tangent[rows, :2] / np.linalg.norm(samples.tangent[rows, :2], axis=1)[:, None]
-    into = np.stack([-along[:, 1], along[:, 0]], axis=1) * np.where(sides == 0, 1.0, -1.0)[:, None]
-    return samples.position[rows, :2] + radii_of(cutters, samples.tool[rows])[:, None] * into, into

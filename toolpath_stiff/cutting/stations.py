@@ -7,7 +7,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter
-from toolpath_stiff.cutting.workpiece import Workpiece
+from toolpath_stiff.cutting.workpiece import SLACK, Workpiece
 from toolpath_stiff.nc.courses import points_along
 from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.path.sampling import Samples
@@ -15,7 +15,7 @@ from toolpath_stiff.path.sampling import Samples
 BLOCK = 8192  # stations at a time
 # The front of the cutter would touch what the pieces just before have left: these are taken for smaller by SLACK. It is
 # above the rounding of coordinates (4 decimals of a mm); a turn of the tool moves it on by much more.
-RECENT, SLACK = 0.05, 5e-7  # radii of the cutter along the path; m
+RECENT = 0.05  # radii of the cutter along the path
 TOUCH = 1e-9  # m, by which the envelope is taken for smaller: what it only touches is not in cut
 
 STATION = np.dtype([
@@ -89,11 +89,6 @@ def blocks_of_stations(
         yield some, stations_at(work, cutters, (tool, move, path, position, tangent))
 
 
-def headings(samples: Samples) -> FloatArray:
-    """(n,) rad from x to y, the direction in the plane that the angles of each sample's contact start from."""
-    return np.asarray(np.arctan2(samples.tangent[:, 1], samples.tangent[:, 0]))
-
-
 def points_around(stations: AnyArray, radius: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """x, y, m, of points around the axis, end to end; radius and angle (from the left, clockwise) are (n, ...)."""
     shape = (-1,) + (1,) * (np.broadcast(radius, angle).ndim - 1)
@@ -109,16 +104,24 @@ def heights_around(
     angle: FloatArray,
     ceiling: FloatArray | float = np.inf,
     enough: FloatArray | float = -np.inf,
+    at: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
     """Top of the material before each station, underside of the stock, m above the tip; points as `points_around`.
 
-    `ceiling` (m above the tip) and `enough` as of `Workpiece.tops`.
+    `ceiling` (m above the tip) and `enough` as of `Workpiece.tops`. `at`: only what stands at `enough` is asked.
     """
     x, y = points_around(stations, radius, angle)
     whole = np.zeros(np.broadcast_shapes(radius.shape, angle.shape))
     z = stations["z"].reshape((-1,) + (1,) * (whole.ndim - 1))
-    limits = ((whole + (z + height)).ravel() for height in (ceiling, enough))
-    piece, recent = (np.repeat(stations[name], len(x) // max(len(stations), 1)) for name in ("piece", "recent"))
+    limits = [(whole + (z + height)).ravel() for height in (ceiling, enough)]
+    names = ("piece", "recent", "path")
+    piece, recent, path = (np.repeat(stations[name], len(x) // max(len(stations), 1)) for name in names)
     window = np.zeros(len(x), dtype=np.int64), piece
-    top = work.tops(x, y, window, recent, SLACK, *limits)[0]
-    return top.reshape(whole.shape) - z, work.stock.bottoms(x, y).reshape(whole.shape) - z
+    top, bottom = work.tops(x, y, window, recent, SLACK, *limits)[0], work.stock.bottoms(x, y)
+    if at:
+        rows = np.flatnonzero(top > limits[1]) if work.others else np.zeros(0, dtype=np.int64)
+        stands = work.standing(np.stack([x, y, limits[1]])[:, rows], 0.0 * path[rows], path[rows] - TOUCH)
+        top[rows[~stands]] = -np.inf
+    else:
+        bottom, top = work.span(x, y, (bottom, top), 0.0 * path, path - TOUCH)
+    return top.reshape(whole.shape) - z, bottom.reshape(whole.shape) - z

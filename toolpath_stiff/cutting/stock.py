@@ -2,7 +2,7 @@
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,9 @@ class Stock:
         (nx, ny) m; top -inf: no material. Hollows below the top are taken as filled.
     origin
         Where this comes from, a sentence.
+    turn
+        (3, 3) axes of a frame as columns: there a box is looked at aslant, all else is of the frame that it is square
+        in. None: no other frame.
 
     Examples
     --------
@@ -43,6 +46,12 @@ class Stock:
     top: FloatArray
     bottom: FloatArray
     origin: str
+    turn: FloatArray | None = None
+
+    def seen(self, turn: FloatArray) -> "Stock":
+        """The box, or the one around it, in another frame, whose axes are the columns of `turn`."""
+        top, bottom = np.array([[self.top.max()]]), np.array([[self.bottom.min()]])
+        return replace(self, cell=self.cell * self.top.shape, top=top, bottom=bottom, turn=turn)
 
     def __repr__(self) -> str:
         x, y = mm_from_m(self.cell * self.top.shape)
@@ -51,6 +60,9 @@ class Stock:
 
     def tops(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """(n,) m of the top at points x, y; -inf beside the stock."""
+        if self.turn is not None:
+            bottom, top = self._through(x, y, self.turn)
+            return np.where(top > bottom, top, -np.inf)
         if self.top.size == 1:
             end = self.corner + self.cell
             inside = (x >= self.corner[0]) & (x < end[0]) & (y >= self.corner[1]) & (y < end[1])
@@ -60,10 +72,21 @@ class Stock:
 
     def bottoms(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """(n,) m of the underside at points x, y."""
+        if self.turn is not None:
+            bottom, _ = self._through(x, y, self.turn)
+            return bottom
         if self.top.size == 1:
             return np.full(len(x), self.bottom[0, 0])
         i, j, _ = self._cells(x, y)
         return np.asarray(self.bottom[i, j])
+
+    def _through(self, x: FloatArray, y: FloatArray, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n,) m, where lines along z enter a box that stands aslant, and (n,) leave it; less: they miss it."""
+        low = np.append(self.corner, self.bottom[0, 0])
+        ends = np.stack([low, np.append(self.corner + self.cell, self.top[0, 0])])
+        along = np.where(np.abs(turn[:, 2]) > 1e-12, turn[:, 2], 1e-12)
+        places = (ends[:, :, None] - turn[:, :1] * x - turn[:, 1:2] * y) / along[:, None]
+        return places.min(axis=0).max(axis=0), places.max(axis=0).min(axis=0)
 
     def _cells(self, x: FloatArray, y: FloatArray) -> tuple[IntArray, IntArray, BoolArray]:
         i, j = np.floor((x - self.corner[0]) / self.cell[0]), np.floor((y - self.corner[1]) / self.cell[1])

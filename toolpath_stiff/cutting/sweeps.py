@@ -35,15 +35,18 @@ FIELDS = (
 PIECE = np.dtype([(name, np.float64) for name in FIELDS])
 
 
-def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, IntArray]:
-    """The pieces of all cutting moves with an upright tool, and (moves + 1,) the first piece of each move.
+def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter], chosen: BoolArray) -> tuple[AnyArray, IntArray]:
+    """The pieces of those chosen (n,) of the moves that cut, and (n + 1,) the first piece of each move.
 
-    Raises `ProgramError` where none is upright, or a tool is not known.
+    Raises `ProgramError` where the tool of one is not known.
     """
     length = move_lengths(moves)
-    every = (moves.motion != RAPID) & (length > 0.0)
-    cuts = every & ~tilted_moves(moves)
-    _refuse(moves, every, cuts, cutters)
+    cuts = chosen & (moves.motion != RAPID) & (length > 0.0)
+    unknown = np.flatnonzero(cuts & ~np.isin(moves.tool, list(cutters)))
+    if len(unknown):
+        mistake = f"tool {moves.tool[unknown[0]]} cuts and its geometry is not known"
+        hint = "give it a [[tool]] in the file of --cut"
+        raise ProgramError(mistake, hint=hint, line=int(moves.line[unknown[0]]))
     radius, flat = np.zeros(len(moves)), np.zeros(len(moves))
     for tool in np.unique(moves.tool[cuts]).tolist():
         radius[cuts & (moves.tool == tool)] = cutters[tool].radius
@@ -86,19 +89,3 @@ def sweeps_of(moves: Moves, cutters: Mapping[int, Cutter]) -> tuple[AnyArray, In
         pieces["growth"][rows] = (frame.radius_end - frame.radius_start) / np.abs(sweep)
     pieces["cos"], pieces["sin"] = np.cos(pieces["heading"]), np.sin(pieces["heading"])
     return pieces, first
-
-
-def tilted_moves(moves: Moves) -> BoolArray:
-    """(n,) moves with a tool that is not along Z at either end."""
-    return np.asarray((moves.start[:, 3:5] != 0.0).any(axis=1) | (moves.end[:, 3:5] != 0.0).any(axis=1))
-
-
-def _refuse(moves: Moves, cuts: BoolArray, upright: BoolArray, cutters: Mapping[int, Cutter]) -> None:
-    for rows, text, hint in (
-        (cuts & ~upright.any(), "tilted tools: no cut of the program has the tool along Z", "leave --cut out"),
-        (cuts & ~np.isin(moves.tool, list(cutters)), "tool {tool} cuts and its geometry is not known",
-         "give it a [[tool]] in the file of --cut"),
-    ):  # fmt: skip
-        if rows.any():
-            row = int(np.flatnonzero(rows)[0])
-            raise ProgramError(text.format(tool=moves.tool[row]), hint=hint, line=int(moves.line[row]))

@@ -5,19 +5,39 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from toolpath_stiff.arrays import FloatArray, product
-from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.arrays import FloatArray, IntArray, product
+from toolpath_stiff.cutting.cutters import Cutter, radii_of
 from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.path.sampling import Samples
-from toolpath_stiff.rotations import rotation_matrices
+from toolpath_stiff.rotations import along_tool_axis, rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel, parameter_slopes
 
+ALONG = 1e-12  # part of a unit vector square to the tool that is rounding
 
-def station_axes(heading: FloatArray, origin: ArrayLike) -> FloatArray:
-    """(n, 3, 3) in machine coordinates, columns x (feed), y (left), z (up); `heading` (n,) rad in the set-up frame."""
-    axes = rotation_matrices(np.stack([np.zeros_like(heading), np.zeros_like(heading), heading], axis=1))
-    return product(rotation_matrices(np.asarray(origin, dtype=float)[3:])[None], axes)
+
+def station_axes(samples: Samples, origin: ArrayLike) -> FloatArray:
+    """(n, 3, 3) in machine coordinates, as `axes_at` of samples in the set-up frame."""
+    return product(rotation_matrices(np.asarray(origin, dtype=float)[3:])[None], axes_at(samples))
+
+
+def axes_at(samples: Samples) -> FloatArray:
+    """(n, 3, 3) frames of stations, columns x along the feed square to the tool, y to its left, z along the tool."""
+    axes = rotation_matrices(samples.abc)
+    level = samples.tangent - along_tool_axis(samples.tangent, samples.abc)[:, None] * axes[:, :, 2]
+    length = np.linalg.norm(level, axis=1)[:, None]
+    axes[:, :, 0] = np.where(length > ALONG, level / np.where(length > 0.0, length, 1.0), axes[:, :, 0])
+    axes[:, :, 1] = np.cross(axes[:, :, 2], axes[:, :, 0])
+    return axes
+
+
+def walls_beside(
+    samples: Samples, cutters: Mapping[int, Cutter], rows: IntArray, sides: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """(m, 3) m, the foot of the wall beside samples (sides 0 left, 1 right), and its normal into the part."""
+    some = samples.take(rows)
+    into = axes_at(some)[:, :, 1] * np.where(sides == 0, 1.0, -1.0)[:, None]
+    return some.position + radii_of(cutters, some.tool)[:, None] * into, into
 
 
 def tip_compliances(
@@ -31,7 +51,7 @@ def tip_compliances(
     position = product(samples.position, rotation_matrices(zero[3:]).T) + zero[:3]
     rotation = rotation_matrices(upright) if upright.any() else None
     load = product(axes, force[:, :, None])[..., 0] if model.load_dependent else None
-    tensor = core.tip_compliance(model, position, rotation, samples.tool_length, load=load)
+    tensor = core.tip_compliance(model, position, rotation, samples.tool_length, load=load, in_work=True)
     return product(product(np.swapaxes(axes, 1, 2), tensor), axes)
 
 

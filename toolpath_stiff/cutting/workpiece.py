@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered, portions
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered, portions, product
 from toolpath_stiff.cutting.cells import PORTION, cells_of_boxes
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import (
@@ -31,6 +31,10 @@ from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.sweeps import PIECE, sweeps_of
 from toolpath_stiff.nc.moves import Moves
 
+# Of a line through the work, where what other tools have left is looked for, and the steps in which it is bounded.
+SHARES = np.union1d(np.geomspace(1e-3, 0.0625, 7), np.linspace(1e-6, 1.0 - 1e-6, 9))
+HALVINGS = 17
+SLACK = 5e-7  # m by which other tools take more than they do: what two of them only touch is rounding
 CELL = 0.33  # radii of the smallest cutter, size of a cell of the index
 MANY = 500  # pieces from where on it pays to import numba: half a second
 STAGE = 8192  # pieces
@@ -59,6 +63,8 @@ class Workpiece:
         entries that counts after it; (e,) m, the piece leaves no less anywhere in the cell.
     quick
         Whether numba looks up.
+    others
+        The same work as tools with other axes cut it: (3, 3) from this frame into theirs, and it; without theirs.
     """
 
     stock: Stock
@@ -70,12 +76,18 @@ class Workpiece:
     columns: int
     index: Index
     quick: bool
+    others: tuple[tuple[FloatArray, "Workpiece"], ...] = ()
 
     @cached_property
     def key(self) -> IntArray:
         """(e,) cell * m + piece, ascending."""
         starts, piece = self.index[:2]
         return np.repeat(np.arange(len(starts) - 1), np.diff(starts)) * len(self.pieces) + piece
+
+    @cached_property
+    def has_levels(self) -> bool:
+        """Whether all that is left stands level, between upright walls."""
+        return not (self.others or self.pieces["slope"].any() or (self.pieces["flat"] < self.pieces["reach"]).any())
 
     def tops(
         self,
@@ -122,6 +134,44 @@ class Workpiece:
             owner[points[cut]] = last[cut]
         return top, owner
 
+    def standing(self, points: FloatArray, since: FloatArray, until: FloatArray) -> BoolArray:
+        """(n,) whether what tools with other axes take on stretches of the path (n,) m leaves points (3, n)."""
+        stands = np.full(points.shape[1], True)
+        for turn, other in self.others:
+            rows = np.flatnonzero(stands)
+            x, y, z = product(turn, points[:, rows])
+            first, last = (np.searchsorted(other.pieces["before"], path[rows]) for path in (since, until))
+            top = other.tops(x, y, (first, last), np.zeros_like(first), -SLACK, enough=z)[0]
+            stands[rows] = (top > z) & (other.stock.bottoms(x, y) < z)
+        return stands
+
+    def span(
+        self, x: FloatArray, y: FloatArray, ends: tuple[FloatArray, FloatArray], since: FloatArray, until: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest place (n,) m at points between `ends` that tools with other axes leave, as `standing`."""
+        low, high = (place.copy() for place in ends)
+        rows = np.flatnonzero(high > low)
+        if not self.others or not len(rows):
+            return low, high
+        base, size = ends[0], ends[1] - ends[0]
+
+        def stands(some: IntArray, share: FloatArray) -> BoolArray:
+            place = base[some] + share * size[some]
+            return self.standing(np.stack([x[some], y[some], place]), since[some], until[some])
+
+        found = np.array([stands(rows, np.full(len(rows), share)) for share in SHARES])
+        high[rows[~found.any(axis=0)]] = -np.inf
+        for limit, order in ((low, 1), (high, -1)):
+            first, shares = found[::order].argmax(axis=0), SHARES[::order]
+            cut = np.flatnonzero(first > 0)
+            inner, outer, some = shares[first[cut]], shares[first[cut] - 1], rows[cut]
+            for _ in range(HALVINGS):
+                middle = 0.5 * (inner + outer)
+                inside = stands(some, middle)
+                inner, outer = np.where(inside, middle, inner), np.where(inside, outer, middle)
+            limit[some] = base[some] + inner * size[some]
+        return low, high
+
     def _entries(self, x: FloatArray, y: FloatArray, window: tuple[IntArray, IntArray]) -> tuple[IntArray, IntArray]:
         """(n,) first entry, and (n,) the one after the last, to look at."""
         i = np.floor((x - self.corner[0]) / self.size).astype(np.int64)
@@ -136,12 +186,14 @@ class Workpiece:
         return low, np.maximum(high, low)
 
 
-def stages_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> Iterator[Workpiece]:
-    """The stock with the pieces of the program's cuts up to one after the other; the last has all.
+def stages_of(
+    stock: Stock, moves: Moves, cutters: Mapping[int, Cutter], chosen: BoolArray, staged: bool = True
+) -> Iterator[Workpiece]:
+    """The stock with the pieces of the moves chosen (n,) up to one after the other; the last, or the only one, has all.
 
     Raises `ProgramError`.
     """
-    pieces, first = sweeps_of(moves, cutters)
+    pieces, first = sweeps_of(moves, cutters, chosen)
     quick = len(pieces) >= MANY and importlib.util.find_spec("numba") is not None
     if not len(pieces):
         pieces = np.zeros(1, PIECE)  # far from everything: its reach is 0
@@ -151,8 +203,9 @@ def stages_of(stock: Stock, moves: Moves, cutters: Mapping[int, Cutter]) -> Iter
     low, high = (np.floor((ends - corner) / size).astype(np.int64) for ends in (low, high))
     rows, columns = (high.max(axis=0) + 1).tolist()
     entries = np.zeros(0, dtype=ENTRY)
-    for begin in range(0, len(pieces), STAGE):
-        until = min(begin + STAGE, len(pieces))
+    stage = STAGE if staged else len(pieces)
+    for begin in range(0, len(pieces), stage):
+        until = min(begin + stage, len(pieces))
         boxes = cells_of_boxes(low[begin:until], high[begin:until])
         new = (_bounded(pieces, begin + number, place, corner, size, columns, quick) for number, place in boxes)
         entries = np.concatenate([entries, *new])

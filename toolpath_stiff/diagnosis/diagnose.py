@@ -14,13 +14,11 @@ from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.comparison.loop_readings import beside_tip
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.diagnosis.examination import NAMING, SHOWN
-from toolpath_stiff.diagnosis.result import Diagnosis
+from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Diagnosis
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.inference import slips
 from toolpath_stiff.inference.candidates import testable_effects
-from toolpath_stiff.inference.detectable import detectable_sizes
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import baseline, refine
 from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
@@ -117,16 +115,14 @@ def diagnose(
     fits |= {name: refine(main.problem, fits[name]) for name in likely}
     likeliest = fits.get(max(main.probability, key=lambda name: main.probability[name], default=NONE), main.base)
     log_model = main.problem.observed - likeliest.residual
-    verdict, plausible = common_verdict(list(judgements.values()))
     diagnosis = Diagnosis(
-        verdict, list(plausible), judgements, main, data.of_tip, machine, cannot,
+        common_verdict(list(judgements.values())), judgements, main, data.of_tip, machine, cannot,
         of_readings(as_given, tip), of_readings(refitted, tip),
         {name: of_readings(fit, tip) for name, fit in fits.items()},
         held_out(refitted, data.point).of_readings(tip),
         {name: held_out(fit, data.point).of_readings(tip) for name, fit in fits.items()},
-        tuple(detectable_sizes(main.problem, main.families, main.base_gate.gain_threshold)),
         tuple(dict.fromkeys(data.file.tolist())), seed, suspects=suspects,
-        unexcluded=tuple(hidden for hidden in unexcluded(main) if hidden.effect.name not in plausible),
+        unexcluded=unexcluded(main),
         loops=beside_tip(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
     )  # fmt: skip
     return replace(diagnosis, portrait=portrait_of(diagnosis, progress), alike=alike_of(diagnosis))
@@ -155,17 +151,13 @@ def _without_slips(
     return *judged(data.select(kept)), data.select(kept), entries
 
 
-def common_verdict(judgements: Sequence[Judgement]) -> tuple[str, tuple[str, ...]]:
-    """The verdict that all noise models share, and names that hold the truth under any; else `ambiguous`."""
+def common_verdict(judgements: Sequence[Judgement]) -> str:
+    """The verdict that all noise models share, of names the same ones; else `ambiguous`."""
     verdicts = {judgement.verdict for judgement in judgements}
-    plausible = tuple(dict.fromkeys(name for judgement in judgements for name in judgement.plausible))
     same = len({frozenset(judgement.plausible) for judgement in judgements}) == 1
-    if verdicts == set(NAMING) and same:
-        return "described", plausible
-    if len(verdicts) > 1:
-        return "ambiguous", plausible or (NONE,)
-    (verdict,) = verdicts
-    return verdict if same or verdict not in NAMING else "ambiguous", plausible
+    if same and verdicts == set(NAMING):
+        return "described"
+    return verdicts.pop() if len(verdicts) == 1 and (same or not verdicts & set(NAMING)) else "ambiguous"
 
 
 def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portrait | None:

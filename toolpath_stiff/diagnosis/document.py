@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from toolpath_stiff.diagnosis.examination import Examination, HypothesisRow, percent_of, rounded_errors
+from toolpath_stiff.diagnosis.examination import Diagnosis, HypothesisRow, percent_of, rounded_errors
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why
 from toolpath_stiff.documents import Document, certain, json_number, to_dict
-from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.judgement import Judgement
 from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.inference.votes import vote_document
@@ -19,7 +18,7 @@ ERRORS = (
 )  # fmt: skip
 
 
-def document_of(diagnosis: Examination) -> Document:
+def document_of(diagnosis: Diagnosis) -> Document:
     """Everything that `diagnose.json` holds."""
     main, noise, rows = diagnosis.main, diagnosis.noise, diagnosis.rows
     drawn = diagnosis.unconfirmed or main.drawn
@@ -30,8 +29,8 @@ def document_of(diagnosis: Examination) -> Document:
         "question": main.question,
         "draft_status": None if drawn is None else drawn.document,
         "baseline": _baseline(diagnosis),
-        "candidates": [{**_candidate(row, links[row.name]), **_vote(main, row.name)} for row in rows.candidates],
-        "pairs": [{**_pair(row), **_vote(main, row.name)} for row in rows.pairs],
+        "candidates": [_candidate(row, main, links[row.name]) for row in rows.candidates],
+        "pairs": [_pair(row, main) for row in rows.pairs],
         "votes": [vote_document(rival, differences) for rival, differences in main.votes.items()],
         "nuisances": diagnosis.nuisances,
         "plausible": diagnosis.plausible,
@@ -53,12 +52,12 @@ def document_of(diagnosis: Examination) -> Document:
             "origin": noise.origin,
         },
         "gates": _gates(main),
-        "detectable": [_detectable(smallest) for smallest in diagnosis.detectable],
+        "bounds": [_not_excluded(hidden) for hidden in diagnosis.unexcluded],
         "path": diagnosis.path,
         "portrait": None if diagnosis.portrait is None else portrait_entry(diagnosis.portrait),
         "looks_the_same": alike_entry(diagnosis.alike),
-        "not_excluded": [_not_excluded(hidden) for hidden in diagnosis.unexcluded],
-        "not_excluded_text": beside_text(diagnosis.unexcluded),
+        "not_excluded": [_not_excluded(hidden) for hidden in diagnosis.beside],
+        "not_excluded_text": beside_text(diagnosis.beside),
         "assumptions": assumptions(diagnosis),
         "warnings": list(diagnosis.predictor.data.warnings),
         "notes": [*diagnosis.data.notes, *doubts(diagnosis)],
@@ -73,7 +72,7 @@ def document_of(diagnosis: Examination) -> Document:
     }
 
 
-def _baseline(diagnosis: Examination) -> Document:
+def _baseline(diagnosis: Diagnosis) -> Document:
     """The model as given, and with its strut law refitted."""
     law, rows = diagnosis.machine.strut_law, diagnosis.rows
     count = len(law.parameters)  # of a constant law one, which belongs to no length
@@ -103,50 +102,32 @@ def _part(row: HypothesisRow, names: tuple[str, ...]) -> Document:
     return {name: getattr(row, name) for name in names}
 
 
-def _candidate(row: HypothesisRow, link: str) -> Document:
-    """A single effect; without the probability of its gate where it fits best when it is absent."""
-    return {
-        "effect": row.name,
-        "title": row.title,
-        "link": link,
-        **_part(row, FIGURES),
-        "parameters": to_dict(row.sizes.get(row.name, {})),
-        "choice": row.choice.get(row.name, {}),
-        **_part(row, ERRORS),
-        **_part(row, ("adequate", *(["adequate_probability"] if row.sizes else []), "eligible", "remark")),
-    }
+def _hypothesis(row: HypothesisRow, judgement: Judgement, head: Document, parameters: Document) -> Document:
+    """Effects with figures and the vote for the first explanation against them, none of that itself and its own part.
+
+    Without the probability of its gate where an effect fits best when it is absent.
+    """
+    tested = ("adequate", "adequate_probability") if row.sizes else ("adequate",)
+    votes = judgement.votes.get(row.name)
+    vote = None if votes is None else vote_document(row.name, votes)
+    return {**head, **_part(row, FIGURES), **parameters, **_part(row, (*ERRORS, *tested)), "vote": vote}
 
 
-def _vote(judgement: Judgement, name: str) -> Document:
-    """The vote for the first explanation against a rival; None of that itself and of its own part."""
-    votes = judgement.votes
-    return {"vote": vote_document(name, votes[name]) if name in votes else None}
+def _candidate(row: HypothesisRow, judgement: Judgement, link: str) -> Document:
+    """A single effect."""
+    parameters = {"parameters": to_dict(row.sizes.get(row.name, {})), "choice": row.choice.get(row.name, {})}
+    head = {"effect": row.name, "title": row.title, "link": link}
+    return {**_hypothesis(row, judgement, head, parameters), **_part(row, ("eligible", "remark"))}
 
 
-def _pair(row: HypothesisRow) -> Document:
+def _pair(row: HypothesisRow, judgement: Judgement) -> Document:
     """Several effects; parameters by effect, with what it acts on."""
-    return {
-        "effects": row.name.split(" + "),
-        **_part(row, FIGURES),
-        "parameters": {name: to_dict(sizes) | dict(row.choice[name]) for name, sizes in row.sizes.items()},
-        **_part(row, (*ERRORS, "adequate", "adequate_probability")),
-    }
-
-
-def _detectable(smallest: Detectable) -> Document:
-    """The smallest size of a parameter that these readings would show."""
-    return {
-        "effect": smallest.effect,
-        "parameter": smallest.parameter.name,
-        "unit": smallest.parameter.unit,
-        "size": json_number(smallest.value / smallest.parameter.si) if smallest.seen else None,
-        "rms_percent": percent_of(smallest.rms),
-        "detectable": smallest.seen,
-    }
+    parameters = {name: to_dict(sizes) | dict(row.choice[name]) for name, sizes in row.sizes.items()}
+    return _hypothesis(row, judgement, {"effects": row.name.split(" + ")}, {"parameters": parameters})
 
 
 def _not_excluded(hidden: Unexcluded) -> Document:
-    """An effect that the readings neither show nor exclude."""
+    """How far an effect may go that the readings do not show."""
     return {
         "effect": hidden.effect.name,
         "title": hidden.effect.title,
@@ -155,6 +136,7 @@ def _not_excluded(hidden: Unexcluded) -> Document:
         "choice": dict(hidden.candidate.choice),
         "up_to": json_number(hidden.value / hidden.parameter.si, 2),
         "rms_percent": percent_of(hidden.rms, 2),
+        "left_percent": percent_of(hidden.left, 2),
         "probability": json_number(hidden.probability, 2),
         "would_tell": reading_words(telling(hidden.effect)),
     }
@@ -171,7 +153,6 @@ def _gates(judgement: Judgement) -> Document:
         "structure_probability": json_number(gate.structure_probability, 3),
         "structure": gate.worst,
         "gain_probability": json_number(gate.gain_probability, 3),
-        "gain_threshold": json_number(gate.gain_threshold),
     }
 
 

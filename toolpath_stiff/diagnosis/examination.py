@@ -1,8 +1,12 @@
 """What a diagnosis has found: judgements under each noise model, fits, errors held out; a row for each hypothesis."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -12,12 +16,11 @@ from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.documents import DIGITS, Document, json_number
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import Component
-from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.errors import AS_GIVEN, error_figures
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.hypotheses import Family, averaged_interval
-from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
+from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement, shortened
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import fitted_nuisances
@@ -30,7 +33,11 @@ from toolpath_stiff.planning.result import PlanRow
 from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.sizes import joined
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
@@ -106,12 +113,12 @@ class HypothesisRows:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Examination:
+class Diagnosis(FolderResult):
     """Which physical effect the model lacks, if any, and what stands behind it; arrays in SI.
 
     Attributes
     ----------
-    verdict, plausible
+    verdict
         Common to all noise models; see `inference.judgement`.
     judgements
         Name of the noise model -> judgement. The one that is written out in full is `main`.
@@ -125,8 +132,6 @@ class Examination:
         The machine file as it stands; its strut law refitted; effect or "a + b" -> final fit of all that were offered.
     held_out_base, held_out
         Errors at left-out points.
-    detectable
-        What these data would have shown.
     names, seed, line, asked, inputs
         For the record, and for the commands that go on from here: names of the measurement files, the command; files
         that were read.
@@ -140,7 +145,7 @@ class Examination:
     alike
         Named effect -> what else would look the same in its place (`alike_of`).
     unexcluded
-        Effects that the readings neither show nor exclude beside the likeliest explanation, at a size that matters.
+        How far each further effect may go beside the likeliest explanation.
     suspects
         Rows that look mistyped; `data` no longer holds those that are clear.
     loops
@@ -148,8 +153,10 @@ class Examination:
         reading is of those of the tip.
     """
 
+    command: ClassVar[str] = "diagnose"
+    shown_by: ClassVar[str] = "diagnose"
+
     verdict: str
-    plausible: list[str]
     judgements: dict[str, Judgement]
     main: Judgement
     data: Readings
@@ -160,7 +167,6 @@ class Examination:
     fits: dict[str, Fit]
     held_out_base: HeldOut
     held_out: dict[str, HeldOut]
-    detectable: tuple[Detectable, ...]
     names: tuple[str, ...]
     seed: int
     line: str = ""
@@ -175,6 +181,17 @@ class Examination:
     loops: tuple[LoopMean, ...] = ()
     inputs: tuple[str, ...] = ()
 
+    def to_dict(self) -> dict[str, Any]:
+        """The content of diagnose.json."""
+        return dict(self.view.document(self))
+
+    def to_frame(self) -> pd.DataFrame:
+        """The candidates, one a row: probability, errors, why not."""
+        return frame_of(self.to_dict()["candidates"])
+
+    def _short(self) -> str:
+        return f"{self.verdict}: {', '.join(self.plausible)}" if self.plausible else self.verdict
+
     @property
     def noise(self) -> Noise:
         """The noise model of `main`."""
@@ -185,21 +202,36 @@ class Examination:
         """The model's answers to the data."""
         return self.main.problem.predictor
 
-    @property
+    @cached_property
     def explanations(self) -> tuple[str, ...]:
-        """Hypotheses left standing under any noise model, the most likely first: effects, `none`, "a + b".
+        """Hypotheses left standing, the most likely first: effects, `none`, "a + b"; one alone where one is the answer.
 
-        One alone where one is the answer.
+        Of several noise models by turns, as many entries as of one.
         """
         most = 1 if self.verdict in NAMING else None
-        standing = (name for judgement in self.judgements.values() for name in judgement.explanations[:most])
-        return tuple(dict.fromkeys(standing))
+        turns = zip_longest(*(judgement.explanations[:most] for judgement in self.judgements.values()))
+        standing = tuple(dict.fromkeys(name for turn in turns for name in turn if name))
+        return standing if len(self.judgements) == 1 else shortened(self.main.problem, self._standing_fits, standing)
+
+    @property
+    def plausible(self) -> list[str]:
+        """Names of the effects in `explanations`, each once."""
+        return [*dict.fromkeys(name for explanation in self.explanations for name in explanation.split(" + "))]
 
     @property
     def entries(self) -> list[tuple[str, ...]]:
         """The explanations, those together that sit at one place and that these readings could not tell apart."""
+        return entries(self.main.problem, self._standing_fits, self.explanations)
+
+    @property
+    def beside(self) -> list[Unexcluded]:
+        """Effects that may be there beside the likeliest explanation at a size that matters, and are in none."""
+        return [hidden for hidden in self.unexcluded if hidden.matters and hidden.effect.name not in self.plausible]
+
+    @property
+    def _standing_fits(self) -> dict[str, Fit]:
         bests = {family.name: family.best for family in self.main.families if family.best is not None}
-        return entries(self.main.problem, bests | self.main.fits, self.explanations)
+        return {NONE: self.main.base} | bests | self.main.fits
 
     @cached_property
     def best(self) -> str | None:
@@ -265,7 +297,7 @@ class Examination:
         )  # fmt: skip
 
 
-def _row(diagnosis: Examination, name: str, log_evidence: float) -> HypothesisRow:
+def _row(diagnosis: Diagnosis, name: str, log_evidence: float) -> HypothesisRow:
     """A hypothesis with its final fit; the model alone where the effect fits best when it is absent."""
     main, base = diagnosis.main, diagnosis.held_out_base
     fit, held = diagnosis.fits.get(name, diagnosis.base), diagnosis.held_out.get(name, base)
@@ -292,7 +324,7 @@ def _row(diagnosis: Examination, name: str, log_evidence: float) -> HypothesisRo
     )
 
 
-def _candidate(diagnosis: Examination, family: Family) -> HypothesisRow:
+def _candidate(diagnosis: Diagnosis, family: Family) -> HypothesisRow:
     """A single effect; where it fits best when it is absent, without sizes."""
     name, alone = family.name, diagnosis.main.base_gate.probability > FALSE_ALARM
     row = replace(_row(diagnosis, name, family.log_evidence), title=family.effect.title)
@@ -303,7 +335,7 @@ def _candidate(diagnosis: Examination, family: Family) -> HypothesisRow:
     return replace(row, eligible=not bounded, remark=f"{', '.join(bounded)} at its bound" if bounded else remark)
 
 
-def row_words(diagnosis: Examination, name: str) -> str:
+def row_words(diagnosis: Diagnosis, name: str) -> str:
     """How a hypothesis stands: by its odds against the likeliest, unless a gate has settled it."""
     main = diagnosis.main
     probability = main.probability.get(name, 0.0)

@@ -15,21 +15,23 @@ from toolpath_stiff.diagnosis.examination import fitted_sizes, held_errors, perc
 from toolpath_stiff.documents import Document, json_number, to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.element_fits import (
+    LEAST,
     PullProblem,
     chi_square,
+    estimate_noise,
     explanations,
     label_of,
     question,
-    share_left,
     verdict_of,
 )
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.left_out import held_out
+from toolpath_stiff.inference.noise import GUESSES
 from toolpath_stiff.readings.pulls import Pulls, read_pulls
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, effects_stated
 from toolpath_stiff.stiffness.sizes import joined
-from toolpath_stiff.units import um_from_m
+from toolpath_stiff.units import deg_from_rad, um_from_m
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,6 +39,12 @@ if TYPE_CHECKING:
 NRAD = 1e9  # nrad/(N m) of rad/(N m)
 FEWEST = 6  # readings below which nothing is fitted
 SHOWN = 12  # explanations in the document
+NAMED = 4  # causes in a sentence
+WORTHWHILE = 0.8  # of the error as given: what refitted joints have to leave to be spoken of
+NO_NAME = {
+    "adequate": "nothing is missing that shows",
+    "unexplained": "no effect of the catalogue by itself explains the readings",
+}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -131,17 +139,57 @@ class ElementDiagnosis(FolderResult):
             "chi_square_of_joints_fitted": None if self.joints is None else chi_square(self.joints),
             "error_of_joints_fitted_at_left_out_poses_percent": error,
             "gates": dict.fromkeys(f"{name}_probability" for name in ("baseline", "squares", "structure", "gain")),
-            **{key: [] for key in ("why", "warnings", "detectable", "next_measurements")},
+            **{key: [] for key in ("why", "warnings", "bounds", "next_measurements")},
             "assumptions": [f"noise: {problem.noise.origin}"],
+            "components": self.components,
             "notes": list(self.pulls.notes),
         }
 
     @property
     def sentence(self) -> str:
-        """Verdict, cause and error."""
-        causes = joined([finding for fit in self.plausible[:SHOWN] for finding in fit.findings])
-        told = f"{self.verdict[0].upper()}{self.verdict[1:]}{f': {causes}' if causes else ''}"
-        return f"{told}. Error as given {self.error_as_given:.1f} % of the displacements (rms)."
+        """Verdict, cause, error, and what to do next."""
+        causes, problem = [finding for fit in self.plausible for finding in fit.findings], self.problem
+        more = [f"{len(causes) - NAMED} more"] if len(causes) > NAMED else []
+        told = NO_NAME.get(self.verdict) or joined([*causes[:NAMED], *more])
+        text = f"{self.verdict.capitalize()}: {told}. Error as given {self.error_as_given:.1f} %"
+        text += " of the displacements (rms)"
+        if self.verdict == "adequate" and problem.typical > GUESSES["low"] and problem.freedom < np.inf:
+            return f"{text}, all of which counts as scatter, since nobody says how pulls scatter (--noise, sd_um)."
+        left = problem.error_percent(self.left_out)
+        if self.verdict == "identified" or question(problem) or not left < WORTHWHILE * self.error_as_given:
+            return f"{text}."
+        return (
+            f"{text}; the torsions of all joints refitted leave {left:.1f} % at left-out poses (tps update --joints)."
+        )
+
+    @cached_property
+    def components(self) -> list[Document]:
+        """Of each component that was read: size and error of the model as given, root mean squares, mean error; um."""
+        pulls, error = self.pulls, um_from_m(self.problem.predicted - self.pulls.value)
+        chosen = {str(name): pulls.component == name for name in np.unique(pulls.component)}
+        return [
+            {
+                "component": name,
+                "measured_rms_um": float(np.sqrt(np.mean(um_from_m(pulls.value[rows]) ** 2))),
+                "error_rms_um": float(np.sqrt(np.mean(error[rows] ** 2))),
+                "error_mean_um": float(error[rows].mean()),
+            }
+            for name, rows in chosen.items()
+        ]
+
+    def vectors(self) -> dict[str, AnyArray]:
+        """Column of `vectors.csv` -> values, of each pull read in three directions: what moved, and the error."""
+        pulls = self.pulls
+        first = np.unique(pulls.pull, return_index=True)[1]
+        whole = np.bincount(pulls.pull) == len("xyz")
+        moved, error = (um_from_m(pulls.vectors(v)[whole]) for v in (pulls.value, self.problem.predicted - pulls.value))
+        lengths = [np.linalg.norm(v, axis=1) for v in (moved, moved + error)]
+        cosine = (moved * (moved + error)).sum(axis=1) / np.maximum(np.multiply(*lengths), 1e-300)
+        columns: dict[str, AnyArray] = {"file": pulls.file[first][whole], "line": pulls.line[first][whole]}
+        columns |= {f"u{axis}_um": moved[:, i] for i, axis in enumerate("xyz")}
+        columns |= {f"error_{axis}_um": error[:, i] for i, axis in enumerate("xyz")}
+        columns["error_percent"] = 100.0 * np.linalg.norm(error, axis=1) / lengths[0]
+        return columns | {"angle_deg": deg_from_rad(np.arccos(np.clip(cosine, -1.0, 1.0)))}
 
     @property
     def wild(self) -> list[str]:
@@ -215,9 +263,8 @@ def pull_problem(
         words += ", sd_um where a row has it" if stated.any() else ""
         problem.noise_of(np.where(stated, pulls.sd / pulls.size, noise), spread, words)
     else:
-        share = share_left(problem)
-        words = f"estimated or guessed, {100 * share:.2g} % of the size of each displacement (say --noise)"
-        problem.noise_of(np.full(len(pulls), share), spread, words)
+        problem.noise_of(np.full(len(pulls), LEAST), spread)
+        estimate_noise(problem)
     return problem, noise is not None or bool(stated.all())
 
 

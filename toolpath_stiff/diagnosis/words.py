@@ -6,7 +6,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Examination
+from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Diagnosis
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.drawn import seen_readings
@@ -21,6 +21,7 @@ from toolpath_stiff.inference.judgement import (
     OUTSIDE,
     POSITIVE,
     STANDS,
+    TAKEN_UP,
     Judgement,
 )
 from toolpath_stiff.inference.noise import REST
@@ -37,20 +38,20 @@ from toolpath_stiff.units import mm_from_m
 MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has all
 
 
-def verdict_text(diagnosis: Examination) -> str:
+def verdict_text(diagnosis: Diagnosis) -> str:
     """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
     same = [alike_text(name, alike) for name, alike in diagnosis.alike.items()]
     return " ".join([_verdict_text(diagnosis), *same, *(f"{_capital(doubt)}." for doubt in doubts(diagnosis))])
 
 
-def doubts(diagnosis: Examination) -> list[str]:
+def doubts(diagnosis: Diagnosis) -> list[str]:
     """What may be wrong with the data instead of the machine: the stated noise, single rows."""
     noise = dict.fromkeys(judgement.doubt for judgement in diagnosis.judgements.values() if judgement.doubt)
     nuisances = [f"{nuisance_words(entry)}, more than is assumed of any" for entry in findings(diagnosis.nuisances)[:1]]
     return [*noise, *([] if diagnosis.main.question else nuisances), *(suspect.words for suspect in diagnosis.suspects)]
 
 
-def _verdict_text(diagnosis: Examination) -> str:
+def _verdict_text(diagnosis: Diagnosis) -> str:
     main, judgements = diagnosis.main, diagnosis.judgements.values()
     if diagnosis.verdict == "adequate":
         names = [name for name in diagnosis.explanations if name != NONE]
@@ -87,7 +88,7 @@ def _verdict_text(diagnosis: Examination) -> str:
     return text
 
 
-def _cause(diagnosis: Examination, name: str) -> str:
+def _cause(diagnosis: Diagnosis, name: str) -> str:
     """An explanation as an engineer says it, its effects and its probability after it."""
     chance = _percent(diagnosis.main.probability.get(name, 0.0))
     if name == NONE:
@@ -108,7 +109,7 @@ def _unusual(fit: Fit) -> list[str]:
     return [f"{p.name.replace('_', ' ')} {p.typical[0]:g} to {p.typical[1]:g} {p.unit}".rstrip() for p in beyond]
 
 
-def _outvoted(diagnosis: Examination) -> str:
+def _outvoted(diagnosis: Diagnosis) -> str:
     """The closest rival that a name has outvoted, a sentence with the space before it; "" without votes."""
     rival, differences = next(iter(diagnosis.main.votes.items()), ("", np.zeros(0)))
     return f" Of all rivals of another part {vote_words(rival, differences)} (log probability)." if rival else ""
@@ -122,7 +123,7 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _rivals(diagnosis: Examination) -> str:
+def _rivals(diagnosis: Diagnosis) -> str:
     """Explanations that stand beside each other."""
     causes = [
         f"{_cause(diagnosis, first)}{f' - or, alike at these poses, {joined(same)}' if same else ''}"
@@ -137,40 +138,46 @@ def _rivals(diagnosis: Examination) -> str:
         causes[0] = f"the strut law is off and moves the stiffness by {100.0 * moved:.2g} %"
         return f"Readings of the tip do not tell which of these it is: either {', or '.join(causes)}."
     if diagnosis.explanations[0] == NONE and diagnosis.main.base_gate.probability > FALSE_ALARM:
-        left = f"what is not excluded may leave more than {100 * LEFT:g} % of the stiffness"
-        return f"What the model leaves looks like scatter, but {left}: either {', or '.join(causes)}."
+        left = f"with what struts, joints and links leave that may be more than {100 * LEFT:g} %"
+        looks = f"What the model leaves looks like scatter.{_most_left(diagnosis)} {_capital(left)}"
+        return f"{looks}: either {', or '.join(causes)}."
     first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
     if first < POSITIVE * second or len(causes) < 2:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
     return f"Most likely {causes[0]}; not ruled out: {'; '.join(causes[1:])}."
 
 
-def _hidden(diagnosis: Examination) -> str:
-    """Of an adequate model whose noise is a guess: what such a noise would hide."""
+def _most_left(diagnosis: Diagnosis) -> str:
+    """By how much the stiffness may differ by what is not excluded, a sentence with the space before it."""
+    further = [hidden for hidden in diagnosis.unexcluded if hidden.effect.name not in TAKEN_UP]
+    most = max(further, key=lambda hidden: round(hidden.left, 9), default=None)
+    return "" if most is None else f" Up to {100.0 * most.left:.2g} % are not excluded ({most.effect.name})."
+
+
+def _hidden(diagnosis: Diagnosis) -> str:
+    """What an adequate model may still hide; under a guessed noise the law."""
+    text = _most_left(diagnosis)
     if not diagnosis.noise.guess:
-        return ""
-    shown = [smallest.rms for smallest in diagnosis.detectable if smallest.seen]
+        return text
     law = NORMAL_95 * np.sqrt(np.diag(diagnosis.base.covariance)[: len(diagnosis.machine.strut_law.parameters)].max())
-    change = f"a missing effect that changes the stiffness by less than {100.0 * min(shown, default=0.0):.2g} % (rms)"
-    change = change if shown else "every effect"
     return (
-        f" But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading would "
-        f"hide {change} and struts that are off by up to {100.0 * law:.2g} %."
+        f"{text} But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading "
+        f"would hide struts that are off by up to {100.0 * law:.2g} %, too."
     )
 
 
-def _errors(diagnosis: Examination, name: str = "") -> str:
+def _errors(diagnosis: Diagnosis, name: str = "") -> str:
     """Mean errors as given, with the strut law refitted, with an explanation."""
     rest = [(f"with {name}", 100.0 * float(diagnosis.fits[name].errors.mean()))] if name else []
     return f"Mean error: {errors_text(*_mean_errors(diagnosis), rest)}"
 
 
-def _mean_errors(diagnosis: Examination) -> tuple[float, float]:
+def _mean_errors(diagnosis: Diagnosis) -> tuple[float, float]:
     """Of the machine file as given and with its strut law refitted, %."""
     return 100.0 * float(diagnosis.as_given.errors.mean()), 100.0 * float(diagnosis.base.errors.mean())
 
 
-def why(diagnosis: Examination) -> list[str]:
+def why(diagnosis: Diagnosis) -> list[str]:
     """The reasons, most important first."""
     main, several = diagnosis.main, len(diagnosis.judgements) > 1
     reasons = [_base_text(judgement, several) for judgement in diagnosis.judgements.values()]
@@ -204,7 +211,7 @@ def _base_text(judgement: Judgement, several: bool) -> str:
     )
 
 
-def _not_told_apart(diagnosis: Examination) -> list[str]:
+def _not_told_apart(diagnosis: Diagnosis) -> list[str]:
     """Why the plausible effects cannot be told apart."""
     rivals = [(name, votes) for name, votes in diagnosis.main.votes.items() if not outvoted(votes) and name != NONE]
     reasons = [f"{vote_words(*rival)} (log probability): not beyond chance" for rival in rivals[:MOST_BESIDE]]
@@ -219,7 +226,7 @@ def _not_told_apart(diagnosis: Examination) -> list[str]:
     return reasons
 
 
-def next_steps(diagnosis: Examination, request: Asked | None = None) -> list[str]:
+def next_steps(diagnosis: Diagnosis, request: Asked | None = None) -> list[str]:
     """What to do next, as hints: commands run as they stand."""
     request = request or diagnosis.asked or Asked(diagnosis.names)
     repeat = "repeat a few readings, re-clamped, or state --noise"
@@ -251,11 +258,11 @@ def next_steps(diagnosis: Examination, request: Asked | None = None) -> list[str
             write = hint("write what it looks like as an effect to edit", request.command("effects draft", "-o", file))
         look = hint("look where the residuals lie", request.command("compare"))
         return [look, write, hint("and try it", request.command("diagnose", effects=[file]))]
-    use = "use the model; `detectable` lists what could still be there unseen"
+    use = "use the model; `bounds` lists what could still be there unseen"
     return [repeat, use] if diagnosis.noise.guess else [use]
 
 
-def assumptions(diagnosis: Examination) -> list[str]:
+def assumptions(diagnosis: Diagnosis) -> list[str]:
     """What was assumed, in sentences."""
     noise = diagnosis.noise
     sentences = [

@@ -120,7 +120,9 @@ class Kernel:
             pivot = int(np.argmax(left))
             if left.sum() <= LEFT * len(left) or left[pivot] <= 0.0:
                 return rows[:r].T
-            rows[r] = (self.column(pivot) / scale - rows[:r, pivot] @ rows[:r]) / np.sqrt(left[pivot])
+            known = np.flatnonzero(rows[:r, pivot])  # few where readings of one point alone are alike
+            before = rows[:r] if len(known) == r else rows[known]
+            rows[r] = (self.column(pivot) / scale - before[:, pivot] @ before) / np.sqrt(left[pivot])
             left = np.maximum(left - rows[r] ** 2, 0.0)
             left[pivot] = 0.0
         return rows.T

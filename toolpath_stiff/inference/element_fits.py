@@ -25,8 +25,8 @@ from toolpath_stiff.machine.elements import turns
 from toolpath_stiff.readings.pulls import MOVED_AXES, Pulls
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
-from toolpath_stiff.stiffness.contract import ELEMENT, Effect
-from toolpath_stiff.stiffness.element_sum import added_by
+from toolpath_stiff.stiffness.contract import ELEMENT, Effect, LoadPath
+from toolpath_stiff.stiffness.element_sum import added_by, stance_of
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
 
 FEWEST = 6  # degrees of freedom that tell anything of the noise
@@ -34,31 +34,31 @@ NONE, JOINTS = "none", "joints refitted"
 ALIKE = 10.0  # chi-square: an explanation that leaves no more than this beside the best cannot be told from it
 GAIN = 16.0  # chi-square that a name must gain over no effect, with some thirty candidates: under 1 in 500 by chance
 PRICE = 4.0  # chi-square that a further parameter must gain (one degree of freedom: 5 % by chance)
+COARSE = 0.04  # scatter of the size of the displacements from which nothing is named that nobody stated it for
+COMMON = 0.01  # probability of so much in common in what is left of pulls alike, below which it is no scatter
 WRONG = 1e-3  # probability of so large a misfit, below which something else is missing
+REWEIGHTED = 8  # times that scatter is estimated
+OFF = 3.0  # standard deviations that one reading counts for at most in it
 LEAST = 1e-4  # relative sd of a reading: nobody measures better
 FOLLOWS = 0.5  # correlation of measured with modelled components, joints refitted, below which it is another machine's
-INVISIBLE = 1e-6  # of the readings' size: what a candidate of its largest usual size must change at least
+OTHER_UNIT = 100.0  # measured over modelled, or the inverse, from which the unit is asked for
+INVISIBLE = 1e-6  # of the readings' size, rms: what a candidate of its largest usual size must change at least
+VISIBLE = 5e-3  # the same of the geometry, which pulls hardly show
+ALIKE_FREEDOM = 20  # degrees of freedom within pulls that are alike, from which these tell scatter from a misfit
 NO_LAW = np.zeros(2)
 
 
 class PullProblem(Problem):
     """What a model says to m pulls, and how they scatter."""
 
+    linear = True
+
     def __init__(self, model: StiffnessModel, pulls: Pulls, files: Sequence[str] = ()) -> None:
         self.model, self.pulls, self.machine, self.files = model, pulls, model.machine, tuple(files)
-        seen = model.conditions.columns(len(pulls))
-        force = np.linalg.norm(pulls.wrench[:, :3], axis=1)
-        path = path_of_stance(model, pulls.stance, force=force, direction=pulls.along[:, :3], **seen)
-        rows = [load.rows(pulls.stance.position) for load in pulls.stance.loads]
-        loads, read = (
-            [np.einsum("nri,ni->nr", part, wrench) for part in rows] for wrench in (pulls.wrench, pulls.along)
-        )
-        self.path = replace(path, element_loads=np.concatenate(loads, axis=1))
-        self.products = [load * other for load, other in zip(loads, read, strict=True)]
-        stated = zip(self.products, pulls.stance.loads, strict=True)
-        self.by_element = np.stack([(part * load.compliance).sum(axis=1) for part, load in stated], axis=1)
+        self.path, self.products, self.by_element = self._standing(model.effects)
         self.predicted = self.with_effects((*model.effects, *model.instruments), self.by_element.sum(axis=1))
         self.observed = (pulls.value - self.predicted) / pulls.size
+        self.freedom, self.together = np.inf, 0  # of a scatter that was estimated, and of what all candidates take away
         self.noise_of(np.full(len(pulls), LEAST))
 
     @property
@@ -66,13 +66,33 @@ class PullProblem(Problem):
         """(m,) the pose of each reading."""
         return self.pulls.point
 
+    def _standing(self, effects: Sequence[ActiveEffect]) -> tuple[LoadPath, FloatArray, FloatArray]:
+        """Load paths; (m, r) products of what elements carry under pull and unit load; (m, e) m that each gives."""
+        model, pulls = self.model, self.pulls
+        seen = {"direction": pulls.along[:, :3], **model.conditions.columns(len(pulls))}
+        force = np.linalg.norm(pulls.wrench[:, :3], axis=1)
+        path = path_of_stance(replace(model, effects=tuple(effects)), pulls.stance, force=force, **seen)
+        stance = stance_of(path)
+        rows = [load.rows(stance.position) for load in stance.loads]
+        loads, read = (
+            [np.einsum("nri,ni->nr", part, wrench) for part in rows] for wrench in (pulls.wrench, pulls.along)
+        )
+        products = [load * other for load, other in zip(loads, read, strict=True)]
+        given = [(part * load.compliance).sum(axis=1) for part, load in zip(products, stance.loads, strict=True)]
+        path = replace(path, element_loads=np.concatenate(loads, axis=1))
+        return path, np.concatenate(products, axis=1), np.stack(given, axis=1)
+
     def with_effects(self, effects: Sequence[ActiveEffect], moved: FloatArray) -> FloatArray:
         """(m,) m that the readings show: what moved, what effects add, and what instruments make of it."""
-        at_tip, more = added_by((active for active in effects if not active.effect.is_instrument), self.path)
+        path, products = self.path, self.products
+        if moving := [a for a in effects if "stands" in a.effect.hooks and a not in self.model.effects]:
+            path, products, given = self._standing([*self.model.effects, *moving])
+            moved = moved + (given - self.by_element).sum(axis=1)
+        at_tip, more = added_by((active for active in effects if not active.effect.is_instrument), path)
         if at_tip is not None:
             moved = moved + np.einsum("ni,nij,nj->n", self.pulls.along, at_tip, self.pulls.wrench)
         if more is not None:
-            moved = moved + (more * np.concatenate(self.products, axis=1)).sum(axis=1)
+            moved = moved + (more * products).sum(axis=1)
         for active in (active for active in effects if active.effect.is_instrument):  # they show what all others make
             stiffness = self.path.force / np.maximum(np.abs(moved), 1e-15)
             moved = moved * stiffness / active.reading(stiffness, self.path)
@@ -136,7 +156,13 @@ class PullProblem(Problem):
         usual = np.array([component.signs[-1] * min(component.typical()[1], component.reach(component.signs[-1]))
                           for component in candidate.components])  # fmt: skip
         change = self.residual(NO_LAW, [candidate.active(usual)]) - self.observed
-        return bool(np.abs(change).max() > INVISIBLE)
+        least = VISIBLE if "stands" in candidate.effect.hooks else INVISIBLE
+        return bool(np.linalg.norm(change) > least * np.sqrt(len(change)))
+
+    @property
+    def typical(self) -> float:
+        """Scatter of the readings over their size, root mean squares."""
+        return float(np.linalg.norm(self.noise.repeat * self.pulls.size) / np.linalg.norm(self.pulls.size))
 
     def error_percent(self, residual: FloatArray) -> float:
         """Root mean square of (m,) residuals in m, of that of the readings, all components together."""
@@ -159,14 +185,16 @@ def question(problem: PullProblem) -> str:
     modelled = pulls.value - best.residual * pulls.size
     alike = float((pulls.value @ modelled) / np.maximum(np.linalg.norm(pulls.value) * np.linalg.norm(modelled), 1e-300))
     if alike >= FOLLOWS:
-        return ""
+        share = float(np.linalg.norm(pulls.value)) / max(float(np.linalg.norm(problem.predicted)), 1e-300)
+        if 1.0 / OTHER_UNIT < share < OTHER_UNIT:
+            return ""
+        return f"Are the units right? What moved is {share:.2g} of what the model says (mm read as um: ux=ux_um:mm)."
+    if alike <= -FOLLOWS:
+        return "Is this the force on the tool? What moved goes against it: reversed the two would fit."
     text = f"Are these pulls of this machine? Measured and modelled components correlate by {alike:.2f} only."
     # Were the sensor's axes turned: the turn that brings it nearest to the model as given (Kabsch 1976, Acta
     # Crystallographica A32, 922).
-    rows = np.unique(np.char.add(pulls.file, pulls.line.astype(str)), return_inverse=True)[1].reshape(-1)
-    read, modelled = np.zeros((2, rows.max() + 1, 3))
-    np.add.at(read, rows, pulls.value[:, None] * pulls.direction)
-    np.add.at(modelled, rows, problem.predicted[:, None] * pulls.direction)
+    read, modelled = pulls.vectors(pulls.value), pulls.vectors(problem.predicted)
     turn = Rotation.align_vectors(modelled, read)[0]
     turned = float((turn.apply(read) * modelled).sum() / max(np.linalg.norm(read) * np.linalg.norm(modelled), 1e-300))
     if turned < FOLLOWS:
@@ -189,25 +217,78 @@ def chi_square(fit: Fit) -> float:
     return float(fit.scatter.precision.squares(fit.residual))
 
 
+def chance(problem: PullProblem, fit: Fit) -> float:
+    """Probability of so large a misfit by scatter: stated, or estimated by what all candidates together leave.
+
+    Then what these take away more is held against what they leave (Fisher's F of nested models).
+    """
+    from scipy.special import chdtrc, fdtrc
+
+    squares = chi_square(fit)
+    if np.isinf(problem.freedom):
+        return float(chdtrc(max(len(fit.residual) - len(fit.free), 1), squares))
+    more = max(problem.together - len(fit.free), 1)
+    return float(fdtrc(more, problem.freedom, max(squares - problem.freedom, 0.0) / more))
+
+
+def lack_of_fit(problem: PullProblem, fit: Fit) -> float:
+    """Probability of so much in common in what a fit leaves of pulls that are alike; nan where these are too few.
+
+    Of pulls at one pose along one direction, of whatever size, scatter differs and a misfit does not (Fisher's test:
+    Draper and Smith 1998, Applied Regression Analysis, 2.1). What elements scatter by is taken off before.
+    """
+    from scipy.special import fdtrc
+
+    pulls, covariance = problem.pulls, fit.scatter.covariance
+    along = np.round(pulls.wrench / np.linalg.norm(pulls.wrench[:, :3], axis=1, keepdims=True), 2)
+    labels = np.column_stack([pulls.pose, np.unique(pulls.component, return_inverse=True)[1], along])
+    groups = Groups(np.unique(labels, axis=0, return_inverse=True)[1].reshape(-1))
+    own = np.clip(np.sqrt(covariance.own_variance) * fit.scatter.precision.times(fit.residual), -OFF, OFF)
+    counts = np.bincount(groups.of)
+    mean, several = groups.sums(own) / counts, counts > 1
+    freedom, within = int(several.sum()) - len(fit.free), len(own) - len(counts)
+    if within < ALIKE_FREEDOM or freedom < 1:
+        return np.nan
+    ratio = (counts * mean**2)[several].sum() / freedom * within / ((own - groups.spread(mean)) ** 2).sum()
+    return float(fdtrc(freedom, within, ratio))
+
+
 def explanations(problem: PullProblem, before: Fit) -> list[Fit]:
     """Each candidate fitted on top of a fit, the likeliest first."""
     fits = [add_effect(problem, before, [candidate], law_free=False) for candidate in problem.candidates()]
     return sorted((fit for fit in fits if fit.sizes[-1].any()), key=lambda fit: -fit.log_posterior)
 
 
-def share_left(problem: PullProblem) -> float:
-    """Relative sd of a reading by what all candidates together leave, each of at least its neutral size."""
-    units = [
-        candidate.active(np.eye(len(candidate.components))[j] * component.signs[-1] * component.typical()[1])
-        for candidate in problem.candidates()
-        for j, component in enumerate(candidate.components)
-    ]
-    columns = np.stack([problem.observed - problem.residual(NO_LAW, [active]) for active in units], axis=1)
-    columns, most = columns / np.linalg.norm(columns, axis=0).clip(min=1e-300), np.full(len(units), np.inf)
-    sizes = bounded_step(columns.T @ columns, columns.T @ problem.observed, np.zeros(len(units)), most)
-    left = problem.observed - columns @ sizes
-    freedom = len(left) - int(np.linalg.matrix_rank(columns))
-    return GUESSES["high"] if freedom < FEWEST else max(float(np.sqrt(left @ left / freedom)), LEAST)
+def estimate_noise(problem: PullProblem) -> None:
+    """Take for scatter what all candidates together leave, each of at least its neutral size.
+
+    A reading's variance is that of its component (an indicator's own) and a share of the squared size of its pull:
+    both by weighted squares of what is left (iterated, Davidian and Carroll 1987, J. Am. Stat. Assoc. 82, 1079).
+    """
+    from scipy.optimize import nnls
+
+    parts = [(c, j, part) for c in problem.candidates() for j, part in enumerate(c.components)]
+    units = [c.active(np.eye(len(c.components))[j] * part.signs[-1] * part.typical()[1]) for c, j, part in parts]
+    least = np.array([-np.inf if len(part.signs) > 1 else 0.0 for *_, part in parts])
+    size, names = problem.pulls.size, np.unique(problem.pulls.component)
+    changes = np.stack([problem.observed - problem.residual(NO_LAW, [active]) for active in units], axis=1)
+    variances = np.stack([*(problem.pulls.component == name for name in names), size**2]).astype(float)
+    variance = (GUESSES["high"] * size) ** 2
+    for _ in range(REWEIGHTED):
+        weight = size / np.sqrt(variance)
+        columns, observed = changes * weight[:, None], problem.observed * weight
+        columns = columns / np.linalg.norm(columns, axis=0).clip(min=1e-300)
+        rank = int(np.linalg.matrix_rank(columns))
+        if len(observed) - rank < FEWEST:
+            break
+        sizes = bounded_step(columns.T @ columns, columns.T @ observed, least, np.full(len(least), np.inf))
+        squares = np.minimum((observed - columns @ sizes) ** 2, OFF**2)  # in units of the variance so far
+        shares = nnls((variances / variance).T, squares)[0] * len(observed) / (len(observed) - rank)
+        variance = np.maximum(shares @ variances, (LEAST * size) ** 2)
+        problem.freedom, problem.together = float(len(observed) - rank), rank
+    share = float(np.sqrt(variance.sum() / (size**2).sum()))
+    words = f"estimated or guessed, {100 * share:.2g} % of the size of the displacements (say --noise)"
+    problem.noise_of(np.sqrt(variance) / size, problem.noise.strut_spread, words)
 
 
 def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool) -> tuple[str, list[Fit]]:
@@ -215,21 +296,21 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
 
     "adequate": nothing is missing that shows; "identified": one, which foretells pose after pose better than every
     other one beyond chance; "ambiguous": several; "unexplained": none. `known`: whether somebody states the noise; else
-    nothing can be said to be missing from the candidates, which are what it was estimated by, and nothing is named
-    where they leave more than good readings scatter by.
+    nothing can be said to be missing from the candidates together, which are what it was estimated by, and nothing is
+    named where they leave more than good readings scatter by.
     """
-    from scipy.stats import chi2
-
     if question(problem):
         return "unexplained", []
-    count, best = len(base.residual), fits[0] if fits else base
+    best = fits[0] if fits else base
     gain = 2.0 * (best.log_posterior - base.log_posterior)
-    if gain < GAIN and chi2.sf(chi_square(base), count) > WRONG:
+    common = np.nan if known else lack_of_fit(problem, base if gain < GAIN else best)
+    fits_alike = not common < COMMON
+    if gain < GAIN and chance(problem, base) > WRONG and fits_alike:
         return "adequate", []
-    explained = chi2.sf(chi_square(best), max(count - len(best.free), 1)) >= WRONG and gain >= GAIN
+    explained = chance(problem, best) >= WRONG and gain >= GAIN and fits_alike
     if explained and problem.torsions:  # no name where all joints together say far more
         explained = not outvoted(-votes(problem, best, {JOINTS: problem.joints_fitted})[JOINTS])
-    if not explained and known:
+    if not explained:
         return "unexplained", []
     behind = {label_of(fit): 2.0 * (best.log_posterior - fit.log_posterior) for fit in fits}
     ballots = votes(problem, best, {label_of(fit): fit for fit in (base, *fits[1:])})
@@ -237,7 +318,8 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
     standing = [fit for fit in fits[1:] if fit not in alike and not outvoted(ballots[label_of(fit)])]
     more = [fit for fit in (*alike, *standing) if any(_says_more(fit, other, behind) for other in alike)]
     alike, standing = ([fit for fit in some if fit not in more] for some in (alike, standing))
-    guessed = not known and problem.noise.typical > GUESSES["low"]  # more is left than good readings scatter by
-    if guessed or not explained or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
+    # More is left than good readings scatter by, and nothing says that it is scatter; or so much that little shows.
+    guessed = not known and problem.typical > (GUESSES["low"] if np.isnan(common) else COARSE)
+    if guessed or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
         return "ambiguous", [*alike, *standing]
     return "identified", alike

@@ -23,8 +23,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 from toolpath_stiff.defaults import NORMAL_95
-from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.fits import prior_of
+from toolpath_stiff.inference.evidence import Fit, law_prior
 from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.machine.error_model import GEOMETRY, ErrorModel, alike, coordinates
@@ -142,9 +141,7 @@ def regions(place: FloatArray, point: TextArray) -> Iterator[IntArray]:
 def _estimator(jacobian: FloatArray, covariance: FloatArray, law_free: bool) -> FloatArray:
     """(q, n) by how much each reading moves the unknowns of a least-squares fit."""
     weighted = np.linalg.solve(covariance, jacobian).T
-    information = weighted @ jacobian
-    information[:2, :2] += np.eye(2) * prior_of(law_free)
-    return np.asarray(scaled_inverse(information) @ weighted)
+    return np.asarray(scaled_inverse(weighted @ jacobian + law_prior(len(weighted), law_free)) @ weighted)
 
 
 def _left_out(

@@ -29,16 +29,24 @@ from toolpath_stiff.stiffness.contract import Effect
 LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stiffness is right within 20 %
 
 
-def law_prior(unknowns: int) -> FloatArray:
-    """(q, q) information of the strut law's prior about q unknowns, of which the law's two are the first."""
+def law_prior(unknowns: int, law_free: bool = True) -> FloatArray:
+    """(q, q) information of the strut law's prior about q unknowns, of which the law's two are the first.
+
+    Of a law that is not fitted, that it does not change.
+    """
     prior = np.zeros((unknowns, unknowns))
-    prior[:2, :2] = np.eye(2) / LAW_PRIOR**2
+    prior[:2, :2] = np.eye(2) * (LAW_PRIOR**-2 if law_free else 1e12)
     return prior
 
 
 MOST_ROUNDS = 3  # searches for wild readings
 TABLE_STEPS, TABLE_TOLERANCE = 12, 1e-4  # of a fit on tables; standard deviations
 BEYOND = 0.05  # share of a bound by which a search may overshoot it
+
+
+def relative_errors(residual: FloatArray, linear: bool) -> FloatArray:
+    """(n,) (modelled - measured) / measured of residuals, logarithms unless `linear`."""
+    return np.asarray(-residual if linear else np.expm1(-residual))
 
 
 @dataclass(frozen=True)
@@ -72,6 +80,8 @@ class Fit:
         Of a search: how likely it makes the data, integrated over sizes and law under their priors; else nan.
     possible
         Whether the sizes lie within their bounds; if not, only `log_evidence` means anything.
+    linear
+        Whether residuals are relative errors themselves, not logarithms: of pulls, whose components pass zero.
     """
 
     candidates: tuple[Candidate, ...]
@@ -87,6 +97,7 @@ class Fit:
     tables: tuple[CandidateTable, ...] = ()
     log_evidence: float = np.nan
     possible: bool = True
+    linear: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -122,7 +133,7 @@ class Fit:
     @property
     def errors(self) -> FloatArray:
         """(n,) |modelled - measured| / measured."""
-        return np.abs(np.expm1(-self.residual))
+        return np.abs(relative_errors(self.residual, self.linear))
 
     @property
     def projected(self) -> Precision:
@@ -170,6 +181,8 @@ class Problem:
     sight
         What the data can see.
     """
+
+    linear = False  # as of `Fit`
 
     def __init__(self, predictor: Predictor, scatter: Scatter) -> None:
         self.predictor, self.scatter = predictor, scatter
@@ -344,11 +357,10 @@ def split(tables: Sequence[CandidateTable], sizes: FloatArray) -> Iterator[tuple
 
 
 def normal_equations(
-    jacobian: FloatArray, residual: FloatArray, law: FloatArray, precision: Precision, prior: float = LAW_PRIOR**-2
+    jacobian: FloatArray, residual: FloatArray, law: FloatArray, precision: Precision, law_free: bool = True
 ) -> NormalEquations:
     """With the prior of the strut law, whose two logarithms are the first unknowns."""
-    weighted = precision.times(jacobian.T)
-    information, gradient = weighted @ jacobian, weighted @ residual
-    information[:2, :2] += prior * np.eye(2)
-    gradient[:2] -= prior * law
-    return NormalEquations(jacobian, information, gradient)
+    weighted, prior = precision.times(jacobian.T), law_prior(jacobian.shape[1], law_free)
+    gradient = weighted @ residual
+    gradient[:2] -= prior[0, 0] * law
+    return NormalEquations(jacobian, weighted @ jacobian + prior, gradient)

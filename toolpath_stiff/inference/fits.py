@@ -31,7 +31,6 @@ class _Model:
     def __init__(self, problem: Problem, candidates: tuple[Candidate, ...], law_free: bool) -> None:
         self.problem, self.candidates, self.law_free = problem, candidates, law_free
         self.components = [component for candidate in candidates for component in candidate.components]
-        self.prior = prior_of(law_free)
         bounds = [(-np.inf, np.inf)] * 2 + [component.bounds for component in self.components]
         self.low, self.high = np.array(bounds, dtype=float).T
 
@@ -60,18 +59,14 @@ class _Model:
             moved[i] += step
             columns.append((residual - self.residual(moved)) / step)
         jacobian = np.nan_to_num(np.stack(columns, axis=1))
-        return normal_equations(jacobian, residual, x[:2], scatter.precision, self.prior)
+        return normal_equations(jacobian, residual, x[:2], scatter.precision, self.law_free)
 
     def newton_step(self, x: FloatArray, unknowns: Sequence[int], equations: NormalEquations) -> FloatArray:
         """Step of the unknowns to the least quadratic model within the bounds.
 
-        By bounded-variable least squares where the plain step would leave them: cutting that off leads uphill where
-        sizes trade off against each other.
+        Cutting off a step that leaves them leads uphill where sizes trade off against each other.
         """
-        step = np.asarray(scaled_inverse(equations.information) @ equations.gradient)
         low, high = (limit[unknowns] - x[unknowns] for limit in (self.low, self.high))
-        if ((step >= low) & (step <= high)).all():
-            return step
         return bounded_step(equations.information, equations.gradient, low, high)
 
     def moved(
@@ -92,11 +87,6 @@ class _Model:
                 return further, left
             step = 0.5 * step
         return None
-
-
-def prior_of(law_free: bool) -> float:
-    """Information about each logarithm of the strut law; of one that is not fitted, that it does not change."""
-    return LAW_PRIOR**-2 if law_free else 1e12
 
 
 def refine(problem: Problem, fit: Fit, law_free: bool = True) -> Fit:
@@ -151,7 +141,7 @@ def fit_effects(
         absent = {i - 2: (float(pulled[i]), float(sd[i])) for i in range(len(x)) if i not in unknowns}
     return Fit(
         tuple(model.candidates), model.sizes(x), tuple(free), x[:2].copy(), residual, last.jacobian,
-        scaled_inverse(last.information), noise, law_free, absent,
+        scaled_inverse(last.information), noise, law_free, absent, linear=problem.linear,
     )  # fmt: skip
 
 
@@ -196,12 +186,9 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
         start = np.array([_start(component, share) for component in candidate.components])
         fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
         x = np.concatenate([fit.law, *fit.sizes])
-        near = (
-            TOLERANCE
-            / normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter.precision, prior_of(law_free)).scale
-        )
+        last = normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter.precision, law_free)
         # Two starts mostly end in one place, and go on from there alike.
-        if not any((np.abs(x - other) < near).all() for other in seen):
+        if not any((np.abs(x - other) * last.scale < TOLERANCE).all() for other in seen):
             yield fit
         seen.append(x)
 

@@ -46,8 +46,6 @@ class Gate:
         Of the structure alone; the form that sticks out most, in words.
     gain_probability
         Of the largest gain of any candidate; 1 where it was not asked.
-    gain_threshold
-        Gain that the best of all candidates reaches by chance in one campaign of twenty; 0 where it was not asked.
     """
 
     probability: float
@@ -57,7 +55,6 @@ class Gate:
     structure_probability: float
     worst: str
     gain_probability: float = 1.0
-    gain_threshold: float = 0.0
 
 
 def simulate(noise: Noise, covariance: Covariance, seed: int, draws: int = DRAWS) -> FloatArray:
@@ -205,7 +202,6 @@ def absolute_gate(
         structure_probability=float(ranked[0, 1]),
         worst=forms.names[int(np.argmax(seen[0]))] if forms.names else "",
         gain_probability=float(ranked[0, 2]) if signatures else 1.0,
-        gain_threshold=float(np.quantile(looks[2][1:], 1.0 - CHANCE)) if signatures else 0.0,
     )
 
 

@@ -18,7 +18,7 @@ Two gates. Absolute: a hypothesis must leave residuals that its own noise explai
 posterior probabilities decide; only a name far ahead of all others is given as the answer.
 
 adequate      nothing is missing that these data could show
-identified    one effect (or pair, or triple) explains the data, far likelier than any other
+identified    one effect (or pair) explains the data, far likelier than any other
 described     the same, but its form was read off these very readings, and no others have confirmed it (`drawn`)
 ambiguous     several explain them, and none is far likelier than the others
 unexplained   something is missing, and nothing in the catalogue accounts for it; or the readings do not look as if
@@ -44,8 +44,8 @@ from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, pr
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import findings, fitted_nuisances, mean_left_by_nuisances
-from toolpath_stiff.inference.rivals import SERIES, entries, lowers_error, rivals_of, rivals_of_law
-from toolpath_stiff.inference.several import search_pairs, search_triples
+from toolpath_stiff.inference.rivals import ONE_BODY, SERIES, entries, lowers_error, rivals_of, rivals_of_law
+from toolpath_stiff.inference.several import search_pairs
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded, rooms
 from toolpath_stiff.inference.votes import Votes, closest, outvoted
 from toolpath_stiff.stiffness.contract import Effect
@@ -53,7 +53,7 @@ from toolpath_stiff.stiffness.contract import Effect
 NONE = "none"
 OUTSIDE = "outside the catalogue"
 # What is expected before anything is measured; assumed. Whoever measures has a reason, but most machines are sound.
-PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_TRIPLES, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.03, 0.10
+PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.10
 FALSE_ALARM = 0.05  # of the base model's gate
 ADEQUATE = 0.005  # below this probability an explanation does not explain the data
 MOST_OPEN = 3  # entries that an ambiguous verdict lists; all votes are in the document
@@ -70,7 +70,6 @@ POSITIVE = 3.0
 LEFT = 0.03
 ONE_SIDED = 1.645  # normal quantile of 95 %
 TAKEN_UP = {"joint_offset": "joint", "weak_strut": "strut"}  # effects that nuisances take up, of which kind
-Evidence = dict[tuple[str, ...], float]  # of effects, pairs and triples by their names
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ class Judgement:
     gates, fits
         Effect (or "a + b") -> its absolute test and final fit, where they were made.
     pairs
-        Pairs tried, and triples, most likely first.
+        Pairs tried, most likely first.
     probability
         Hypothesis -> posterior probability: effects, `none`, "a + b", `OUTSIDE`. Hypotheses that fail the absolute gate
         have none unless nothing passes.
@@ -242,26 +241,9 @@ class Gates:
         """Whether the model explains the data without a further effect."""
         return self.base.probability > FALSE_ALARM
 
-    def add(self, combinations: Sequence[Fit], evidence: Evidence, passes: Callable[[str, Fit], bool]) -> None:
-        """Try pairs or triples: those of the likeliest that beat each of their parts and pass stand.
-
-        What two effects do to each other is not in their tables: the final fit says how much more likely it makes the
-        data.
-        """
-        tried = list(combinations)
-        for k, fit in enumerate(combinations[:TESTED]):
-            parts = [log for names, log in evidence.items() if set(names) < set(fit.names)]
-            if fit.log_evidence <= max(parts) + SURVIVES:
-                continue
-            passed = passes(fit.name, fit)
-            more = self.fits[fit.name].log_posterior - fit.log_posterior
-            tried[k] = replace(fit, log_evidence=fit.log_evidence + more)
-            self.pairs += (tried[k],) if passed else ()
-        self.tried += tuple(sorted(tried, key=lambda fit: (-fit.log_evidence, fit.name)))
-
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: int) -> Gates:
-    """The model alone, then single effects, then all pairs, then triples where no single effect is enough."""
+    """The model alone, then single effects, then pairs: of the likeliest those that beat each of their two and pass."""
     draws = simulate(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
     signs = signatures(problem, (table for family in families for table in family.tables))
@@ -284,16 +266,17 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: in
         if passes(family.name, best):
             singles.append(family)
     gates.singles = tuple(family.name for family in singles)
-    evidence: Evidence = {(f.name,): f.log_evidence for f in families}
-    pairs, search = search_pairs(problem, [f for f in families if f.name not in candidates.within], base)
-    gates.add(pairs, evidence, passes)
-    # What an effect beside another must add to be considered: its prior, and odds of 3 to 1.
-    price = float(np.log(POSITIVE * _prior(families, 1) / _prior(families, 2)))
-    least = singles[0].log_evidence + price if singles else -np.inf
-    if not singles or any(pair.log_evidence > least for pair in gates.pairs):
-        # A pair that leaves no more than noise may have taken up what a third effect does: triples compete with it.
-        evidence |= {pair.names: pair.log_evidence for pair in gates.tried}
-        gates.add(search_triples(search, bool(gates.pairs)), evidence, passes)
+    evidence, tried = {family.name: family.log_evidence for family in families}, []
+    for k, fit in enumerate(search_pairs(problem, [f for f in families if f.name not in candidates.within], base)):
+        pair = fit
+        if k < TESTED and fit.log_evidence > max(evidence[name] for name in fit.names) + SURVIVES:
+            passed = passes(fit.name, fit)
+            # What two effects do to each other is not in their tables: the final fit says by how much it is likelier.
+            more = gates.fits[fit.name].log_posterior - fit.log_posterior
+            pair = replace(fit, log_evidence=fit.log_evidence + more)
+            gates.pairs += (pair,) if passed else ()
+        tried.append(pair)
+    gates.tried = tuple(sorted(tried, key=lambda fit: (-fit.log_evidence, fit.name)))
     # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
     gates.none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE
     return gates
@@ -324,16 +307,12 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
 
 
 def _sparing(gates: Gates, posterior: Callable[[Sequence[Fit]], dict[str, float]]) -> dict[str, float]:
-    """Probabilities without triples that are not likelier enough than the best pair, and pairs than the best effect."""
-    standing: Sequence[Fit] = gates.pairs
-    weights = posterior(standing)
-    for count in (2, 1):
-        fewer = gates.singles if count == 1 else [several.name for several in standing if len(several.names) == count]
-        more = sum(weights[several.name] for several in standing if len(several.names) > count)
-        if fewer and more < POSITIVE * max(weights[name] for name in fewer):
-            standing = [several for several in standing if len(several.names) <= count]
-            weights = posterior(standing)
-    return weights
+    """Probabilities without pairs that add to the best effect, unless pairs are likelier enough; others are rivals."""
+    weights = posterior(gates.pairs)
+    best = max(gates.singles, key=lambda name: weights[name], default="")
+    if not best or sum(weights[pair.name] for pair in gates.pairs) >= POSITIVE * weights[best]:
+        return weights
+    return posterior([pair for pair in gates.pairs if best not in pair.names])
 
 
 def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
@@ -370,8 +349,8 @@ def _posterior(
 
 
 def _prior(families: Sequence[Family], count: int) -> float:
-    """Prior probability of one effect, pair or triple of effects."""
-    return {1: PRIOR_SINGLES, 2: PRIOR_PAIRS, 3: PRIOR_TRIPLES}[count] / max(comb(len(families), count), 1)
+    """Prior probability of one effect, or of one pair."""
+    return {1: PRIOR_SINGLES, 2: PRIOR_PAIRS}[count] / max(comb(len(families), count), 1)
 
 
 def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit: Fit) -> float:
@@ -417,8 +396,8 @@ def put_to_vote(
     base, data, ballots = candidates.base, problem.predictor.data, dict[str, FloatArray]()
     fits = {NONE: base} | {family.name: best for family, best in candidates.offered} | gates.fits
     if verdict == "adequate":
-        likely = explanations if not noise.guess and _may_leave(problem, candidates) > LEFT else ()
-        standing = [NONE, *(name for name in TAKEN_UP if name in fits), *likely]
+        open_ones = explanations if not noise.guess and _may_leave(problem, candidates) > LEFT else ()
+        likely = standing = [*dict.fromkeys([NONE, *(name for name in TAKEN_UP if name in fits), *open_ones])]
     elif verdict in ("identified", "ambiguous"):
         left_out = {name: held_out(fits[name], data.point).of_readings(data.tip) for name in {NONE, *explanations}}
         standing = [n for n in explanations if n == NONE or lowers_error(left_out[NONE], left_out[n])]
@@ -426,30 +405,34 @@ def put_to_vote(
         if top == NONE and not gates.none_stands:
             return "unexplained", (), {}
         if top == NONE:
-            verdict, standing = "ambiguous", [*explanations, NONE]
+            verdict, likely = "ambiguous", [*dict.fromkeys([*explanations, NONE])]
+            standing = likely
         else:
             rivals = {name: fit for name, fit in fits.items() if name != NONE or gates.none_stands}
             ballots = votes(problem, fits[top], rivals_of(fits[top], rivals))
             ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
             open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
-            others = [name for name in standing if name != top and name not in ballots]
-            others += [name for name in ballots if name in (*standing, *open_rivals)]  # the closest first
-            verdict, standing = "ambiguous" if open_rivals else verdict, [top, *others]
+            ranked = [top, *(name for name in standing if name not in ballots), *ballots]  # the closest first
+            likely = [name for name in dict.fromkeys(ranked) if name in standing]
+            verdict, standing = "ambiguous" if open_rivals else verdict, [*likely, *open_rivals]
+            small = gates.none_stands and _is_small(problem, base, [fits[name] for name in likely])
+            if verdict == "ambiguous" and small:
+                standing.append(NONE)
     else:
         return verdict, explanations, {}
-    standing = [*dict.fromkeys(standing)]
-    instead, of_law = _instead_of_law(problem, fits, standing)
+    # Of the likely ones: a name that is open only in a fair form does not fit as it stands.
+    instead, of_law = _instead_of_law(problem, fits, likely)
     gates.fits |= instead
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
     return (
         "ambiguous" if instead or verdict == "adequate" else verdict,
-        _shortened(problem, fits | instead, (*standing, *instead)),
+        shortened(problem, fits | instead, (*standing, *instead)),
         closest(ballots, of_law),
     )
 
 
-def _shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
+def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
     """Explanations without those beyond the `MOST_OPEN` entries that come first; the model alone stays."""
     groups = entries(problem, fits, tuple(dict.fromkeys(names)))
     kept = groups[:MOST_OPEN]
@@ -468,6 +451,23 @@ def _may_leave(problem: Problem, candidates: Candidates) -> float:
     return hidden + mean_left_by_nuisances(candidates.base, problem.predictor.data.tip)
 
 
+def _moved_by_law(problem: Problem, fit: Fit) -> float:
+    """Mean change (relative, 95 %) of the stiffness at the readings by the refitted strut law."""
+    columns = fit.jacobian[problem.predictor.data.tip, :2]
+    spread = np.sqrt(np.einsum("ni,ij,nj->n", columns, fit.covariance[:2, :2], columns))
+    return float(np.mean(np.abs(columns @ fit.law) + ONE_SIDED * spread))
+
+
+def _is_small(problem: Problem, base: Fit, explanations: Sequence[Fit]) -> bool:
+    """Whether the model alone would be off by no more (95 %) than an adequate one, were any of these true."""
+    tip, most = problem.predictor.data.tip, _moved_by_law(problem, base)
+    for fit in explanations:
+        deviates = np.sqrt(max(2.0 * (fit.log_posterior - base.log_posterior), 1e-12))
+        change = float(np.abs(fit.residual - base.residual)[tip].mean())
+        most = max(most, change * (1.0 + ONE_SIDED / deviates) + mean_left_by_nuisances(fit, tip))
+    return most <= LEFT
+
+
 def _instead_of_law(problem: Problem, fits: Mapping[str, Fit], standing: Sequence[str]) -> tuple[dict[str, Fit], Votes]:
     """Explanations beside the file's strut law that hold as well as these with a law that had to move; their votes.
 
@@ -476,33 +476,30 @@ def _instead_of_law(problem: Problem, fits: Mapping[str, Fit], standing: Sequenc
     instead, ballots = dict[str, Fit](), dict[str, FloatArray]()
     leaders = [first for first, *_ in entries(problem, fits, standing)[:MOST_OPEN]]
     for fit in (fits[name] for name in leaders if name in fits):
-        columns = fit.jacobian[problem.predictor.data.tip, :2]
-        spread = np.sqrt(np.einsum("ni,ij,nj->n", columns, fit.covariance[:2, :2], columns))
-        if float(np.mean(np.abs(columns @ fit.law) + ONE_SIDED * spread)) <= LEFT:
+        if _moved_by_law(problem, fit) <= LEFT:
             continue
         given = with_given_law(problem, fit)
         if outvoted(votes(problem, fit, {NONE: given})[NONE]):
-            rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (SERIES,)).values()}
+            rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (SERIES, *ONE_BODY)).values()}
             ballots |= votes(problem, fit, rivals)
             instead |= {rival: rivals[rival] for rival in rivals if not outvoted(ballots[rival])}
     return instead, ballots
 
 
 def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
-    """Effects that may be there beside the likeliest explanation at a size that matters, and are not plausible yet.
+    """How far each further effect may go beside the likeliest explanation.
 
-    A further effect is as likely beforehand as one effect is beside none, a pair beside one of its effects, a triple
-    beside one of its pairs. Where the readings say nothing of it, it keeps that probability: a few per cent. So it is
-    in no set that holds the truth with 95 %, and a name stays a name.
+    A further effect is as likely beforehand as one effect is beside none, or a pair beside one of its effects. Where
+    the readings say nothing of it, it keeps that probability: a few per cent. So it is in no set that holds the truth
+    with 95 %, and a name stays a name.
     """
     name = next((name for name in judgement.explanations if name == NONE or name in judgement.fits), "")
     if not name:
         return ()
-    count, families = 0 if name == NONE else len(name.split(" + ")), judgement.families
-    before = _prior(families, min(count, 2)) if count else PRIOR_NONE
-    odds = _prior(families, min(count + 1, 3)) / before
-    hidden = not_excluded(judgement.problem, families, judgement.fits.get(name, judgement.base), odds)
-    return tuple(effect for effect in hidden if effect.effect.name not in judgement.plausible)
+    families = judgement.families
+    one, two = (_prior(families, count) for count in (1, 2))
+    odds = one / PRIOR_NONE if name == NONE else two / one
+    return tuple(not_excluded(judgement.problem, families, judgement.fits.get(name, judgement.base), odds))
 
 
 def _smallest_set(posterior: Mapping[str, float], named: float = NAMED) -> tuple[str, ...]:

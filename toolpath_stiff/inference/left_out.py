@@ -9,7 +9,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.inference.covariances import Groups, Precision
-from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
+from toolpath_stiff.inference.evidence import Fit, law_prior, relative_errors
 
 SAME_ERROR = 1e-10  # of a stiffness; rounding makes 1e-14
 
@@ -26,20 +26,23 @@ class HeldOut:
         (points, 2 + free) by how much law and sizes moved.
     point
         (n,) labels of the points.
+    linear
+        As of `Fit`.
     """
 
     residual: FloatArray
     moves: FloatArray
     point: TextArray
+    linear: bool = False
 
     @property
     def errors(self) -> FloatArray:
         """(n,) |modelled - measured| / measured."""
-        return np.abs(np.expm1(-self.residual))
+        return np.abs(relative_errors(self.residual, self.linear))
 
     def of_readings(self, rows: BoolArray) -> HeldOut:
         """Of some of the readings."""
-        return HeldOut(self.residual[rows], self.moves, self.point[rows])
+        return HeldOut(self.residual[rows], self.moves, self.point[rows], self.linear)
 
     @property
     def mean_error(self) -> float:
@@ -49,7 +52,7 @@ class HeldOut:
     @property
     def rms(self) -> float:
         """Root mean square of (modelled - measured) / measured."""
-        return float(np.sqrt(np.mean(np.expm1(-self.residual) ** 2)))
+        return float(np.sqrt(np.mean(relative_errors(self.residual, self.linear) ** 2)))
 
 
 def of_readings(fit: Fit, rows: BoolArray) -> Fit:
@@ -63,10 +66,8 @@ def held_out(fit: Fit, point: TextArray) -> HeldOut:
     residual = np.full(len(fit.residual), np.nan)
     moves = np.zeros((points.count, fit.jacobian.shape[1]))
     if points.count < 3:
-        return HeldOut(residual, moves, point)
-    prior = np.zeros((fit.jacobian.shape[1],) * 2)
-    prior[:2, :2] = np.eye(2) * (1.0 / LAW_PRIOR**2 if fit.law_free else 1e12)
-    precision = fit.scatter.precision
+        return HeldOut(residual, moves, point, fit.linear)
+    precision, prior = fit.scatter.precision, law_prior(fit.jacobian.shape[1], fit.law_free)
     scale = np.sqrt(np.maximum(precision.squares(fit.jacobian.T) + np.diag(prior), 1e-300))
     for which, out, products in products_without(precision, fit.jacobian / scale, fit.residual, points):
         pull = products[..., -1]
@@ -74,7 +75,7 @@ def held_out(fit: Fit, point: TextArray) -> HeldOut:
         information = products[..., :-1] + prior / np.outer(scale, scale)
         moves[which] = (np.linalg.pinv(information, hermitian=True) @ pull[..., None])[..., 0] / scale
         residual[out] = fit.residual[out] - (fit.jacobian[out] @ moves[which][..., None])[..., 0]
-    return HeldOut(residual, moves, point)
+    return HeldOut(residual, moves, point, fit.linear)
 
 
 def products_without(

@@ -1,12 +1,12 @@
-"""Two and three effects at once: all pairs of the catalogue searched, and triples that hold one of the best pairs.
+"""Two effects at once: all pairs of the catalogue searched.
 
 The search is linear. With c the measured compliance, c_0 the model's and d_j what effect j adds per unit of its size,
 c = c_0 + sum_j x_j d_j is exact for whatever gives way in series, however large: divided by c, the relative error of
-c_0 is linear in the sizes. So columns and residual are projected beside strut law and nuisances once, and a pair, a
-triple costs a few products of small matrices, all of them side by side: sizes within their bounds by coordinate
+c_0 is linear in the sizes. So columns and residual are projected beside strut law and nuisances once, and a pair
+costs a few products of small matrices, all of them side by side: sizes within their bounds by coordinate
 descent, Laplace's approximation of the evidence. The best few are then scored on their tables as single effects are.
 
-Some hundred pairs and some five hundred triples are on offer: each pays for that with its share of the prior
+Some hundred pairs are on offer: each pays for that with its share of the prior
 (`inference.weigh`), and one of them has to leave no more than noise would, like every explanation.
 """
 
@@ -24,7 +24,6 @@ from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
 
 SCORED = 8  # sets of effects whose tables are scored
-SEEDS = 6  # pairs from which triples are grown
 SWEEPS = 60  # of the coordinate descent
 ROUNDS = 2  # searches, each without the readings that the best set of the one before takes for wild
 NEGLIGIBLE = 1e-3  # whitened length of a component below which it counts as absent
@@ -32,7 +31,6 @@ NEGLIGIBLE = 1e-3  # whitened length of a component below which it counts as abs
 PER_SIZE = float(np.log(np.log(60.0) / np.sqrt(2.0 * np.pi)))
 LARGE = (0.05, 0.15)  # rms change of ln stiffness at which an effect is large
 STRAIGHT = 0.999  # correlation of what an effect adds at two sizes above which it grows in proportion
-BLOCK = 4000  # sets that are searched side by side
 
 
 @dataclass(frozen=True)
@@ -52,29 +50,13 @@ class TableSet:
     score: float
 
 
-def search_pairs(problem: Problem, families: Sequence[Family], base: Fit) -> tuple[list[Fit], LinearSearch]:
-    """The pairs worth looking at, the most likely first, each pair of effects once; and the search, for triples."""
+def search_pairs(problem: Problem, families: Sequence[Family], base: Fit) -> list[Fit]:
+    """The pairs worth looking at, the most likely first, each pair of effects once."""
     search = LinearSearch(problem, families, base)
     owner = np.array(search.owner)
     pairs = np.stack(np.triu_indices(len(owner), 1), axis=1)
     search.search(pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]])
-    return search.scored(search.ranked), search
-
-
-def search_triples(search: LinearSearch, only_better: bool = False) -> list[Fit]:
-    """The triples worth looking at that hold one of the best pairs of the search.
-
-    `only_better`: those that the linear search finds likelier than every pair; a pair explains the readings already.
-    """
-    least = search.ranked[0].score if only_better and search.ranked else -np.inf
-    triples = {
-        tuple(sorted((*pair.tables, k)))
-        for pair in search.ranked[:SEEDS]
-        for k in range(len(search.tables))
-        if search.owner[k] not in {search.owner[i] for i in pair.tables}
-    }
-    search.search(np.array(sorted(triples), dtype=np.int64).reshape(-1, 3))
-    return search.scored([triple for triple in search.ranked if triple.score > least])
+    return search.scored()
 
 
 class LinearSearch:
@@ -145,17 +127,15 @@ class LinearSearch:
         """The best set of tables for each set of effects, the best first."""
         best: dict[tuple[str, ...], TableSet] = {}
         p = self.columns.shape[1]
-        for start in range(0, len(sets), BLOCK):
-            part = sets[start : start + BLOCK]
-            rows = (part[:, :, None] * p + np.arange(p)).reshape(len(part), -1)  # columns of each set
-            sizes, scores = self._bounded(rows, information, pull)
-            for k in np.argsort(-scores, kind="stable").tolist():
-                tables = tuple(part[k].tolist())
-                names = tuple(sorted(self.owner[t] for t in tables))
-                if names not in best or best[names].score < scores[k]:
-                    each = zip(tables, np.split(sizes[k], len(tables)), strict=True)
-                    cut = tuple(x[: self.tables[t].columns.shape[1]].copy() for t, x in each)
-                    best[names] = TableSet(tables, cut, float(scores[k]))
+        rows = (sets[:, :, None] * p + np.arange(p)).reshape(len(sets), -1)  # columns of each set
+        sizes, scores = self._bounded(rows, information, pull)
+        for k in np.argsort(-scores, kind="stable").tolist():
+            tables = tuple(sets[k].tolist())
+            names = tuple(sorted(self.owner[t] for t in tables))
+            if names not in best:
+                each = zip(tables, np.split(sizes[k], len(tables)), strict=True)
+                cut = tuple(x[: self.tables[t].columns.shape[1]].copy() for t, x in each)
+                best[names] = TableSet(tables, cut, float(scores[k]))
         return sorted(best.values(), key=lambda ranked: (-ranked.score, ranked.tables))
 
     def _bounded(self, rows: IntArray, information: FloatArray, pull: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -185,10 +165,10 @@ class LinearSearch:
         whole = np.all(present.reshape(len(rows), -1, p).any(axis=2), axis=1)
         return sizes / scale[rows], np.where(whole, 0.5 * gains - 0.5 * volume - price, -np.inf)
 
-    def scored(self, sets: Sequence[TableSet]) -> list[Fit]:
+    def scored(self) -> list[Fit]:
         """The first of what the search found, fitted on tables; the most likely first, what is on offer paid for."""
         fits = []
-        for ranked in sets[:SCORED]:
+        for ranked in self.ranked[:SCORED]:
             fit = self._likeliest_subset(*self._side_by_side(ranked)) if np.isfinite(ranked.score) else None
             if fit is not None:
                 price = sum(np.log(self.choices[self.owner[t]]) for t in ranked.tables)

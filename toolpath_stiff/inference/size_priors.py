@@ -73,34 +73,30 @@ class SizePrior:
     ----------
     log_sizes, log_density
         Sign -> (g,) logarithms of sizes, and of the density over the logarithm of the size, normalised over all signs.
-    rms, lengths
-        Sign -> (g,) rms change of ln stiffness by these sizes, and its whitened length beside the strut law.
     """
 
     log_sizes: dict[float, FloatArray]
     log_density: dict[float, FloatArray]
-    rms: dict[float, FloatArray]
-    lengths: dict[float, FloatArray]
 
     @classmethod
     def of(cls, table: CandidateTable, j: int, sight: Sight) -> SizePrior:
         """Of component `j` of a table."""
         component = table.candidate.components[j]
-        logs, density, rms, lengths = {}, {}, {}, {}
+        logs, density, lengths = {}, {}, {}
         for sign in component.signs:
             if table.knots and sign not in table.knots:
                 continue
             logs[sign] = np.log(_sizes(table, j, sign, sight))
             sizes = (sign * np.exp(logs[sign]))[:, None] * np.eye(len(table.candidate.components))[j]
             change = sight.change(table.delta(sizes))
-            rms[sign], lengths[sign] = np.sqrt(np.mean(change**2, axis=1)), sight.length(change)
-            density[sign] = log_expected(rms[sign]) + log_usual(sizes[:, j], component.typical())
+            lengths[sign], rms = sight.length(change), np.sqrt(np.mean(change**2, axis=1))
+            density[sign] = log_expected(rms) + log_usual(sizes[:, j], component.typical())
         longest = max(float(length.max()) for length in lengths.values())
         if longest >= VISIBLE:  # else all sizes are alike: even the longest is not visible
             for sign, length in lengths.items():
                 density[sign] = density[sign] - 0.5 * (np.maximum(VISIBLE - length, 0.0) / FADES) ** 2
         mass = max(sum(_trapezoid(np.exp(density[sign]), logs[sign]) for sign in logs), 1e-300)
-        return cls(logs, {sign: density[sign] - np.log(mass) for sign in logs}, rms, lengths)
+        return cls(logs, {sign: density[sign] - np.log(mass) for sign in logs})
 
     def log_at(self, sizes: FloatArray) -> FloatArray:
         """(g,) log density of the size itself."""

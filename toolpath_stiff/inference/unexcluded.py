@@ -1,12 +1,12 @@
 """Effects that readings neither show nor exclude beside an explanation."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.inference.candidates import LARGEST, SMALLEST, Candidate, CandidateTable
+from toolpath_stiff.inference.candidates import Candidate, CandidateTable
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.inference.least_squares import bounded_step
@@ -16,7 +16,7 @@ from toolpath_stiff.stiffness.contract import Effect, Parameter
 # Rms change of ln stiffness from which an effect matters; assumed: at 5 % of its stiffness the tip's deflection is off
 # by less than the 10 % to which a cutting force is known.
 MATTERS = 0.05
-SIZES = 16  # a sign, between those that are tabulated
+SIZES = 20  # a sign, between those that are tabulated
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,14 @@ class Unexcluded:
     left: float
     probability: float = np.nan
 
+    @property
+    def matters(self) -> bool:
+        """Whether it changes the stiffness by so much that it should be known."""
+        return self.rms >= MATTERS
+
 
 def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_odds: float) -> list[Unexcluded]:
-    """Effects that may be there beside an explanation at a size that matters, the likeliest first.
+    """How far each further effect may go beside an explanation, the likeliest first.
 
     Parameters
     ----------
@@ -60,7 +65,7 @@ def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_o
     """
     widest = rooms(problem, [family for family in families if family.name not in fit.names], fit)
     whole = 1.0 + prior_odds * sum(mean for _, mean in widest)
-    hidden = [replace(room, probability=prior_odds * mean / whole) for room, mean in widest if room.rms >= MATTERS]
+    hidden = [replace(room, probability=prior_odds * mean / whole) for room, mean in widest]
     return sorted(hidden, key=lambda room: (-room.probability, room.effect.name))
 
 
@@ -71,7 +76,9 @@ def rooms(problem: Problem, families: Sequence[Family], fit: Fit) -> list[tuple[
     for family in families:
         seen = ((table, np.flatnonzero(table.columns.any(axis=0)).tolist()) for table in family.tables)
         each, means = zip(*(beside.room(table, j) for table, components in seen for j in components), strict=True)
-        room = replace(max(each, key=lambda room: room.rms), left=max(room.left for room in each))
+        # Of choices that are alike the first, whatever the last digits: a set-up stiffer is the other one softer.
+        widest_of = max(each, key=lambda room: round(room.rms, 9))
+        room = replace(widest_of, left=max(room.left for room in each))
         widest.append((room, float(np.mean(means))))
     return widest
 
@@ -100,7 +107,8 @@ class _Beside:
         component, candidate, sides = table.candidate.components[j], table.candidate, []
         none, gain, mass = float(self._fitted(self.fit.residual[None])[0][0]), 0.0, 0.0
         whole = self.problem.base_compliance if candidate.effect.is_instrument else self.compliance
-        for sizes in self._sizes(table, j):
+        for sign, logs in self.problem.prior(table, j).log_sizes.items():
+            sizes = sign * np.exp(np.linspace(logs[0], logs[-1], SIZES))
             every = sizes[:, None] * np.eye(len(candidate.components))[j]
             change = np.log1p(np.maximum(table.delta(every) / whole, -0.9))
             squares, stays = self._fitted(self.fit.residual + change)
@@ -114,18 +122,6 @@ class _Beside:
         size, rms, left = max((_widest(side, none, most) for side in sides), key=lambda figures: figures[1])
         room = Unexcluded(candidate.effect, candidate, component.parameter, component.value(size), rms, left)
         return room, gain / mass
-
-    def _sizes(self, table: CandidateTable, j: int) -> Iterator[FloatArray]:
-        """Sizes (g,) of each sign, rising."""
-        component = table.candidate.components[j]
-        for sign in component.signs:
-            if not table.knots:
-                scale = float(np.sqrt(np.mean((table.columns[self.tip, j] / self.compliance[self.tip]) ** 2)))
-                ends = np.minimum(np.array([SMALLEST, LARGEST]) / max(scale, 1e-300), component.reach(sign))
-                yield sign * np.geomspace(min(ends[0], 0.1 * ends[1]), ends[1], SIZES)
-            elif sign in table.knots:
-                logs = table.knots[sign][0]
-                yield sign * np.exp(np.linspace(logs[0], logs[-1], SIZES))
 
     def _fitted(self, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(g,) squares that are left of residuals (g, n) once law and sizes have moved to fit them best.

@@ -54,6 +54,11 @@ class FixedFrame:
         """The placement of what stands so in this one."""
         return FixedFrame(self.axes @ other.axes, self.axes @ other.origin + self.origin)
 
+    def longer(self, by: float) -> FixedFrame:
+        """Further away by so many m; one at the origin stays there."""
+        length = float(np.linalg.norm(self.origin))
+        return FixedFrame(self.axes, self.origin * (1.0 + by / length)) if length else self
+
     def inverse(self) -> FixedFrame:
         """The placement of the other body in this one."""
         return FixedFrame(self.axes.T, -self.axes.T @ self.origin)

@@ -17,6 +17,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray
 
+TORSION = ".torsion_nrad_per_Nm"  # after a joint's name: its torsion among fitted parameters
 SIX = ("along x", "along y", "along z", "about x", "about y", "about z")
 
 
@@ -37,6 +38,11 @@ class Element:
     name: str
     link: str
     directions: tuple[str, ...] = SIX
+
+
+def joint_element(joint: str) -> str:
+    """Name of the element that a joint that turns is: "joint 3" of J3, "joint A" of A."""
+    return f"joint {joint[1:]}" if joint[:1] in "Jj" and joint[1:].isdigit() else f"joint {joint}"
 
 
 def turns(element: Element) -> bool:

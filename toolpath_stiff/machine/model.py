@@ -372,9 +372,17 @@ class MachineTool:
         """(n, r) N and N m, all loads of the elements, one after the other, under the machine's own weight."""
         return np.zeros((len(stance), sum(load.compliance.shape[-1] for load in stance.loads)))
 
-    def standing(self, joints: FloatArray) -> Stance:
-        """How the machine stands at joint values (n, j) m or rad, with the reference tool."""
-        return self.solve(*self.forward(joints))
+    def standing(self, joints: FloatArray, tool_length: ArrayLike = np.nan) -> Stance:
+        """How the machine stands at joint values (n, j) m or rad, with tools of a length, m."""
+        return self.solve(*self.forward(joints, tool_length), tool_length)
+
+    def joint_of(self, element: str) -> int:
+        """Number of the joint that an element is. Raises `InputError` where it is none."""
+        raise InputError(f"machine {self.name}: element {element!r} is no joint that turns")
+
+    def with_longer_link(self, joint: int, by: float) -> Self:
+        """The machine with a joint further from the one before it, m."""
+        return self
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
         """Bodies of a drawing by name, (n, p, 3) m in base axes."""

@@ -9,7 +9,7 @@ a table beside a robot, stay where they are.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import ClassVar
 
@@ -29,7 +29,7 @@ from toolpath_stiff.machine.chain import (
     turned_from_left,
 )
 from toolpath_stiff.machine.chain_search import follow
-from toolpath_stiff.machine.elements import Element, Stance
+from toolpath_stiff.machine.elements import Element, Stance, joint_element
 from toolpath_stiff.machine.joint_values import joint_margin, wound
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.machine.rotary_axes import RotaryAxes
@@ -295,9 +295,23 @@ class Serial(MachineTool):
             values[i] = (missing * np.cross(second, third, axis=0)).sum(axis=0) / volume
         return np.where(np.isfinite(angles).all(axis=0), values, np.nan)
 
-    def standing(self, joints: FloatArray) -> Stance:
+    def standing(self, joints: FloatArray, tool_length: ArrayLike = np.nan) -> Stance:
         """How it stands at joint values (n, j)."""
-        return self._stance(joints.T, np.zeros(len(joints), dtype=np.int64), np.zeros(1))
+        return self._stance(joints.T, np.zeros(len(joints), dtype=np.int64), self.extension(tool_length))
+
+    def joint_of(self, element: str) -> int:
+        """Number of the joint that an element is."""
+        names = [joint_element(name) for name in self.joint_names]
+        return names.index(element) if element in names else super().joint_of(element)
+
+    def with_longer_link(self, joint: int, by: float) -> Serial:
+        """With the joint's origin further from that of the joint before, in the frame of that."""
+        sides = {"tool_joints": self.tool_joints, "work_joints": self.work_joints}
+        chosen = self.joints[joint]
+        longer = replace(chosen, place=chosen.place.longer(by))
+        return self.with_changes(
+            **{key: tuple(longer if j is chosen else j for j in some) for key, some in sides.items()}
+        )
 
     def _stance(self, joints: FloatArray, chosen: IntArray, extension: FloatArray) -> Stance:
         """The stance at joint values (j, n) with tools so much longer than the reference tool."""

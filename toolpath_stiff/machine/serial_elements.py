@@ -9,7 +9,7 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.bodies import Body, SpanningBeam
 from toolpath_stiff.machine.chain import STILL, ChainJoint, FixedFrame
-from toolpath_stiff.machine.elements import Element, beam_axes, beam_compliance
+from toolpath_stiff.machine.elements import Element, beam_axes, beam_compliance, joint_element
 from toolpath_stiff.machine.schema import Key, MachineToml, read_rows
 from toolpath_stiff.units import m_from_mm, m_from_nm
 
@@ -105,9 +105,7 @@ class ElementReader:
                 raise self.fault(key, f": {len(values)} numbers", f"{len(rotary)}, one a rotary joint")
             given[key] = np.broadcast_to(m_from_nm(values), (len(rotary),))
         for (work, i), torsion, bending in zip(rotary, *given.values(), strict=True):
-            name = self.chains[work][i].name
-            name = f"joint {name[1:]}" if name[:1] in "Jj" and name[1:].isdigit() else f"joint {name}"
-            element = Element(name, self.row.get("link", "joints"))
+            element = Element(joint_element(self.chains[work][i].name), self.row.get("link", "joints"))
             compliance = np.array([0.0, 0.0, 0.0, bending, bending, torsion])
             parts[work].append(Body(element, i + 1, STILL, compliance))
         return parts

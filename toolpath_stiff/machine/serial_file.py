@@ -16,7 +16,7 @@ from toolpath_stiff.machine.chain import (
     standard_dh,
 )
 from toolpath_stiff.machine.common_sections import common_fields
-from toolpath_stiff.machine.elements import beam_axes
+from toolpath_stiff.machine.elements import TORSION, beam_axes, turns
 from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections, read_rows, read_sections
 from toolpath_stiff.machine.serial import Serial
@@ -89,7 +89,8 @@ def read(toml: MachineToml) -> Serial:
     masses = read_masses(toml, (tool, work), (tip, table))
     if not any(bodies):
         raise InputError("no [[element]]: nothing gives way", expected="springs, joints or beams", file=toml.file)
-    common = common_fields(toml, values)
+    known = [body.element.name + TORSION for side in bodies for body in side if turns(body.element)]
+    common = common_fields(toml, values, known)
     machine = Serial(
         **{"limits": Limits(neutral_pose=common["default_origin"]), **common},
         reference_tool_length=m_from_mm(values.get("reference_tool", {}).get("length_mm", np.nan)),

@@ -3,34 +3,30 @@
 With `--interpreter linuxcnc`, what LinuxCNC's interpreter says of the program, in the words of the built-in check.
 """
 
-import copy
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
-from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.codes.registry import code_meaning
-from toolpath_stiff.nc.cutter_location import reader as cutter_location
-from toolpath_stiff.nc.cutter_location.state import CutterLocationState
-from toolpath_stiff.nc.cutter_location.vocabulary import meaning_of
-from toolpath_stiff.nc.languages import CUTTER_LOCATION_FILE, foreign_program, recognise, refused_program
+from toolpath_stiff.nc.languages import foreign_program, refused_program
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.reader import (
-    INTERPRETERS,
-    LANGUAGE_RUNS,
     PARAMETRIC,
+    READ_ELSEWHERE,
     in_language,
+    no_cut,
     on_the_part,
-    program_of,
     read,
+    recognised,
     run_of,
 )
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.run_records import MOST_ERRORS, Tally
+from toolpath_stiff.nc.run_records import Tally
 from toolpath_stiff.nc.state import START
 
 CODE = re.compile(r"([GM])(\d+\.?\d*)")
@@ -146,20 +142,14 @@ def check(request: Request) -> Checked:
     >>> checked.findings[0].line, checked.findings[0].severity
     (3, 'error')
     """
-    if request.interpreter not in INTERPRETERS:
-        raise ProgramError(f"interpreter {request.interpreter!r}", expected=", ".join(INTERPRETERS))
-    if not any(line.strip() for line in request.lines):
-        raise ProgramError("the program is empty", expected="an NC program", file=request.name)
-    language, sign = recognise(request.lines, request.name, request.controller.dialect)
+    language, sign = recognised(request)
     return replace(_checked(request, language), language=f"{language} ({sign})")
 
 
 def _checked(request: Request, language: str) -> Checked:
     if request.interpreter == "linuxcnc":
         return _check_by_linuxcnc(request)
-    if language == CUTTER_LOCATION_FILE:
-        return _check_cutter_location(request)
-    if language in LANGUAGE_RUNS:
+    if language in READ_ELSEWHERE:
         request = in_language(request, language)
         return _check_built_in(request, run_of(language)(request, Tally()))
     ours = _check_built_in(request, ProgramRun(request, Tally()))
@@ -184,7 +174,7 @@ def _check_built_in(request: Request, run: ProgramRun) -> Checked:
         errors, ending = _run_to_the_end(run, g_code)
     state, tally = run.state, run.tally
     assert tally is not None
-    program = program_of(run, request, ending)
+    program = run.program(ending)
     try:
         program = on_the_part(program, request, state) if len(program.moves) else program
     except InputError as error:
@@ -218,26 +208,12 @@ def _run_to_the_end(run: ProgramRun, g_code: bool) -> tuple[list[InputError], li
     if foreign is not None:
         return [foreign], warnings
     if not errors and not run.state.recorder.cuts:
-        errors = [ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=name)]
+        errors = [no_cut(run)]
     return errors, warnings
 
 
 def _used_codes(tally: Tally, meaning: Callable[[str], str] = code_meaning) -> tuple[UsedCode, ...]:
     return tuple(UsedCode(*tally.first[code], code, meaning(code), NOTE, tally.count[code]) for code in tally.first)
-
-
-def _check_cutter_location(request: Request) -> Checked:
-    state = CutterLocationState(request.name, copy.deepcopy(request.controller.tools), request.controller.feed)
-    errors = cutter_location.run(state, request.lines, MOST_ERRORS)
-    program = cutter_location.program_of(state, request)
-    return Checked(
-        program=program,
-        complete=not errors,
-        used=tuple(
-            UsedCode(line, 1, word, meaning_of(word), NOTE, count) for word, (line, count) in state.used_words.items()
-        ),
-        findings=findings_of(errors, program),
-    )
 
 
 def _check_by_linuxcnc(request: Request, may_lack: bool = False) -> Checked:
@@ -274,7 +250,5 @@ def _codes_in_lines(request: Request) -> tuple[UsedCode, ...]:
         return ()
     for line in lines:
         for letter, digits in CODE.findall(line.plain):
-            code = code_name(letter, float(digits))
-            tally.first.setdefault(code, (line.number, 0))
-            tally.count[code] += 1
+            tally.add(code_name(letter, float(digits)), line.number, 0)
     return _used_codes(tally)

@@ -33,13 +33,7 @@ from toolpath_stiff.toml_reader import TomlReader, is_text
 INCREMENT_MM, INCREMENT_INCH, INCREMENT_DEGREE = 1e-3, 1e-4, 1e-3
 
 SECONDS, MILLISECONDS, BY_POINT = "s", "ms", "ms without, s with a decimal point"
-LATHE_CYCLE = ("a lathe cycle", "this is a mill")
-UNITS_OR_CYCLE = (
-    "inch or metric units on some controls, a cycle on others",
-    'write G20 or G21, or give a controller file with inch_metric = "G70 G71"',
-)
 INCH_METRIC = {"G70": "G20", "G71": "G21"}
-HOLE_PATTERN = ("a pattern of holes", "post the holes one by one")
 
 
 @dataclass(frozen=True)
@@ -69,12 +63,8 @@ class Dialect:
         Whether I, J, K are absolute at the start (G90.1).
     aliases
         Its other names of codes.
-    g70
-        Why G70 and G71 are refused, where they are no such names.
     additional
         The codes that take additional work offsets.
-    local_calls
-        Whether M97 calls a block by its N number.
     feed_needs_point
         Units in which F without a decimal point depends on a parameter, and is refused.
     """
@@ -88,10 +78,8 @@ class Dialect:
     cycle_repeats: str = "L"
     semicolon: bool = True
     arc_absolute: bool = False
-    g70: tuple[str, str] = UNITS_OR_CYCLE
     aliases: Mapping[str, str] = field(default_factory=dict)
     additional: tuple[str, ...] = ("G54.1", "G154")
-    local_calls: bool = False
     feed_needs_point: tuple[str, ...] = ()
 
 
@@ -100,7 +88,7 @@ DIALECTS = {
     dialect.name: dialect
     for dialect in (
         GENERIC,
-        Dialect("linuxcnc", keeps_heights=False, repeats_in_p=False, g70=LATHE_CYCLE, additional=()),
+        Dialect("linuxcnc", keeps_heights=False, repeats_in_p=False, additional=()),
         Dialect(
             "fanuc",
             increments=True,
@@ -122,9 +110,7 @@ DIALECTS = {
             keeps_heights=True,
             repeats_in_p=False,
             semicolon=False,
-            g70=HOLE_PATTERN,
             additional=("G154",),
-            local_calls=True,
             feed_needs_point=("mm", "inch"),
             aliases={"G234": "G43.4"},
         ),
@@ -154,17 +140,9 @@ def dialect_named(name: str) -> Dialect:
 
 ALL_SWITCHES = frozenset(range(1, 10))
 KEYS = (
-    "dialect",
-    "block_delete",
-    "arc_centers",
-    "inch_metric",
-    "offsets",
-    "tools",
-    "kinematics",
-    "setup",
-    "feed_mm_per_min",
-    "subprograms",
-)
+    "dialect", "block_delete", "arc_centers", "inch_metric", "offsets", "tools", "kinematics", "setup",
+    "feed_mm_per_min", "subprograms",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -206,11 +184,9 @@ class Controller:
     def check_plain(self) -> None:
         """Raise `InputError` if LinuxCNC's interpreter would read a program differently from the control."""
         if not self.plain:
-            raise ProgramError(
-                f"LinuxCNC's interpreter knows its own dialect alone, and this control's is {self.dialect.name!r}, "
-                "or it has single block-delete switches",
-                hint="use the built-in interpreter (--interpreter builtin)",
-            )
+            other = f"this control's is {self.dialect.name!r}, or it has single block-delete switches"
+            problem = f"LinuxCNC's interpreter knows its own dialect alone, and {other}"
+            raise ProgramError(problem, hint="use the built-in interpreter (--interpreter builtin)")
 
     @property
     def label(self) -> str:
@@ -265,16 +241,9 @@ def read_controller(path: str | Path, dialect: str | None = None) -> Controller:
         if beside is None or not beside.is_dir():
             raise toml.error(f"subprograms = {folder!r}", "a folder beside this file", where="subprograms")
         folder = str(beside)
-    return Controller(
-        replace(control, arc_absolute=control.arc_absolute or absolute, aliases=aliases),
-        _switches(toml),
-        offsets_of(toml),
-        tools_of(toml),
-        read_kinematics(toml),
-        setup,
-        feed,
-        folder,
-    )
+    control = replace(control, arc_absolute=control.arc_absolute or absolute, aliases=aliases)
+    tables = offsets_of(toml), tools_of(toml), read_kinematics(toml)
+    return Controller(control, _switches(toml), *tables, setup, feed, folder)
 
 
 def _switches(toml: TomlReader) -> frozenset[int]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray, norms
 from toolpath_stiff.nc.moves import Arc, Moves
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
@@ -25,7 +25,7 @@ def move_lengths(moves: Moves) -> FloatArray:
     >>> (move_lengths(moves) * 1e3).round(3).tolist()  # mm
     [50.0, 31.416]
     """
-    chord = np.linalg.norm(moves.end[:, :3] - moves.start[:, :3], axis=1)
+    chord = norms(moves.end[:, :3] - moves.start[:, :3])
     arc = moves.arc_sweep != 0.0
     if arc.any():
         frame = arc_frame(moves, np.flatnonzero(arc))
@@ -54,8 +54,8 @@ class ArcFrame:
         lift = np.einsum("ni,ni->n", from_center, normal)
         self.climb = np.einsum("ni,ni->n", to_end, normal) - lift
         in_plane = from_center - lift[:, None] * normal
-        self.radius_start = np.linalg.norm(in_plane, axis=1)
-        self.radius_end = np.linalg.norm(to_end - (lift + self.climb)[:, None] * normal, axis=1)
+        self.radius_start = norms(in_plane)
+        self.radius_end = norms(to_end - (lift + self.climb)[:, None] * normal)
         self.e1 = in_plane / self.radius_start[:, None]
         self.e2 = np.cross(normal, self.e1)
         self.lift = lift
@@ -82,7 +82,7 @@ def points_along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArra
     """Positions (n, 3) and unit tangents (n, 3) at shares u of moves; ends are met exactly."""
     start, end = moves.start[:, :3], moves.end[:, :3]
     chord = end - start
-    length = np.linalg.norm(chord, axis=1)
+    length = norms(chord)
     tangent = (chord / np.where(length > 0.0, length, 1.0)[:, None]).take(move, axis=0)
     position = start.take(move, axis=0)  # of most samples in a program of short moves: they are ends
     last = np.flatnonzero(u == 1.0)
@@ -110,7 +110,7 @@ def _along_arcs(frame: ArcFrame, sweep: FloatArray, arc: IntArray, u: FloatArray
     around = -np.sin(angle) * e1 + np.cos(angle) * e2
     position = frame.center[arc] + radius * outward + (frame.lift[arc] + u * frame.climb[arc])[:, None] * normal
     velocity = radius * sweep[arc][:, None] * around + growth * outward + frame.climb[arc][:, None] * normal
-    return position, velocity / np.linalg.norm(velocity, axis=1, keepdims=True)
+    return position, velocity / norms(velocity)[:, None]
 
 
 def extents(moves: Moves) -> Extents:

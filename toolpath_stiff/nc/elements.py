@@ -42,16 +42,19 @@ def _holds(element: Element, place: complex) -> bool:
     return part <= whole + REACHED or math.tau - part < REACHED
 
 
-def _meeting(first: Element, second: Element, left: float, near: complex) -> complex | None:
-    """Where two elements, both set off to the left, meet next to a point; None: nowhere."""
+def meetings(first: Element, second: Element, left: float = 0.0) -> tuple[complex, ...]:
+    """Where two elements, both set off to the left, meet: nowhere or at two places, which lines have in one.
+
+    In the order along the line; of two arcs the one to the right of the way from the first's centre to the second's.
+    """
     if first[2] is None and second[2] is not None:
         first, second = second, first
-    v = direction(second, second[0])
+    v = direction(second, second[0]) if second[2] is None else 0j
     line = second[0] + left * 1j * v
     if first[2] is None:
         u = direction(first, first[0])
         apart = line - (first[0] + left * 1j * u)
-        return first[0] + left * 1j * u + u * (apart.conjugate() * v).imag / (u.conjugate() * v).imag
+        return (first[0] + left * 1j * u + u * (apart.conjugate() * v).imag / (u.conjugate() * v).imag,) * 2
     radius = abs(first[0] - first[2]) - first[3] * left
     if second[2] is None:
         middle, across = line + v * ((first[2] - line) / v).real, v
@@ -59,13 +62,13 @@ def _meeting(first: Element, second: Element, left: float, near: complex) -> com
     else:
         apart, other = second[2] - first[2], abs(second[0] - second[2]) - second[3] * left
         if not abs(apart) or other <= 0.0:
-            return None
+            return ()
         along = (abs(apart) ** 2 + radius**2 - other**2) / (2.0 * abs(apart))
         middle, across = first[2] + along * apart / abs(apart), 1j * apart / abs(apart)
         square = radius**2 - along**2
     if radius <= 0.0 or square < 0.0:
-        return None
-    return min((middle + sign * math.sqrt(square) * across for sign in (1.0, -1.0)), key=lambda z: abs(z - near))
+        return ()
+    return tuple(middle + sign * math.sqrt(square) * across for sign in (-1.0, 1.0))
 
 
 def cut_off(
@@ -89,8 +92,9 @@ def cut_off(
     turn = 1 if turned > 0.0 else -1
     begin, end, center = apex - size * u, apex + size * v, None
     if rounded:
-        center = _meeting(before, after, turn * size, apex)
-        refuse_arc_if(center is None, TOO_LONG, "a smaller one")
-        begin, end = (_foot(element, center or 0j) for element in (before, after))
+        places = meetings(before, after, turn * size)
+        refuse_arc_if(not places, TOO_LONG, "a smaller one")
+        center = min(places, key=lambda place: abs(place - apex))
+        begin, end = (_foot(element, center) for element in (before, after))
     refuse_arc_if(not (_holds(before, begin) and _holds(after, end)), TOO_LONG, "a smaller one")
     return begin, end, center, turn

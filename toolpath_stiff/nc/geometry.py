@@ -95,11 +95,9 @@ def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) 
         return
     allowed = min(max(least, RELATIVE_TOLERANCE * max(first, last)), MOST_TOLERANCES * least)
     if difference > allowed:
-        raise ArcError(
-            f"an arc whose end lies {difference:.4f} mm off its circle (radius {first:.4f} mm at the start, "
-            f"{last:.4f} mm at the end)",
-            f"radii that agree within {allowed:.4f} mm",
-        )
+        radii = f"(radius {first:.4f} mm at the start, {last:.4f} mm at the end)"
+        problem = f"an arc whose end lies {difference:.4f} mm off its circle {radii}"
+        raise ArcError(problem, f"radii that agree within {allowed:.4f} mm")
 
 
 def check_bulge(radius: float, sweep: float) -> None:

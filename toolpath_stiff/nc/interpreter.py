@@ -12,10 +12,7 @@ from toolpath_stiff.nc.codes.motion import homes_standing
 from toolpath_stiff.nc.codes.passive import m_parameters
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.codes.tools import list_numbers
-from toolpath_stiff.nc.geometry import ArcError
-from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import LAST_MODE, CurrentBlock, Flow, Group, State, Then
-from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
 
 NAMES = {"O": "program number", "$": "a setting of grbl or TinyG"}
@@ -48,10 +45,8 @@ def finish(state: State, block: CurrentBlock) -> Then:
     for code in _in_order(block, ahead=False):
         code.act(state, block, code.name)
     pending = state.corner
-    try:
+    with block.placing(increments_hint(state)):
         _move(state, block)
-    except ArcError as error:
-        raise block.fail(None, error.found, error.expected, increments_hint(state)) from None
     for letter in CORNERS:
         if block.has(letter):
             CODES[letter].act(state, block, letter)
@@ -78,20 +73,11 @@ def sort_words(state: State, block: Block) -> CurrentBlock:
             _sort_code(state, current, word)
         elif word.letter in NAMES:
             state.note(block.line, word, NAMES[word.letter])
-        elif word.letter in current.values:
-            raise current.fail(word, f"repeats the word {word.letter} of its block", "each word once")
         else:
-            current.values[word.letter] = word
-    current.free = set(current.values)
-    for letter in ("U", "V", "W"):
-        if letter in current.values and not homes_standing(current, letter):
-            raise current.fail(letter, "moves an axis that this machine does not have", "X Y Z A B C")
-    for letter, word in current.values.items():
-        if letter in AXES:
-            if abs(word.value) > LARGEST_MM:
-                raise current.fail(word, "is beyond 100 m", f"at most {LARGEST_MM:g}")
-        elif abs(word.value) > LARGEST_WORD:
-            raise current.fail(word, "is beyond any number that a control takes", f"at most {LARGEST_WORD:.0f}")
+            current.add(word.letter, word)
+    for letter in current.free & {"U", "V", "W"}:
+        moves = not homes_standing(current, letter)
+        current.refuse_if(moves, letter, "moves an axis that this machine does not have", "X Y Z A B C")
     return current
 
 
@@ -104,25 +90,23 @@ def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
     unknown = code is None and word.letter == "G"
     block.refuse_if(unknown, word, "is not a G code that is known", hint="check the program, or post it without it")
     if code is None:  # it may run anything, a change of kinematics included; its parameters go with it
-        state.note(block.line, word, "an M code of one control, not acted upon")
-        state.warnings.append(Remark(f"what {word.text} does on its control is not known", block.line))
+        state.note_unknown(block.line, word)
         for other in block.block.words:
             if other.letter in "PQE":
                 state.note(block.line, other, f"parameter of {word.text}")
         return
-    foreign = code.listed and word.letter == "G" and dialect.name not in code.controls
-    block.refuse_if(foreign, word, f"is not a code of the dialect {dialect.name}", " or ".join(code.controls))
+    acts = word.letter == "G" or code.group == "M subprogram"  # other M codes are a machine builder's
+    foreign = acts and name == written and dialect.name not in code.controls
+    hint = f"there it is {code.meaning}: name the control with --dialect"
+    block.refuse_if(foreign, word, f"is not a code of the dialect {dialect.name}", " or ".join(code.controls), hint)
     if code.listed:
         state.note(block.line, word, code.listed)
     before = block.groups.get(code.group)
     # `G0 G17 G40 G49 G80 G90`, the usual first block: G80 ends a cycle, the other code says what follows.
     if before is not None and (before == name or "G80" not in (before, name)):
         group = code.group.removeprefix("M ")
-        raise block.fail(
-            word,
-            f"and {before} are both of the modal group {group!r}, or act once in their block",
-            "one of them in a block",
-        )
+        problem = f"and {before} are both of the modal group {group!r}, or act once in their block"
+        raise block.fail(word, problem, "one of them in a block")
     if before is None or name != "G80":
         block.groups[code.group] = name
         block.codes[name] = word
@@ -155,9 +139,7 @@ def _move(state: State, block: CurrentBlock) -> None:
     instead = once if once is not None and CODES[once].when == "motion" else None  # G53
     if state.motion is None:
         for letter in AXES:
-            block.refuse_if(
-                block.has(letter), letter, "has no motion mode to move in", "G0, G1, G2, G3 or a cycle before it"
-            )
+            block.refuse_if(block.has(letter), letter, "has no motion mode to move in", "G0 to G3 or a cycle before it")
         block.refuse_if(instead is not None, instead, "without G0 or G1")
     else:
         mode = instead or state.motion

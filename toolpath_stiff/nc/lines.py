@@ -42,12 +42,8 @@ def read_text(path: str | Path) -> tuple[str, str]:
     except ValueError as error:  # a NUL in the name
         raise ProgramError(f"cannot read {str(path)!r}: {error}") from None
     if len(content) > LARGEST_FILE:
-        raise ProgramError(
-            "a file that is too large to be read",
-            expected=f"an NC program of at most {LARGEST_FILE >> 20} MB",
-            hint="split the program",
-            file=Path(path).name,
-        )
+        problem, expected = "a file that is too large to be read", f"an NC program of at most {LARGEST_FILE >> 20} MB"
+        raise ProgramError(problem, expected=expected, hint="split the program", file=Path(path).name)
     encoding = "utf-8-sig" if content.startswith(codecs.BOM_UTF8) else "utf-8"
     try:
         return content.decode(encoding), encoding

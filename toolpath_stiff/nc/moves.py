@@ -28,6 +28,7 @@ RAPID, FEED, ARC, CYCLE = 0, 1, 2, 3
 CUTTER_LOCATION = "cutter-location file"
 Blank = tuple[tuple[float, float, float], tuple[float, float, float]]
 MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
+NARROW = {"line": np.int32, "motion": np.int8}  # whole numbers that a long program has many of
 HELD = ("tool", "tool_length", "spindle")  # columns that most programs have one value of
 
 
@@ -256,12 +257,12 @@ class Move:
 
 @dataclass
 class Recorder:
-    """Collects moves; a move of no length in any axis is none. `recent`: those since the last of `parts`, in SI."""
+    """Collects moves; a move of no length in any axis is none. `recent`: those that are not in `columns` yet."""
 
     recent: list[Move] = field(default_factory=list)
-    parts: list[Moves] = field(default_factory=list)
+    columns: dict[str, NDArray[Any]] = field(default_factory=dict)  # of `Moves`, longer than what they hold
     cuts: bool = False  # whether any move is a cutting one
-    packed: int = 0  # number of moves in `parts`
+    packed: int = 0  # number of moves in `columns`
 
     def __len__(self) -> int:
         return len(self.recent) + self.packed
@@ -282,37 +283,50 @@ class Recorder:
         pause = self.recent.pop(row).dwell
         if row:
             self.recent[row - 1].dwell += pause
-        elif self.parts:
-            self.parts[-1].dwell[-1] += pause
+        elif self.packed:
+            self.columns["dwell"][self.packed - 1] += pause
 
     def add_many(self, moves: Moves) -> None:
         """Add moves at once, each of some length; units as of `Move`."""
         if not len(moves):
             return
         self.pack()
-        self.parts.append(in_si(moves))
-        self.packed += len(moves)
+        self._keep(in_si(moves))
         self.cuts = self.cuts or bool((moves.motion != RAPID).any())
 
     def pack(self) -> None:
         """The recent moves to arrays, which take a fifth of their memory."""
         if self.recent:
-            self.parts.append(self._recent_in_si())
-            self.packed += len(self.recent)
+            self._keep(self._recent_in_si())
             self.recent = []
+
+    def _keep(self, moves: Moves) -> None:
+        """Moves in SI behind those in the columns, which grow in place: a long program stands in memory once."""
+        first, self.packed = self.packed, self.packed + len(moves)
+        for column in fields(Moves):
+            new = getattr(moves, column.name)
+            kept = self.columns.setdefault(column.name, new[:0].astype(NARROW.get(column.name, new.dtype)))
+            if len(kept) < self.packed:
+                kept.resize((self.packed + self.packed // 4, *new.shape[1:]), refcheck=False)
+            kept[first : self.packed] = new
 
     def add_dwell(self, seconds: float) -> None:
         """A pause after the last move; before the first move nothing waits."""
         if self.recent:
             self.recent[-1].dwell += seconds
-        elif self.parts:
-            self.parts[-1].dwell[-1] += seconds
+        elif self.packed:
+            self.columns["dwell"][self.packed - 1] += seconds
 
     def moves(self) -> Moves:
         """The moves as arrays, SI; the recorder is empty afterwards."""
-        parts = [*self.parts, self._recent_in_si()]
-        self.recent, self.parts, self.packed = [], [], 0
-        return _joined(parts)
+        self._keep(self._recent_in_si())
+        columns, n = self.columns, self.packed
+        self.recent, self.columns, self.packed = [], {}, 0
+        for name, column in columns.items():
+            column.resize((n, *column.shape[1:]), refcheck=False)
+            if not column.any():  # pages that nobody writes to take no memory
+                columns[name] = np.zeros(column.shape, column.dtype)
+        return Moves(**columns | {name: held_once(columns[name]) for name in HELD})
 
     def _recent_in_si(self) -> Moves:
         def column(name: str, kind: type = float, *wide: int) -> NDArray[Any]:
@@ -353,17 +367,6 @@ def in_si(moves: Moves) -> Moves:
         tool_length=m_from_mm(moves.tool_length),
         spindle=rad_per_s_from_per_min(moves.spindle),
     )
-
-
-def _joined(parts: list[Moves]) -> Moves:
-    """All parts, column by column."""
-    columns = {column.name: _end_to_end([getattr(part, column.name) for part in parts]) for column in fields(Moves)}
-    return replace(Moves(**columns), **{name: held_once(columns[name]) for name in HELD})
-
-
-def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:
-    whole = np.concatenate(parts)
-    return whole if whole.any() else np.zeros(whole.shape, whole.dtype)  # pages that nobody writes to take no memory
 
 
 def held_once(column: NDArray[Any]) -> NDArray[Any]:

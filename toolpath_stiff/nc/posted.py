@@ -87,12 +87,8 @@ def check_rotary_offsets(offsets: Offsets, kinematics: PostedKinematics, name: s
     """Raise `InputError` for work offsets with A, B, C under tool centre point control: controls differ in them."""
     every = (*offsets.table, *offsets.additional.values())
     if kinematics.tcp and any(any(offset.axes[3:]) for offset in every):
-        raise ProgramError(
-            "a work offset with A, B or C, and tool centre point control (kinematics.tcp = true): controls differ in "
-            "what X Y Z are then",
-            expected="work offsets of X Y Z alone",
-            file=name,
-        )
+        problem = "a work offset with A, B or C, and tool centre point control (kinematics.tcp = true): controls differ"
+        raise ProgramError(problem, expected="work offsets of X Y Z alone", file=name)
 
 
 def switched(frames: Frames, tool_length: float, hold: bool) -> list[float]:
@@ -119,12 +115,10 @@ def _points_at(kinematics: PostedKinematics, zero: Pose | None, name: str) -> Po
     if kinematics.points != MACHINE or not used:
         return kinematics
     if zero is None:
-        raise ProgramError(
-            'kinematics.points = "machine" needs the place of G54 on the machine that the program was posted for',
-            expected="G54 in the controller file's [offsets], or G10 L2 P1 in the program",
-            hint='or give the points in program coordinates: points = "program"',
-            file=name,
-        )
+        problem = 'kinematics.points = "machine" needs the place of G54 on the machine that the program was posted for'
+        expected = "G54 in the controller file's [offsets], or G10 L2 P1 in the program"
+        hint = 'or give the points in program coordinates: points = "program"'
+        raise ProgramError(problem, expected=expected, hint=hint, file=name)
     axes = []
     for axis in kinematics.axes:
         point = axis.point
@@ -149,12 +143,12 @@ def _known_points(
         reason, hint = "tool centre point control does not hold there", ""
     cuts = fixed & (moves.motion != RAPID)
     if cuts.any():
-        raise Place(name, int(moves.line[np.argmax(cuts)])).fail(
-            f"a cut that begins or ends at a point of the machine that the program was posted for (G53, G28, G30): "
-            f"{reason}",
-            "rapids alone there, and X Y Z in the move after them",
-            hint,
+        problem = "a cut that begins or ends at a point of the machine that the program was posted for (G53, G28, G30)"
+        place, expected = (
+            Place(name, int(moves.line[np.argmax(cuts)])),
+            "rapids alone there, and X Y Z in the move after",
         )
+        raise place.fail(f"{problem}: {reason}", expected, hint)
     lines = np.unique(moves.line[fixed])
     more = f", in {len(lines)} lines," if len(lines) > 1 else ""
     text = (

@@ -17,12 +17,13 @@ from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.codes.saved import leave_call
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.lines import read_lines
-from toolpath_stiff.nc.moves import Jump, Remark
+from toolpath_stiff.nc.moves import Jump, ReadProgram, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
+from toolpath_stiff.nc.run_result import program_of
 from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, Then
 from toolpath_stiff.nc.words import Block, Word, read_block
 
@@ -34,7 +35,7 @@ SEQUENCE = re.compile(r"\s*+(?:/\d?\s*+)?[nN]\s*+0*+(\d{0,17}+)(?![\d.])", re.AS
 HEAD = re.compile(r"\s*+(?:/\s*+)?[oO:]\s*+0*+(\d{0,17}+)\s*+(?:[(;].*)?$", re.ASCII)
 REPEATS_IN_P = 10_000  # P with more than four digits holds the repeats before them
 
-Argument = TypeVar("Argument", int, Block)
+Argument = TypeVar("Argument", int, str, Block)
 Outcome = TypeVar("Outcome")
 
 
@@ -53,7 +54,7 @@ class ProgramRun:
 
     def __init__(self, request: Request, tally: Tally | None = None, fast: bool = True) -> None:
         state, lines, name = request.start(), request.lines, request.name
-        self.state, self.lines, self.name = state, lines, name
+        self.request, self.state, self.lines, self.name = request, state, lines, name
         state.keep = tally.keep if tally is not None else None
         self.switches, self.tally = request.controller.switches, tally
         self._plain = PlainRun(state, lines, name) if fast else None
@@ -70,10 +71,12 @@ class ProgramRun:
         self._passes: dict[int, str] = {}  # by the line that jumps back: what changes often, as it was there
         self._moved = (0, 0)  # moves at the last step back after a move, and the blocks that had run by then
 
-    @staticmethod
-    def meaning(code: str) -> str:
-        """What a code, or a word of the language, is taken for."""
-        return code_meaning(code)
+    meaning = staticmethod(code_meaning)  # what a code, or a word of the language, is taken for
+    cuts_by = "a feed move (G1, G2, G3 or a cycle)"
+
+    def program(self, ending: list[Remark]) -> ReadProgram:
+        """What the run has made of the program, with the warnings of its end."""
+        return program_of(self.state, self.request, self.lines, self.jumps, ending)
 
     def run(self) -> list[Remark]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
@@ -100,7 +103,7 @@ class ProgramRun:
             flow: Then = Flow.NEXT
             if block.words and not (block.optional and block.switch in self.switches):
                 if self.tally is not None:
-                    self.tally.add(block)
+                    self.tally.add_block(block)
                 flow = self._tried(self._execute, block, flow)
             if flow is Flow.END:
                 return self._end(row, "the program's end", ended=True)
@@ -131,10 +134,8 @@ class ProgramRun:
         rows_of_codes = [(words.code == number).nonzero()[0] for number in range(int(words.code.max()) + 1)]
         for rows in sorted((rows for rows in rows_of_codes if len(rows)), key=lambda rows: int(rows[0])):
             code, line = f"G{words.code[rows[0]]}", first + int(rows[0])
-            if code not in self.tally.first:
-                column = next(word.column for word in self._read(line).words if word.letter == "G")
-                self.tally.first[code] = (line + 1, column)
-            self.tally.count[code] += len(rows)
+            column = next(word.column for word in self._read(line).words if word.letter == "G")
+            self.tally.add(code, line + 1, column, len(rows))
 
     def _steered(self, row: int) -> int | None:
         """Where the run goes on, of a line that only says that; None: its words act."""
@@ -201,17 +202,18 @@ class ProgramRun:
         self._programs = self._sequence = None
         return first
 
+    def _files_called(self, stem: str, suffixes: tuple[str, ...]) -> list[str]:
+        """Files of the folder with a name, whatever its case."""
+        files = sorted(self.folder.iterdir()) if self.folder is not None and stem else []
+        return [file.name for file in files if file.suffix.upper() in suffixes and file.stem.upper() == stem]
+
     def _check_head(self, block: Block, numbered: bool) -> None:
         """A program number within a program: the next one begins where this one did not end."""
         if self._levels:
             raise self._unended(block.line - 1)
         if (numbered or len(self.state.recorder)) and self.state.dialect.name != "linuxcnc":
-            raise self._fail(
-                block.line - 1,
-                f"{block.words[0].text} begins another program before the first one has ended",
-                "M30 or M2 before it",
-                column=block.words[0].column,
-            )
+            head, problem = block.words[0], "begins another program before the first one has ended"
+            raise self._fail(block.line - 1, f"{head.text} {problem}", "M30 or M2 before it", column=head.column)
 
     def _unended(self, row: int) -> InputError:
         level = self._levels[-1]
@@ -245,12 +247,8 @@ class ProgramRun:
 
     def _begin(self, level: Subprogram, row: int, column: int) -> None:
         if len(self._levels) == DEEPEST:
-            raise self._fail(
-                row,
-                f"more than {DEEPEST} subprograms within each other, {level.name} the last one",
-                "calls that end",
-                column=column,
-            )
+            problem = f"more than {DEEPEST} subprograms within each other, {level.name} the last one"
+            raise self._fail(row, problem, "calls that end", column=column)
         self._levels.append(level)
         self.state.saved.append(None)
 
@@ -286,12 +284,8 @@ class ProgramRun:
             return to if to > row else None
         level = self._pop_level(row)
         if level.again or to < level.back:
-            raise self._fail(
-                row,
-                f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram",
-                "a block after the call, which is not repeated",
-                column=flow.column,
-            )
+            problem = f"M99 P goes back to line {to + 1} of the caller, or leaves out repeats of its own subprogram"
+            raise self._fail(row, problem, "a block after the call, which is not repeated", column=flow.column)
         return to
 
     def _leave(self, row: int) -> int:
@@ -317,19 +311,12 @@ class ProgramRun:
         known = [meaning for meaning in sorted(meanings) if meaning[0] in heads]
         if not known:
             names = " or ".join(f"O{number}" for number, _ in sorted(meanings))
-            raise self._fail(
-                row,
-                f"M98 calls {names}, and the file has no such subprogram",
-                hint="put the subprogram into the file, after the main program's M30",
-                column=call.column,
-            )
+            hint = "put the subprogram into the file, after the main program's M30"
+            raise self._fail(row, f"M98 calls {names}, and the file has no such subprogram", "", hint, call.column)
         if len(known) > 1:
-            raise self._fail(
-                row,
-                f"M98 P{call.number} calls O{call.number} or, {known[0][1]} times, O{known[0][0]}: the file has both",
-                hint="give the number of repeats as L",
-                column=call.column,
-            )
+            both = f"O{call.number} or, {known[0][1]} times, O{known[0][0]}: the file has both"
+            hint = "give the number of repeats as L"
+            raise self._fail(row, f"M98 P{call.number} calls {both}", "", hint, call.column)
         return known[0]
 
     def _heads(self) -> dict[int, int]:

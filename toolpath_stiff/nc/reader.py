@@ -1,53 +1,52 @@
 """An NC program or a cutter-location file, from file or text, to `ReadProgram`."""
 
-import math
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.nc.codes.increments import point_warning
 from toolpath_stiff.nc.controller import DIALECTS, LANGUAGES, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.languages import (
     CUTTER_LOCATION_FILE,
     READ,
     foreign_program,
-    lathe_warning,
     recognise,
     refused_program,
 )
 from toolpath_stiff.nc.lines import read_lines, split_lines
-from toolpath_stiff.nc.moves import RAPID, Blank, ReadProgram, Remark
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, ReadProgram
 from toolpath_stiff.nc.parametric.families import uses_variables
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
 from toolpath_stiff.nc.program_run import ProgramRun
-from toolpath_stiff.nc.request import ORIGIN_WINS, ZERO, Request
-from toolpath_stiff.nc.state import START, State
+from toolpath_stiff.nc.request import ZERO, Request
+from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import read_tool_table
-from toolpath_stiff.poses import Pose, pose_in_si
-from toolpath_stiff.units import m_from_mm, mm_per_min_from_m_per_s
+from toolpath_stiff.poses import Pose
+from toolpath_stiff.units import mm_per_min_from_m_per_s
 
 INTERPRETERS = ("builtin", "linuxcnc", "auto")
 PARAMETRIC = "variables and jumps"
-# What runs a program of a language, loaded where there is such a program: most are plain G code, and are not to wait.
-LANGUAGE_RUNS = {
-    LANGUAGES["heidenhain"]: ("heidenhain", "HeidenhainRun"),
-    LANGUAGES["siemens"]: ("siemens", "SiemensRun"),
-}
-
-
-def reader_of(room: str) -> ModuleType:
-    """The reader of cutter-location files, or that by LinuxCNC's interpreter, loaded when it is asked for."""
-    return import_module(f"toolpath_stiff.nc.{room}.reader")
+READ_ELSEWHERE = (*READ, CUTTER_LOCATION_FILE)  # languages with a reader of their own
 
 
 def run_of(language: str) -> type[ProgramRun]:
-    """What runs programs of a language of `LANGUAGE_RUNS`, or `PARAMETRIC` ones."""
-    room, name = LANGUAGE_RUNS.get(language, ("parametric", "ParametricRun"))
-    run: type[ProgramRun] = getattr(import_module(f"toolpath_stiff.nc.{room}.run"), name)
-    return run
+    """What runs programs of a language, or `PARAMETRIC` ones, loaded for these alone: most are plain G code."""
+    if language == CUTTER_LOCATION_FILE:
+        from toolpath_stiff.nc.cutter_location.reader import CutterLocationRun
+
+        return CutterLocationRun
+    if language == LANGUAGES["heidenhain"]:
+        from toolpath_stiff.nc.heidenhain.run import HeidenhainRun
+
+        return HeidenhainRun
+    if language == LANGUAGES["siemens"]:
+        from toolpath_stiff.nc.siemens.run import SiemensRun
+
+        return SiemensRun
+    if language == PARAMETRIC:
+        from toolpath_stiff.nc.parametric.run import ParametricRun
+
+        return ParametricRun
+    return ProgramRun
 
 
 def read_program(
@@ -114,19 +113,13 @@ def read(request: Request) -> ReadProgram:
     InputError
         With file, line and column, what was found and what was expected.
     """
-    lines, name = request.lines, request.name
-    if request.interpreter not in INTERPRETERS:
-        raise ProgramError(f"interpreter {request.interpreter!r}", expected=", ".join(INTERPRETERS))
-    if not any(line.strip() for line in lines):
-        raise ProgramError("the program is empty", expected="an NC program", file=name)
-    native, (language, sign) = request.interpreter == "linuxcnc", recognise(lines, name, request.controller.dialect)
-    if native and (language == CUTTER_LOCATION_FILE or language in LANGUAGE_RUNS):
+    lines, name, (language, sign) = request.lines, request.name, recognised(request)
+    native = request.interpreter == "linuxcnc"
+    if native and language in READ_ELSEWHERE:
         what = "cutter-location files" if language == CUTTER_LOCATION_FILE else f"{language} ({sign})"
         problem = f"LinuxCNC's interpreter reads no {what}"
         raise ProgramError(problem, expected="--interpreter builtin", file=name)
-    if language == CUTTER_LOCATION_FILE:
-        return _with_feed(reader_of("cutter_location").read(request), request)
-    if language in LANGUAGE_RUNS:
+    if language in READ_ELSEWHERE:
         request = in_language(request, language)
         return _finished(request, run_of(language)(request))
     refused = foreign_program(lines, name) if native else refused_program(lines, name, request.controller.dialect)
@@ -134,7 +127,7 @@ def read(request: Request) -> ReadProgram:
         raise refused
     if native:
         request.controller.check_plain()
-        return on_the_part(reader_of("linuxcnc").read(request), request)
+        return by_linuxcnc(request)
     try:
         return _read_built_in(request)
     except InputError as error:
@@ -144,7 +137,7 @@ def read(request: Request) -> ReadProgram:
         if request.interpreter == "builtin" or not request.controller.plain:
             raise
         try:
-            return on_the_part(reader_of("linuxcnc").read(request), request)
+            return by_linuxcnc(request)
         except InputError as second:
             raise ProgramError(
                 error.found,
@@ -156,9 +149,26 @@ def read(request: Request) -> ReadProgram:
             ) from None
 
 
+def recognised(request: Request) -> tuple[str, str]:
+    """The language of a program, and its sign. Raises `InputError` for an empty one, or an unknown interpreter."""
+    if request.interpreter not in INTERPRETERS:
+        raise ProgramError(f"interpreter {request.interpreter!r}", expected=", ".join(INTERPRETERS))
+    if not any(line.strip() for line in request.lines):
+        raise ProgramError("the program is empty", expected="an NC program", file=request.name)
+    return recognise(request.lines, request.name, request.controller.dialect)
+
+
 def in_language(request: Request, language: str) -> Request:
-    """The request with the dialect of the program's language, which has a reader."""
-    return replace(request, controller=replace(request.controller, dialect=DIALECTS[READ[language]]))
+    """The request with the dialect of the program's language, where that is one."""
+    dialect = DIALECTS[READ[language]] if language in READ else request.controller.dialect
+    return replace(request, controller=replace(request.controller, dialect=dialect))
+
+
+def by_linuxcnc(request: Request) -> ReadProgram:
+    """A program as LinuxCNC's interpreter reads it."""
+    from toolpath_stiff.nc.linuxcnc.reader import read as read_by_linuxcnc
+
+    return on_the_part(read_by_linuxcnc(request), request)
 
 
 def _read_built_in(request: Request) -> ReadProgram:
@@ -173,51 +183,19 @@ def _read_built_in(request: Request) -> ReadProgram:
 def _finished(request: Request, run: ProgramRun) -> ReadProgram:
     ending = run.run()
     if not run.state.recorder.cuts:
-        raise ProgramError("no cutting move", expected="a feed move (G1, G2, G3 or a cycle)", file=request.name)
-    return on_the_part(program_of(run, request, ending), request, run.state)
+        raise no_cut(run)
+    return on_the_part(run.program(ending), request, run.state)
 
 
-def program_of(run: ProgramRun, request: Request, ending: Sequence[Remark]) -> ReadProgram:
-    """What a run made of a program, with the warnings of its end; of a posted one the moves of its own machine."""
-    state, frames, warnings = run.state, run.state.frames, [*ending]
-    if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
-        warnings.append(ORIGIN_WINS)
-    moves = state.recorder.moves()
-    return ReadProgram(
-        name=request.name,
-        path=request.path,
-        source=request.lines,
-        moves=moves,
-        origin=pose_in_si(frames.origin),
-        origin_source=frames.source,
-        unsupported=tuple(state.unsupported),
-        warnings=(
-            *warnings,
-            *state.warnings,
-            *lathe_warning(state.turning, moves),
-            *point_warning(state, run.lines),
-        ),
-        assumptions=(START, *state.assumptions),
-        tools=tuple(state.used_tools.values()),
-        dialect=request.controller.label,
-        jumps=tuple(run.jumps),
-        stock=blank_of(state.plain.stock),
-    )
-
-
-def blank_of(stock: Mapping[str, Sequence[float]]) -> Blank | None:
-    """The corners of BLK FORM in m, where both are whole."""
-    corners = [[m_from_mm(v) for v in corner] for corner in stock.values()]
-    if len(corners) != 2 or any(map(math.isnan, [*corners[0], *corners[1]])):
-        return None
-    (a, b, c), (d, e, f) = corners
-    return (a, b, c), (d, e, f)
+def no_cut(run: ProgramRun) -> ProgramError:
+    """The error of a program that cuts nothing."""
+    return ProgramError("no cutting move", expected=run.cuts_by, file=run.name)
 
 
 def on_the_part(program: ReadProgram, request: Request, state: State | None = None) -> ReadProgram:
     """A program with the moves of the tool on the part, if it was posted for another machine; the state at its end."""
     program = _with_feed(program, request)
-    if request.controller.kinematics is None:
+    if request.controller.kinematics is None or program.dialect == CUTTER_LOCATION:
         return program
     offsets = request.work_offsets if state is None else state.frames.offsets
     check_rotary_offsets(offsets, request.controller.kinematics, program.name)

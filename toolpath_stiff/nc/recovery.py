@@ -67,12 +67,9 @@ def recover_moves(
     length = _lengths_at_heads(moves, kinematics, held, tool_lengths, name)
     count = _pieces(moves, kinematics, held, length)
     if count.sum() > MOST_PIECES:
-        raise Place(name, int(moves.line[np.argmax(count)])).fail(
-            f"dividing moves with turning axes within {mm_from_m(kinematics.tolerance):g} mm gives "
-            f"{float(count.sum()):.0f} pieces",
-            f"at most {MOST_PIECES}",
-            "give a larger kinematics.tolerance_mm in the controller file",
-        )
+        within, hint = mm_from_m(kinematics.tolerance), "give a larger kinematics.tolerance_mm in the controller file"
+        problem = f"dividing moves with turning axes within {within:g} mm gives {float(count.sum()):.0f} pieces"
+        raise Place(name, int(moves.line[np.argmax(count)])).fail(problem, f"at most {MOST_PIECES}", hint)
     move, step = numbered(count + 1)
     share, last = step / count[move], step == count[move]
     angles = moves.start[move, 3:] + share[:, None] * (moves.end[move, 3:] - moves.start[move, 3:])
@@ -101,11 +98,9 @@ def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> Non
     for column, letter in enumerate(LETTERS):
         used = (moves.start[:, 3 + column] != 0.0) | (moves.end[:, 3 + column] != 0.0)
         if letter not in letters and used.any():
-            raise Place(name, int(moves.line[np.argmax(used)])).fail(
-                f"{letter} turns, and the kinematics that the program was posted for has {' and '.join(letters)} alone",
-                f"no {letter} words",
-                "see [kinematics] of the controller file",
-            )
+            problem = f"{letter} turns, and the kinematics that it was posted for has {' and '.join(letters)} alone"
+            place = Place(name, int(moves.line[np.argmax(used)]))
+            raise place.fail(problem, f"no {letter} words", "see [kinematics] of the controller file")
 
 
 def _shorter_way(moves: Moves, kinematics: PostedKinematics) -> Moves:
@@ -137,12 +132,10 @@ def _lengths_at_heads(
     missing = tilted & ~held & np.isnan(length)
     if missing.any():
         first = int(np.argmax(missing))
-        raise Place(name, int(moves.line[first])).fail(
-            f"the head is tilted, and the length of tool {moves.tool[first]} is not known: the pivot is the pivot "
-            "length and the tool's length above the tip",
-            "the tool's length from the gauge line to the tip",
-            "add it to the tool table (--tools FILE, or [[tools]] of the controller file)",
-        )
+        problem = f"the head is tilted, and the length of tool {moves.tool[first]} is not known"
+        hint = "add it to the tool table (--tools FILE, or [[tools]] of the controller file)"
+        expected = "the tool's length from the gauge line to the tip"
+        raise Place(name, int(moves.line[first])).fail(problem, expected, hint)
     return length
 
 

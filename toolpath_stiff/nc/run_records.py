@@ -27,6 +27,8 @@ class Subprogram:
         Whether G66 calls it.
     stop
         Of a repeated section the line after it; -1: it is a call.
+    references
+        Parameter -> where the variable is kept that it stands for, and its name there.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Subprogram:
     arguments: Mapping[Any, float | None] | None = None
     modal: bool = False
     stop: int = -1
+    references: Mapping[str, tuple[dict[Any, float | None], str]] = field(default_factory=dict)
 
 
 @dataclass
@@ -55,13 +58,16 @@ class Tally:
         if self.met >= MOST_ERRORS:
             raise error
 
-    def add(self, block: Block) -> None:
+    def add(self, code: str, line: int, column: int, times: int = 1) -> None:
+        """Count a code, or a word, of a block."""
+        self.first.setdefault(code, (line, column))
+        self.count[code] += times
+
+    def add_block(self, block: Block) -> None:
         """Count the codes of a block."""
         for word in block.words:
             if word.letter in "GM":
-                code = code_name(word.letter, word.value)
-                self.first.setdefault(code, (block.line, word.column))
-                self.count[code] += 1
+                self.add(code_name(word.letter, word.value), block.line, word.column)
 
 
 def beyond_the_end(what: str, row: int, lines: int) -> list[Remark]:

@@ -4,7 +4,8 @@ mm, degrees, mm/min.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal, get_args
@@ -14,10 +15,11 @@ from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
-from toolpath_stiff.nc.tables import ToolEntry
-from toolpath_stiff.nc.words import Block, Word
-from toolpath_stiff.units import MM_PER_INCH
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD, ToolEntry
+from toolpath_stiff.nc.words import AXES, Block, Word
+from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
 # Modal groups in the order in which the codes and words of a block act: both are LinuxCNC's (manual, "G-Code Overview",
 # "Modal Groups" and "Order of Execution"), because its interpreter is what the results are compared with. Groups of M
@@ -140,6 +142,24 @@ class CurrentBlock:
         """Raise the error of `fail` where something is wrong."""
         if wrong:
             raise self.fail(culprit, problem, expected, hint)
+
+    def add(self, letter: str, word: Word) -> None:
+        """Take up a word by its letter: each once, and not beyond what a control takes."""
+        self.refuse_if(letter in self.values, word, "repeats a word of its block", "each word once")
+        of_axis = letter.lstrip("I@") in {*AXES}
+        largest = LARGEST_MM if of_axis else LARGEST_WORD
+        problem = "is beyond 100 m" if of_axis else "is beyond any number that a control takes"
+        self.refuse_if(abs(word.value) > largest, word, problem, f"at most {largest:.0f}")
+        self.values[letter] = word
+        self.free.add(letter)
+
+    @contextmanager
+    def placing(self, hint: str = "") -> Iterator[None]:
+        """Give errors of geometry (`ArcError`) the block's place, and perhaps a hint."""
+        try:
+            yield
+        except ArcError as error:
+            raise self.fail(None, error.found, error.expected, hint) from None
 
     def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
         """An error at a word of the block (or that of a code or letter), or at the block."""
@@ -364,6 +384,17 @@ class State:
         if self.keep is None:
             raise error
         self.keep(error)
+
+    def note_unknown(self, line: int, word: Word) -> None:
+        """List an M code that may do anything, with a warning."""
+        self.note(line, word, "an M code of one control, not acted upon")
+        self.warnings.append(Remark(f"what {word.text} does on its control is not known", line))
+
+    def pause(self, block: CurrentBlock, code: str, seconds: float | None, expected: str) -> None:
+        """A pause after the last move."""
+        if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
+            raise block.fail(code, "needs its time", expected)
+        self.recorder.add_dwell(seconds)
 
     def note(self, line: int, word: Word, reason: str) -> None:
         """List a word that is not acted upon."""

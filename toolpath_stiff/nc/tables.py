@@ -144,11 +144,8 @@ def tools_of(toml: TomlReader, key: str = "tools") -> dict[int, ToolEntry] | Non
     if isinstance(given, str):
         return read_tool_table(Path(toml.file).parent / given)
     if not isinstance(given, list) or not all(isinstance(tool, dict) for tool in given):
-        raise toml.error(
-            f"{key} is not a list of tables",
-            f"[[{key}]] with number, length_mm, ..., or the name of a file",
-            where=key,
-        )
+        expected = f"[[{key}]] with number, length_mm, ..., or the name of a file"
+        raise toml.error(f"{key} is not a list of tables", expected, where=key)
     tools: dict[int, ToolEntry] = {}
     for place, row in enumerate(given, 1):
         where = f"{key}[{place}]"
@@ -277,11 +274,8 @@ def _offsets_in(toml: TomlReader, table: Mapping[str, object], before: str) -> O
         if number in offsets.additional:
             raise toml.error(f"{where!r} is there twice: G54.1 and G154 name the same offsets", where=where)
         if name not in (*WORK_OFFSETS, *HOMES) and number is None:
-            raise toml.error(
-                f"{where} is not an offset",
-                f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)',
-                where=where,
-            )
+            expected = f'{", ".join((*WORK_OFFSETS, *HOMES))}, "G54.1 P1" (to P300) or "G154 P1" (to P99)'
+            raise toml.error(f"{where} is not an offset", expected, where=where)
         most = 6 if name in HOMES else 7
         if not isinstance(values, list) or not 1 <= len(values) <= most:
             raise toml.error(f"{where} = {values!r}", f"1 to {most} numbers: x, y, z, a, b, c, r", where=where)

@@ -83,9 +83,7 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
     if compact[0] == "$" and "=" in compact:
         return Block(line, (Word("$", 0.0, columns[0], text.strip()),))
     if len(compact) > LONGEST_BLOCK:
-        raise place.fail(
-            f"a block of {len(compact)} characters without comments and blanks", f"at most {LONGEST_BLOCK}"
-        )
+        raise place.fail(f"a block of {len(compact)} characters without comments", f"at most {LONGEST_BLOCK}")
     slash, start, rest, switch = compact.find("/"), 0, None, 1
     if slash > 0 and EXPRESSION.search(compact):  # a quotient
         slash = -1
@@ -121,12 +119,9 @@ def program_number(compact: str, column: int, place: Place) -> Block:
         if len(compact) > MOST_DIGITS:
             raise place.fail(f"a program number of {len(compact) - 1} digits", "O and up to 8 digits", column=column)
         return Block(place.line, (Word("O", float(compact[1:]), column, compact),))
-    raise place.fail(
-        f"O word {compact[:20]!r}: subprograms and loops are not supported",
-        "plain moves",
-        "expand it before analyzing (the control or the post can do it), or give --interpreter linuxcnc",
-        column=column,
-    )
+    problem = f"O word {compact[:20]!r}: subprograms and loops are not supported"
+    hint = "expand it before analyzing (the control or the post can do it), or give --interpreter linuxcnc"
+    raise place.fail(problem, "plain moves", hint, column)
 
 
 def without_comments(text: str, place: Place, semicolon: bool) -> tuple[str, Sequence[int]]:
@@ -147,11 +142,8 @@ def without_comments(text: str, place: Place, semicolon: bool) -> tuple[str, Seq
             depth -= character == ")"
         elif character == ";":
             if not semicolon and without_comments(text[column:].replace(";", " "), place, semicolon)[0]:
-                raise place.fail(
-                    f"{text[column:].strip()[:20]!r} after `;`, which ends the block in this dialect",
-                    "comments in parentheses, one block a line",
-                    column=column,
-                )
+                problem = f"{text[column:].strip()[:20]!r} after `;`, which ends the block in this dialect"
+                raise place.fail(problem, "comments in parentheses, one block a line", column=column)
             break
         elif character == ")":
             raise place.fail("`)` without `(`", column=column)

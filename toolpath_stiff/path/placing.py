@@ -38,20 +38,19 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
     zero = np.asarray(origin, dtype=float)
     turn = rotation_matrices(zero[3:])
 
+    def turned(vectors: FloatArray) -> FloatArray:
+        # Nothing where nothing turns: a multiplication by the unit matrix would cost the last digit.
+        return product(vectors, turn.T) if zero[3:].any() else vectors
+
     def placed(pose: FloatArray) -> FloatArray:
-        # Plain addition where nothing turns: a multiplication by the unit matrix would cost the last digit.
-        point = product(pose[:, :3], turn.T) if zero[3:].any() else pose[:, :3]
-        return np.concatenate([point + zero[:3], pose[:, 3:]], axis=1)
+        return np.concatenate([turned(pose[:, :3]) + zero[:3], pose[:, 3:]], axis=1)
 
     placed_moves = replace(moves, start=placed(moves.start), end=placed(moves.end))
     if not moves.arc_sweep.any():  # a long program of straight moves need not hold its zeros twice
         return placed_moves
     arc = (moves.arc_sweep != 0.0)[:, None]
-    return replace(
-        placed_moves,
-        arc_center=np.where(arc, product(moves.arc_center, turn.T) + zero[:3], 0.0),
-        arc_normal=product(moves.arc_normal, turn.T),
-    )
+    center = np.where(arc, turned(moves.arc_center) + zero[:3], 0.0)
+    return replace(placed_moves, arc_center=center, arc_normal=turned(moves.arc_normal))
 
 
 def place_orientations(abc: FloatArray, origin: ArrayLike) -> FloatArray:

@@ -17,7 +17,7 @@ from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray,
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import arc_frame, extents, move_lengths, points_along
 from toolpath_stiff.nc.moves import HELD, RAPID, Moves, held_once
-from toolpath_stiff.path.placing import place_orientations
+from toolpath_stiff.path.placing import place, place_orientations
 from toolpath_stiff.rotations import along_tool_axis
 from toolpath_stiff.units import mm_from_m, rad_from_deg
 
@@ -101,17 +101,17 @@ class Samples(ArrayColumns):
         return np.asarray(self.motion != 0)
 
 
-def move_durations(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> FloatArray:
-    r"""(n,) s, the time of each move without the dwell after it; rapids at `rapid_feed`, m/s.
+def move_durations(moves: Moves, length: FloatArray, rapid_feed: float = defaults.RAPID_FEED) -> FloatArray:
+    r"""(n,) s, the time of each move of `length` (n,) m without the dwell after it; rapids at `rapid_feed`, m/s.
 
     Examples
     --------
     >>> from toolpath_stiff.nc.reader import parse_program
     >>> moves = parse_program("G21 G90 F600\nG0 Z5\nG1 Z0\nX40\nM30\n").moves
-    >>> move_durations(moves).round(3).tolist()  # s; the rapid at 10 m/min
+    >>> move_durations(moves, move_lengths(moves)).round(3).tolist()  # s; the rapid at 10 m/min
     [0.03, 0.5, 4.0]
     """
-    length, rapid = move_lengths(moves), moves.motion == RAPID
+    rapid = moves.motion == RAPID
     feed = np.where(rapid, rapid_feed, moves.feed)
     # A move of the rotary axes alone takes its turn over its feed (rad/s); rapid ones take no time.
     distance = np.where(length > 0.0, length, np.where(rapid, 0.0, _turn(moves)))
@@ -133,13 +133,13 @@ def sample_moves(
     Parameters
     ----------
     moves
-        In machine coordinates (`place`).
+        In the set-up frame.
     step
         Largest distance of two samples along the tip's path, m. Rotary axes turn by at most `ANGULAR_STEP`.
     rapid_feed
         m/s of rapid moves, for the time.
     origin
-        The placement that `moves` were placed with: it turns the orientations.
+        (6,) x, y, z in m, A, B, C in rad: where program zero sits (`place`).
     angles_of
         Roll, pitch, yaw of the tool (n, 3) of programmed angles (n, 3); None: they are these.
 
@@ -151,51 +151,67 @@ def sample_moves(
     Examples
     --------
     >>> from toolpath_stiff.nc.reader import parse_program
-    >>> from toolpath_stiff.path.placing import place
     >>> moves = parse_program("G21 G90 F600\nG2 X20 Y0 I10 J0\nM30\n").moves
-    >>> samples = sample_moves(place(moves, (0.0, 0.0, 0.8, 0.0, 0.0, 0.0)), step=0.016)
+    >>> samples = sample_moves(moves, step=0.016, origin=(0.0, 0.0, 0.8, 0.0, 0.0, 0.0))
     >>> (samples.position * 1e3).round(3).tolist()  # mm
     [[0.0, 0.0, 800.0], [10.0, 10.0, 800.0], [20.0, 0.0, 800.0]]
     >>> samples.t.round(3).tolist()  # s, 31.416 mm at 600 mm/min
     [0.0, 1.571, 3.142]
     """
-    length = move_lengths(moves)
-    pieces = _pieces(moves, length, step)
 
     def orient(programmed: FloatArray) -> FloatArray:
         return place_orientations(programmed if angles_of is None else angles_of(programmed), origin)
 
-    border = _plunge_borders(moves, pieces, length, orient)
+    # Placed block by block: a long program never stands in memory twice.
+    blocks = list(portions(np.ones(len(moves), dtype=np.int64), BLOCK))
+    length, pieces = np.empty((2, len(moves)))
+    for block in blocks:
+        some = place(moves.take(block), origin)
+        length[block] = move_lengths(some)
+        pieces[block] = _pieces(some, length[block], step)
+    _check_count(pieces, step)
+    found = [
+        _plunge_borders(place(moves.take(block), origin), pieces[block], length[block], orient) for block in blocks
+    ]
+    border = (
+        np.concatenate([np.empty(0, np.int64), *(b.start + move for b, (move, _) in zip(blocks, found, strict=True))]),
+        np.concatenate([np.empty(0), *(share for _, share in found)]),
+    )
     counts = pieces.astype(np.int64) + 1 + np.bincount(border[0], minlength=len(moves))
-    duration = move_durations(moves, rapid_feed)
-    columns = {
-        "length": length,
-        "duration": duration,
-        "length_before": np.cumsum(length) - length,
-        "time_before": np.cumsum(duration + moves.dwell) - (duration + moves.dwell),
-        "piece": np.where(moves.motion != RAPID, length / pieces, 0.0),
-        "pieces": pieces,
-    }
     ends = np.cumsum(counts)
-    samples = _empty_samples(int(ends[-1]) if len(ends) else 0)
+    samples = _empty_samples(moves, int(ends[-1]) if len(ends) else 0)
+    s = t = 0.0
     for block in portions(counts, BLOCK):
-        rows = slice(ends[block.start] - counts[block.start], ends[block.stop - 1])
-        some = {name: column[block] for name, column in columns.items()}
+        some = place(moves.take(block), origin)
+        duration = move_durations(some, length[block], rapid_feed)
+        along, until = (np.cumsum(np.append(*sums))[1:] for sums in ((s, length[block]), (t, duration + some.dwell)))
+        columns = {
+            "length": length[block],
+            "duration": duration,
+            "length_before": along - length[block],
+            "time_before": until - (duration + some.dwell),
+            "piece": np.where(some.motion != RAPID, length[block] / pieces[block], 0.0),
+            "pieces": pieces[block],
+        }
+        s, t = float(along[-1]), float(until[-1])
         put = slice(*np.searchsorted(border[0], (block.start, block.stop)))
         extra = border[0][put] - block.start, border[1][put]
-        _sample_block(moves.take(block), counts[block], some, extra, block.start, orient, samples.take(rows))
-    return replace(samples, **{name: held_once(getattr(samples, name)) for name in (*HELD, "abc")})
+        into = samples.take(slice(ends[block.start] - counts[block.start], ends[block.stop - 1]))
+        _sample_block(some, counts[block], columns, extra, block.start, orient, into)
+    return replace(samples, abc=held_once(samples.abc))
 
 
 def _plunge_borders(
     moves: Moves, pieces: FloatArray, length: FloatArray, orient: Orient
 ) -> tuple[IntArray, FloatArray]:
     """(k,) move and (k,) share of it where a plunge becomes a cut or a cut a plunge, in order along the path."""
-    upright = along_tool_axis(moves.arc_normal, orient(moves.start[:, 3:]))
     turn = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).sum(axis=1)
+    arcs = np.flatnonzero(moves.arc_sweep != 0.0)
+    chosen = turn > 0.0
     # An arc across the axis keeps its angle to it.
-    leaning = (moves.arc_sweep != 0.0) & (np.abs(upright) < 1.0 - ROUNDED)
-    rows = np.flatnonzero((moves.motion != RAPID) & (length > 0.0) & (leaning | (turn > 0.0)))
+    upright = along_tool_axis(moves.arc_normal[arcs], orient(moves.start[arcs, 3:]))
+    chosen[arcs] |= np.abs(upright) < 1.0 - ROUNDED
+    rows = np.flatnonzero(chosen & (moves.motion != RAPID) & (length > 0.0))
     # Lines lean by no more than the axes turn.
     lean = np.arccos(np.minimum(np.abs(_along(moves, rows, np.zeros(len(rows)), orient)), 1.0))
     near = np.abs(lean - defaults.PLUNGE_ANGLE) <= turn[rows] + ROUNDED
@@ -243,25 +259,30 @@ def _turn(moves: Moves) -> FloatArray:
 
 
 def _pieces(moves: Moves, length: FloatArray, step: float) -> FloatArray:
-    """(n,) whole numbers from 1, into how many pieces the samples divide each move. Raises `InputError`."""
+    """(n,) whole numbers from 1, into how many pieces the samples divide each move."""
     # A length that is a whole number of steps up to rounding must not gain a step.
     steps, turns = length * _fastest_part(moves) / step, _turn(moves) / ANGULAR_STEP
-    pieces = np.maximum(np.maximum(np.ceil(steps - 1e-9), np.ceil(turns - 1e-9)), 1.0)
-    total = float(pieces.sum()) + len(moves)
+    return np.asarray(np.maximum(np.maximum(np.ceil(steps - 1e-9), np.ceil(turns - 1e-9)), 1.0))
+
+
+def _check_count(pieces: FloatArray, step: float) -> None:
+    """Raise `InputError` where the step gives more than `MOST_SAMPLES` samples."""
+    total = float(pieces.sum()) + len(pieces)
     if total > MOST_SAMPLES:
         raise ProgramError(
             f"a step of {mm_from_m(step):g} mm gives {total:.0f} samples",
             expected=f"at most {MOST_SAMPLES}",
             hint=f"use --step {mm_from_m(step) * total / MOST_SAMPLES * 1.1:.3g} or more",
         )
-    return np.asarray(pieces)
 
 
-def _empty_samples(n: int) -> Samples:
-    columns: dict[str, NDArray[Any]] = {
-        name: np.empty(n) for name in ("tool_length", "spindle", "s", "t", "weight", "feed")
-    }
-    columns |= {name: np.empty(n, dtype=np.int64) for name in ("move", "line", "motion", "tool")}
+def _empty_samples(moves: Moves, n: int) -> Samples:
+    """Room for n samples; what the moves have one value of they have at once."""
+    held = {name: getattr(moves, name) for name in HELD}
+    columns: dict[str, NDArray[Any]] = {name: np.empty(n) for name in ("s", "t", "weight", "feed")}
+    columns |= {"move": np.empty(n, np.int32), "line": np.empty(n, np.int32), "motion": np.empty(n, np.int8)}
+    for name, column in held.items():
+        columns[name] = np.empty(n, column.dtype) if column.flags.writeable else np.broadcast_to(column[0], n)
     return Samples(**columns, position=np.empty((n, 3)), abc=np.zeros((n, 3)), tangent=np.empty((n, 3)))
 
 
@@ -294,7 +315,8 @@ def _sample_block(
         into.abc[:] = angles
     into.move[:] = move + first_move
     for name in ("line", "motion", "feed", *HELD):
-        getattr(into, name)[:] = np.repeat(getattr(moves, name), counts)
+        if getattr(into, name).flags.writeable:
+            getattr(into, name)[:] = np.repeat(getattr(moves, name), counts)
     into.s[:] = np.repeat(columns["length_before"], counts) + u * np.repeat(columns["length"], counts)
     into.t[:] = np.repeat(columns["time_before"], counts) + u * np.repeat(columns["duration"], counts)
     into.weight[:] = np.repeat(columns["piece"], counts) * np.where(u == 0.0, 0.5, 1.0)
@@ -323,7 +345,8 @@ def _fastest_part(moves: Moves) -> FloatArray:
 def move_figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> dict[str, dict[str, Any]]:
     """Extents of the cuts in program coordinates of G54, lengths and times of moves; rapids at `rapid_feed`, m/s."""
     cutting = moves.motion != RAPID
-    length, duration, ends = move_lengths(moves), move_durations(moves, rapid_feed), extents(moves.take(cutting))
+    length, ends = move_lengths(moves), extents(moves.take(cutting))
+    duration = move_durations(moves, length, rapid_feed)
     parts = (("cutting", cutting), ("rapid", ~cutting))
     lengths = {name: mm_from_m(float(length[rows].sum())) for name, rows in parts}
     times = {name: float(duration[rows].sum()) for name, rows in parts} | {"dwell": float(moves.dwell.sum())}

@@ -52,7 +52,7 @@ def path_columns(samples: Samples, rows: slice | IntArray = slice(None)) -> dict
     axes = zip("xyz", mm_from_m(samples.position[rows]).T, strict=True)
     angles = zip("abc", deg_from_rad(samples.abc[rows]).T, strict=True)
     return {
-        "line": samples.line[rows],
+        "line": samples.line[rows].astype(np.int64),
         "motion": np.array(MOTION_NAMES)[samples.motion[rows]],
         "tool": samples.tool[rows],
         "s_mm": mm_from_m(samples.s[rows]),

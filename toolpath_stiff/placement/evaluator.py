@@ -30,7 +30,7 @@ from toolpath_stiff.machine.model import NO_END, Hexapod, as_hexapod
 from toolpath_stiff.placement.keep_out import KeepOut
 from toolpath_stiff.placement.paths import WorkPath
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_about_z, rotation_matrices
-from toolpath_stiff.stiffness import core
+from toolpath_stiff.stiffness import closed_form, core
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 POSES_AT_A_TIME = 30_000  # fits the processor's cache
@@ -253,9 +253,9 @@ class Evaluator:
         directions = motions
         if self.direct and self.load.kind != "tangential":
             directions = [geometric_directions(self.load, tip.T, turns, motion.T)[0].T for motion in motions]
-        # The same kernel whatever is installed: a search amplifies the last digit, and gives the same everywhere.
-        along, determinant, lengths, good = core.compliance_along_columns(
-            machine, tip, np.stack(directions), rotation, tool, "closed_form"
+        kernel = closed_form.prepare(machine, tool)
+        along, determinant, lengths, good = closed_form.compliance_along_columns(
+            kernel, tip, np.stack(directions), rotation
         )
         extremes = Extremes(machine, tip, lengths, determinant, rotation, tool)
         margin, law = extremes.margin, machine.strut_law.room_of(extremes.shortest, extremes.longest)

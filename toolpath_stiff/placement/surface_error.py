@@ -31,10 +31,9 @@ def errors_of_walls(model: StiffnessModel, cut: Cut, present: Pose, name: str) -
     chosen = np.unique(np.searchsorted(along, (np.arange(STATIONS) + 0.5) / STATIONS * along[-1]))
     rows, side = rows[chosen], side[chosen]
     samples, force, outward = cut.samples.take(rows), cut.wall_force[rows, side], 2.0 * side - 1.0
-    heading = np.arctan2(samples.tangent[:, 1], samples.tangent[:, 0])
 
     def of_machine(placement: FloatArray) -> FloatArray:
-        compliance = tip_compliances(model, samples, placement, station_axes(heading, placement), force)
+        compliance = tip_compliances(model, samples, placement, station_axes(samples, placement), force)
         return np.asarray(outward * product(compliance[:, 1, None], force[:, :, None])[:, 0, 0])
 
     rest = cut.wall_mean[rows, side] - of_machine(np.array(present))

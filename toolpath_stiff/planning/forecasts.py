@@ -1,14 +1,14 @@
 """Forecasts of rivals: the mean of each reading, and how they vary together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.inference.candidates import Component
+from toolpath_stiff.inference.candidates import Candidate
 from toolpath_stiff.inference.element_predictor import predictor_of
 from toolpath_stiff.inference.noise import JOINT_ERROR, REST
 from toolpath_stiff.inference.prediction import Predictor
@@ -33,39 +33,33 @@ class Rival:
         For people: `none`, or the effects joined by " + ".
     law
         (2,) logarithms of the factors on the strut law's stiffnesses.
-    effects
-        What it adds to the machine file.
+    candidates, sizes
+        What it adds to the machine file, as of `Fit`.
     covariance
-        (2 + p, 2 + p) of the law and of the p real parameters of the effects that are `free`, as sizes from their
-        neutral values (`candidates.Component`); None: law and parameters are known.
+        (2 + p, 2 + p) of the law and of the p sizes that are `free`; None: law and sizes are known.
     free
-        Which real parameters these are, counted over all effects; None: all.
+        Which sizes these are, counted over all candidates; None: all.
     weight
         Its probability, up to a common factor.
     """
 
     name: str
     law: tuple[float, float] | FloatArray = (0.0, 0.0)
-    effects: tuple[ActiveEffect, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    sizes: tuple[FloatArray, ...] = ()
     covariance: FloatArray | None = None
     free: tuple[int, ...] | None = None
     weight: float = 1.0
 
     @property
-    def components(self) -> list[tuple[int, Component]]:
-        """The free real parameters: which effect, which component."""
-        every = [
-            (k, Component.of(parameter))
-            for k, active in enumerate(self.effects)
-            for parameter in active.effect.parameters
-            if not parameter.discrete
-        ]
-        return every if self.free is None else [every[i] for i in self.free]
+    def effects(self) -> tuple[ActiveEffect, ...]:
+        """The effects with their values."""
+        return tuple(c.active(sizes) for c, sizes in zip(self.candidates, self.sizes, strict=True))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of its effects."""
-        return tuple(active.effect.name for active in self.effects)
+        return tuple(candidate.name for candidate in self.candidates)
 
 
 @dataclass(frozen=True)
@@ -126,8 +120,10 @@ def _forecast(rival: Rival, predictor: Predictor) -> Forecast:
         moved[k] += LAW_STEP
         columns.append((_answers(predictor, moved, rival.effects) - mean) / LAW_STEP)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    for (k, component), sd in zip(rival.components, deviations[2:], strict=True):
-        columns.append(_slope(rival, k, component, float(sd), predictor, law, mean))
+    places = [(k, j) for k, sizes in enumerate(rival.sizes) for j in range(len(sizes))]
+    free = range(len(places)) if rival.free is None else rival.free
+    for index, sd in zip(free, deviations[2:].tolist(), strict=True):
+        columns.append(_slope(rival, *places[index], sd, predictor, law, mean))
     # Of the correlations: beside 1e7 of one unit the variances of another, 1e-18, are rounding.
     scale = np.where(deviations > 0.0, deviations, 1.0)
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T) / np.outer(scale, scale))
@@ -136,28 +132,20 @@ def _forecast(rival: Rival, predictor: Predictor) -> Forecast:
 
 
 def _slope(
-    rival: Rival, k: int, component: Component, sd: float, predictor: Predictor, law: FloatArray, mean: FloatArray
+    rival: Rival, k: int, j: int, sd: float, predictor: Predictor, law: FloatArray, mean: FloatArray
 ) -> FloatArray:
-    """(m,) d ln k / d size, by a difference that stays within the bounds."""
-    active = rival.effects[k]
-    size = size_of(component, float(active.values[component.parameter.name]))
+    """(m,) d ln k / d size j of effect k, by a difference that stays within the bounds."""
+    candidate, sizes = rival.candidates[k], rival.sizes[k].copy()
+    component, size = candidate.components[j], float(sizes[j])
     usual = component.typical()[1]
     least = SMALL_SHARE * (usual if np.isfinite(usual) and usual > 0.0 else 1.0)
     step = max(min(sd, LARGEST_STEP * abs(size)), least)
     low, high = component.bounds
     if size + step > high and size - step >= low:
         step = -step
-    value = component.value(size + step)
-    moved = ActiveEffect(active.effect, {**active.values, component.parameter.name: value})
-    effects = (*rival.effects[:k], moved, *rival.effects[k + 1 :])
+    sizes[j] += step
+    effects = replace(rival, sizes=(*rival.sizes[:k], sizes, *rival.sizes[k + 1 :])).effects
     return (_answers(predictor, law, effects) - mean) / step
-
-
-def size_of(component: Component, value: float) -> float:
-    """The size from neutral of a parameter's SI value; the inverse of `Component.value`."""
-    if component.inverse:
-        return 1.0 / value
-    return value - component.parameter.neutral * component.parameter.si
 
 
 def _answers(predictor: Predictor, law: FloatArray, effects: Sequence[ActiveEffect]) -> FloatArray:

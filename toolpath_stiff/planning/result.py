@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.defaults import STRUT_SPREAD
-from toolpath_stiff.documents import Document, certain, to_dict
+from toolpath_stiff.documents import Document, certain, records, to_dict
 from toolpath_stiff.inference.candidates import testable_effects
 from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.evidence import Problem
@@ -28,7 +28,7 @@ from toolpath_stiff.planning.menu import Menu
 from toolpath_stiff.planning.plan import MOST_RIVALS, RivalPlan, plan_measurements
 from toolpath_stiff.planning.rivals import errors_so_far, fitted_rivals, rivals_of, unfitted_rivals
 from toolpath_stiff.planning.visits import AXES, Visits
-from toolpath_stiff.readings.measurements import Readings
+from toolpath_stiff.readings.measurements import Readings, point_names
 from toolpath_stiff.results import FolderResult, frame_of
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m
@@ -84,7 +84,7 @@ class Plan(FolderResult):
                 {key: first[clamp][key] for key in ("clamp", "point", *POSE, "tool_extension_mm")}
                 | {
                     "setup": str(visits.setup[visit]),
-                    "forces_N": sorted(set(map(_round, visits.readings.force[taken]))),
+                    "forces_N": sorted(set(_round(visits.readings.force[taken]).tolist())),
                     "directions": list(dict.fromkeys(visits.names[taken].tolist())),
                     "loops": list(dict.fromkeys(filter(None, visits.readings.loop[taken].tolist()))),
                     "kind": kind,
@@ -129,42 +129,34 @@ def plan_rows(visits: Visits, chosen: Sequence[int], taken: Collection[str] = ()
     taken
         Names of points that new points must not have.
     """
-    readings, planned = visits.readings, np.concatenate([visits.rows(visit) for visit in chosen])
-    timed, beside = not np.isnan(readings.time).any(), bool((readings.loop[planned] != "").any())
-    axes_only = set(visits.names[planned].tolist()) <= set(AXES)
-    named = bool((visits.setup[list(chosen)] != "").any())
-    fresh = (name for name in map("plan {}".format, count(1)) if name not in taken)
-    points: dict[bytes, str] = {}  # one name a pose: the one that it had before, or a new one
-    rows = list[PlanRow]()
-    for clamp, visit in enumerate(chosen, 1):
-        pose = visits.pose[visit]
-        if pose.tobytes() not in points:
-            points[pose.tobytes()] = str(visits.label[visit]) or next(fresh)
-        for row in visits.rows(visit):
-            name, shop = str(visits.names[row]), [*mm_from_m(pose[:3]), *deg_from_rad(pose[3:])]
-            # Files allow vectors of any length: directions in whole numbers.
-            direction = {"direction": name} if axes_only else {f"d{axis.lower()}": int(axis in name) for axis in AXES}
-            rows.append(
-                {
-                    **dict(zip(POSE, map(_round, shop), strict=True)),
-                    **direction,
-                    "stiffness_N_per_mm": "",
-                    **({"loop": str(readings.loop[row]), "displacement_um": ""} if beside else {}),
-                    "force_N": _round(readings.force[row]),
-                    **({"setup": str(visits.setup[visit])} if named else {}),
-                    "clamp": clamp,
-                    "repeat": int(visits.rounds[row]),
-                    "point": points[pose.tobytes()],
-                    **({"time_min": _round(min_from_s(readings.time[row]))} if timed else {}),
-                    "tool_extension_mm": _round(mm_from_m(visits.extension[visit])),
-                }
-            )
-    return rows
+    planned = [visits.rows(visit) for visit in chosen]
+    rows, counts = np.concatenate(planned), [len(each) for each in planned]
+    visit, clamp = (np.repeat(of, counts) for of in (list(chosen), range(1, len(planned) + 1)))
+    readings, names, setup = visits.readings.select(rows), visits.names[rows], visits.setup[visit]
+    pose = np.concatenate([mm_from_m(visits.pose[visit, :3]), deg_from_rad(visits.pose[visit, 3:])], axis=1)
+    empty, beside = np.full(len(rows), ""), bool((readings.loop != "").any())
+    axes = {"direction": names}
+    if not np.isin(names, AXES).all():  # files allow vectors of any length: directions in whole numbers
+        axes = {f"d{axis.lower()}": (np.char.find(names, axis) >= 0).astype(int) for axis in AXES}
+    columns = {
+        **dict(zip(POSE, _round(pose).T, strict=True)),
+        **axes,
+        "stiffness_N_per_mm": empty,
+        **({"loop": readings.loop, "displacement_um": empty} if beside else {}),
+        "force_N": _round(readings.force),
+        **({"setup": setup} if (setup != "").any() else {}),
+        "clamp": clamp,
+        "repeat": visits.rounds[rows],
+        "point": point_names(visits.pose[visit], visits.label[visit], "plan ", taken),
+        **({} if np.isnan(visits.readings.time).any() else {"time_min": _round(min_from_s(readings.time))}),
+        "tool_extension_mm": _round(mm_from_m(visits.extension[visit])),
+    }
+    return records(columns)
 
 
-def _round(value: float) -> float:
+def _round(values: FloatArray) -> FloatArray:
     """To ten digits after the unit's point at most: 0.30000000000000004 is 0.3 to whoever keys it in."""
-    return round(float(value), 6) + 0.0
+    return np.round(values, 6) + 0.0
 
 
 def plan_csv(rows: Sequence[PlanRow]) -> str:

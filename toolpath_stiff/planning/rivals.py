@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.candidates import Component
+from toolpath_stiff.inference.candidates import Candidate, Component
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, error_figures
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.fits import baseline, fit_effects, refine
 from toolpath_stiff.inference.hypotheses import score_family
 from toolpath_stiff.inference.judgement import NONE, Judgement
 from toolpath_stiff.planning.forecasts import Rival
-from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import ELEMENT, Effect
 
@@ -23,7 +22,7 @@ UNKNOWN_SIZE = 0.5  # relative sd of a size that nothing has been measured of; a
 
 def rival_of_fit(name: str, fit: Fit, weight: float = 1.0) -> Rival:
     """A rival as fitted to the data so far."""
-    return Rival(name, fit.law, fit.effects, fit.covariance, fit.free, weight)
+    return Rival(name, fit.law, fit.candidates, fit.sizes, fit.covariance, fit.free, weight)
 
 
 def rivals_of(judgement: Judgement) -> list[Rival]:
@@ -102,25 +101,23 @@ def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: 
     rivals = []
     for name in names:
         if name == NONE:
-            rivals.append(Rival(NONE, (0.0, 0.0), (), np.diag([LAW_PRIOR**2] * 2)))
+            rivals.append(Rival(NONE, covariance=np.diag([LAW_PRIOR**2] * 2)))
             continue
         plain, _, element = name.partition(":")
         effect = effects[plain]
-        sizes = [usual_size(Component.of(p)) for p in effect.parameters if not p.discrete]
-        values: dict[str, Any] = {}
-        discrete = sum(parameter.discrete for parameter in effect.parameters)
-        for parameter in effect.parameters:
-            if parameter.kind == "real":
-                component = Component.of(parameter)
-                values[parameter.name] = component.value(usual_size(component))
-            elif parameter.kind == "integer":  # 0 means all: with other choices beside it that is no effect at all
-                values[parameter.name] = max(int(parameter.bounds[0]), int(discrete > 1))
+        components = tuple(Component.of(p) for p in effect.parameters if not p.discrete)
+        sizes, choice = np.array([usual_size(component) for component in components]), dict[str, Any]()
+        discrete = [parameter for parameter in effect.parameters if parameter.discrete]
+        for parameter in discrete:
+            if parameter.kind == "integer":  # 0 means all: with other choices beside it that is no effect at all
+                choice[parameter.name] = max(int(parameter.bounds[0]), int(len(discrete) > 1))
             elif parameter.name == ELEMENT:
-                values[ELEMENT] = element
+                choice[ELEMENT] = element
             else:
-                values[parameter.name] = setup if discrete == 1 else ""
-        covariance = np.diag([LAW_PRIOR**2] * 2 + [(UNKNOWN_SIZE * size) ** 2 for size in sizes])
-        rivals.append(Rival(name, (0.0, 0.0), (ActiveEffect(effect, values),), covariance))
+                choice[parameter.name] = setup if len(discrete) == 1 else ""
+        covariance = np.diag([*[LAW_PRIOR**2] * 2, *(UNKNOWN_SIZE * sizes) ** 2])
+        candidate = Candidate(effect, tuple(choice.items()), components)
+        rivals.append(Rival(name, candidates=(candidate,), sizes=(sizes,), covariance=covariance))
     return rivals
 
 

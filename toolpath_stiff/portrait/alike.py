@@ -116,11 +116,9 @@ def _in_place(selection: Selection, named: Fit, k: int) -> Alike | None:
 
 def _told(leading: list[Leading]) -> tuple[tuple[Term, float], ...]:
     """The best of each link, direction and variable, with the shares of all of them."""
-    best: dict[tuple[str, str, str], Term] = {}
-    shares: dict[tuple[str, str, str], float] = {}
-    for term, weight, _ in leading:
-        kind = (term.link, term.direction, term.variable)
-        best.setdefault(kind, term)
-        shares[kind] = shares.get(kind, 0.0) + weight
-    ranked = sorted(shares.items(), key=lambda item: -item[1])
-    return tuple((best[kind], share) for kind, share in ranked[:MOST_TOLD] if share >= TOLD)
+
+    def kind(term: Term) -> str:
+        return f"{term.link} {term.direction} {term.variable}"
+
+    best = {kind(term): term for term, *_ in reversed(leading)}
+    return tuple((best[name], share) for name, share in summed(leading, kind)[:MOST_TOLD] if share >= TOLD)

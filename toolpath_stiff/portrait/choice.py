@@ -58,29 +58,18 @@ def choose(selection: Selection) -> tuple[Description | None, list[Leading], flo
     if chance > LEADS or begun is None:
         return None, [], chance
     descriptions = [_completed(selection, begun, threshold)]
-    if _searched(descriptions[0]) > 1:
+    if len(descriptions[0].terms) > 1:
         others = _other_beginnings(selection, start, descriptions[0].terms[0])
         descriptions += [_completed(selection, other, threshold) for other in others]
-    # Less what chance would gain by further terms and second variables.
-    descriptions.sort(key=lambda whole: -(whole.posterior - 0.5 * threshold * (_searched(whole) - 1)))
+    # Less what chance would gain by further terms.
+    descriptions.sort(key=lambda whole: -(whole.posterior - 0.5 * threshold * (len(whole.terms) - 1)))
     descriptions = [_leading_first(selection, description) for description in _different(descriptions)]
     return descriptions[0], weigh(selection, descriptions, threshold), chance
 
 
 def _completed(selection: Selection, begun: Description, threshold: float) -> Description:
-    """With a second variable of its term, and further terms as long as they join."""
-    points = selection.problem.predictor.data.point
-
-    def helps(more: Description | None, before: Description) -> bool:
-        """Whether it does more than chance, and at left-out points too."""
-        if more is None or 2.0 * (more.posterior - before.posterior) <= threshold:
-            return False
-        return held_out(more.fit, points).rms <= BETTER * held_out(before.fit, points).rms
-
-    description = begun
-    if begun.terms[0].times is None:
-        more = selection.multiplied(selection.without(begun, 0), begun, 0)
-        description = more if more is not None and helps(more, begun) else begun
+    """With further terms as long as they join: do more than chance, and at left-out points too."""
+    points, description = selection.problem.predictor.data.point, begun
     while len(description.terms) < min(MOST_TERMS, len(np.unique(points)) // POINTS_EACH):
         more = selection.grown(description) if selection.scores(description).max() > threshold else None
         if more is None or 2.0 * (more.posterior - description.posterior) <= threshold:
@@ -88,7 +77,7 @@ def _completed(selection: Selection, begun: Description, threshold: float) -> De
         # The first term once more the best beside the others: it was chosen without them.
         again = selection.grown(selection.without(more, 0))
         more = again if again is not None and again.posterior > more.posterior else more
-        if not helps(more, description):
+        if held_out(more.fit, points).rms > BETTER * held_out(description.fit, points).rms:
             break
         description = more
     return description
@@ -113,16 +102,11 @@ def _other_beginnings(selection: Selection, start: Description, first: Term) -> 
     return [selection.settled(start, begun) for begun in list(links.values())[:BEGINNINGS]]
 
 
-def _searched(description: Description) -> int:
-    """How often the dictionary was searched for it: terms and second variables."""
-    return len(description.terms) + sum(term.times is not None for term in description.terms)
-
-
 def _different(descriptions: Sequence[Description]) -> list[Description]:
     """The first of those that differ by constants only."""
     kept: dict[frozenset[tuple[object, ...]], Description] = {}
     for description in descriptions:
-        kinds = frozenset((t.link, t.where, t.direction, t.variables, t.column, t.shape) for t in description.terms)
+        kinds = frozenset((t.link, t.where, t.direction, t.variable, t.column, t.shape) for t in description.terms)
         kept.setdefault(kinds, description)
     return list(kept.values())
 
@@ -148,7 +132,7 @@ def weigh(selection: Selection, descriptions: Sequence[Description], threshold: 
     fit, free = descriptions[0].fit, len(selection.compliance) - 2 - len(descriptions[0].terms)
     left = float(fit.scatter.precision.squares(fit.residual)) / max(free, 1)
     flat = ROUGH * max(left, 1.0) + SHAPE * max(float(costs[0].max()), 0.0)
-    worths = np.array([whole.posterior / flat - 0.5 * threshold * _searched(whole) for whole in descriptions])
+    worths = np.array([whole.posterior / flat - 0.5 * threshold * len(whole.terms) for whole in descriptions])
     leading: list[tuple[Term, float, bool]] = []
     for number, (description, cost) in enumerate(zip(descriptions, costs, strict=True)):
         leads = np.exp((cost - cost.max()) / flat)
@@ -158,7 +142,7 @@ def weigh(selection: Selection, descriptions: Sequence[Description], threshold: 
             if np.exp(worths[number] - worths.max()) * leads[k] < FAINT and not chosen:
                 continue
             terms, logs = _in_place(selection, description, k, flat)
-            logs = logs - 0.5 * threshold * (_searched(description) - 1) + np.log(leads[k])
+            logs = logs - 0.5 * threshold * (len(description.terms) - 1) + np.log(leads[k])
             leading += [(term, log, chosen) for term, log in zip(terms, logs.tolist(), strict=True)]
     weights = np.exp(np.array([log for _, log, _ in leading]) - max(log for _, log, _ in leading))
     weights /= weights.sum()

@@ -15,19 +15,20 @@ from toolpath_stiff.stiffness import exact
 from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.effects.joint_moment_stiffness import end_rotations
 from toolpath_stiff.stiffness.term_effect import (
-    along_pins,
+    NEEDS,
     carriers,
     coupled,
     pair_stiffness,
     reading_share,
     spring_rows,
     spring_stiffness,
+    strut_share,
 )
 from toolpath_stiff.stiffness.terms import (
     AXES,
     IN_SERIES,
+    PAIR,
     PARALLEL,
-    PINS,
     PLACE,
     SWINGS,
     VARIABLES,
@@ -164,12 +165,13 @@ class Ground:
         data, path = predictor.data, predictor.full_path
         forces = predictor.strut_forces()
         self.predictor, self.data, self.compliance = predictor, data, compliance
-        self.path: LoadPath = replace(path, strut_forces=forces * data.force[:, None], direction=data.direction)
+        machine = predictor.machine.with_changes(strut_law=scaled_law(predictor.machine.strut_law, law))
+        self.path: LoadPath = replace(
+            path, machine_tool=machine, strut_forces=forces * data.force[:, None], direction=data.direction
+        )
         self.forces = np.concatenate([forces, data.direction, np.zeros_like(data.direction)], axis=1)  # [f; w]
-        self.law = law
-        self.softness = 1.0 / scaled_law(predictor.machine.strut_law, law).stiffness(path.struts.lengths)
         self._values: dict[tuple[str, str], FloatArray] = {}
-        self._shares: dict[tuple[Any, ...], FloatArray] = {}
+        self._shares: dict[Term, FloatArray] = {}
         self._shapes: dict[tuple[Any, ...], Shapes] = {}
 
     def values(self, variable: str, column: str = "") -> FloatArray:
@@ -184,42 +186,26 @@ class Ground:
 
     def known(self, variable: str) -> bool:
         """Whether the readings say what a variable is."""
-        if variable == "tool length" and self.predictor.machine.reference_tool_length <= 0.0:
-            return False
-        needed = {
-            "tool length": "tool_extension_mm",
-            "time": "time_min",
-            "temperature": "temperature_C",
-            "load": "force_N",
-            "strut force": "force_N",
-        }
         if variable in self.data.extra:
             return bool(np.isfinite(self.data.extra[variable]).all())
-        return needed.get(variable, "") not in self.data.missing
+        if variable == "tool length":
+            return self.predictor.machine.reference_tool_length > 0.0 and "tool_extension_mm" not in self.data.missing
+        return NEEDS.get(variable, "") not in self.data.missing
 
     def share(self, term: Term) -> FloatArray:
         """(n,) or (n, 6) m/N that a term's link adds where its shape is 1, per unit of its size; worked out once."""
-        key = (term.link, term.action, term.direction, term.where, term.column, *term.at[:2])
-        if term.action not in ("coupling", "joint offset"):
-            key = key[:4]
-        if key not in self._shares:
-            self._shares[key] = self._share(term)
-        return self._shares[key]
+        plain = _plain(term)
+        if plain not in self._shares:
+            self._shares[plain] = self._share(plain)
+        return self._shares[plain]
 
     def _share(self, term: Term) -> FloatArray:
         path = self.path
-        if term.action in (*IN_SERIES, "turning"):
-            each = self.forces[:, :6] ** 2
-            if term.action == "turning":
-                turns = np.einsum("nkai,nij,nj->nka", self._rotations, self._flexibility, self.forces[:, 6:])
-                each = -(turns**2).sum(axis=2) * self._seen[:, None]
-            if term.action in PINS:
-                each = each * along_pins(term, path) ** 2
-            if term.action == "strut factor":
-                each = each * self.softness
-            if term.where is not None:
-                each = each * (np.arange(6) == term.where - 1)
-            return np.asarray(each)
+        if term.action in IN_SERIES:
+            return self.forces[:, :6] ** 2 * strut_share(term, path)
+        if term.action == "turning":
+            turns = np.einsum("nkai,nij,nj->nka", self._rotations, self._flexibility, self.forces[:, 6:])
+            return np.asarray(-(turns**2).sum(axis=2) * self._seen[:, None] * strut_share(term, path))
         if term.action == "coupling":
             first, second = coupled(term)
             return np.asarray(2.0 * self.forces[:, first] * self.forces[:, second] * (1.0 / pair_stiffness(term, path)))
@@ -231,7 +217,7 @@ class Ground:
             moves = np.einsum("nki,nij,nj->nk", spring_rows(term, path), self._flexibility, self.forces[:, 6:])
             return np.asarray(-(moves**2).sum(axis=1) * self._seen)
         if term.action in ("reading factor", "reading shift"):
-            share = reading_share(replace(term, variable="constant", shape="offset", times=None), path)
+            share = reading_share(term, path)
             return np.asarray(share * (self.compliance if term.action == "reading factor" else 1.0 / self.data.force))
         rows = carriers(term, path)
         return np.asarray((np.einsum("nkj,nj->nk", rows, self.forces) ** 2).sum(axis=1))
@@ -243,10 +229,8 @@ class Ground:
     @cached_property
     def _flexibility(self) -> FloatArray:
         """(n, 6, 6) of the tip, forces and moments."""
-        machine = self.path.machine
-        machine = machine.with_changes(strut_law=scaled_law(machine.strut_law, self.law))
-        path = replace(self.path, machine_tool=machine)
-        links = exact.assemble_links(replace(self.predictor.base, machine=machine), path)
+        path = self.path
+        links = exact.assemble_links(replace(self.predictor.base, machine=path.machine), path)
         return exact.respond(path, *links, np.broadcast_to(np.eye(6), (len(path), 6, 6)))[0]
 
     @cached_property
@@ -263,7 +247,7 @@ class Ground:
         if term.action == "spring":
             springs = spring_stiffness(term, self.path, size * shape)
         else:
-            weights = size * _each(shape, term)
+            weights = size * strut_share(_plain(term), self.path) * shape.reshape(len(shape), -1)
             springs = np.einsum("nk,nkai,nkaj->nij", weights, self._rotations, self._rotations)
         wrench = self.forces[:, 6:, None]
         moved = np.linalg.solve(np.eye(6) + self._flexibility @ springs, self._flexibility @ wrench)
@@ -318,7 +302,8 @@ class Ground:
         return np.asarray(self.columns(term, self.share(term), self.shape(term)[None])[0])
 
 
-def _each(shape: FloatArray, term: Term) -> FloatArray:
-    """(n, 6) of a shape (n,) or (n, 6) at the struts of a term."""
-    each = shape if shape.ndim == 2 else np.repeat(shape[:, None], 6, axis=1)
-    return each if term.where is None else np.asarray(each * (np.arange(6) == term.where - 1))
+def _plain(term: Term) -> Term:
+    """The term's link as it gives way where the shape is 1, which of its kind it is."""
+    column = term.column if term.action == "joint offset" else ""
+    pair = tuple((name, value) for name, value in term.at if name in PAIR)
+    return replace(term, variable="constant", shape="offset", at=pair, column=column)

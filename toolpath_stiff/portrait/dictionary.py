@@ -9,25 +9,22 @@ over the constants of a shape, so that no link is preferred for having many term
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.portrait.columns import Ground
-from toolpath_stiff.stiffness.terms import PARALLEL, PINS, PLACE, SWINGS, Action, Constants, Term
+from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Term
 
 WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
 ONCE = ("constant", "direction")  # variables whose every place stands in the dictionary as it is
 ALL_STRUTS, ALL_VERTICES = (None, 1, 2, 3, 4, 5, 6), (None, 1, 2, 3)
 ALONE = ("coupling", "joint offset")  # actions that depend on nothing
 SIDE = 0.2  # prior weight of what a link could do by a way round: a frame does not feel where the tip is
-# Numbers in columns that are kept, 64 MB, and the dear ones of `PARALLEL`; the others are made again when asked for.
-MOST_HELD = 8_000_000
 NOTHING = 1e-4  # rms change of stiffness by the largest size below which a term does nothing to these readings
 
 
@@ -54,12 +51,10 @@ class Local:
         """Whether it is one of several places or channels: a joint, a vertex, the readings along one axis."""
         return self.where is not None or (self.link == "instrument" and self.direction != "reading")
 
-    def term(
-        self, variable: str, shape: str, constants: Constants, column: str = "", times: Term | None = None
-    ) -> Term:
-        """With a variable and a shape, and a second one where there is one."""
+    def term(self, variable: str, shape: str, constants: Constants, column: str = "") -> Term:
+        """With a variable and a shape."""
         column, constants = column or self.column, (*self.constants, *constants)
-        return Term(self.link, self.direction, variable, shape, self.action, self.where, constants, column, times=times)
+        return Term(self.link, self.direction, variable, shape, self.action, self.where, constants, column)
 
 
 def locals_of(extra: Iterable[str]) -> list[Local]:
@@ -143,9 +138,8 @@ class Dictionary:
     ----------
     terms
         Without sizes.
-    blocks
-        Columns of some terms at a time, in their order, (m, n) each, or what makes them: of many readings all together
-        take more memory than a computer has to spare.
+    columns
+        (N, n) change of compliance over the compliance, scaled to an rms of 1.
     log_prior
         (N,) weights.
     signed
@@ -153,49 +147,37 @@ class Dictionary:
     """
 
     terms: tuple[Term, ...]
-    blocks: tuple[FloatArray | Callable[[], FloatArray], ...]
+    columns: FloatArray
     log_prior: FloatArray
     signed: NDArray[np.bool_]
-
-    def columns(self) -> Iterator[FloatArray]:
-        """Change of compliance over the compliance, scaled to an rms of 1: (m, n) of some terms at a time, in order."""
-        return (block() if callable(block) else block for block in self.blocks)
 
 
 def dictionary_of(ground: Ground) -> Dictionary:
     """Every term that does something to these readings."""
-    terms, blocks, logs, held = list[Term](), list[FloatArray | Callable[[], FloatArray]](), list[float](), 0
+    terms, logs, columns = list[Term](), list[float](), np.zeros((0, len(ground.data)))
     for local, priors in place_priors(ground):
         plain = local.term("constant", "offset", ())
         for variable in local.variables:
-            columns = columns_of(variable, ground, local.link == "joints")
-            for column in columns:
+            names = columns_of(variable, ground, local.link == "joints")
+            for column in names:
                 named, values = ground.shapes(variable, column, plain.signed, local.where)
                 if not named:
                     continue
-                relative = _relative(ground, plain, values)
+                relative = ground.columns(plain, ground.share(plain), values) / ground.compliance
                 scale = np.sqrt((relative**2).mean(axis=1))
                 shaped = [local.term(variable, shape, constants, column) for shape, constants in named]
                 limits = np.array([max(map(abs, term.bounds)) * term.si for term in shaped])
                 # A term that changes every reading alike is the strut law's affair.
                 kept = np.flatnonzero((scale * limits > NOTHING) & (relative.std(axis=1) > 1e-6 * scale))
-                block = partial(_relative, ground, plain, values, kept, scale)
-                blocks.append(block() if held < MOST_HELD or plain.action in PARALLEL else block)
-                held += len(kept) * relative.shape[1]
+                # In place: of thousands of readings they take most of all memory, which is not to be held twice.
+                columns.resize((len(terms) + len(kept), columns.shape[1]), refcheck=False)
+                columns[len(terms) :] = relative[kept] / scale[kept, None]
                 kinds = Counter(shape for shape, _ in named)
-                log = priors[variable] - float(np.log(len(kinds) * len(columns)))
+                log = priors[variable] - float(np.log(len(kinds) * len(names)))
                 terms += [shaped[i] for i in kept]
                 logs += [log - float(np.log(kinds[named[i][0]])) for i in kept]
     signed = np.array([term.signed for term in terms], dtype=bool)
-    return Dictionary(tuple(terms), tuple(blocks), np.array(logs), signed)
-
-
-def _relative(
-    ground: Ground, plain: Term, values: FloatArray, kept: IntArray | None = None, scale: FloatArray | None = None
-) -> FloatArray:
-    """(s, n) change of compliance over the compliance by a link with shapes (s, n), some of them over their scale."""
-    relative = ground.columns(plain, ground.share(plain), values) / ground.compliance
-    return relative if kept is None or scale is None else relative[kept] / scale[kept, None]
+    return Dictionary(tuple(terms), columns, np.array(logs), signed)
 
 
 def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:
@@ -234,32 +216,12 @@ def crossed(term: Term, ground: Ground) -> dict[Term, float]:
     """
     if term.variable in ONCE:
         return {}
-    felt = (term,) if term.times is None else (term, term.times)
-    swings = any(part.column in SWINGS for part in felt)
     terms: dict[Term, float] = {}
     for local, priors in place_priors(ground):
-        able = local.action not in ALONE and all(part.variable in priors for part in felt)
-        if able and not (swings and local.link != "joints"):
+        able = local.action not in ALONE and term.variable in priors
+        if able and not (term.column in SWINGS and local.link != "joints"):
             for shape, constants in _translated(term, local.term("constant", "offset", ()).signed, ground):
-                moved = local.term(term.variable, shape, constants, term.column, term.times)
-                terms[moved] = priors[term.variable]
-    return terms
-
-
-def products(term: Term, ground: Ground) -> list[Term]:
-    """The same term times every shape of every other variable that its link may depend on, itself not negative."""
-    if term.times is not None or term.action in ALONE:
-        return []
-    place = (term.link, term.action, term.direction, term.where)
-    every = {(local.link, local.action, local.direction, local.where): local for local in locals_of(ground.data.extra)}
-    local, terms = every[place], list[Term]()
-    for variable in dict.fromkeys((*local.variables, *local.crossed)):
-        if variable in (*ONCE, term.variable):
-            continue
-        for column in columns_of(variable, ground, local.link == "joints"):
-            for shape, constants in ground.shapes(variable, column, False, local.where)[0]:
-                if shape != "periodic":
-                    terms.append(term.with_second(variable, shape, constants, column))
+                terms[local.term(term.variable, shape, constants, term.column)] = priors[term.variable]
     return terms
 
 

@@ -20,7 +20,7 @@ from toolpath_stiff.inference.gates import set_wild_aside, simulate
 from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.noise import Noise, Scatter
 from toolpath_stiff.portrait.columns import Ground, shapes_near
-from toolpath_stiff.portrait.dictionary import crossed, dictionary_of, products
+from toolpath_stiff.portrait.dictionary import crossed, dictionary_of
 from toolpath_stiff.stiffness.terms import PARALLEL, Term
 
 DRAWS = 200  # simulated campaigns
@@ -194,7 +194,7 @@ class Selection:
     @cached_property
     def _squares(self) -> FloatArray:
         """(N,) information of each term by itself under the base fit's scatter."""
-        return np.concatenate([self.base.scatter.precision.squares(part) for part in self.dictionary.columns()])
+        return self.base.scatter.precision.squares(self.dictionary.columns)
 
     def _gains(self, residuals: FloatArray, before: Description) -> FloatArray:
         """(s, N) twice the gain in log likelihood for residuals (s, n), where the size goes to an allowed side.
@@ -205,9 +205,8 @@ class Selection:
         weights = set_wild_aside(projected.times(residuals), projected)[0]
         weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
         root = inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
-        alone, taken = self._squares, weighted.T @ root
-        parts = [(weights @ part.T, ((part @ taken) ** 2).sum(axis=1)) for part in self.dictionary.columns()]
-        slope, information = -np.hstack([of for of, _ in parts]), alone - np.concatenate([of for _, of in parts])
+        columns, alone = self.dictionary.columns, self._squares
+        slope, information = -weights @ columns.T, alone - ((columns @ weighted.T @ root) ** 2).sum(axis=1)
         allowed = self.dictionary.signed | (slope > 0.0)
         seen = information > 1e-6 * alone
         return np.asarray(np.where(allowed & seen, slope**2 / np.where(seen, information, 1.0), 0.0))
@@ -277,32 +276,10 @@ class Selection:
             near = shapes_near(grown.terms[-1], self.ground, finer)
             if not near:
                 break
-            grown = self._likeliest(before, grown, near)
+            sizes = self.together(self.scattered(before, grown), near)
+            better = self.extended(before, near[int(np.argmax(sizes.posterior))])
+            grown = better if better.posterior > grown.posterior else grown
         return grown
-
-    def multiplied(self, before: Description, whole: Description, k: int) -> Description | None:
-        """The k-th term of a whole, which `before` lacks, times the best shape of a second variable; None without."""
-        terms = products(whole.terms[k], self.ground)
-        if not terms:
-            return None
-        others = self.scattered(before, whole)
-        best = self.extended(before, terms[int(np.argmax(self.together(others, terms).posterior))])
-        for finer in FINER:
-            term = best.terms[-1]
-            assert term.times is not None
-            near = shapes_near(term.times, self.ground, finer)
-            if not near:
-                break
-            best = self._likeliest(before, best, [replace(term, times=factor) for factor in near], others)
-        return best
-
-    def _likeliest(
-        self, before: Description, grown: Description, terms: Sequence[Term], others: Description | None = None
-    ) -> Description:
-        """The likeliest of some further terms, refitted, or what has grown, if that is likelier."""
-        beside = self.scattered(before, grown) if others is None else others
-        better = self.extended(before, terms[int(np.argmax(self.together(beside, terms).posterior))])
-        return better if better.posterior > grown.posterior else grown
 
 
 def _bounded_step(

@@ -35,7 +35,6 @@ ROCKS = {
     "X": "rocks about Y", "Y": "rocks about X", "all": "rocks about X and Y", "tangential": "turns about Z",
 }  # fmt: skip
 OF_HEAD = {"X": "along the platform's X", "Y": "along the platform's Y", "radial": "across the tool axis"}
-PINNED = {"radial": "radially", "tangential": "tangentially"}
 TIPS = {"X": "tips about the platform's Y", "Y": "tips about the platform's X", "radial": "tips"}
 # Way of acting -> what gives way.
 CAUSES = {
@@ -70,10 +69,7 @@ MOST_SAID = 3  # terms in a sentence on what else would look the same; a documen
 
 def term_words(term: Term) -> str:
     """What gives way and what it varies with: a clause, without its size."""
-    clause = f"{_cause(term)}{_with(term, term.signed)}"
-    if term.times is None:
-        return clause
-    return f"{clause}, and this {_with(term.times, signed=False).removeprefix(',').strip()}"
+    return f"{_cause(term)}{_with(term)}"
 
 
 def _cause(term: Term) -> str:
@@ -95,14 +91,14 @@ def _cause(term: Term) -> str:
         "tips": TIPS.get(direction, ""),
         "softer": f"{strut} {'is' if single else 'are'} {'softer' if more else 'stiffer'}",
         "pin": f"{term.action.removesuffix(' pin')} {joint} of {strut} {give}",
-        "pinned": PINNED.get(direction, ""),
+        "pinned": GIVES.get(direction, ""),
         "vertex": f"{vertex} {give} way {GIVES.get(direction, '')}",
     }
     return CAUSES[term.action].format(**words, **term.constants)
 
 
-def _with(term: Term, signed: bool) -> str:
-    """What it varies with and how, after its cause; `signed`: to both sides."""
+def _with(term: Term) -> str:
+    """What it varies with and how, after its cause."""
     if term.variable in ("constant", "direction"):
         return ""
     if term.variable == "setup":
@@ -120,7 +116,7 @@ def _with(term: Term, signed: bool) -> str:
     if "power" in constants:
         trend = "less" if constants["power"] < 0.0 else "more"
         values["power"] = f", {trend} with {name} (power {constants['power']:.2g}"
-    straight = signed and term.shape == "slope"
+    straight = term.signed and term.shape == "slope"
     kind = next(key for key in COURSES if key in constants or (key == "signed" and straight))
     return COURSES[kind].format(name=name, **values)
 
@@ -237,13 +233,12 @@ def _sized(sized: Sized) -> Document:
 
 
 def _term(term: Term) -> Document:
-    """A term of the dictionary with its size; `where` is a strut or a vertex, `second_variable` null without one."""
+    """A term of the dictionary with its size; `where` is a strut or a vertex."""
     return {
         "link": term.link,
         "where": term.where,
         "direction": term.direction,
         "variable": term.variable,
-        "second_variable": None if term.times is None else term.times.variable,
         "shape": term.shape,
         "size": json_number(term.size / term.si),
         "unit": term.unit,

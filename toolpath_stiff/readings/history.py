@@ -22,7 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray, TextArray
+from toolpath_stiff.arrays import ArrayColumns, FloatArray, TextArray
 from toolpath_stiff.documents import certain
 from toolpath_stiff.readings.dates import date_text
 
@@ -46,7 +46,7 @@ BOTH_SIDES = 0.01
 
 
 @dataclass(frozen=True)
-class StrutReadings:
+class StrutReadings(ArrayColumns):
     """n readings of struts alone.
 
     Attributes
@@ -66,13 +66,9 @@ class StrutReadings:
     log_stiffness: FloatArray
     side: FloatArray
 
-    def select(self, rows: BoolArray) -> StrutReadings:
-        """Some of them."""
-        return StrutReadings(self.strut[rows], self.day[rows], self.log_stiffness[rows], self.side[rows])
-
     def by_strut(self) -> dict[str, StrutReadings]:
         """Those of each strut."""
-        return {name: self.select(self.strut == name) for name in sorted(set(self.strut.tolist()))}
+        return {name: self.take(self.strut == name) for name in sorted(set(self.strut.tolist()))}
 
     @cached_property
     def dates(self) -> FloatArray:
@@ -148,7 +144,7 @@ def series_of(readings: StrutReadings) -> dict[str, StrutReadings]:
             mean = 0.5 * strut.side * float(apart.mean()) if len(apart) else 0.0
             series[name] = replace(strut, log_stiffness=strut.log_stiffness - mean)
         else:
-            series |= {f"{name} in tension": strut.select(~pushed), f"{name} in compression": strut.select(pushed)}
+            series |= {f"{name} in tension": strut.take(~pushed), f"{name} in compression": strut.take(pushed)}
     return series
 
 

@@ -176,8 +176,7 @@ def _lost_motion(loop: Loop) -> float:
         force, deflection = loop.force[outer], loop.deflection[outer]
         if np.ptp(drive[outer]) < loop.same or np.ptp(force) == 0.0:
             return math.nan
-        centred = force - force.mean()
-        at_zero.append(float(deflection.mean() - (centred @ deflection) / (centred @ centred) * force.mean()))
+        at_zero.append(float(np.polynomial.Polynomial.fit(force, deflection, 1)(0.0)))
     return at_zero[0] - at_zero[1]
 
 

@@ -9,20 +9,32 @@ from functools import cached_property
 from importlib import resources
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, TextArray
-from toolpath_stiff.column_names import Mapped
+from toolpath_stiff.arrays import AnyArray, ArrayColumns, BoolArray, FloatArray, IntArray, TextArray
+from toolpath_stiff.column_names import Mapped, parted
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.machine.elements import Stance
-from toolpath_stiff.machine.model import MachineTool, as_hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import INDICATOR_SD, LOAD_SHARE, WIDEST, LoopColumns, offsets
 from toolpath_stiff.readings.mapping import mapped_table
 from toolpath_stiff.readings.measured_poses import pose_warnings
-from toolpath_stiff.readings.rows import ANGLES, COLUMNS, LABELS, OPTIONAL, POSITION, VECTOR, Row, duplicates, read_rows
+from toolpath_stiff.readings.rows import (
+    ANGLES,
+    COLUMNS,
+    OPTIONAL,
+    POSITION,
+    SOFTEST,
+    SOFTEST_ARM,
+    VECTOR,
+    Row,
+    duplicates,
+    read_rows,
+)
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import element_sum, exact
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -37,7 +49,7 @@ RISER_ABOVE_MM = 1000.0  # of the paper's two planes, 353 and 1268 mm, Figure 6 
 
 
 @dataclass(frozen=True)
-class Readings:
+class Readings(ArrayColumns):
     """n measured stiffnesses. SI; nan or "" where a reading does not say.
 
     Attributes
@@ -143,12 +155,9 @@ class Readings:
 
     def select(self, rows: AnyArray) -> Readings:
         """Some of the rows, by mask or index."""
-        chosen = {
-            f.name: getattr(self, f.name)[rows] for f in fields(self) if isinstance(getattr(self, f.name), np.ndarray)
-        }
         extra = {name: values[rows] for name, values in self.extra.items()}
         beside = self.beside.select(rows) if self.beside is not None and self.beside.beside[rows].any() else None
-        return replace(self, **chosen, extra=extra, beside=beside)
+        return replace(self.take(rows), extra=extra, beside=beside)
 
     def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
         """Effects that these data cannot test -> the columns that they lack."""
@@ -195,7 +204,7 @@ def read_measurements(
     for name in names:
         try:
             table = _table_1() if name == NIST_TABLE_1 else mapped_table(name, "measurements", COLUMNS, columns)
-            of_file, remarks = read_rows(table, planned)
+            of_file, remarks = read_rows(table, planned, SOFTEST if isinstance(machine, Hexapod) else SOFTEST_ARM)
             rows += of_file
             notes += remarks
         except InputErrors as bad:  # those of all files are reported together
@@ -229,52 +238,34 @@ def _table_1() -> Table:
 
 def _columns(rows: list[Row], notes: Sequence[str], machine: MachineTool) -> Readings:
     """Readings as columns; those of loops in m/N until `with_offsets`."""
-
-    def numbers(name: str) -> FloatArray:
-        return np.array([getattr(row, name) for row in rows], dtype=float)
-
+    names = {field.name for field in fields(Row)} & {field.name for field in fields(Readings)} - {"extra"}
+    columns: dict[str, Any] = {name: np.array([getattr(row, name) for row in rows]) for name in sorted(names)}
     # A strut on a bench has no pose: it is given the machine's neutral one, which its length overrules.
-    pose = np.concatenate([numbers("position"), numbers("angles")], axis=1)
+    pose = np.concatenate([columns["position"], columns["angles"]], axis=1)
     pose = np.where(np.isnan(pose[:, :1]), machine.limits.neutral_pose, pose)
-    force, sd, time, temperature, extension = map(numbers, ("force", "sd", "time", "temperature", "tool_extension"))
-    labels = {name: np.array([row.labels[name] for row in rows], dtype=str) for name in LABELS}
-    on_tip, point = labels["loop"] == "", _points(pose, labels["point"])
-    given = {
-        "force_N": ~np.isnan(force),
-        "sd_N_per_mm": on_tip & ~np.isnan(sd),
-        "time_min": ~np.isnan(time),
-        "tool_extension_mm": ~np.isnan(extension),
-        "temperature_C": ~np.isnan(temperature),
-        **{name: texts != "" for name, texts in labels.items()},
-    }
+    on_tip, point = columns["loop"] == "", point_names(pose, columns["point"])
+    read = {name: columns[parted(name)[0]] for name in OPTIONAL}
+    given = {name: of != "" if of.dtype.kind == "U" else ~np.isnan(of) for name, of in read.items()}
+    given["sd_N_per_mm"] &= on_tip
     common = set.intersection(*(set(row.extra) for row in rows))
     dropped = sorted({name for row in rows for name in row.extra} - common)
-    dates = np.array([row.date for row in rows], dtype=str)
     unknown = sum(bool(np.isnan(row.length) and np.isnan(row.position[0])) for row in rows)
     bench = f"{unknown} readings of struts alone say neither length_mm nor a pose: taken at the neutral pose"
+    # Numbers of clampings start anew in every file; without a number, a point in a set-up is one.
+    clamps = [
+        f"{row.file}: clamp {row.clamp}" if row.clamp else f"point {p}, set-up {row.setup}"
+        for row, p in zip(rows, point, strict=True)
+    ]
+    columns |= {
+        "position": pose[:, :3],
+        "angles": pose[:, 3:],
+        "force": np.where(given["force_N"], columns["force"], defaults.FORCE),
+        "tool_extension": np.nan_to_num(columns["tool_extension"], nan=0.0),
+        "point": point,
+        "clamp": np.array(clamps),
+    }
     return Readings(
-        position=pose[:, :3],
-        angles=pose[:, 3:],
-        direction=numbers("direction"),
-        stiffness=numbers("value"),
-        force=np.where(given["force_N"], force, defaults.FORCE),
-        sd=sd,
-        tool_extension=np.nan_to_num(extension, nan=0.0),
-        time=time,
-        temperature=temperature,
-        setup=labels["setup"],
-        loop=labels["loop"],
-        repeat=labels["repeat"],
-        point=point,
-        # Numbers of clampings start anew in every file; without a number, a point in a set-up is one.
-        clamp=np.array(
-            [
-                f"{row.file}: clamp {row.labels['clamp']}" if row.labels["clamp"] else f"point {p}, set-up {s}"
-                for row, p, s in zip(rows, point, labels["setup"], strict=True)
-            ]
-        ),
-        file=np.array([row.file for row in rows], dtype=str),
-        line=np.array([row.line for row in rows], dtype=np.int64),
+        **columns,
         extra={name: np.array([row.extra[name] for row in rows]) for name in sorted(common)},
         # Set-ups and loops may go without a name; of the other columns every reading must have its own.
         missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
@@ -284,8 +275,7 @@ def _columns(rows: list[Row], notes: Sequence[str], machine: MachineTool) -> Rea
             *(f"column {name} is not in every file and is not used" for name in dropped),
             *[bench] * bool(unknown),
         ),
-        beside=None if on_tip.all() else LoopColumns.of(labels["loop"].tolist(), numbers("length")),
-        date=dates if (dates != "").any() else None,
+        beside=None if on_tip.all() else LoopColumns.of(columns["loop"].tolist(), np.array([r.length for r in rows])),
     )
 
 
@@ -337,11 +327,14 @@ def _incomplete(given: Mapping[str, BoolArray]) -> list[str]:
     return notes
 
 
-def _points(poses: FloatArray, labels: TextArray) -> TextArray:
-    """Labels of the points; readings without one share a label if they share the pose (to 1 um and 1e-6 rad)."""
-    keys, taken = [*map(tuple, (np.round(poses, 6) + 0.0).tolist())], set(labels.tolist())
+def point_names(poses: FloatArray, labels: TextArray, prefix: str = "P", taken: Iterable[str] = ()) -> TextArray:
+    """Labels of the points, new ones unlike those taken.
+
+    Readings without one share a label if they share the pose (to 1 um and 1e-6 rad).
+    """
+    keys, known = [*map(tuple, (np.round(poses, 6) + 0.0).tolist())], {*labels.tolist(), *taken}
     unnamed = dict.fromkeys(key for key, label in zip(keys, labels, strict=True) if not label)
-    names = dict(zip(unnamed, (name for n in count(1) if (name := f"P{n}") not in taken), strict=False))
+    names = dict(zip(unnamed, (name for n in count(1) if (name := f"{prefix}{n}") not in known), strict=False))
     return np.array([label or names[key] for key, label in zip(keys, labels, strict=True)], dtype=str)
 
 

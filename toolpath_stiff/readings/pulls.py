@@ -19,21 +19,32 @@ from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.joint_values import joint_margin
 from toolpath_stiff.machine.model import MachineTool
-from toolpath_stiff.readings.mapping import mapped_table
+from toolpath_stiff.readings.mapping import check_needed, mapped_table
 from toolpath_stiff.readings.measurements import lacking_columns, read_measurements
-from toolpath_stiff.readings.rows import ANGLES, COLUMNS, POSITION, number, optional_number, parsed_rows
+from toolpath_stiff.readings.rows import (
+    ANGLES,
+    COLUMNS,
+    POSITION,
+    VECTOR,
+    direction_of,
+    number,
+    optional_number,
+    parsed_rows,
+)
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.tables import Columns, Table
-from toolpath_stiff.units import m_from_mm, m_from_um, mm_from_m, rad_from_deg
+from toolpath_stiff.units import deg_from_rad, m_from_mm, m_from_um, mm_from_m, rad_from_deg
 
 FORCE, MOVED, DIAL = ("fx_N", "fy_N", "fz_N"), ("ux_um", "uy_um", "uz_um"), ("dial_x", "dial_y", "dial_z")
+MOMENT = ("mx_Nm", "my_Nm", "mz_Nm")  # about the tip, beside the force
 TENSION, CABLE = "tension_N", ("cable_x_mm", "cable_y_mm", "cable_z_mm")
 PULL, TARGET = (tuple(f"{what}_d{axis}_mm" for axis in "xyz") for what in ("pull", "target"))
 FORCE_AXES, MOVED_AXES = (tuple(f"{what}_axes_{axis}_deg" for axis in "abc") for what in ("force", "sensor"))
 NOT_READ = ("nan", "n/a", "na", "-")  # cells that say so, as empty ones do
 FARTHEST = -1e6, 1e6  # um, of a dial
 SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
+SMALL_TURNS, SEVERAL = rad_from_deg(6.29), 3  # poses of which no joint turns by more are hardly in degrees
 SAME_PLACE = m_from_mm(1.0)  # by which a pose and the joints beside it may differ: both are rounded
 
 
@@ -75,10 +86,20 @@ class Pulls(ArrayColumns):
         return len(self.value)
 
     @cached_property
+    def pull(self) -> IntArray:
+        """(m,) number of the pull that each is read of: of its row."""
+        return np.unique(np.char.add(self.file, self.line.astype(str)), return_inverse=True)[1].reshape(-1)
+
+    @cached_property
     def size(self) -> FloatArray:
         """(m,) m, length of the displacement that each reading is a component of."""
-        pull = np.unique(np.char.add(self.file, self.line.astype(str)), return_inverse=True)[1].reshape(-1)
-        return np.asarray(np.maximum(np.sqrt(np.bincount(pull, self.value**2)), SMALLEST)[pull])
+        return np.asarray(np.maximum(np.sqrt(np.bincount(self.pull, self.value**2)), SMALLEST)[self.pull])
+
+    def vectors(self, values: FloatArray) -> FloatArray:
+        """(pulls, 3) in base axes of values (m,) of the components that were read."""
+        total = np.zeros((int(self.pull.max()) + 1, 3))
+        np.add.at(total, self.pull, values[:, None] * self.direction)
+        return total
 
     @property
     def setup(self) -> TextArray:
@@ -113,13 +134,14 @@ class Pulls(ArrayColumns):
 def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> Pulls:
     """Pulls on a machine of elements, or its stiffnesses as pulls. Raises `InputError`, `InputErrors`."""
     joints, rows, notes = _joint_columns(machine), list[_Pull](), list[str]()
-    used = {*_further(machine), *POSITION, *ANGLES, "displacement_um", "sd_um"}
+    used = {*_further(machine), *POSITION, *ANGLES, *VECTOR, "direction", "force_N", "displacement_um", "sd_um"}
     tables = pull_tables(files, machine, mapping)
     if not tables:
         return _of_stiffnesses(files, machine, mapping)
     if len(tables) < len(files):
         raise MeasurementError("pulls beside stiffnesses", hint="give one kind of files at a time")
     for table in tables:
+        _check_places(table, machine)
         of_file, errors = parsed_rows(table, partial(_Pull.of, table.file, joints))
         if errors:
             raise InputErrors(errors)
@@ -137,7 +159,15 @@ def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = No
     """The files that give forces as vectors or by cables, as tables; the others give stiffnesses along directions."""
     known = Columns((*COLUMNS.numbers, *_further(machine)), COLUMNS.texts)
     tables = [mapped_table(name, "measurements", known, mapping) for name in files]
-    return [table for table in tables if not {FORCE[0], TENSION}.isdisjoint(table.heading)]
+    further = {*FORCE, TENSION, *_joint_columns(machine)}
+    return [table for table in tables if not further.isdisjoint(table.heading)]
+
+
+def _check_places(table: Table, machine: MachineTool) -> None:
+    """Refuse a table that says neither poses nor all joints."""
+    if not {*POSITION} <= {*table.heading}:
+        missing = [named for named in _names_of_joints(machine) if {*named}.isdisjoint(table.heading)]
+        check_needed(table, [by_number for _, by_number in missing], f"all joints, or {', '.join(POSITION)}")
 
 
 @dataclass(frozen=True)
@@ -147,6 +177,7 @@ class _Pull:
     pose: tuple[float, ...]
     joints: tuple[float, ...]
     force: tuple[float, ...]
+    moment: tuple[float, ...]
     tension: float
     pulley: tuple[float, ...]
     moved: tuple[tuple[str, tuple[float, ...], float], ...]
@@ -174,15 +205,19 @@ class _Pull:
             raise MeasurementError("neither a pose nor all joints", expected=expected)
         angles = tuple(rad_from_deg(number(record, name)) if record.get(name) else 0.0 for name in ANGLES)
         tension, vector = optional_number(record, TENSION), any(record.get(name) for name in FORCE)
-        components = [number(record, name) if vector else np.nan for name in FORCE]
-        force = tuple((_turn(record, FORCE_AXES) @ components).tolist())
+        components = np.array([_component(record, name) if vector else np.nan for name in FORCE])
+        along = direction_of(record) if record.get("force_N") and not vector and np.isnan(tension) else None
+        if along is not None:  # force and displacement along one direction
+            vector, components = True, number(record, "force_N") * np.array(along)
+        turn = _turn(record, FORCE_AXES)
+        force, moment = (tuple((turn @ v).tolist()) for v in (components, [_component(record, m) for m in MOMENT]))
         pulled = any(force) if vector else tension > 0.0 and record.get(CABLE[0])
         if not pulled or (vector and not np.isnan(tension)):
             raise MeasurementError("no force", expected=f"{', '.join(FORCE)}; or {TENSION} and {', '.join(CABLE)}")
         axes = zip("xyz", _turn(record, MOVED_AXES).T.tolist(), MOVED, strict=True)
         moved = [(c, tuple(axis), m_from_um(number(record, name))) for c, axis, name in axes if record.get(name)]
-        if record.get("displacement_um") and record.get(DIAL[0]):
-            dial = np.array([number(record, name) for name in DIAL])
+        if record.get("displacement_um") and (record.get(DIAL[0]) or along is not None):
+            dial = np.array([number(record, name) for name in DIAL] if along is None else along)
             reading = m_from_um(number(record, "displacement_um", FARTHEST))
             moved.append(("dial", tuple(dial / np.linalg.norm(dial)), reading))
         if not any(value for *_, value in moved):
@@ -190,7 +225,14 @@ class _Pull:
             raise MeasurementError("nothing read", expected=expected)
         pose = (*mm(POSITION), *angles) if placed else (np.nan,) * 6
         pulley, sd = mm(CABLE), m_from_um(optional_number(record, "sd_um"))
-        return cls(pose, tuple(values), force, tension, pulley, tuple(moved), mm(PULL), mm(TARGET), sd, file, line)
+        return cls(
+            pose, tuple(values), force, moment, tension, pulley, tuple(moved), mm(PULL), mm(TARGET), sd, file, line
+        )
+
+
+def _component(record: Mapping[str, str], name: str) -> float:
+    """A component of a load; 0 where the file has no such column."""
+    return number(record, name) if name in record else 0.0
 
 
 def _turn(record: Mapping[str, str], names: Sequence[str]) -> FloatArray:
@@ -199,21 +241,22 @@ def _turn(record: Mapping[str, str], names: Sequence[str]) -> FloatArray:
     return np.asarray(rotation_matrices(np.array(angles)))
 
 
+def _names_of_joints(machine: MachineTool) -> list[tuple[str, str]]:
+    """Columns that a joint's value may stand in: `joint_J1_deg`, `joint_1_deg`."""
+    kinds = zip(machine.joint_names, machine.joint_kinds, strict=True)
+    both = [(name.replace(" ", "_"), "mm" if kind == "linear" else "deg") for name, kind in kinds]
+    return [(f"joint_{name}_{unit}", f"joint_{i}_{unit}") for i, (name, unit) in enumerate(both, 1)]
+
+
 def _joint_columns(machine: MachineTool) -> dict[str, tuple[int, bool]]:
-    """Column -> number of the joint and whether it is linear: `joint_J1_deg`, also `joint_1_deg`."""
-    columns = {}
-    for i, (name, kind) in enumerate(zip(machine.joint_names, machine.joint_kinds, strict=True)):
-        unit = "mm" if kind == "linear" else "deg"
-        for word in (name.replace(" ", "_"), str(i + 1)):
-            columns[f"joint_{word}_{unit}"] = (i, kind == "linear")
-    return columns
+    """Column -> number of the joint and whether it is linear."""
+    return {name: (i, name.endswith("mm")) for i, names in enumerate(_names_of_joints(machine)) for name in names}
 
 
 def _further(machine: MachineTool) -> tuple[str, ...]:
     """Columns that pulls have beside those of stiffnesses."""
-    return (
-        *FORCE, *FORCE_AXES, *MOVED, *MOVED_AXES, *DIAL, TENSION, *CABLE, *PULL, *TARGET, *_joint_columns(machine)
-    )  # fmt: skip
+    loads = (*FORCE, *MOMENT, *FORCE_AXES, TENSION, *CABLE, *PULL)
+    return (*loads, *MOVED, *MOVED_AXES, *DIAL, *TARGET, *_joint_columns(machine))
 
 
 def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) -> Pulls:
@@ -232,7 +275,7 @@ def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) 
                          return_inverse=True)[1].reshape(-1)  # fmt: skip
     return Pulls(
         stance=stance.take(which),
-        wrench=np.hstack([force, np.cross(pull, force)])[which],
+        wrench=np.hstack([force, np.cross(pull, force) + [row.moment for row in rows]])[which],
         along=np.hstack([direction, np.cross(target[which], direction)]),
         value=np.array([value for row in rows for *_, value in row.moved]),
         sd=np.array([row.sd for row in rows])[which],
@@ -270,6 +313,11 @@ def _stances(
             notes.append(f"poses without joint values: taken in the configuration {machine.configurations[kept]}")
     for row in np.flatnonzero(np.isnan(joints).any(axis=1)).tolist():
         errors.append(MeasurementError("no joint values lead to the pose", file=rows[row].file, line=rows[row].line))
+    turning = joints[by_joints][:, [kind != "linear" for kind in machine.joint_kinds]]
+    if len(np.unique(turning, axis=0)) >= SEVERAL and turning.any() and np.abs(turning).max() < SMALL_TURNS:
+        turned = f"no joint turns by more than {deg_from_rad(float(np.abs(turning).max())):.3g} deg"
+        hint = 'columns in radians are named by --columns "joint_1=joint_1_deg:rad, ..." (columns=)'
+        errors.append(MeasurementError(turned, expected="degrees", hint=hint, file=rows[0].file))
     if errors:
         raise InputErrors(errors)
     return machine.standing(joints), notes

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from toolpath_stiff.column_files import csv_text
+from toolpath_stiff.documents import Document
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.history import SURE, StrutHistory, StrutReadings, history
 from toolpath_stiff.readings.loop_figures import LoopFigures
@@ -62,28 +63,30 @@ def remarks(figures: Sequence[LoopFigures], over_time: StrutHistory) -> Iterator
             )
 
 
-def loop_entry(figures: LoopFigures) -> dict[str, str | int | float | None]:
-    """A loop in the shop's units; what it cannot say is None."""
-    numbers = {
+# Columns of a measurement file that say more than the stiffness.
+FURTHER = ("lost_motion_um", "loop_width_um", "linearity_percent", "closure_um")
+
+
+def _in_shop_units(figures: LoopFigures) -> dict[str, float]:
+    """What a loop says by the names that documents have; nan for what it cannot say."""
+    return {
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(figures.stiffness),
         "force_N": figures.force,
         "deflection_um": um_from_m(figures.deflection),
         "tension_N_per_mm": n_per_mm_from_n_per_m(figures.tension),
         "compression_N_per_mm": n_per_mm_from_n_per_m(figures.compression),
-        **_further(figures),
-    }
-    rounded = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers.items()}
-    return {"loop": figures.loop.title, "line": figures.loop.line, **rounded}
-
-
-def _further(figures: LoopFigures) -> dict[str, float]:
-    """Columns of a measurement file that say more than the stiffness."""
-    return {
         "lost_motion_um": um_from_m(figures.lost_motion),
         "loop_width_um": um_from_m(figures.loop_width),
         "linearity_percent": 100.0 * figures.linearity,
         "closure_um": um_from_m(figures.closure),
     }
+
+
+def loop_entry(figures: LoopFigures) -> Document:
+    """A loop in the shop's units; what it cannot say is None."""
+    numbers = _in_shop_units(figures).items()
+    rounded = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers}
+    return {"loop": figures.loop.title, "line": figures.loop.line, **rounded}
 
 
 def measurement_csv(reduced: Sequence[LoopFigures], over_time: StrutHistory) -> str:
@@ -94,27 +97,24 @@ def measurement_csv(reduced: Sequence[LoopFigures], over_time: StrutHistory) -> 
     both_sides = _sided(reduced, over_time)
     figures: list[LoopFigures] = []
     for record in reduced:
+        rows = [(record.stiffness, record.force)]
         if record.loop.strut in both_sides:
-            figures.append(replace(record, stiffness=record.tension, force=float(record.loop.force.max())))
-            figures.append(replace(record, stiffness=record.compression, force=float(record.loop.force.min())))
-        else:
-            figures.append(record)
-    loops = [record.loop for record in figures]
-    place = [name for name in PLACE if any(loop.place.get(name) for loop in loops)]
-    forces = sorted({_force_column(record) for record in figures})
-    further = [name for name in _further(figures[0]) if all(math.isfinite(_further(r)[name]) for r in figures)]
-    rows = [
+            force = record.loop.force
+            rows = [(record.tension, float(force.max())), (record.compression, float(force.min()))]
+        figures += [replace(record, stiffness=stiffness, force=force) for stiffness, force in rows]
+    numbers = [_in_shop_units(record) for record in figures]
+    place = [name for name in PLACE if any(record.loop.place.get(name) for record in figures)]
+    # The force of a strut measured alone is along it, else at the tool tip.
+    of_force = ["strut_force_N" if record.loop.jog is None else "force_N" for record in figures]
+    forces = sorted(set(of_force))
+    further = [name for name in FURTHER if all(math.isfinite(values[name]) for values in numbers)]
+    cells = [
         [
             *(record.loop.place.get(name, "") for name in place),
-            f"{n_per_mm_from_n_per_m(record.stiffness):.1f}",
-            *(f"{record.force:.2f}".replace("nan", "") if name == _force_column(record) else "" for name in forces),
-            *(f"{_further(record)[name] + 0.0:.3f}" for name in further),
+            f"{values['stiffness_N_per_mm']:.1f}",
+            *(f"{record.force:.2f}".replace("nan", "") if name == column else "" for name in forces),
+            *(f"{values[name] + 0.0:.3f}" for name in further),
         ]
-        for record in figures
+        for record, values, column in zip(figures, numbers, of_force, strict=True)
     ]
-    return csv_text([*place, "stiffness_N_per_mm", *forces, *further], rows)
-
-
-def _force_column(figures: LoopFigures) -> str:
-    """The force of a strut measured alone is along it, else at the tool tip."""
-    return "strut_force_N" if figures.loop.jog is None else "force_N"
+    return csv_text([*place, "stiffness_N_per_mm", *forces, *further], cells)

@@ -6,7 +6,7 @@ A bad row is named with its line; all bad rows of a file are reported together.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.readings.dates import day_of
@@ -36,10 +36,10 @@ KNOWN = (*COLUMNS.numbers, *COLUMNS.texts)
 
 # N/mm: no machine is softer than 0.1 N/um or stiffer than 10 kN/um; beyond, the unit is not N/mm.
 SOFTEST, STIFFEST = 1e2, 1e7
+SOFTEST_ARM = 10.0  # N/mm, of machines of elements: a light arm, stretched (assumed); robots that mill have 100 to 3000
 BOUNDS = {
     **dict.fromkeys((*POSITION, "tool_extension_mm"), (-1e5, 1e5)),
     **dict.fromkeys(ANGLES, (-360.0, 360.0)),
-    "stiffness_N_per_mm": (SOFTEST, STIFFEST),
     "sd_N_per_mm": (1e-6, STIFFEST),
     "force_N": (1e-3, 1e7),
     "displacement_um": (1e-3, 1e6),
@@ -57,30 +57,16 @@ AGREEMENT = 0.01  # a stiffness printed beside force and displacement must be th
 
 @dataclass(frozen=True)
 class Row:
-    """One reading. SI; a cell that is absent or empty is nan or "".
+    """One reading: what `Readings` has of each. SI; a cell that is absent or empty is nan or "".
 
     Attributes
     ----------
-    position, angles
-        m; roll, pitch, yaw in rad.
-    direction
-        Unit vector of force and displacement.
-    force
-        N, nan if not given.
-    sd
-        N/m; of a loop beside the tip m/N.
-    time, temperature, tool_extension
-        s, degrees C, m.
-    labels
-        `LABELS` -> text; `loop` by its own name, "" for the tip's.
-    file, line
-        Where it was read.
+    stiffness, sd
+        N/m of a reading of the tip; m/N per load of a loop beside it. nan where a plan leaves it empty.
+    loop
+        By its own name, "" for the tip's.
     extra
         Further numeric columns, as they stand.
-    date
-        As in the file; a date of ISO 8601.
-    value
-        N/m of a reading of the tip; m/N per load of a loop beside it. nan where a plan leaves it empty.
     length, side
         m of a strut measured alone; 1, or -1 under compression.
     """
@@ -90,20 +76,24 @@ class Row:
     direction: tuple[float, ...]
     force: float
     sd: float
+    tool_extension: float
     time: float
     temperature: float
-    tool_extension: float
-    labels: Mapping[str, str]
+    setup: str
+    loop: str
+    repeat: str
+    point: str
+    clamp: str
+    date: str
     file: str
     line: int
     extra: Mapping[str, float]
-    date: str
-    value: float = math.nan
+    stiffness: float = math.nan
     length: float = math.nan
     side: float = 1.0
 
 
-def read_rows(table: Table, planned: bool = False) -> tuple[list[Row], list[str]]:
+def read_rows(table: Table, planned: bool = False, softest: float = SOFTEST) -> tuple[list[Row], list[str]]:
     """Rows of a measurement file; and what was not used, in words.
 
     Parameters
@@ -112,6 +102,8 @@ def read_rows(table: Table, planned: bool = False) -> tuple[list[Row], list[str]
         As `tables.read_table` reads it with `COLUMNS`.
     planned
         Whether the stiffness may be left empty (a plan of measurements).
+    softest
+        N/mm that a machine has at least.
 
     Raises
     ------
@@ -129,7 +121,7 @@ def read_rows(table: Table, planned: bool = False) -> tuple[list[Row], list[str]
         raise MeasurementError(fault, file=file, line=line)
     further = [name for name in heading if name not in KNOWN and _all_numbers(table, heading.index(name))]
     unused = [name for name in heading if name not in (*KNOWN, *further)]
-    rows, errors = parsed_rows(table, lambda line, record: _row(record, further, file, line, planned))
+    rows, errors = parsed_rows(table, lambda line, record: _row(record, further, file, line, planned, softest))
     errors += duplicates(rows)
     if errors:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
@@ -168,12 +160,13 @@ def _all_numbers(table: Table, column: int) -> bool:
         return False
 
 
-def _row(record: Mapping[str, str], further: Sequence[str], file: str, line: int, planned: bool) -> Row:
+def _row(record: Mapping[str, str], further: Sequence[str], file: str, line: int, planned: bool, softest: float) -> Row:
     loop = loop_of(record.get("loop", ""))
     day_of(record.get(DATE, ""))  # refuses what is no date
     # A strut on a bench has neither pose nor direction.
     poseless = loop.kind == "alone" and not any(record.get(name) for name in (*POSITION, *ANGLES))
     undirected = loop.kind == "alone" and not (record.get("direction") or VECTOR[0] in record)
+    texts: Any = {name: record.get(name, "") for name in (*LABELS, DATE)} | {"loop": "" if loop == TIP else str(loop)}
     row = Row(
         position=(math.nan,) * 3 if poseless else tuple(m_from_mm(number(record, name)) for name in POSITION),
         angles=(math.nan,) * 3 if poseless else tuple(_angle(record, name) for name in ANGLES),
@@ -183,15 +176,14 @@ def _row(record: Mapping[str, str], further: Sequence[str], file: str, line: int
         time=s_from_min(optional_number(record, "time_min")),
         temperature=optional_number(record, "temperature_C"),
         tool_extension=m_from_mm(optional_number(record, "tool_extension_mm")),
-        labels={name: record.get(name, "") for name in LABELS} | {"loop": "" if loop == TIP else str(loop)},
+        **texts,
         file=file,
         line=line,
         extra={name: float(record[name]) for name in further},
-        date=record.get(DATE, ""),
     )
     if loop != TIP:
         return _beside_tip(row, record, loop, planned)
-    return replace(row, value=n_per_m_from_n_per_mm(_stiffness(record, row.force, planned)))
+    return replace(row, stiffness=n_per_m_from_n_per_mm(_stiffness(record, row.force, planned, softest)))
 
 
 def _angle(record: Mapping[str, str], name: str) -> float:
@@ -236,23 +228,24 @@ def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planne
         row,
         force=abs(force),
         sd=m_from_um(sd) / abs(force),
-        value=compliance,
+        stiffness=compliance,
         length=m_from_mm(length),
         side=math.copysign(1.0, force),
     )
 
 
-def _stiffness(record: Mapping[str, str], force: float, planned: bool) -> float:
+def _stiffness(record: Mapping[str, str], force: float, planned: bool, softest: float) -> float:
     """N/mm of a reading of the tip; nan of a plan's."""
-    printed = optional_number(record, "stiffness_N_per_mm")
+    given = record.get("stiffness_N_per_mm")
+    printed = number(record, "stiffness_N_per_mm", (softest, STIFFEST)) if given else math.nan
     displacement = optional_number(record, "displacement_um")
     quotient = force / (displacement / 1e3)  # N/mm
     if math.isnan(printed) and math.isnan(quotient) and not planned:
         raise MeasurementError("no stiffness", expected="stiffness_N_per_mm, or force_N and displacement_um")
-    if abs(quotient - printed) > AGREEMENT * printed or quotient < SOFTEST or quotient > STIFFEST:
+    if abs(quotient - printed) > AGREEMENT * printed or quotient < softest or quotient > STIFFEST:
         raise MeasurementError(
             f"{force:g} N over {displacement:g} um, force over displacement, is {quotient:.6g} N/mm",
-            expected=f"the stiffness that is given, {SOFTEST:g} to {STIFFEST:g} N/mm; is the unit right?",
+            expected=f"the stiffness that is given, {softest:g} to {STIFFEST:g} N/mm; is the unit right?",
         )
     return quotient if math.isnan(printed) else printed
 
@@ -300,11 +293,10 @@ def duplicates(rows: list[Row]) -> list[InputError]:
     first: dict[str, Row] = {}
     errors: list[InputError] = []
     for row in rows:
-        cells = (row.position, row.angles, row.direction, row.force, row.time, row.tool_extension, row.labels, row.date,
-                 row.length, row.side)  # fmt: skip
-        loop = (row.value, row.sd) if row.labels["loop"] else ()
+        cells = replace(row, temperature=math.nan, extra={}, file="", line=0)
+        cells = cells if row.loop else replace(cells, sd=math.nan, stiffness=math.nan)
         # repr: nan differs from itself, its text does not.
-        keys = [repr((cells, loop, row.value)), *([repr((cells, loop, row.file))] if row.labels["repeat"] else [])]
+        keys = [repr((cells, row.stiffness)), *([repr((cells, row.file))] if row.repeat else [])]
         earlier = next((first[key] for key in keys if key in first), None)
         first |= {key: row for key in keys if key not in first}
         if earlier is not None:

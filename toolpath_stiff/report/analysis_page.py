@@ -20,7 +20,6 @@ from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report import analysis_tables as words
-from toolpath_stiff.report.colours import error_colours, page_colours
 from toolpath_stiff.report.curves import beyond_scale, cutting_box, extremes_by_column, profile_curve, scale_limits
 from toolpath_stiff.report.cut import cut_tables
 from toolpath_stiff.report.pages import Part, markup, part, render
@@ -30,11 +29,11 @@ from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
-SCRIPTS = ("stage.js", "viewer.js", "solids.js", "machine.js", "profile.js", "analysis.js")
+SCRIPTS = ("stage.js", "viewer.js", "solids.js", "machine.js", "profile.js", "listing.js", "analysis.js")
 
 
-def page(analysis: Analysis, drawn: Mapping[str, bytes], *, show_plunges: bool = False) -> Iterator[str]:
-    """The page in pieces of text; `show_plunges`: how the switch stands that lets plunges set axis and colour scale."""
+def page(analysis: Analysis, drawn: Mapping[str, bytes]) -> Iterator[str]:
+    """The page in pieces of text."""
     summary, data = analysis.to_dict(), page_data(analysis)
     machine, load = f"machine {summary['machine']}", f"load {summary['load']}, {summary['force_N']:g} N"
     return render(
@@ -42,11 +41,13 @@ def page(analysis: Analysis, drawn: Mapping[str, bytes], *, show_plunges: bool =
         styles=["viewer.css", "analysis.css"],
         scripts=SCRIPTS if analysis.cut is None else (*SCRIPTS, "part.js"),
         cut=analysis.cut is not None,
+        shown=data,
+        number=number,
+        analysis=analysis,
         data=data,
         title=f"{summary['program']}: stiffness along the path",
         program=summary["program"],
         heading=" · ".join([machine, load, words.headline_text(summary, " · ")]),
-        plunges_shown=show_plunges,
         warnings=summary["warnings"],
         note=_thinned_note(data["count"], len(analysis.samples)),
         tables=_tables(analysis, data["weakest"], page_rows(analysis)),
@@ -147,10 +148,8 @@ def page_data(analysis: Analysis) -> Document:
         "tools": [[int(i), int(samples.tool[i])] for i in np.flatnonzero(np.diff(samples.tool, prepend=-1))],
         "operations": _operation_starts(analysis, samples.move),
         "weakest": [int(np.searchsorted(rows, row)) for row in analysis.weakest_rows],
-        "scale": _scale(analysis, False),
-        "scale_with_plunges": _scale(analysis, True) if analysis.set_aside.any() else None,
+        "scale": _scale(analysis),
         "plunges": [stiffness_figures(analysis, analysis.set_aside)[f"{end}_N_per_mm"] for end in ("min", "max")],
-        **page_colours(),
         "mean": stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"],
         "required": None if analysis.required is None else n_per_mm_from_n_per_m(analysis.required),
         "other": None if analysis.on_other is None else _other_curve(analysis.on_other),
@@ -172,13 +171,12 @@ def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
         "error_range": ends,
         "limit": um_from_m(error_limit(cut)),
         "sample": _base64(np.where(sample < 0, -1, nearest).astype("<i4")),
-        "colours": error_colours(),
     }
 
 
-def _scale(analysis: Analysis, show_plunges: bool) -> Document:
+def _scale(analysis: Analysis) -> Document:
     """Ends of the colour scale, N/mm, and whether values lie beyond them."""
-    limits = scale_limits(analysis, show_plunges)
+    limits = scale_limits(analysis)
     below, above = beyond_scale(analysis, limits)
     return {"ends": limits, "beyond_low": below, "beyond_high": above}
 
@@ -197,8 +195,11 @@ def page_rows(analysis: Analysis) -> IntArray:
     extremes = [extremes_by_column(np.arange(n, dtype=float), k, MOST_SAMPLES // part) for k, part in curves]
     even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too
     firsts = np.searchsorted(analysis.samples.move, [row.first_move for row in analysis.operations.rows])
-    wanted = np.array([0, *analysis.weakest_rows], dtype=np.int64)
-    return np.unique(np.concatenate([*extremes, even, ends, wanted, firsts, np.maximum(firsts - 1, 0)]))
+    kept = np.zeros(n, dtype=bool)
+    kept[[0, *analysis.weakest_rows]] = True
+    for rows in (*extremes, even, ends, firsts, np.maximum(firsts - 1, 0)):
+        kept[rows] = True
+    return np.flatnonzero(kept)
 
 
 def _operation_starts(analysis: Analysis, move: IntArray) -> list[list[object]]:
@@ -215,7 +216,6 @@ def _other_curve(other: Analysis) -> dict[str, str]:
         "machine": plain(other.machine.name),
         "s": _base64(s[keep].astype("<f4")),
         "stiffness": _base64(stiffness[keep].astype("<f4")),
-        "plunge": _base64(other.set_aside[keep].astype("u1")),
     }
 
 

@@ -1,6 +1,4 @@
-"""The colours of pictures, and of the scale of stiffness on pages."""
-
-import numpy as np
+"""The colours of pictures; those of pages stand in their scripts."""
 
 INK, MUTED, GRID = "#1f2933", "#616e7c", "#e4e7eb"
 SLATE, GREY, RED, ORANGE = "#52606d", "#9aa5b1", "#d64545", "#de6b12"
@@ -11,21 +9,3 @@ STIFFNESS, RESIDUAL = "viridis", "RdBu"  # scales; red: measured softer than mod
 ERROR = "RdYlBu_r"  # of a surface; red: material left, blue: cut too deep
 DIRECTIONS = {"X": BLUE, "Y": ORANGE, "Z": GREEN, "oblique": PURPLE}  # of a reading
 CLASSES = 32  # colours; more cannot be told apart along a line, and each costs a drawing call
-
-
-def error_colours() -> list[str]:
-    """The classes' colours of an error of the surface, from cut too deep to material left."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return [to_hex(c) for c in colormaps[ERROR](np.linspace(0.06, 0.94, CLASSES))]
-
-
-def page_colours() -> dict[str, list[str]]:
-    """The classes' colours for the script of a page, weakest first, on light and on dark."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    # The lightest yellow does not show on white, nor the darkest violet on black.
-    ends = {"colours": (0.0, 0.93), "colours_dark": (0.22, 1.0)}
-    return {name: [to_hex(c) for c in colormaps[STIFFNESS](np.linspace(*end, CLASSES))] for name, end in ends.items()}

@@ -11,22 +11,19 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Data Analysis, 1977: "far out"
 
 
-def profile_curve(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray]:
-    """Path length in mm and stiffness in N/mm of every sample; nan on rapids and out of reach.
-
-    Without `with_plunges` also nan on the plunges beside the headline.
-    """
+def profile_curve(analysis: Analysis) -> tuple[FloatArray, FloatArray]:
+    """Path length in mm and stiffness in N/mm of every sample; nan on rapids, out of reach, on plunges set aside."""
     stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness)
-    drawn = analysis.samples.cutting & (with_plunges | ~analysis.set_aside)
+    drawn = analysis.samples.cutting & ~analysis.set_aside
     return mm_from_m(analysis.samples.s), np.where(drawn, stiffness, np.nan)
 
 
-def profile_band(analysis: Analysis, with_plunges: bool = True) -> tuple[FloatArray, FloatArray] | None:
+def profile_band(analysis: Analysis) -> tuple[FloatArray, FloatArray] | None:
     """Lower and upper end of the 95 % band of every sample in N/mm, nan as in `profile_curve`; None without a band."""
     band = analysis.parameter_band
     if band is None:
         return None
-    _, k = profile_curve(analysis, with_plunges)
+    _, k = profile_curve(analysis)
     reach = defaults.NORMAL_95 * n_per_mm_from_n_per_m(band.deviation)
     return k - reach, k + reach
 
@@ -40,18 +37,19 @@ def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
     if len(x) <= 4 * columns:
         return np.arange(len(x))
     span = float(x[-1] - x[0])
-    column = np.zeros(len(x), dtype=np.int64) if span == 0.0 else ((x - x[0]) / span * columns).astype(np.int64)
+    column = np.zeros(len(x), dtype=np.int32) if span == 0.0 else ((x - x[0]) / span * columns).astype(np.int32)
     missing = np.isnan(y)
-    fresh = np.concatenate([[True], (np.diff(column) != 0) | (missing[1:] != missing[:-1])])
+    fresh = np.concatenate([[True], (column[1:] != column[:-1]) | (missing[1:] != missing[:-1])])
     first = np.flatnonzero(fresh)
     last = np.append(first[1:], len(x)) - 1
-    run = np.cumsum(fresh) - 1
-    lowest = np.flatnonzero(y == np.minimum.reduceat(y, first)[run])
-    highest = np.flatnonzero(y == np.maximum.reduceat(y, first)[run])
-    lowest = lowest[np.diff(run[lowest], prepend=-1) != 0]  # the first of equals
-    highest = highest[np.diff(run[highest], append=-1) != 0]  # the last of equals
-    rows = np.unique(np.concatenate([first, last, lowest, highest]))
-    return np.asarray(rows[~missing[rows] | fresh[rows]])
+    lengths = last - first + 1
+    run = np.repeat(np.arange(len(first), dtype=np.int32), lengths)
+    lowest = np.flatnonzero(y == np.repeat(np.minimum.reduceat(y, first), lengths))
+    highest = np.flatnonzero(y == np.repeat(np.maximum.reduceat(y, first), lengths))
+    kept = fresh.copy()
+    kept[last] = kept[lowest[np.diff(run[lowest], prepend=-1) != 0]] = True  # the first of equals
+    kept[highest[np.diff(run[highest], append=-1) != 0]] = True  # the last of equals
+    return np.flatnonzero(kept & (fresh | ~missing))
 
 
 def cutting_box(samples: Samples) -> tuple[FloatArray, FloatArray]:
@@ -69,11 +67,11 @@ def _charted(analysis: Analysis) -> FloatArray:
     return n_per_mm_from_n_per_m(analysis.at.stiffness[rows])
 
 
-def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float, float]:
+def scale_limits(analysis: Analysis) -> tuple[float, float]:
     """Ends of the colour scale in N/mm: lowest and highest of the headline, values far out set aside.
 
     A few short cuts, stiffer by far than the rest, would otherwise take all the contrast. The legend marks an end
-    that values lie beyond. With `show_plunges` the plunges beside the headline are on the scale, all of them.
+    that values lie beyond.
     """
     stiffness = _charted(analysis)
     lower, upper = np.quantile(stiffness, (0.25, 0.75))
@@ -81,9 +79,6 @@ def scale_limits(analysis: Analysis, show_plunges: bool = False) -> tuple[float,
     inside = stiffness[(stiffness >= lower - reach) & (stiffness <= upper + reach)]
     values = inside if np.ptp(inside) > 0.0 else stiffness
     low, high = float(values.min()), float(values.max())
-    if show_plunges and analysis.set_aside.any():
-        plunges = n_per_mm_from_n_per_m(analysis.at.stiffness[analysis.set_aside])
-        low, high = min(low, float(plunges.min())), max(high, float(plunges.max()))
     if high - low < 1e-6 * high:  # a constant: keep the scale from collapsing
         low, high = low * (1.0 - 1e-3), high * (1.0 + 1e-3)
     return low, high

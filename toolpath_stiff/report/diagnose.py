@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from markupsafe import Markup
 
-from toolpath_stiff.diagnosis.examination import percent_of
-from toolpath_stiff.diagnosis.result import Diagnosis
+from toolpath_stiff.diagnosis.document import document_of
+from toolpath_stiff.diagnosis.examination import Diagnosis, percent_of
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, doubts, next_steps, verdict_text, why
 from toolpath_stiff.documents import json_number, number
 from toolpath_stiff.inference.errors import deviation_percent
@@ -22,6 +22,7 @@ from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, pla
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 text = words.text  # what a terminal shows
+document = document_of  # what diagnose.json holds
 PAGE = "report.html"
 # Picture -> the question that it answers, and how it is read.
 QUESTIONS = {
@@ -45,7 +46,7 @@ QUESTIONS = {
 
 def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
     """The page, the pictures within."""
-    about, beside = words.data_text(diagnosis), beside_text(diagnosis.unexcluded)
+    about, beside = words.data_text(diagnosis), beside_text(diagnosis.beside)
     head = Head(
         title=f"Diagnosis: {about[1]}",
         verdict=diagnosis.verdict,
@@ -151,15 +152,11 @@ def _sized(sized: Sized, part: str) -> list[str]:
 
 def _unseen(diagnosis: Diagnosis) -> list[Part]:
     rows = [
-        (
-            words.hidden_name(smallest),
-            words.smallest_text(smallest) if smallest.seen else "hardly seen at any size within its bounds",
-            percent(percent_of(smallest.rms)),
-        )
-        for smallest in sorted(diagnosis.detectable, key=lambda smallest: (not smallest.seen, smallest.rms))
+        (words.bound_name(hidden), words.bound_text(hidden), percent(percent_of(hidden.rms)))
+        for hidden in sorted(diagnosis.unexcluded, key=lambda hidden: -round(hidden.rms, 9))
     ]
-    remark = "Seen with 80 % power at 5 % family-wise; a smaller effect could be there unseen."
-    return [ShownTable(("effect", ">smallest size seen", ">change of stiffness, rms"), rows), remark if rows else ""]
+    remark = "Larger ones are excluded (95 %) beside the likeliest explanation, smaller ones are not."
+    return [ShownTable(("effect", ">at most", ">change of stiffness, rms"), rows), remark if rows else ""]
 
 
 def _next_readings(diagnosis: Diagnosis) -> ShownTable:

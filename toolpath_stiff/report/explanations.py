@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 
-from toolpath_stiff.diagnosis.examination import SHOWN, FittedSize, HypothesisRow, percent_of
-from toolpath_stiff.diagnosis.result import Diagnosis
+from toolpath_stiff.diagnosis.examination import SHOWN, Diagnosis, FittedSize, HypothesisRow, percent_of
 from toolpath_stiff.diagnosis.words import assumptions, beside_text, next_steps, verdict_text, why
 from toolpath_stiff.documents import Document, json_number, number
 from toolpath_stiff.hints import parted
-from toolpath_stiff.inference.detectable import Detectable
 from toolpath_stiff.inference.errors import scatter_text
 from toolpath_stiff.inference.judgement import NONE
+from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.portrait.words import portrait_text
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import WIDTH, counted, labelled, machine_text, percent, plain, shortened, significant
@@ -58,15 +57,14 @@ def remark_text(row: HypothesisRow) -> str:
     return plain("; ".join(filter(None, (row.words, row.remark or ("leaves structure" if leaves else "")))))
 
 
-def hidden_name(smallest: Detectable) -> str:
-    """Effect and parameter of a smallest size."""
-    return plain(f"{smallest.effect} {smallest.parameter.name.replace('_', ' ')}")
+def bound_name(hidden: Unexcluded) -> str:
+    """Effect and parameter of a bound."""
+    return plain(f"{hidden.effect.name} {hidden.parameter.name.replace('_', ' ')}")
 
 
-def smallest_text(smallest: Detectable) -> str:
-    """The smallest size of an effect that would have been seen."""
-    size = significant(json_number(smallest.value / smallest.parameter.si))
-    return plain(f"{size} {smallest.parameter.unit}".rstrip())
+def bound_text(hidden: Unexcluded) -> str:
+    """The size up to which an effect is not excluded."""
+    return plain(f"{significant(json_number(hidden.value / hidden.parameter.si))} {hidden.parameter.unit}".rstrip())
 
 
 def floor_text(diagnosis: Diagnosis) -> str:
@@ -122,9 +120,8 @@ def data_text(diagnosis: Diagnosis) -> list[str]:
 
 LABEL = 12  # columns of the left-hand words
 FEW_REASONS = 3  # of the poses proposed, on the terminal
-MOST_CANDIDATES = 5  # in the table; all are in diagnose.json
+MOST_CANDIDATES = 5  # in table and ladder; all are in diagnose.json
 MOST_PAIRS = 2
-MOST_SIZES = 6
 LONGEST_NAME = 45
 
 
@@ -149,11 +146,10 @@ def text(diagnosis: Diagnosis) -> str:
         *_table(diagnosis),
         "",
         *_listed("plausible", [plausible_text(diagnosis.explanations)]),
-        *_listed("beside it", [beside_text(diagnosis.unexcluded)]),
+        *_listed("beside it", [beside_text(diagnosis.beside)]),
         *_listed("noise", ["; ".join(by_noise)] if len(by_noise) > 1 else []),
         *_listed("beside the tip", [loop.text for loop in diagnosis.loops]),
         *_listed("cannot test", ["; ".join(cannot)]),
-        *_listed("would show", [_would_show(diagnosis)]),
         *_listed("path", [path_text(diagnosis.path) or _UNTRIED] if diagnosis.verdict == "ambiguous" else []),
         *_hints("next", [*next_steps(diagnosis), *_next_readings(diagnosis)]),
         *_listed("assumptions", [f"{len(assumptions(diagnosis))}, listed in diagnose.json"]),
@@ -188,11 +184,17 @@ def _error(diagnosis: Diagnosis) -> str:
     return f"mean {', '.join(steps)}; {scatter}"
 
 
-def _table(diagnosis: Diagnosis) -> list[str]:
-    """As given, strut law refitted, pairs and the best candidates; an asterisk marks what is left standing."""
+def leading_rows(diagnosis: Diagnosis) -> tuple[list[HypothesisRow], int]:
+    """As given, strut law refitted, pairs and best candidates, all that stand; how many more there are."""
     every = diagnosis.rows
     shown = [every.as_given, every.refitted, *every.pairs[:MOST_PAIRS], *every.candidates[:MOST_CANDIDATES]]
     shown += [row for row in every.candidates[MOST_CANDIDATES:] if row.standing]
+    return shown, len(every.candidates) + len(every.pairs) + 2 - len(shown)
+
+
+def _table(diagnosis: Diagnosis) -> list[str]:
+    """The leading rows; an asterisk marks what is left standing."""
+    shown, more = leading_rows(diagnosis)
     cells = [
         (
             shortened(f"{'* ' if row.standing else '  '}{row.label}", LONGEST_NAME),
@@ -208,17 +210,7 @@ def _table(diagnosis: Diagnosis) -> list[str]:
     for place, row in reversed([*enumerate(shown, 1)]):
         if below := "; ".join(filter(None, (", ".join(size_texts(row, intervals=False)), plain(row.remark)))):
             lines.insert(place, shortened(f"      {below}", WIDTH))
-    more = len(every.candidates) + len(every.pairs) + 2 - len(shown)
     return [head, *lines, *([f"  and {more} less likely, in diagnose.json"] if more > 0 else [])]
-
-
-def _would_show(diagnosis: Diagnosis) -> str:
-    if diagnosis.verdict != "adequate":
-        return ""
-    never = ", ".join(hidden_name(smallest) for smallest in diagnosis.detectable if not smallest.seen)
-    seen = [f"{hidden_name(smallest)} {smallest_text(smallest)}" for smallest in diagnosis.detectable if smallest.seen]
-    more = f" and {len(seen) - MOST_SIZES} more in diagnose.json" if len(seen) > MOST_SIZES else ""
-    return "; ".join(filter(None, (", ".join(seen[:MOST_SIZES]) + more, f"at no size: {never}" if never else "")))
 
 
 def _next_readings(diagnosis: Diagnosis) -> list[str]:

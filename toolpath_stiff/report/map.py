@@ -6,7 +6,7 @@ import numpy as np
 
 from toolpath_stiff.analysis.grid import StiffnessMap
 from toolpath_stiff.column_files import csv_rows
-from toolpath_stiff.report.colours import page_colours
+from toolpath_stiff.documents import number
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.words import machine_text, plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
@@ -31,7 +31,6 @@ def page(planes: StiffnessMap, drawn: dict[str, bytes]) -> Iterator[str]:
         "x": np.round(mm_from_m(planes.x[::step]), 3).tolist(),
         "y": np.round(mm_from_m(planes.y[::step]), 3).tolist(),
         "z": np.round(mm_from_m(planes.z), 3).tolist(),
-        **page_colours(),
         "values": [[None if np.isnan(v) else round(float(v)) for v in layer.ravel()] for layer in stiffness],
     }
     slices = ", ".join(f"{z:g}" for z in mm_from_m(planes.z))
@@ -41,6 +40,8 @@ def page(planes: StiffnessMap, drawn: dict[str, bytes]) -> Iterator[str]:
         scripts=["stage.js", "viewer.js", "map.js"],
         data=data,
         title=f"Stiffness map, load {planes.load}",
+        low=number(float(np.nanmin(stiffness))),
+        high=number(float(np.nanmax(stiffness))),
         about=" · ".join([*heading(planes), f"slices at z = {slices} mm"]),
         warnings=[f"Warning: {text}" for text in planes.to_dict()["warnings"]],
     )

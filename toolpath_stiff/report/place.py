@@ -8,7 +8,6 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.documents import number
 from toolpath_stiff.placement.result import Placement, PlacementRow, Written
-from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.place_path import drawn_path
 from toolpath_stiff.report.words import machine_text, plain
@@ -93,20 +92,21 @@ def _cell(value: float | None) -> str:
 def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
     """The page, in pieces."""
     best, present = placed.best, placed.present
-    path, note = drawn_path(placed, [*placed.front, *([present] if present else [])])
+    rows = [*placed.front, *([present] if present else [])]
+    path, note = drawn_path(placed, rows)
     data = {
         "front": [row.cells for row in placed.front],
         "recommended": (placed.chosen.number or 0) - 1,
         "before": present.cells if present else None,
-        "before_reason": plain(placed.present_reason),
         "force": best.force,
         "keepouts": [
             {"name": plain(box.name), "box": _corners(mm_from_m(box.corners))} for box in placed.task.rules.keepouts
         ],
         "workspace": _corners(mm_from_m(best.machine.limits.workspace)),
         **path,
-        **page_colours(),
     }
+    weakest = [row.min_N_per_mm for row in rows]
+    digits = max(0, 2 - int(np.log10(path["scale"][1] - path["scale"][0])))  # soft machines have decimals
     return render(
         "place.html",
         styles=["viewer.css", "place.css"],
@@ -118,6 +118,11 @@ def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
         load=str(best.load),
         note=note,
         warnings=placed.warnings,
+        before=present is not None,
+        reason=placed.present_reason,
+        low=f"{'≤ ' * path['beyond'][0]}{number(path['scale'][0], digits)}",
+        high=f"{'≥ ' * path['beyond'][1]}{number(path['scale'][1], digits)}",
+        weakest=[number(end) for end in (min(weakest), max(weakest))],
     )
 
 

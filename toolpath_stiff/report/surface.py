@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from toolpath_stiff.arrays import FloatArray, IntArray, product
 from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.cutting.final_surface import finished_surface
-from toolpath_stiff.cutting.passes import walls_beside
+from toolpath_stiff.cutting.tip import axes_at, walls_beside
 from toolpath_stiff.rotations import rotation_matrices
 
 Quads = tuple[FloatArray, FloatArray, IntArray]
@@ -61,8 +61,8 @@ def _walls(cut: Cut, side: int, most: int) -> Quads:
 def _foot_and_top(cut: Cut, side: int, rows: IntArray) -> tuple[FloatArray, FloatArray]:
     """(k, 3) m, lowest and highest point of the wall beside some samples."""
     foot, _ = walls_beside(cut.samples, cut.cutters, rows, np.full(len(rows), side))
-    heights = cut.samples.position[rows, 2] + cut.wall_heights[rows, side].T
-    return np.column_stack([foot, heights[0]]), np.column_stack([foot, heights[1]])
+    up, heights = axes_at(cut.samples.take(rows))[:, :, 2], cut.wall_heights[rows, side]
+    return foot + heights[:, :1] * up, foot + heights[:, 1:] * up
 
 
 def _floors(cut: Cut, most: int) -> Quads:

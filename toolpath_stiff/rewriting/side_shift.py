@@ -36,12 +36,12 @@ STRAIGHT = 1e5  # mm: an arc of more is straight
 
 
 def movable_rows(moves: Moves) -> BoolArray:
-    """(n,) moves that may be shifted: feeds and flat arcs of linear axes, no plunges, nothing in machine numbers."""
+    """(n,) moves that may be shifted: feeds and flat arcs of linear axes, upright, no plunges or machine numbers."""
     plan = np.linalg.norm(moves.end[:, :2] - moves.start[:, :2], axis=1)
     plan = np.where(moves.arc_sweep != 0.0, move_lengths(moves), plan)
     steep = np.abs(moves.end[:, 2] - moves.start[:, 2]) * math.tan(defaults.PLUNGE_ANGLE) >= plan
     flat = (moves.arc_sweep == 0.0) | (np.abs(moves.arc_normal[:, 2]) > 1.0 - 1e-9)
-    still = np.logical_and.reduce([moves.start[:, axis] == moves.end[:, axis] for axis in (3, 4, 5)])
+    still = (moves.start[:, 3:] == moves.end[:, 3:]).all(axis=1) & ~moves.start[:, 3:5].any(axis=1)
     feeds = np.isin(moves.motion, (FEED, ARC)) & ~moves.from_machine.any(axis=1)
     return np.asarray(feeds & flat & still & ~steep)
 

@@ -5,7 +5,7 @@ effect alone.
 """
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,16 +17,17 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
-from toolpath_stiff.rig.effects import CATALOGUE, with_effect
+from toolpath_stiff.rig.effects import BEYOND, CATALOGUE, Hideable, with_effect
 from toolpath_stiff.rig.fem import FemMachine, sound_machine
-from toolpath_stiff.rig.fem_faults import FAULTS, faults
+from toolpath_stiff.rig.fem_faults import FAULTS, Fault
 from toolpath_stiff.rig.fem_path import path_truth
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, disturb_machine, disturb_readings, readings
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
-from toolpath_stiff.rig.oddities import ODDITIES, ODDITIES_IN_TIME
+from toolpath_stiff.rig.oddities import ODDITIES
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
 from toolpath_stiff.rig.sizes import Scale
+from toolpath_stiff.rig.unknown import Kind
 from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
@@ -124,12 +125,6 @@ class DrawnCase:
         return self.measure(plan, rows_of(plan, elapsed=np.ones(len(plan["x_mm"]))), rng, stated_sd)
 
 
-def effects_of_layout(layout: str) -> tuple[str, ...]:
-    """Effects of the catalogue that a layout has the columns for: the paper's has neither `force_N` nor `time_min`."""
-    lacking = ("joint_clearance", "contact_nonlinearity", "thermal_drift") if layout == "paper" else ()
-    return tuple(name for name in CATALOGUE if name not in lacking)
-
-
 def make_case(seed: int, *args: Any, **named: Any) -> tuple[Table, Document]:
     """Rows and truth of the same as `draw_case`."""
     case = draw_case(seed, *args, **named)
@@ -184,7 +179,7 @@ def draw_case(
     nominal = load_nominal(machine) if isinstance(machine, str) else machine
     streams = {name: np.random.default_rng([seed, i]) for i, name in enumerate(_STREAMS)}
     table = campaign(layout, nominal, plan, streams["campaign"])
-    names = _names(hidden, layout, table, streams["kind"], fem=built == "fem")
+    names = _names(hidden, table, streams["kind"], fem=built == "fem")
     rows = rows_of(table)
     true: HiddenMachine = sound_machine(nominal) if built == "fem" else HiddenMachine()
     effects = []
@@ -201,10 +196,9 @@ def draw_case(
                 words = {"links": sorted(FAULTS[name].links), "names": sorted(FAULTS[name].names)}
             effects.append({"effect": name, "parameters": parameters, **strength, **words})
     true = disturb_machine(true, nuisances, streams["machine"])
-    beyond = {*OUTSIDE, *faults(in_catalogue=False)}
     truth: dict[str, object] = {
         "hidden": list(names),
-        "kind": "outside" if {*names} & beyond else ("none", "one", "two", "three")[min(len(names), 3)],
+        "kind": "outside" if {*names} & BEYOND else ("none", "one", "two", "three")[min(len(names), 3)],
         "effects": effects,
     }
     if isinstance(true, FemMachine):
@@ -223,21 +217,24 @@ def _sizes(size: float | Sequence[float] | None, count: int) -> Sequence[float |
     return sizes
 
 
-def _names(
-    hidden: str | Sequence[str] | None, layout: str, table: Table, rng: Generator, *, fem: bool
-) -> tuple[str, ...]:
+def hideable(columns: Container[str], *, fem: bool) -> tuple[list[str], list[str], list[str]]:
+    """What a campaign with these columns shows: names in the catalogue, outside it, and unknowns.
+
+    `fem`: on a machine of finite elements, where what lies outside is unknown.
+    """
+    outside = {name: fault for name, fault in FAULTS.items() if not fault.names}
+    inside = {name: fault for name, fault in FAULTS.items() if fault.names}
+    kinds: tuple[Mapping[str, Hideable | Fault | Kind], ...]
+    kinds = (inside, outside, outside) if fem else (CATALOGUE, ODDITIES, UNKNOWNS)
+    shown = [[name for name, kind in some.items() if all(c in columns for c in kind.columns)] for some in kinds]
+    return shown[0], shown[1], shown[2]
+
+
+def _names(hidden: str | Sequence[str] | None, table: Table, rng: Generator, *, fem: bool) -> tuple[str, ...]:
     """Names of what is hidden, in a machine of finite elements or of springs."""
     if hidden is None:
         hidden = str(rng.choice(list(BLIND), p=list(BLIND.values())))
-    outside: Sequence[str] = (*ODDITIES, *(() if layout == "paper" else ODDITIES_IN_TIME))
-    unknown: Sequence[str] = [name for name, kind in UNKNOWNS.items() if all(c in table for c in kind.columns)]
-    known: Sequence[str] = effects_of_layout(layout)
-    if fem:
-        known, outside = (
-            [name for name in faults(in_catalogue=inside) if all(c in table for c in FAULTS[name].columns)]
-            for inside in (True, False)
-        )
-        unknown = outside
+    known, outside, unknown = hideable(table, fem=fem)
     if hidden in ("two", "three"):
         return tuple(known[i] for i in rng.choice(len(known), size=2 if hidden == "two" else 3, replace=False))
     drawn = {"one": known, "unknown": unknown, "outside": outside}
@@ -246,16 +243,13 @@ def _names(
     if hidden == "none":
         return ()
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
-    everything = FAULTS if fem else (*CATALOGUE, *OUTSIDE)
+    everything: Mapping[str, Hideable | Fault | Kind] = FAULTS if fem else {**CATALOGUE, **OUTSIDE}
     if strange := [name for name in names if name not in everything]:
         expected = f"none, one, two, three, outside, unknown, or of {', '.join(everything)}"
         raise InputError(f"nothing called {strange[0]!r} to hide", expected=expected)
     if len(set(names)) < len(names) or sum(name in OUTSIDE for name in names) > 1:
         raise InputError(f"hidden effects {', '.join(names)}", expected="each once, at most one outside the catalogue")
     for name in names:
-        kinds = FAULTS if fem else OUTSIDE
-        needed = ("time_min",) if name == "thermal_drift" else kinds[name].columns if name in kinds else ()
-        for column in needed:
-            if column not in table:
-                raise InputError(f"{name} needs the column {column}", expected="layout tilted, or a plan with it")
+        if lacking := [column for column in everything[name].columns if column not in table]:
+            raise InputError(f"{name} needs the column {lacking[0]}", expected="layout tilted, or a plan with it")
     return names

@@ -1,6 +1,7 @@
 """Where the platform really stands when the control, with the nominal geometry, commands a pose."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from toolpath_stiff.arrays import FloatArray
 
@@ -33,19 +34,7 @@ def true_poses(
         unit = strut / reached[:, :, None]
         step = np.linalg.solve(np.concatenate([unit, np.cross(arms, unit)], axis=2), gap[:, :, None])[:, :, 0]
         position = position + step[:, :3]
-        orientation = _turn(step[:, 3:]) @ orientation
+        orientation = Rotation.from_rotvec(step[:, 3:]).as_matrix() @ orientation
         if np.abs(step).max() < 1e-12:
             return position, orientation
     raise ClosureError("the closure equations of the platform did not converge")
-
-
-def _turn(vector: FloatArray) -> FloatArray:
-    """(n, 3, 3) rotation matrices of rotation vectors (n, 3) (Rodrigues)."""
-    angle = np.linalg.norm(vector, axis=1)
-    x, y, z = vector.T
-    zero = np.zeros_like(x)
-    skew = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], 1)
-    # sin(t)/t and (1 - cos t)/t^2 through sinc, which is safe at 0.
-    first = np.sinc(angle / np.pi)[:, None, None]
-    second = 0.5 * np.sinc(angle / (2.0 * np.pi))[:, None, None] ** 2
-    return np.asarray(np.eye(3) + first * skew + second * (skew @ skew))

@@ -92,11 +92,14 @@ class Hideable:
         The parameters at a strength in (0, 1].
     draw
         What is drawn beside the strength: which strut, which axis, which sign, which proportions.
+    columns
+        Columns that a measurement file needs to show it.
     """
 
     change: Callable[[HiddenMachine, Shape], Shape]
     grow: Grow
     draw: Draw = _no_shape
+    columns: tuple[str, ...] = ()
 
 
 CATALOGUE: dict[str, Hideable] = {
@@ -109,8 +112,12 @@ CATALOGUE: dict[str, Hideable] = {
     ),
     "joint_compliance": Hideable(lambda h, p: {"joint": p["compliance"] * NM_PER_N}, _scaled("compliance", SOFT)),
     "joint_moment_stiffness": Hideable(lambda h, p: {"moment": p["stiffness"]}, _scaled("stiffness", 2e6)),
-    "joint_clearance": Hideable(lambda h, p: {"clearance": m_from_um(p["lost_motion"])}, _scaled("lost_motion", 50.0)),
-    "contact_nonlinearity": Hideable(lambda h, p: {"hertz": p["compliance"] * NM_PER_N}, _scaled("compliance", SOFT)),
+    "joint_clearance": Hideable(
+        lambda h, p: {"clearance": m_from_um(p["lost_motion"])}, _scaled("lost_motion", 50.0), columns=("force_N",)
+    ),
+    "contact_nonlinearity": Hideable(
+        lambda h, p: {"hertz": p["compliance"] * NM_PER_N}, _scaled("compliance", SOFT), columns=("force_N",)
+    ),
     "strut_law": Hideable(lambda h, p: {"curvature": p["curvature"] / 100.0}, _scaled("curvature", 40.0), _sign),
     "weak_strut": Hideable(
         lambda h, p: {"strut_factors": np.where(np.arange(1, 7) == p["strut"], p["factor"], 1.0) * h.strut_factors},
@@ -143,9 +150,11 @@ CATALOGUE: dict[str, Hideable] = {
         _scaled("scale", 20.0, "direction", "setup"), _gauge_shape,
     ),
     "thermal_drift": Hideable(
-        lambda h, p: {"drift": per_s_from_per_min(m_from_um(p["rate"]))}, _scaled("rate", 20.0), _sign
+        lambda h, p: {"drift": per_s_from_per_min(m_from_um(p["rate"]))}, _scaled("rate", 20.0), _sign, ("time_min",)
     ),
 }  # fmt: skip
+
+BEYOND = {*OUTSIDE, *(name for name, fault in FAULTS.items() if not fault.names)}  # what the catalogue has no name for
 
 
 def draw_shape(name: str, rng: Generator, vertices: int, setups: list[str]) -> Shape:

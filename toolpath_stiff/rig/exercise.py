@@ -11,6 +11,7 @@ import io
 import json
 import re
 import zlib
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -24,9 +25,9 @@ from toolpath_stiff.files import Content, read_bytes, read_text
 from toolpath_stiff.results_folder import Rules, write_folder
 from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, POSE, Table
 from toolpath_stiff.rig.case import BUILT, DrawnCase, clamp_of, draw_case, rows_of
-from toolpath_stiff.rig.effects import CATALOGUE
+from toolpath_stiff.rig.effects import BEYOND, CATALOGUE
 from toolpath_stiff.rig.fem import FemMachine
-from toolpath_stiff.rig.fem_faults import FAULTS, faults
+from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
 from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
@@ -120,8 +121,7 @@ def score(hidden: list[str], claim: list[str]) -> str:
     claimed, truth = set(claim) - set(SOUND), set(hidden)
     if claimed & set(OTHER):
         of_robots = {name for name, fault in ROBOT_FAULTS.items() if not fault.names}
-        beyond = {*OUTSIDE, *faults(in_catalogue=False), *of_robots}
-        claimed = (claimed - set(OTHER)) | ((truth & beyond) or {"outside"})
+        claimed = (claimed - set(OTHER)) | ((truth & {*BEYOND, *of_robots}) or {"outside"})
     if claimed == truth:
         return "right" if truth else "correctly none"
     return "partly" if claimed & truth else "wrong"
@@ -145,27 +145,25 @@ def read_plan(file: str, nominal: Nominal) -> Table:
     InputError, InputErrors
         Not a table of poses; or every bad cell and unreachable pose, named.
     """
-    reader = csv.reader(io.StringIO(read_text(file, "the plan"), newline=None))  # whatever the line ends are
+    reader = csv.DictReader(io.StringIO(read_text(file, "the plan"), newline=None), restval="")  # whatever ends lines
     try:
-        lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
+        rows_read = [(reader.line_num, row) for row in reader if any(row.values())]
     except csv.Error as error:  # a quote that never ends, a cell beyond 131,072 characters
-        raise InputError(f"not a CSV file: {error}", file=file, line=reader.line_num) from None
-    if len(lines) < 2:
+        raise InputError(f"not a CSV file: {error}", file=file, line=reader.reader.line_num) from None
+    if not rows_read:
         raise InputError("no poses", expected="a heading (x_mm,y_mm,z_mm,direction ...) and rows", file=file)
-    (first, heading), body = lines[0], lines[1:]
-    _check_heading(heading, file, first)
+    _check_heading(list(reader.fieldnames or ()), file)
     errors: list[InputError] = []
-    table: Table = {}
-    for column, name in enumerate(heading):
-        values = []
-        for line, row in body if name not in RESULTS else ():
-            cell = row[column] if column < len(row) else ""
+    columns: dict[str, list[Any]] = {name: [] for name in reader.fieldnames or () if name not in RESULTS}
+    for line, row in rows_read:
+        for name, values in columns.items():
             try:
-                values.append(_value(name, cell))
+                values.append(_value(name, row[name].strip()))
             except ValueError as error:
-                errors.append(InputError(f"{name} {cell!r}", expected=str(error), file=file, line=line))
-        if name not in RESULTS:
-            table[name] = np.array(values) if name == "clamp" or name in NUMBERS else values
+                errors.append(InputError(f"{name} {row[name]!r}", expected=str(error), file=file, line=line))
+    table: Table = {
+        name: np.array(values) if name == "clamp" or name in NUMBERS else values for name, values in columns.items()
+    }
     if not errors:
         rows = rows_of(table)
         within = reachable(nominal, rows.position, rows.angles, rows.extension)
@@ -174,22 +172,21 @@ def read_plan(file: str, nominal: Nominal) -> Table:
             "a direction of no length": ~np.isfinite(rows.direction).all(axis=1),
         }
         for fault, bad in faults.items():
-            errors += [InputError(fault, file=file, line=body[k][0]) for k in np.flatnonzero(bad)]
+            errors += [InputError(fault, file=file, line=rows_read[k][0]) for k in np.flatnonzero(bad)]
     if errors:
         raise InputErrors(errors)
     return table
 
 
-def _check_heading(heading: list[str], file: str, line: int) -> None:
+def _check_heading(heading: Sequence[str], file: str) -> None:
     known = (*NUMBERS, *TEXTS, *RESULTS)
-    missing = [name for name in POSE[:3] if name not in heading]
-    strange = [name for name in heading if name not in known or heading.count(name) > 1]
-    vectors = sum(name in heading for name in ("dx", "dy", "dz"))
-    fault = f"unknown column {strange[0]!r}, or given twice" if strange else ""
-    if missing or vectors != (0 if "direction" in heading else 3):
-        fault = f"column {missing[0]} is missing" if missing else "directions unclear: either direction or dx,dy,dz"
-    if fault:
-        raise InputError(fault, expected=f"columns of {', '.join(known)}", file=file, line=line)
+    faults = [f"unknown column {name!r}" for name in heading if name not in known]
+    faults += [f"column {name} stands twice" for name in heading if heading.count(name) > 1]
+    faults += [f"column {name} is missing" for name in POSE[:3] if name not in heading]
+    if sum(name in heading for name in ("dx", "dy", "dz")) != (0 if "direction" in heading else 3):
+        faults.append("directions unclear: either direction or dx,dy,dz")
+    if faults:
+        raise InputError(faults[0], expected=f"columns of {', '.join(known)}", file=file, line=1)
 
 
 def _value(name: str, cell: str) -> float | int | str:

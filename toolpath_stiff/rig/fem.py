@@ -13,6 +13,7 @@ from typing import Self
 
 import numpy as np
 from numpy.random import Generator
+from scipy.optimize import least_squares
 
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig import beams, fem_parts
@@ -23,6 +24,7 @@ from toolpath_stiff.rig.hidden import HERTZ_LOAD, HiddenMachine, readings, strut
 from toolpath_stiff.rig.kinematics import commanded_lengths, rotations
 from toolpath_stiff.rig.nominal import Nominal, parse_nominal
 from toolpath_stiff.rig.rows import Rows
+from toolpath_stiff.rig.structure import Motions
 from toolpath_stiff.rig.unknown import CommandedRows, opened
 
 JOINT_SHARE = 0.02  # of a strut's nominal compliance that sits in each of its two joints
@@ -102,6 +104,25 @@ class FemMachine(HiddenMachine):
         stand = rows.force * self.stand * tall**3 * (1.0 - rows.direction[:, 2] ** 2)
         moved = between(nominal, self, rows, self.touches_above) + stand + self.drift * rows.time
         return np.asarray(moved / (1.0 + self.cell_curve * rows.force / CURVED_AT))
+
+    def motions(self, nominal: Nominal, rows: Rows, lengths: FloatArray) -> Motions:
+        """As of a machine of springs; the joints of a strut are those at both its ends."""
+        state, pose, struts, give = solved(nominal, self, rows)
+        columns, pull, extra = moved(self, rows, struts[pose], give[pose])
+        down = (state.place.work_point - state.place.platform_joints.mean(axis=1))[pose]
+        body = columns[:, 12:15] + np.cross(columns[:, 15:18], down)  # the platform carried on to the tip
+        tip, platform = (np.einsum("ni,ni->n", rows.direction, ends) for ends in (columns[:, 6:9], body))
+        work, corners, force = _work(self, rows, state, pose), frame_corners(nominal), rows.force[:, None]
+        proper, joint = np.moveaxis(struts[pose], -1, 0)
+        alone = np.where(lengths[:, None] > 0.0, lengths[:, None], state.lengths[pose])
+        outward = corners * [1.0, 1.0, 0.0] / np.linalg.norm(corners[:, :2], axis=1, keepdims=True)
+        return Motions(
+            tip=(tip + work) / rows.force, spindle=(tip - platform) / rows.force, table=work / rows.force,
+            struts=proper * pull / force, joints=(joint * pull + extra) / force,
+            alone=1.0 / np.diagonal(strut_stiffness(nominal, self, alone), axis1=1, axis2=2),
+            vertices=columns[:, 19:].reshape(len(pose), len(corners), NODE)[..., :3] / force[..., None],
+            outward=np.broadcast_to(outward, (len(pose), len(corners), 3)),
+        )  # fmt: skip
 
     def scattered(self, rng: Generator) -> Self:
         """As one of many: no section is quite that of the drawing; clamping scatters otherwise in each direction."""
@@ -266,35 +287,6 @@ def _work(machine: FemMachine, rows: Rows, state: CommandedRows, pose: IntArray)
     return np.asarray(rows.force * (along + riser))
 
 
-def displacements(
-    nominal: Nominal, machine: FemMachine, rows: Rows, loops: list[str], lengths: FloatArray
-) -> FloatArray:
-    """(n,) m per N at the tip that indicators beside it read, of a strut alone per N in it (`loops`)."""
-    state, pose, struts, give = solved(nominal, machine, rows)
-    columns, pull, extra = moved(machine, rows, struts[pose], give[pose])
-    down = (state.place.work_point - state.place.platform_joints.mean(axis=1))[pose]
-    body = columns[:, 12:15] + np.cross(columns[:, 15:18], down)  # the platform carried on to the tip
-    work, corners, read = _work(machine, rows, state, pose), frame_corners(nominal), np.empty(len(loops))
-    for k, loop in enumerate(loops):
-        kind, *rest = loop.split()
-        number, load = int(rest[0]) - 1 if rest else 0, rows.direction[k]
-        tip, platform = load @ columns[k, 6:9], load @ body[k]
-        proper, joint = struts[pose[k], number]
-        corner = columns[k, 19 + NODE * number : 22 + NODE * number]
-        outward = corners[number, :2] / np.linalg.norm(corners[number, :2])
-        way = {"radial": np.array([*outward, 0.0]), "vertical": np.eye(3)[2]}.get("".join(rest[1:]), load)
-        shown = {
-            "tip": tip + work[k], "spindle": tip - platform, "platform": platform + work[k], "table": work[k],
-            "strut": proper * pull[k, number], "frame": way @ corner,
-            "joint": (joint * pull[k, number] + extra[k, number]) * (0.5 if rest[1:] else 1.0),
-        }  # fmt: skip
-        read[k] = shown[kind or "tip"] / rows.force[k]
-        if kind == "strut" and rest[1:]:
-            given = np.full((1, 6), lengths[k]) if lengths[k] > 0.0 else state.lengths[pose[k], None]
-            read[k] = 1.0 / strut_stiffness(nominal, machine, given)[0, number, number]
-    return read
-
-
 def sound_machine(nominal: Nominal) -> FemMachine:
     """The machine without fault or spread, whose struts make up for what the other parts give (least squares)."""
     return FemMachine(law=np.array(_calibrated(nominal.text, nominal.name)))
@@ -302,15 +294,11 @@ def sound_machine(nominal: Nominal) -> FemMachine:
 
 @lru_cache(maxsize=4)
 def _calibrated(text: str, name: str) -> tuple[float, ...]:
-    nominal, law = parse_nominal(text, name), np.ones(2)
+    nominal = parse_nominal(text, name)
     rows = reference_rows(nominal)
     wanted = np.log(readings(nominal, HiddenMachine(), rows))
 
     def missed(law: FloatArray) -> FloatArray:
         return np.asarray(np.log(readings(nominal, FemMachine(law=law), rows)) - wanted)
 
-    for _ in range(4):  # Gauss and Newton; the third step changes nothing in eight digits
-        now = missed(law)
-        slopes = np.column_stack([(missed(law + 1e-4 * way) - now) / 1e-4 for way in np.eye(2)])
-        law = law - np.linalg.lstsq(slopes, now, rcond=None)[0]
-    return tuple(law.round(8).tolist())
+    return tuple(least_squares(missed, np.ones(2), xtol=1e-12, ftol=1e-12).x.round(8).tolist())

@@ -150,8 +150,3 @@ FAULTS: dict[str, Fault] = {
         "platform,tool", "", 4e7, lambda m, p: {"hose": np.array([p["size"], p["azimuth"]])}, _azimuth
     ),
 }  # fmt: skip
-
-
-def faults(*, in_catalogue: bool) -> list[str]:
-    """Names of faults that the catalogue has a name for, or of those that it has none for."""
-    return [name for name, fault in FAULTS.items() if bool(fault.names) == in_catalogue]

@@ -19,7 +19,7 @@ from toolpath_stiff.rig.closure import true_poses
 from toolpath_stiff.rig.kinematics import commanded_lengths, platform_points, rotations
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import End, Geometry, Links, solved
+from toolpath_stiff.rig.structure import End, Geometry, Links, Motions, radial, solved
 from toolpath_stiff.rig.unknown import CommandedRows, Unknown
 from toolpath_stiff.rig.unknowns import OUTSIDE
 from toolpath_stiff.units import n_per_m_from_n_per_mm, n_per_mm_from_n_per_m
@@ -99,6 +99,25 @@ class HiddenMachine:
         """(n,) m that the indicator shows."""
         return np.asarray(rows.force / self.stiffness(nominal, rows) + self.drift * rows.time)
 
+    def motions(self, nominal: Nominal, rows: Rows, lengths: FloatArray) -> Motions:
+        """What the loads of the rows move; `lengths` (n,) m of struts measured alone, nan: as the pose has it."""
+        n = len(rows.force)
+        place, links = assembled(nominal, self, rows, np.repeat(np.nan_to_num(lengths)[:, None], 6, axis=1))
+        compliance, moved, stretch = solved(place, links, rows.direction, rows.force)
+        own = moved[:, -links.count :]
+        joints, vertices, ends = np.split(own, [6, 6 + links.vertices.size], axis=1)
+        outward = np.stack([radial(place, vertex) for vertex in range(len(links.vertices))], axis=1)
+        give = vertices.reshape(n, -1, 2)
+        at = {"spindle": np.zeros(n), "table": np.zeros(n), "": np.zeros(n)}
+        for end, size in zip(links.ends, ends.T, strict=True):
+            at[end.link] += np.einsum("ni,ni->n", rows.direction, end.lever) * size
+        return Motions(
+            tip=compliance, spindle=at["spindle"], table=at["table"],
+            struts=np.einsum("nki,ni->nk", stretch, moved), joints=joints,
+            alone=np.diagonal(np.linalg.inv(links.struts), axis1=1, axis2=2),
+            vertices=give[..., :1] * outward + give[..., 1:] * AXES[2], outward=outward,
+        )  # fmt: skip
+
 
 def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) N/m that the gauge and the indicator show, before noise: k = factor F / (F / k_true + drift t)."""
@@ -133,8 +152,6 @@ def true_geometry(
 ) -> Geometry:
     """Where joints and tip are when struts of the commanded lengths carry the true platform on the true frame."""
     frame = nominal.frame_joints + hidden.frame_errors
-    if hidden.unknown is not None and (move := OUTSIDE[hidden.unknown.kind].move) is not None:
-        frame = frame + move(hidden.unknown)
     platform = nominal.platform_joints + hidden.platform_errors
     radius = np.linalg.norm(nominal.platform_joints[:, :2], axis=1, keepdims=True)
     platform[:, :2] *= 1.0 + hidden.radius_error / radius

@@ -1,6 +1,7 @@
 """Kinematics of the nominal machine: strut lengths of poses, what is in reach."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.rig.nominal import Nominal
@@ -8,15 +9,7 @@ from toolpath_stiff.rig.nominal import Nominal
 
 def rotations(angles: FloatArray) -> FloatArray:
     """(n, 3, 3) R = Rz(yaw) Ry(pitch) Rx(roll) from (n, 3) roll, pitch, yaw in rad."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(angles).T, np.sin(angles).T
-    return np.stack(
-        [
-            np.stack([cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr], axis=-1),
-            np.stack([sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr], axis=-1),
-            np.stack([-sp, cp * sr, cp * cr], axis=-1),
-        ],
-        axis=1,
-    )
+    return np.asarray(Rotation.from_euler("xyz", angles).as_matrix())
 
 
 def commanded_lengths(nominal: Nominal, tips: FloatArray, turned: FloatArray, extension: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.random import Generator
+from scipy.linalg import solve_triangular
 
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig.closure import ClosureError
@@ -105,29 +106,15 @@ def _rms(change: FloatArray) -> float:
 
 
 def whitened_length(clamps: IntArray, spread: FloatArray, nuisances: Nuisances) -> Callable[[FloatArray], float]:
-    """Whitened length sqrt(x^T C^-1 x) of x (n,), by the covariance of ln readings.
+    """Whitened length sqrt(x^T C^-1 x) of x (n,), by the covariance C of ln readings.
 
-    That has repeat noise, clamping, strut spread and a free strut law. The first two are a multiple of the identity and
-    one block of ones a clamp, whose inverse is known; the rest, `spread` (n, 8), enters by Woodbury's identity,
-    (N + S S^T)^-1 = N^-1 - N^-1 S (1 + S^T N^-1 S)^-1 S^T N^-1.
+    That has repeat noise, clamping, and strut spread and a free strut law as one standard deviation of each, `spread`
+    (n, 8), moves the readings.
     """
-    noise, share = max(nuisances.repeat, 1e-3) ** 2, nuisances.clamping**2
-    pull = share / (noise + np.bincount(clamps) * share)
-
-    def weighted(x: FloatArray) -> FloatArray:
-        """N^-1 x for x (n, m)."""
-        sums = np.zeros((len(pull), x.shape[1]))
-        np.add.at(sums, clamps, x)
-        return np.asarray((x - (pull[:, None] * sums)[clamps]) / noise)
-
-    inner = np.eye(spread.shape[1]) + spread.T @ weighted(spread)
-
-    def length(x: FloatArray) -> float:
-        white = weighted(x[:, None])[:, 0]
-        projected = spread.T @ white
-        return math.sqrt(max(float(x @ white - projected @ np.linalg.solve(inner, projected)), 0.0))
-
-    return length
+    together = clamps[:, None] == clamps
+    covariance = max(nuisances.repeat, 1e-3) ** 2 * np.eye(len(clamps)) + nuisances.clamping**2 * together
+    factor = np.linalg.cholesky(covariance + spread @ spread.T)
+    return lambda x: float(np.linalg.norm(solve_triangular(factor, x, lower=True)))
 
 
 def _spread(scale: Scale, nuisances: Nuisances) -> FloatArray:

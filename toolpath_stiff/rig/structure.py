@@ -17,8 +17,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
 
-BARS = 19  # of the platform truss (the paper's Figure 2b)
-HUB, TIP = 6, 7  # nodes of the platform truss after its six joints
+HUB, TIP = 6, 7  # nodes of the platform truss (the paper's Figure 2b) after its six joints
 SECANT_STEPS = 60
 SECANT_TOLERANCE = 1e-11  # relative change of the tip's compliance between two steps
 
@@ -65,6 +64,29 @@ class End(NamedTuple):
     compliance: FloatArray
 
 
+class Motions(NamedTuple):
+    """What n loads move, m per N of the load; of n rows.
+
+    Attributes
+    ----------
+    tip, spindle, table
+        (n,) tool against work, tool against platform, the work, along the load.
+    struts, joints, alone
+        (n, 6) elongation of the struts, give of the joints of each; of a strut measured alone, m per N in it.
+    vertices, outward
+        (n, v, 3) displacement of the frame's vertices, and horizontal unit vectors out to them.
+    """
+
+    tip: FloatArray
+    spindle: FloatArray
+    table: FloatArray
+    struts: FloatArray
+    joints: FloatArray
+    alone: FloatArray
+    vertices: FloatArray
+    outward: FloatArray
+
+
 @dataclass(frozen=True)
 class Links:
     """How the links of n rows give way; SI. A compliance of zero is rigid.
@@ -78,7 +100,7 @@ class Links:
     moment
         N m/rad, rotational spring at both ends of every strut; (n, 6) where struts and rows differ.
     bars
-        N/m, bars of the platform truss; inf is rigid; (19,) where they differ, in the order of `truss_bars`.
+        N/m, bars of the platform truss; inf is rigid.
     vertices
         (vertices, 2) m/N, radial and vertical.
     ends
@@ -90,7 +112,7 @@ class Links:
     struts: FloatArray
     joints: Callable[[FloatArray], FloatArray]
     moment: float | FloatArray
-    bars: float | FloatArray
+    bars: float
     vertices: FloatArray
     ends: tuple[End, ...]
     loose: Callable[[FloatArray], FloatArray] | None = None
@@ -172,7 +194,7 @@ def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]
     unit = strut / length[:, :, None]
     nodes = _nodes(place)
     rigid = _rigid_motions(nodes - place.work_point[:, None, :])  # (n, 24, 6)
-    flexible = bool(np.isfinite(links.bars).all())
+    flexible = np.isfinite(links.bars)
     motion = np.broadcast_to(np.eye(24), (n, 24, 24)) if flexible else rigid
     dofs = motion.shape[2]
     size = dofs + links.count
@@ -181,13 +203,13 @@ def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]
     relative[..., :dofs] = motion[:, :18].reshape(n, 6, 3, dofs)
     for i, vertex in enumerate(place.vertices):
         column = dofs + 6 + 2 * int(vertex)
-        relative[:, i, :, column] = -_radial(place, int(vertex))
+        relative[:, i, :, column] = -radial(place, int(vertex))
         relative[:, i, 2, column + 1] = -1.0
     stretch = np.einsum("nki,nkij->nkj", unit, relative)
     stretch[:, range(6), range(dofs, dofs + 6)] = -1.0  # what the joints take is not left for the strut
     springs = np.zeros((n, size, size))
     if flexible:
-        springs[:, :dofs, :dofs] = _truss(nodes, np.broadcast_to(links.bars, (BARS,)))
+        springs[:, :dofs, :dofs] = links.bars * _truss(nodes)
     if np.any(np.asarray(links.moment) > 0.0):
         # Rotation of the platform: the rigid motion that follows its joints best; exact when it is rigid.
         follow = np.linalg.pinv(rigid[:, :18])[:, 3:]  # (n, 3, 18)
@@ -233,15 +255,15 @@ def truss_bars(nodes: FloatArray) -> list[tuple[int, int]]:
     return [*rim, *((i, HUB) for i in range(6)), *((i, TIP) for i in range(6)), (HUB, TIP)]
 
 
-def _truss(nodes: FloatArray, stiffness: FloatArray) -> FloatArray:
-    """(n, 24, 24) stiffness of the platform's bars, `stiffness` (19,) N/m."""
+def _truss(nodes: FloatArray) -> FloatArray:
+    """(n, 24, 24) stiffness of the platform's bars, of 1 N/m each."""
     total = np.zeros((len(nodes), 24, 24))
-    for (i, j), spring in zip(truss_bars(nodes), stiffness, strict=True):
+    for i, j in truss_bars(nodes):
         bar = nodes[:, j] - nodes[:, i]
         unit = bar / np.linalg.norm(bar, axis=1, keepdims=True)
         row = np.zeros((len(nodes), 24))
         row[:, 3 * i : 3 * i + 3], row[:, 3 * j : 3 * j + 3] = -unit, unit
-        total += spring * row[:, :, None] * row[:, None, :]
+        total += row[:, :, None] * row[:, None, :]
     return total
 
 
@@ -255,7 +277,7 @@ def _rigid_motions(arms: FloatArray) -> FloatArray:
     return motion.reshape(n, 3 * k, 6)
 
 
-def _radial(place: Geometry, vertex: int) -> FloatArray:
+def radial(place: Geometry, vertex: int) -> FloatArray:
     """(n, 3) horizontal unit vector from the machine's axis to a vertex of the frame."""
     outward = place.frame_joints[:, place.vertices == vertex].mean(axis=1) * np.array([1.0, 1.0, 0.0])
     return np.asarray(outward / np.linalg.norm(outward, axis=1, keepdims=True))

@@ -101,8 +101,6 @@ class Kind:
         What it does to the links; None: nothing.
     read
         (n,) factor on the stiffness that is read; None: 1.
-    move
-        (6, 3) m by which the frame joints stand elsewhere; None: not at all.
     shape
         Draws what is not size; `sign` in it goes to the size.
     columns
@@ -114,7 +112,6 @@ class Kind:
     limit: float
     act: Callable[[Links, CommandedRows, Unknown], Links] | None = None
     read: Callable[[Rows, Unknown], FloatArray] | None = None
-    move: Callable[[Unknown], FloatArray] | None = None
     shape: Draw = lambda rng: {}
     columns: tuple[str, ...] = ()
 
@@ -124,7 +121,7 @@ def kind(
 ) -> Callable[[Physics], Physics]:
     """Puts the function below it among the kinds, by its name; links, variables, columns stand between commas.
 
-    `role`: `act`, `read` or `move`.
+    `role`: `act` or `read`.
     """
 
     def registered(physics: Physics) -> Physics:

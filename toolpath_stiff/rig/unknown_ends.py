@@ -3,10 +3,9 @@
 from functools import partial
 
 import numpy as np
-from numpy.random import Generator
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.draws import Shape, drawn, side, signed, uniform, whole
+from toolpath_stiff.rig.draws import drawn, side, signed, uniform
 from toolpath_stiff.rig.kinematics import rotations
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.rig.structure import Links
@@ -18,7 +17,6 @@ read = partial(kind, END_KINDS, "read")
 
 HALF_SPAN = 0.4  # m, half the distance of a bed's feet (assumed)
 FLOOR = -0.3  # m, height about which a bed rocks that stands on a weak floor (assumed)
-KNEE = 1.6  # m, height of a portal's knee, above all poses (assumed)
 SUPPORTS = 0.35  # m, radius of the circle of a table's three bearings (assumed)
 SOFTENING = 1.5  # K over which a damping plate takes up its softness (assumed; the rig's shop warms by as much)
 HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
@@ -30,12 +28,6 @@ HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
 BASE = "table,frame"
 AZIMUTH = uniform("azimuth", 0.0, 2.0 * np.pi)
 HOLDS = drawn(uniform("holds", 800.0, 2500.0), lambda rng: {"setup": "riser"})
-
-
-def _oblique(rng: Generator) -> Shape:
-    """Within 25 degrees of a diagonal of X and Y, in any quadrant."""
-    quadrant = 0.5 * np.pi * float(rng.integers(4))
-    return {"azimuth": quadrant + float(rng.uniform(np.radians(20.0), np.radians(70.0)))}
 
 
 @act(BASE, "x", SOFT)
@@ -94,13 +86,6 @@ def clamp_loosened(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return links.with_ends((X, give), (Y, give))
 
 
-@act(BASE, "z,constant", 4 * SOFT, shape=whole("axis", 0, 2))
-def portal_bending(links: Links, state: CommandedRows, u: Unknown) -> Links:
-    """The portal that carries the frame bends about a horizontal axis at its knee: the lower the tip, the more."""
-    arm = state.place.work_point - KNEE * Z
-    return links.with_ends((np.cross(np.eye(3)[u.shape["axis"]], arm), u.size))
-
-
 @act(BASE, "radius,x,y,constant", 30 * SOFT)
 def frame_twist(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The frame twists about the machine's axis: a load along the tangent at radius r gives c r^2."""
@@ -118,15 +103,6 @@ def spindle_thrust(links: Links, state: CommandedRows, u: Unknown) -> Links:
     )
 
 
-@act("platform,tool", "constant", SOFT, shape=_oblique)
-def spindle_flange(links: Links, state: CommandedRows, u: Unknown) -> Links:
-    """A screw of the spindle's flange is loose: the spindle rocks in the platform about one oblique axis of it."""
-    across = np.cos(u.shape["azimuth"]) * state.place.rotation[:, :, 0]
-    across = across + np.sin(u.shape["azimuth"]) * state.place.rotation[:, :, 1]
-    longer = 1.0 + state.rows.extension / max(state.nominal.tool_length, 1e-3)
-    return links.with_ends((longer[:, None] * across, u.size))
-
-
 @act("tool", "load", SOFT, shape=uniform("opens", 800.0, 2500.0), columns="force_N")
 def taper_opening(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """The tool holder's taper opens beyond a bending moment, with a longer tool sooner; then the tool tilts in it."""
@@ -137,13 +113,6 @@ def taper_opening(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return links.with_ends((state.place.rotation[:, :, 0], give), (state.place.rotation[:, :, 1], give))
 
 
-@read("instrument", "z", 1.0)
-def indicator_stand(rows: Rows, u: Unknown) -> FloatArray:
-    """A tall indicator stand gives way: sideways deflections are read too large, by the square of the height."""
-    sideways = np.linalg.norm(rows.direction[:, :2], axis=1)
-    return np.asarray(1.0 / (1.0 + u.size * sideways * rows.position[:, 2] ** 2))
-
-
 @read("instrument", "order,load", 1.0, columns="force_N,time_min")
 def load_cell_hysteresis(rows: Rows, u: Unknown) -> FloatArray:
     """A load cell remembers a larger load of the same clamping just before: too high by a share of the drop."""
@@ -151,12 +120,6 @@ def load_cell_hysteresis(rows: Rows, u: Unknown) -> FloatArray:
     anew = np.concatenate([[True], rows.time[1:] <= rows.time[:-1]])
     drop = np.where(anew, 0.0, np.maximum(before - rows.force, 0.0))
     return np.asarray(1.0 + u.size * drop / max(float(rows.force.max()), 1.0))
-
-
-@read("instrument", "load", 0.6, shape=signed, columns="force_N")
-def load_cell_curve(rows: Rows, u: Unknown) -> FloatArray:
-    """A load cell that is not linear: its error grows with the load."""
-    return np.asarray(1.0 + u.size * (rows.force - 500.0) / 4000.0)
 
 
 @read("instrument", "y,load", 0.6, shape=signed, columns="force_N")

@@ -6,18 +6,16 @@ from functools import partial
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.draws import drawn, one_strut, side, signed, uniform, whole
-from toolpath_stiff.rig.structure import BARS, Links
+from toolpath_stiff.rig.draws import drawn, one_strut, side, uniform, whole
+from toolpath_stiff.rig.structure import Links
 from toolpath_stiff.rig.unknown import ALL, ONE, SOFT, CommandedRows, Kind, Unknown, beyond, kind, opened
 
 STRUT_KINDS: dict[str, Kind] = {}
 act = partial(kind, STRUT_KINDS, "act")
-move = partial(kind, STRUT_KINDS, "move")
 
 SWING = np.sin(np.radians(20.0)) ** 2  # squared sine of the swing at which compliances are quoted
 SLIP_LOAD = 300.0  # N, load at which a sticking joint carries half of what it does at rest (assumed)
 LEAST_FORCE = 0.1  # N, below which a secant compliance is held
-SOUND_BAR = 3e9  # N/m, the bars of a platform one of which is cracked: 1.4 % at the tip (assumed)
 PRELOAD_GROWS = 0.3  # of the campaign, time constant of a machine that warms up (assumed)
 
 
@@ -45,12 +43,6 @@ def cardan_fork(links: Links, state: CommandedRows, u: Unknown) -> Links:
     radial = joints - np.einsum("nki,ni->nk", joints, axis)[:, :, None] * axis[:, None, :]
     pin = radial / np.linalg.norm(radial, axis=2, keepdims=True)
     return links.with_joints(u.size * np.einsum("nki,nki->nk", state.units, pin) ** 2)
-
-
-@act("joints,struts,platform", "tilt,radius,strut length,z", 3e6)
-def joint_binding(links: Links, state: CommandedRows, u: Unknown) -> Links:
-    """Joints that bind near the end of their swing: rotational stiffness m0 sin^2."""
-    return dataclasses.replace(links, moment=links.moment + u.size * state.swing / SWING)
 
 
 @act("joints,struts,platform", "load", 6e6, columns="force_N")
@@ -91,13 +83,6 @@ def drive_spring(links: Links, state: CommandedRows, u: Unknown) -> Links:
     return links.with_joints(u.size * np.maximum(state.stretched, 0.0) * _only(u.shape["strut"]))
 
 
-@act(ONE, "strut length", 3.0, shape=drawn(one_strut, signed))
-def other_screw(links: Links, state: CommandedRows, u: Unknown) -> Links:
-    """One strut was replaced: its stiffness has another slope over the length, k exp(a (s - 1/2))."""
-    factor = np.where(np.arange(6) == u.shape["strut"], np.exp(u.size * (state.stretched - 0.5)), 1.0)
-    return links.with_factors(factor)
-
-
 @act(ONE, "strut length", 0.85, shape=drawn(one_strut, uniform("wavelength", 0.12, 0.3), uniform("phase", 0.0, 6.28)))
 def screw_lead(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """One screw was ground with a wavy lead: its nut's stiffness varies periodically with the length."""
@@ -123,14 +108,6 @@ def strut_heating(links: Links, state: CommandedRows, u: Unknown) -> Links:
 def warm_up_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Joints gain their preload as the machine warms up: c = c0 exp(-t / tau) over the campaign."""
     return links.with_joints(u.size * np.exp(-state.rows.elapsed / PRELOAD_GROWS)[:, None] * np.ones(6))
-
-
-@act("platform,joints,one strut", "constant", 0.9995, shape=one_strut)
-def cracked_bar(links: Links, state: CommandedRows, u: Unknown) -> Links:
-    """The bar from one joint of the platform to the spindle nose is cracked; the others are stiff, but not rigid."""
-    stiffness = np.minimum(np.full(BARS, SOUND_BAR), links.bars)
-    stiffness[12 + u.shape["strut"]] *= 1.0 - u.size  # after the rim and the spokes, six each
-    return dataclasses.replace(links, bars=stiffness)
 
 
 @act("frame", "constant", SOFT, shape=whole("vertex", 0, 3))
@@ -159,11 +136,3 @@ def loose_vertex_bolt(links: Links, state: CommandedRows, u: Unknown) -> Links:
         return give
 
     return dataclasses.replace(links, loose=loose)
-
-
-@move("frame,joints,one strut", "constant", 0.3, shape=drawn(one_strut, whole("axis", 0, 3), signed))
-def joint_seat(u: Unknown) -> FloatArray:
-    """One frame joint stands elsewhere than the control believes."""
-    moved = np.zeros((6, 3))
-    moved[u.shape["strut"], u.shape["axis"]] = u.size
-    return moved

@@ -11,7 +11,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.errors import EffectFault
-from toolpath_stiff.machine.model import EffectEntry, Hexapod
+from toolpath_stiff.machine.model import EffectEntry, Hexapod, MachineTool
 from toolpath_stiff.stiffness.contract import SETUP, Effect, LoadPath, Parameter, Values, at_pose
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign, line_in, line_of
 
@@ -71,6 +71,13 @@ class ActiveEffect:
                 if np.shape(joints) != (6, 3) or not np.isfinite(joints).all():
                     raise self._fault("geometry", "gives joints that are not finite", "(6, 3) m")
         return changed
+
+    def stands(self, machine: MachineTool, joints: FloatArray) -> tuple[MachineTool, FloatArray]:
+        """Machine and joint values (n, j) with which it truly stands, of those that the control believes."""
+        true, turned = self._called("stands", machine, joints)
+        if is_foreign(self.effect):
+            self._check_shape("stands", turned, joints.shape)
+        return true, turned
 
     def reading(self, stiffness: FloatArray, path: LoadPath) -> FloatArray:
         """What an instrument shows, (n,) N/m, for a true stiffness; the same where it does not act."""

@@ -58,22 +58,25 @@ def known_effects(files: Iterable[str | Path] = (), kind: str = Hexapod.kind) ->
     InputError
         A file cannot be loaded, holds no effect, or names one that exists already.
     """
-    known = dict(packaged_effects() if kind == Hexapod.kind else effects_of_elements())
+    of_struts = kind == Hexapod.kind
+    known, others = (
+        dict(packaged_effects() if of_struts else effects_of_elements()),
+        "elements" if of_struts else "hexapods",
+    )
     for file in files:
         for name, effect in effects_from_file(file).items():
             if name in known:
                 line = None if effect.file else line_of(type(effect), "name")
                 raise EffectError(f"effect {name} exists already", file=str(file), line=line)
-            known[name] = effect
+            if effect.holds_for != others:
+                known[name] = effect
     return dict(sorted(known.items(), key=lambda item: (LINKS.index(item[1].link), item[0])))
 
 
 def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
     """The effect of that name. Raises `InputError` with the nearest name if there is none."""
     files = list(files)
-    known = known_effects(files)
-    if name not in known and name in effects_of_elements():
-        return effects_of_elements()[name]
+    known = known_effects(files, "elements") | known_effects(files)
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1)
         listed = f"`{command_line('effects', 'list', *options(effects=files))}` lists them"

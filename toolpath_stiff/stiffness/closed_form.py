@@ -18,7 +18,7 @@ from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.stiffness.elimination import Vector, cross, dot, forces, over_struts, strut
 
-BLOCK = 2048  # poses: some 1 MB of work arrays, which stay in a core's second-level cache
+BLOCK = 4096  # poses: fewer spend the time on calls, more fall out of the processor's cache
 # Determinants of unit directions lie within 0 and 1. Above this the elimination loses up to seven of sixteen digits:
 # at one pose in a hundred three or more, at most less than one (144,000 poses of random machines, many near singular).
 SMALL_DETERMINANT = 1e-3

@@ -6,7 +6,7 @@ An effect sits on one link of the load path, declares its parameters, and implem
 - `load_compliance`: a quadratic form in the loads, the six strut forces and the tip wrench. Frame vertices couple
   two struts, platform bars all six, a spindle only the wrench;
 - `parallel_stiffness`: a stiffness parallel to the struts. The core then solves instead of using equilibrium alone;
-- `geometry`: another machine geometry;
+- `geometry`: another machine geometry, of six struts; `stands`: of a machine of elements, how it truly stands;
 - `reading`: a change of the measured figure, not of the machine (an instrument).
 
 Everything is SI and batched over n poses. A method that an effect does not implement adds nothing.
@@ -17,6 +17,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -32,7 +33,8 @@ from toolpath_stiff.units import mm_from_m
 
 Values = Mapping[str, Any]  # name of a parameter -> SI value, or what is chosen: a number, a name
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
-HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading", "element_compliance")
+HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading", "element_compliance",
+         "stands")  # fmt: skip
 
 # Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
@@ -190,6 +192,7 @@ class LoadPath(ArrayColumns):
         assert isinstance(self.stance, Stance)
         return np.zeros((len(self), sum(load.compliance.shape[-1] for load in self.stance.loads)))
 
+    @cached_property
     def weight_loads(self) -> FloatArray:
         """(n, r) loads of the elements under the machine's own weight; 0 where its file has no masses."""
         assert isinstance(self.stance, Stance)
@@ -408,6 +411,17 @@ class Effect:
         """
         return machine
 
+    def stands(self, machine: MachineTool, joints: FloatArray, p: Values) -> tuple[MachineTool, FloatArray]:
+        """The machine, and joint values (n, j) m or rad, with which it truly stands where its control believes these.
+
+        Examples
+        --------
+        >>> import toolpath_stiff as tps
+        >>> "stands" in tps.effects(kind="serial")["joint_zero_error"].hooks
+        True
+        """
+        return machine, joints
+
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:
         """What the instrument reads, (n,) N/m, for a true stiffness (n,) N/m.
 
@@ -471,7 +485,7 @@ class Effect:
         >>> setup.conditions(values), setup.acts_on(path, values), setup.is_instrument  # the path names no set-up
         (('setup',), False, False)
         """
-        if "geometry" in self.hooks:
+        if not {"geometry", "stands"}.isdisjoint(self.hooks):
             return ()
         named = (q.name for q in self.parameters if q.kind == "text" and p.get(q.name))
         return tuple(dict.fromkeys(name for name in (*self.needs, *named) if name in CONDITIONS))

@@ -1,28 +1,26 @@
-"""Which route computes the tip compliance: the exact LAPACK route, the closed form, or the compiled loops.
+"""Which route computes the tip compliance: the exact LAPACK route or the closed form.
 
-For struts on a rigid platform all three give the same to rounding; the choice is made by the number of poses.
-Physical effects take the exact route, and so do whole tensors. Poses at which the closed form is ill-conditioned are
-marked by it, and the caller asks the exact route, which pivots.
+For struts on a rigid platform both give the same to rounding. Physical effects take the exact route, and so do whole
+tensors and few poses. Poses at which the closed form is ill-conditioned are marked by it, and the caller asks the exact
+route, which pivots.
 """
 
 from collections.abc import Iterator
 from dataclasses import replace
-from importlib.util import find_spec
 
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray, product
 from toolpath_stiff.machine.model import Hexapod, as_hexapod
 from toolpath_stiff.stiffness import closed_form, element_sum, exact
 from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.element_sum import stance_of
 from toolpath_stiff.stiffness.geometry_slopes import geometry_slopes
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small
 CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2 ms a call is not earned back
-# Poses; numba takes about 0.5 s to import and load from its cache, which the closed form spends on 1.5 million.
-COMPILED_FROM = 1_500_000
 LEAST_LOAD = 1.0  # N
 
 Tools = FloatArray | float  # m, length of the tool; N, size of the load: of all poses, or (n,)
@@ -38,16 +36,6 @@ def is_closed_form(model: StiffnessModel) -> bool:
     )
 
 
-def choose_route(model: StiffnessModel, poses: int) -> str:
-    """The route for so many poses along one direction each: "exact", "closed_form" or "compiled"."""
-    if poses < CLOSED_FORM_FROM or not is_closed_form(model):
-        return "exact"
-    straight = not as_hexapod(
-        model.machine, "the compiled loops"
-    ).strut_law.shape  # the compiled loops know no other law
-    return "compiled" if poses >= COMPILED_FROM and straight and find_spec("numba") else "closed_form"
-
-
 def tip_compliance(
     model: StiffnessModel,
     position: FloatArray,
@@ -55,6 +43,7 @@ def tip_compliance(
     tool_length: Tools = np.nan,
     force: float = defaults.FORCE,
     load: FloatArray | None = None,
+    in_work: bool = False,
 ) -> FloatArray:
     """Compliance of the tool tip at n poses; load-dependent effects as under the load, left out where none is given.
 
@@ -72,6 +61,8 @@ def tip_compliance(
         N, the size of the load.
     load
         (n, 3) N, the force on the tip that acts; less than `LEAST_LOAD` counts as that.
+    in_work
+        Along the axes of the work, which a machine may turn, not of its base.
 
     Returns
     -------
@@ -84,7 +75,9 @@ def tip_compliance(
         towards = towards / np.linalg.norm(towards, axis=1)[:, None]
     for rows, path in _paths(model, position, rotation, tool_length, size):
         if not isinstance(model.machine, Hexapod):
-            compliance[rows] = element_sum.tip_compliance(model, path)
+            axes, compliance[rows] = stance_of(path).work_axes, element_sum.tip_compliance(model, path)
+            if in_work and axes is not None:
+                compliance[rows] = product(product(np.swapaxes(axes, 1, 2), compliance[rows]), axes)
             continue
         compliance[rows] = exact.tip_compliance(model, path, None if towards is None else towards[rows])
     return compliance
@@ -129,49 +122,6 @@ def rows_of_tools(tool_length: FloatArray) -> list[tuple[float, IntArray | slice
     return [(float(length), np.flatnonzero(number == i)) for i, length in enumerate(lengths)]
 
 
-def compliance_along_columns(
-    machine: Hexapod,
-    position: FloatArray,
-    direction: FloatArray,
-    rotation: FloatArray | None,
-    tool_length: float,
-    route: str,
-) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Compliance of struts on a rigid platform along one direction a pose, with what the limits ask for.
-
-    Arguments and results as of `closed_form.compliance_along_columns`, of a machine with a tool of that length (m), by
-    one of the fast routes. Where a pose is not good the exact route must be asked.
-    """
-    kernel = closed_form.prepare(machine, tool_length)
-    if route == "compiled":
-        return compiled_columns(kernel, position, direction, rotation)
-    return closed_form.compliance_along_columns(kernel, position, direction, rotation)
-
-
-def compiled_columns(
-    kernel: closed_form.ClosedForm, position: FloatArray, direction: FloatArray, rotation: FloatArray | None = None
-) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """As `closed_form.compliance_along_columns`, of contiguous arrays and a law that is a straight line.
-
-    numba is imported when this is first called: 0.4 s, and some seconds to compile the first time on a machine; the
-    result is cached on disk.
-    """
-    from toolpath_stiff.stiffness import compiled_loops
-
-    # Tuples, which the compiled loop keeps in registers.
-    arms, frame = (tuple(map(tuple, joints.T.tolist())) for joints in (kernel.platform, kernel.frame))
-    law, n = (kernel.law.intercept, kernel.law.slope), position.shape[1]
-    loads = np.ascontiguousarray(direction if direction.ndim == 3 else direction[None])
-    out, det, lengths = np.empty((len(loads), n)), np.empty((2, n)), np.empty((6, n))
-    for load, along in zip(loads, out, strict=True):
-        compiled_loops.directed_columns((position, rotation, load), (arms, frame), law, along, det, lengths)
-    in_order = np.empty_like(lengths)
-    in_order[kernel.order] = lengths
-    # Values are nan where a strut has no stiffness above zero.
-    good = np.asarray((closed_form.well_conditioned(kernel, det[0], det[1]) & np.isfinite(out)).all(axis=0))
-    return out if direction.ndim == 3 else out[0], np.abs(det[0] * det[1]), in_order, good
-
-
 def compliance_with_effects(
     model: StiffnessModel,
     position: FloatArray,
@@ -186,7 +136,7 @@ def compliance_with_effects(
 
     Returns
     -------
-    (n,) m/N; nan where the exact route must be asked. Columns as of `compliance_along_columns`.
+    (n,) m/N; nan where the exact route must be asked. Columns as of `closed_form.compliance_along_columns`.
     """
     compliance = np.full(position.shape[1], np.nan)
     kernel = closed_form.prepare(as_hexapod(model.machine, "the closed form"), tool_length)

@@ -1,4 +1,4 @@
-"""Strut forces by elimination: the arithmetic of the closed form, of many poses in numpy or of one in compiled loops.
+"""Strut forces by elimination: the arithmetic of the closed form, of many poses at a time.
 
 Equilibrium J^T f = w of the exact route, solved by 3 x 3 blocks instead of a pivoted 6 x 6: the struts are split into
 two triplets A and B, forces are eliminated first,
@@ -7,10 +7,9 @@ two triplets A and B, forces are eliminated first,
 
 with U the strut directions and M = r x u their moments about the tip as columns. 3 x 3 inverses are cross products.
 
-A vector is three components, a matrix its three columns; a component is an array over poses, or a number where
-`compiled_loops` compiles the same functions with numba. (Whoever changes one saves that file anew: numba's cache on
-disk looks at it alone.) In numpy components may be those of several vectors at once: dimensions before the poses.
-Terms are added in the order in which they are written, so that numbers are the same to the last bit in every version.
+A vector is three components, a matrix its three columns; a component is an array over poses. Components may be those
+of several vectors at once: dimensions before the poses. Terms are added in the order in which they are written, so that
+numbers are the same to the last bit in every version.
 """
 
 from collections.abc import Sequence
@@ -32,16 +31,11 @@ def cross(a: Vector, b: Vector) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def dot(a: Vector, b: Vector) -> FloatArray:
-    """Scalar product a . b."""
+    """Scalar product a . b, or a matrix of the columns a times the vector b."""
     total = a[0] * b[0]
     total += a[1] * b[1]
     total += a[2] * b[2]
     return total
-
-
-def combine(columns: Vector, x: Vector) -> FloatArray:
-    """A matrix of these columns times a vector; numpy's columns are arrays, for numba's `compiled_loops` has it."""
-    return dot(columns, x)
 
 
 def strut(s: Vector, arm: Vector) -> tuple[Sequence[FloatArray], Sequence[FloatArray], FloatArray]:
@@ -57,8 +51,8 @@ def forces(t: Vector, moments: Vector, q: Vector, a: Vector) -> Sequence[FloatAr
 
     `t` is U_A^-1 U_B, `moments` is M_A, `q` the inverse of S = M_B - M_A U_A^-1 U_B.
     """
-    b = combine(q, combine(moments, a))
-    back = combine(t, b)
+    b = dot(q, dot(moments, a))
+    back = dot(t, b)
     return (a[0] + back[0], a[1] + back[1], a[2] + back[2], -b[0], -b[1], -b[2])
 
 

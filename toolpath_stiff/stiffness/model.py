@@ -19,7 +19,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
-from toolpath_stiff.machine.elements import Stance
+from toolpath_stiff.machine.elements import TORSION, Stance
 from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.limits import solved
 from toolpath_stiff.machine.model import EffectEntry, Hexapod, MachineTool, as_hexapod
@@ -29,6 +29,7 @@ from toolpath_stiff.stiffness.as_built import as_built
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import ELEMENT, SETUP, Conditions, LoadPath
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
+from toolpath_stiff.units import m_from_nm
 
 NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
 STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
@@ -182,6 +183,9 @@ def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> Sti
     given, actives = model.given, [*model.effects, *model.instruments]
     if isinstance(given, Hexapod) and name in given.strut_law.parameters:
         return _assembled(given.with_changes(strut_law=given.strut_law.moved(name, change)), actives, model.conditions)
+    if (joint := name.removesuffix(TORSION)) != name:
+        softer = {ELEMENT: joint, "compliance": m_from_nm(change)}
+        return _assembled(given, [*actives, ActiveEffect(find_effect("joint_torsion"), softer)], model.conditions)
     for i, active in enumerate(actives):
         for parameter in active.effect.parameters:
             if name == f"{active.effect.name}.{parameter.key}" and not parameter.discrete:
@@ -257,8 +261,12 @@ def path_of_stance(
     force: ArrayLike = defaults.FORCE,
     **seen: Any,
 ) -> LoadPath:
-    """What the effects see of a machine of elements that stands at n poses; arguments as of `load_path`."""
-    n = len(stance)
+    """What the effects see of a machine of elements whose control believes this stance; arguments as of `load_path`."""
+    n, true, joints = len(stance), model.machine, stance.joints
+    for active in model.effects:
+        true, joints = active.stands(true, joints)
+    if joints is not stance.joints or true is not model.machine:
+        stance = true.standing(joints, tool_length)
     extension = np.asarray(tool_length, dtype=float) - model.machine.reference_tool_length
     return LoadPath(
         machine_tool=model.machine,

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -16,15 +17,16 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import to_dict
 from toolpath_stiff.errors import EffectError, EffectFault, InputError
 from toolpath_stiff.hints import command_line, options
+from toolpath_stiff.machine.elements import turns
 from toolpath_stiff.machine.kinematics import solve_struts
-from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.machine.limits import reach, solved
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.results import Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness import exact
+from toolpath_stiff.stiffness import element_sum, exact
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import effects_from_file
-from toolpath_stiff.stiffness.contract import Effect, LoadPath, Parameter, Values
+from toolpath_stiff.stiffness.contract import ELEMENT, Effect, LoadPath, Parameter, Values
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model, load_path
 from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 POSES, DRAWN = 24, 600
+AROUND = 0.3  # m around the default origin of a machine of elements
 LEANING = rad_from_deg(10.0)  # largest roll, pitch and yaw of the poses
 SETUPS = ("riser", "table")
 ALLOW = "--allow-unchecked-effects"
@@ -61,7 +64,7 @@ def own_effects(model: StiffnessModel, effect_files: Iterable[str | Path]) -> li
     return list(dict.fromkeys([*acting, *in_files]))
 
 
-def refuse_failing(effects: Iterable[Effect], machine: Hexapod, machine_name: str) -> None:
+def refuse_failing(effects: Iterable[Effect], machine: MachineTool, machine_name: str) -> None:
     """Raise `InputError` for the first effect from outside the package that fails on a machine, which it names."""
     for effect, reason in _failing(effects, machine):
         check = command_line("effects", "check", file_of(effect), *options(machine=machine_name))
@@ -69,12 +72,12 @@ def refuse_failing(effects: Iterable[Effect], machine: Hexapod, machine_name: st
         raise EffectError(f"effect {effect.name} {reason}", file=file_of(effect), hint=hint)
 
 
-def failures(effects: Iterable[Effect], machine: Hexapod) -> list[str]:
+def failures(effects: Iterable[Effect], machine: MachineTool) -> list[str]:
     """What results say of effects that were used although they fail."""
     return [f"UNCHECKED effect {effect.name} ({ALLOW}): it {reason}" for effect, reason in _failing(effects, machine)]
 
 
-def _failing(effects: Iterable[Effect], machine: Hexapod) -> Iterator[tuple[Effect, str]]:
+def _failing(effects: Iterable[Effect], machine: MachineTool) -> Iterator[tuple[Effect, str]]:
     """Effects in which `effects check` finds something wrong: the end of a sentence."""
     plain = pickle.dumps(machine.with_changes(effects=(), instruments=()))
     return ((effect, reason) for effect in effects if (reason := _failure(effect, plain)))
@@ -89,7 +92,7 @@ def _failure(effect: Effect, machine: bytes) -> str:
     return "; ".join(f"fails the check of its {row.name}: {row.found}" for row in outcomes if row.passed is False)
 
 
-def try_effect(effect: Effect, machine: Hexapod, seed: int = 0) -> list[TrialOutcome]:
+def try_effect(effect: Effect, machine: MachineTool, seed: int = 0) -> list[TrialOutcome]:
     """Try an effect on a machine, by itself: at its neutral value and typical values.
 
     Parameters
@@ -109,14 +112,18 @@ def try_effect(effect: Effect, machine: Hexapod, seed: int = 0) -> list[TrialOut
     return outcomes
 
 
-def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOutcome]:
+def _behaviour(effect: Effect, machine: MachineTool, seed: int) -> Iterator[TrialOutcome]:
     """What it does at some poses with one set of parameters after the other."""
     plain, poses = build_model(machine), _poses(machine, seed)
+    elements = () if isinstance(machine, Hexapod) else machine.elements
+    names = [element.name for element in elements if turns(element) == (effect.link == "joints")]
+    if effect.holds_for == "elements" and not names:
+        raise InputError(f"machine {machine.name} has no such element", expected="one with it (--machine)")
     before, after = _shown(plain, _path(plain, poses)), {}
-    for words, values in _parameter_sets(effect):
+    for words, values in _parameter_sets(effect, names):
         model = build_model(machine, extra=[ActiveEffect(effect, values)])
         path = _path(model, poses)
-        exact.tip_compliance(model, path)  # refused if there can be no such one
+        _solver(machine).tip_compliance(model, path)  # refused if there can be no such one
         after[words] = _shown(model, path)
     alone = np.concatenate([_shown(model, path.take(slice(i, i + 1))) for i in range(len(path))])
     yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {len(poses)} poses")
@@ -134,7 +141,7 @@ def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOut
     mistake = f"alone and together differ by up to {100.0 * mixed:.3g} %: the poses mix"
     yield TrialOutcome("poses", mixed <= SAME, "each alone gives what all together give" if mixed <= SAME else mistake)
     # What gives way can only soften the tip, what stands beside the struts only stiffen it; others may do both.
-    softening = set(effect.hooks) <= {"strut_compliance", "load_compliance"}
+    softening = set(effect.hooks) <= {"strut_compliance", "load_compliance", "element_compliance"}
     side = 1.0 if softening else -1.0 if effect.hooks == ["parallel_stiffness"] else 0.0
     both_ways = any(p.kind == "real" and p.bounds[0] < p.neutral < p.bounds[1] for p in effect.parameters)
     if (side * changes > 100.0 * SAME).any() and not both_ways and not effect.described_from:
@@ -142,27 +149,30 @@ def _behaviour(effect: Effect, machine: Hexapod, seed: int) -> Iterator[TrialOut
         yield TrialOutcome("sign", False, mistake)
 
 
-def _poses(machine: Hexapod, seed: int) -> FloatArray:
-    """(n, 6) m and rad within reach, the default origin first."""
+def _poses(machine: MachineTool, seed: int) -> FloatArray:
+    """(n, 6) m and rad within reach, the default origin first; a machine of elements as upright as there."""
     origin = np.array(machine.default_origin)
     low, high = machine.limits.workspace
-    size = 0.25 * float(solve_struts(machine, origin[:3]).lengths.mean())
+    of_struts = isinstance(machine, Hexapod)
+    size = 0.25 * float(solve_struts(machine, origin[:3]).lengths.mean()) if isinstance(machine, Hexapod) else AROUND
     low, high = np.maximum(low, origin[:3] - size), np.minimum(high, origin[:3] + size)
     generator = np.random.default_rng(seed)
     place, lean = generator.uniform(low, high, (DRAWN, 3)), generator.uniform(-LEANING, LEANING, (DRAWN, 3))
-    drawn = np.vstack([origin, np.column_stack([place, lean])[1:]])
+    drawn = np.vstack([origin, np.column_stack([place, lean if of_struts else lean * 0.0 + origin[3:]])[1:]])
     turn = rotation_matrices(drawn[:, 3:])
-    within = reach(machine, drawn[:, :3], solve_struts(machine, drawn[:, :3], turn), turn).reachable
+    within = reach(machine, drawn[:, :3], solved(machine, drawn[:, :3], turn), turn).reachable
     return drawn[within][:POSES] if within.any() else drawn[:1]
 
 
-def _parameter_sets(effect: Effect) -> Iterator[tuple[str, Values]]:
+def _parameter_sets(effect: Effect, elements: Sequence[str]) -> Iterator[tuple[str, Values]]:
     """Words -> SI values."""
     for words, index in (("neutral", None), ("typical, low", 0), ("typical, high", 1)):
         values: dict[str, str | float] = {}
         for p in effect.parameters:
             if p.kind == "real":
                 values[p.name] = p.si * (p.neutral if index is None else p.typical[index])
+            elif p.name == ELEMENT:
+                values[p.name] = elements[len(elements) // 2]
             else:
                 values[p.name] = SETUPS[0] if p.kind == "text" else int(p.bounds[index or 0])
         yield words, values
@@ -179,10 +189,15 @@ def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
 def _shown(model: StiffnessModel, path: LoadPath) -> FloatArray:
     """(n,) N/m that a gauge shows, one direction a pose."""
     assert path.direction is not None
-    stiffness = 1.0 / exact.compliance_along(model, path, path.direction)
+    stiffness = 1.0 / _solver(model.machine).compliance_along(model, path, path.direction)
     for active in model.instruments:
         stiffness = active.reading(stiffness, path)
     return np.asarray(stiffness)
+
+
+def _solver(machine: MachineTool) -> ModuleType:
+    """What gives the compliance of a kind of machine."""
+    return exact if isinstance(machine, Hexapod) else element_sum
 
 
 def _unit(parameter: Parameter) -> TrialOutcome:

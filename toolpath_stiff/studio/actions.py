@@ -1,9 +1,11 @@
 """What a page may ask a session to do; files that are dropped on it."""
 
+import re
 import tempfile
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -84,15 +86,6 @@ def _measure(session: Session) -> None:
     session.case.measure(str(session.case.folder / plan / "plan.csv"))
 
 
-def _save_effect(session: Session, file: str, text: str) -> None:
-    try:
-        with _sent(session, Path(file).name, text.encode()) as path:
-            session.case.add_effects(path, instead_of=file)
-        session.faults.pop(file, None)
-    except TpsError as error:
-        session.faults[file] = (text, str(error))
-
-
 @contextmanager
 def _sent(session: Session, name: str, content: bytes) -> Iterator[Path]:
     """What a page has sent, as a file; errors do not name its folder."""
@@ -115,12 +108,14 @@ def take_file(session: Session, name: str, content: bytes, run: bool) -> Documen
         return {"confirm": f"{plain} is code. It is run when it is loaded. Load it?"}
     with session.lock, _sent(session, plain, content) as file:
         case = session.case
+        # A copy that took another's place has a number at its end.
+        again = next((name for name in case.state.effects if plain in (Path(name).name, _unnumbered(name))), "")
         if kind in TABLES:
             case.add_program(**cast("Reading", {kind: file}))
         else:
             takers: dict[str, Callable[[Path], None]] = {
                 "data": case.add_data,
-                "effects": case.add_effects,
+                "effects": partial(case.add_effects, instead_of=again),
                 "machine": case.set_machine,
                 "cut": case.set_cut,
             }
@@ -129,6 +124,10 @@ def take_file(session: Session, name: str, content: bytes, run: bool) -> Documen
         session.follow_up()
         session.tell()
     return {"message": session.message}
+
+
+def _unnumbered(name: str) -> str:
+    return re.sub(r"-\d+(?=\.\w+$)", "", Path(name).name)
 
 
 def _kind(suffix: str, content: bytes) -> str:
@@ -159,7 +158,6 @@ ACTIONS: dict[str, Callable[..., Document | None]] = {
     "draft": lambda session: session.queue("draft"),
     "set_up": lambda session: session.queue("set_up"),
     "place": lambda session: session.queue("place"),
-    "save_effect": _save_effect,
     "measure": _measure,
     "exercise": lambda session, seed, layout="tilted": session.case.start_exercise(seed, layout=layout),
     "claim": lambda session, effects: session.case.claim(str(effects)),

@@ -1,16 +1,14 @@
 """The studio's page: one document of its own scripts and styles, live or, as an export, with the state within it."""
 
 import html
-import json
 from importlib import resources
 
 from toolpath_stiff.defaults import VERSION
-from toolpath_stiff.report.colours import page_colours
 from toolpath_stiff.report.pages import asset, json_pieces, script_hash
 from toolpath_stiff.studio.picture import document
 from toolpath_stiff.studio.session import Session
 
-SHARED = ("stage.js", "elements.js", "viewer.js", "solids.js", "machine.js", "profile.js")  # of the static pages
+SHARED = ("stage.js", "elements.js", "viewer.js", "solids.js", "machine.js", "profile.js", "listing.js")
 OWN = ("scene.js", "panels.js", "studio.js")
 
 
@@ -25,10 +23,8 @@ def exported(session: Session) -> str:
 
 
 def _document(state: str, connect: str, title: str) -> str:
-    palette = page_colours()
-    colours = json.dumps({"light": palette["colours"], "dark": palette["colours_dark"]})
     text = "".join([*map(asset, SHARED), *map(_own, OWN)])
-    script = f'\n"use strict";\n(() => {{\nconst COLOURS = {colours};\n{text}}})();\n'
+    script = f'\n"use strict";\n(() => {{\n{text}}})();\n'
     policy = (
         f"default-src 'none'; script-src '{script_hash(script)}'; style-src 'unsafe-inline'; img-src data:; {connect}"
         "base-uri 'none'; form-action 'none'"

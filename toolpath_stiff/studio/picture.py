@@ -35,7 +35,6 @@ def document(session: Session) -> Document:
             "gauge": gauge(session) if state.data else None,
             "verdict": verdict(session),
             "effects": effects(session),
-            "own_effects": own_effects(session),
             "fit": {**fit, "holds": session.is_fitted} if fit else None,
             "plan": result(session, "plan"),
             "compare": result(session, "compare"),
@@ -177,16 +176,6 @@ def _setups(session: Session) -> list[str]:
         return sorted({*columns.get("setup", ())} - {""})
 
     return session.once("setups", session.case.state.judged, make) if session.case.state.data else []
-
-
-def own_effects(session: Session) -> list[Document]:
-    """The own effects of the case: their text, or what was saved last and is at fault."""
-    rows: list[Document] = []
-    for name in session.case.state.effects:
-        kept = (session.case.folder / name).read_text("utf-8", "replace")
-        text, fault = session.faults.get(name, (kept, ""))
-        rows.append({"file": name, "text": text, "fault": fault})
-    return rows
 
 
 def program(session: Session) -> Document:

@@ -1,25 +1,30 @@
 """Opening a case for the studio, and serving it until it is ended."""
 
+from __future__ import annotations
+
 import os
 import signal
 import threading
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from toolpath_stiff.case.case import Case
-from toolpath_stiff.case.state import CASE_FILE
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
-from toolpath_stiff.studio.server import Studio
-from toolpath_stiff.studio.session import Session
-from toolpath_stiff.studio.work import prepared
+from toolpath_stiff.studio.preloading import prepared
+
+if TYPE_CHECKING:
+    from toolpath_stiff.case.case import Case
 
 
 def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise: int | None) -> Case:
     """The case of a folder, or a new one. Raises `InputError` where machine or exercise are of a case that is there."""
-    prepared()  # while the case is read
+    prepared()  # beside what is loaded here
+    from toolpath_stiff.case.case import Case
+    from toolpath_stiff.case.state import CASE_FILE
+
     there = is_file(Path(folder) / CASE_FILE)
     if there and (machine is not None or exercise is not None):
         name = "machine" if machine is not None else "exercise"
@@ -32,6 +37,9 @@ def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise
 
 def serve(case: Case, port: int = 0, *, browser: bool = True) -> int:
     """Serve until Ctrl-C or a request to end; returns 0. Raises `InputError` where the port is taken."""
+    from toolpath_stiff.studio.server import Studio
+    from toolpath_stiff.studio.session import Session
+
     os.chdir(case.folder)  # so that files are named as the commands in the history name them
     case.folder = Path()
     session = Session(case)

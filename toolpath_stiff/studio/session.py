@@ -41,13 +41,10 @@ class Session:
         Held by whoever reads or changes the state.
     message
         What tabs are told.
-    faults
-        File of own effects -> the text that was saved last and what is wrong with it.
     """
 
     def __init__(self, case: Case) -> None:
         self.case, self.name, self.message = case, case.folder.resolve().name, ""
-        self.faults: dict[str, tuple[str, str]] = {}
         self.lock, self._changed = threading.RLock(), threading.Condition()
         self._version = self._beat = 0
         self._jobs: list[tuple[str, Document]] = []

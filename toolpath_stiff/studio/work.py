@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from multiprocessing import forkserver
 from multiprocessing.connection import Connection
-from multiprocessing.context import BaseContext
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +17,12 @@ from toolpath_stiff.case.case import Case, find
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.report.curves import extremes_by_column
+from toolpath_stiff.studio.preloading import prepared
 from toolpath_stiff.units import mm_from_m, um_from_m
 
 COARSE_SAMPLES = 6000  # of a path in the page; the statistics are those of all samples
 REPORTS_EVERY = 0.2  # s
 DRAWN = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "s_mm", "t_s", "margin")
-PRELOADED = ("studio.work", "correction.strut_law", "diagnosis.diagnose", "analysis.results", "planning.result")
 
 
 class Job:
@@ -71,16 +68,6 @@ class Job:
     def stop(self) -> None:
         """End it at once; nothing of it is kept."""
         self._process.kill()
-
-
-def prepared() -> BaseContext:
-    """Processes that begin with the libraries loaded, from now on, where the system can do that; else from scratch."""
-    if "forkserver" not in multiprocessing.get_all_start_methods():
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["pandas", *(f"toolpath_stiff.{name}" for name in PRELOADED)])
-    forkserver.ensure_running()
-    return context
 
 
 def work(folder: Path, kind: str, result: str, given: Document, first: str, pipe: Connection) -> None:

@@ -23,19 +23,16 @@ def offset_move(state: State, cutter: RadiusCompensation, move: Move, control: l
     Raises `ArcError`.
     """
     frames, rows, step = state.frames, len(state.recorder.recent), None
-    geometry.refuse_arc_if(
-        any(frames.from_machine[axis] for axis in cutter.axes[:2]),
-        "a move under cutter compensation from machine coordinates",
-        "both words of the plane",
-    )
+    of_machine, problem = [frames.from_machine[axis] for axis in cutter.axes[:2]], "from machine coordinates"
+    geometry.refuse_arc_if(any(of_machine), f"a move under cutter compensation {problem}", "both words of the plane")
     there = frames.to_program(control)
     start, target = cutter.in_plane(frames.to_program(frames.position)), cutter.in_plane(there)
-    direction = (target[0] - start[0], target[1] - start[1])
+    direction = target - start
     programmed = None if move.arc is None else _programmed(frames, cutter, move.arc)
     if cutter.position is None:
         step, direction = compensation.enter(cutter, start, target, programmed)
         cutter.position, cutter.anchor = frames.to_program(frames.from_setup(move.start)), start
-    elif programmed is not None or math.dist(start, target) >= SAME_PLACE:  # else the corner is still to come
+    elif programmed is not None or abs(target - start) >= SAME_PLACE:  # else the corner is still to come
         step = compensation.go_on(cutter, start, target, programmed)
         _go_round_corner(state, cutter, move, step, start, there)
     if step is not None and step.center is not None and programmed is not None:
@@ -49,7 +46,7 @@ def offset_move(state: State, cutter: RadiusCompensation, move: Move, control: l
 
 
 def _go_round_corner(
-    state: State, cutter: RadiusCompensation, move: Move, step: CenterMove, start: geometry.Point2, there: list[float]
+    state: State, cutter: RadiusCompensation, move: Move, step: CenterMove, start: complex, there: list[float]
 ) -> None:
     """End the moves before the corner, and go round it if it is convex; rotary axes turn on the way round.
 
@@ -80,13 +77,11 @@ def _add(state: State, cutter: RadiusCompensation, move: Move, end: list[float],
     move.start = to_setup_of_program(frames, here)
     move.end, move.arc, cutter.position = standing(move.start, to_setup_of_program(frames, end)), None, end
     if arc is not None:
-        x, y, z = to_setup_of_program(frames, cutter.moved(here, arc.center))[:3]
-        sweep = arc.sweep_to(cutter.in_plane(here), cutter.in_plane(end))
-        move.arc = Arc((x, y, z), frames.turn_direction(geometry.normal_of(state.plane)), sweep)
+        move.arc = arc_about(state, here, arc.center, arc.sweep_to(cutter.in_plane(here), cutter.in_plane(end)))
     return move if state.recorder.add(move) else None
 
 
-def settle(state: State, cutter: RadiusCompensation, to: geometry.Point2) -> None:
+def settle(state: State, cutter: RadiusCompensation, to: complex) -> None:
     """Move the end of the pending moves; raises `ArcError` where the tool would have to go back."""
     assert cutter.position is not None
     for pending in cutter.pending:
@@ -106,14 +101,22 @@ def _row(state: State, move: Move) -> int:
     return next(row for row in range(len(recent) - 1, -1, -1) if recent[row] is move)
 
 
-def _gouges(cutter: RadiusCompensation, move: Pending, to: geometry.Point2) -> bool:
+def _gouges(cutter: RadiusCompensation, move: Pending, to: complex) -> bool:
     """Whether a move that ends at `to` would go back, or round the wrong way."""
     anchor, arc = cutter.anchor, move.arc
     if arc is None:
-        return move.direction[0] * (to[0] - anchor[0]) + move.direction[1] * (to[1] - anchor[1]) < 0.0
-    apart = abs(math.dist(cutter.in_plane(move.end), arc.center) - math.dist(to, arc.center))
+        return (move.direction.conjugate() * (to - anchor)).real < 0.0
+    apart = abs(abs(cutter.in_plane(move.end) - arc.center) - abs(to - arc.center))
     longer = abs(arc.sweep_to(anchor, to)) > abs(arc.programmed) + compensation.SHORTENED
     return apart > compensation.MATCHING * cutter.unit or (arc.programmed != 0.0 and longer)
+
+
+def arc_about(state: State, here: list[float], center: complex, sweep: float) -> Arc:
+    """The arc about a point of the plane in force, from a point in program coordinates."""
+    frames, middle, (first, second, _) = state.frames, list(here), geometry.PLANES[state.plane]
+    middle[first], middle[second] = center.real, center.imag
+    x, y, z = to_setup_of_program(frames, middle)[:3]
+    return Arc((x, y, z), frames.turn_direction(geometry.normal_of(state.plane)), sweep)
 
 
 def _rewrite(state: State, cutter: RadiusCompensation, pending: Pending) -> None:

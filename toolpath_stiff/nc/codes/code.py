@@ -3,7 +3,7 @@
 Each module here has a group of codes, each a function and a row; `registry` joins the rows to one table.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.state import STEPS, CurrentBlock, Group, State
@@ -90,6 +90,24 @@ def family(
     ['M3', 'M5']
     """
     return tuple(Code(name, group, act, text, source, controls, listed=listed) for name, text in meanings.items())
+
+
+Rows = tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...]  # group, source, and names, function, meaning
+
+
+def table(rows: Rows, controls: tuple[str, ...], between: str | None = None) -> dict[str, Code]:
+    """Codes of a language by their names, which stand between blanks, or other separators."""
+    return {
+        name: Code(name, group, act, meaning, source, controls)
+        for group, source, members in rows
+        for names, act, meaning in members
+        for name in names.split(between)
+    }
+
+
+def refused(rows: Iterable[tuple[str, str, str, str]], between: str | None = None) -> dict[str, Refused]:
+    """Refused codes by their names: names between blanks, or other separators, what they are, a hint, the source."""
+    return {name: Refused(name, what, hint, at) for names, what, hint, at in rows for name in names.split(between)}
 
 
 def code_name(letter: str, value: float) -> str:

@@ -14,7 +14,7 @@ from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import ADDITIONAL_OFFSETS, WORK_OFFSETS, ToolEntry, WorkOffset
 from toolpath_stiff.nc.words import Word
 
-FIRST_NUMBERED = 110  # G110 to G129
+NUMBERED = tuple(f"G{number}" for number in range(110, 130))
 
 
 def work_offset(state: State, block: CurrentBlock, code: str) -> None:
@@ -27,19 +27,11 @@ def work_offset(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def additional_offset(state: State, block: CurrentBlock, code: str) -> None:
-    """G54.1 P and G154 P: an additional offset; the controller file or G10 must have defined it."""
-    block.refuse_if(
-        code not in state.dialect.additional, code, f"is not a code of the dialect {state.dialect.name}", "G54 to G59.3"
-    )
-    _take_additional(state, block, block.codes[code], code, block.whole("P", block.codes[code]))
-
-
-def numbered_offset(state: State, block: CurrentBlock, code: str) -> None:
-    """G110 to G129: Haas' older names of G154 P1 to P20."""
-    block.refuse_if(
-        state.dialect.name != "haas", code, "is a work offset of Haas' controls", hint="name the control with --dialect"
-    )
-    _take_additional(state, block, block.codes[code], "G154", int(code[1:]) - FIRST_NUMBERED + 1)
+    """G54.1 P, G154 P (G110 to G129: Haas' older names of P1 to P20); the controller file or G10 defines them."""
+    if code in NUMBERED:
+        _take_additional(state, block, block.codes[code], "G154", NUMBERED.index(code) + 1)
+    else:
+        _take_additional(state, block, block.codes[code], code, block.whole("P", block.codes[code]))
 
 
 def _take_additional(state: State, block: CurrentBlock, word: Word, code: str, number: int | None) -> None:
@@ -47,11 +39,8 @@ def _take_additional(state: State, block: CurrentBlock, word: Word, code: str, n
     if number is None or number > ADDITIONAL_OFFSETS[code]:
         raise block.fail(word, "needs the number of its offset", f"P1 to P{ADDITIONAL_OFFSETS[code]}")
     if number not in state.frames.offsets.additional:
-        raise block.fail(
-            word,
-            f"is {code} P{number}, an offset that nothing defines",
-            hint=f'give it in the controller file: [offsets] "{code} P{number}" = [x, y, z]',
-        )
+        hint = f'give it in the controller file: [offsets] "{code} P{number}" = [x, y, z]'
+        raise block.fail(word, f"is {code} P{number}, an offset that nothing defines", hint=hint)
     take_offset(state, block, word, len(WORK_OFFSETS) + number - 1)
 
 
@@ -192,9 +181,7 @@ def _rotation_of(state: State, block: CurrentBlock, word: Word, here: list[float
     block.refuse_if(elsewhere, word, "outside of G17, or beside Z, A, B, C, I, J, K", "G68 X Y R in G17")
     if angle is None:
         raise block.fail(word, "without its angle, which is then a parameter of the control", "R in degrees")
-    block.refuse_if(
-        not state.absolute and present is not None, word, "in G91 under a rotation, where R may add", "G69 before it"
-    )
+    block.refuse_if(present and not state.absolute, word, "in G91 under a rotation, where R may add", "G69 before it")
     center = axis_words(state, block)
     if present is not None and not center:
         return (present[0], present[1], angle)
@@ -202,19 +189,15 @@ def _rotation_of(state: State, block: CurrentBlock, word: Word, here: list[float
 
 
 _FANUC = f"{FANUC}, Additional workpiece coordinate systems (G54.1)"
+_G154 = {"G154": "additional work offset (Haas)"}
 _STANDARD = {code: f"work offset {number}" for number, code in enumerate(WORK_OFFSETS, 1)}
-_NUMBERED = dict.fromkeys(
-    (f"G{number}" for number in range(FIRST_NUMBERED, FIRST_NUMBERED + 20)),
-    "additional work offset (Haas: G154 P1 to P20)",
-)
+_NUMBERED = dict.fromkeys(NUMBERED, "additional work offset (Haas: G154 P1 to P20)")
 _ROTATION = f"{FANUC} of the series 16 and 15i, Coordinate system rotation (G68, G69)"
 COORDINATE_CODES = (
     *family(_STANDARD, "work offset", work_offset, g_codes("G54-G59.3")),
     Code("G54.1", "work offset", additional_offset, "additional work offset", _FANUC, ("generic", "fanuc")),
-    Code(
-        "G154", "work offset", additional_offset, "additional work offset (Haas)", f"{HAAS}, G154", ("generic", "haas")
-    ),
-    *family(_NUMBERED, "work offset", numbered_offset, f"{HAAS}, G110-G129", ("haas",)),
+    *family(_G154, "work offset", additional_offset, f"{HAAS}, G154", ("generic", "haas")),
+    *family(_NUMBERED, "work offset", additional_offset, f"{HAAS}, G110-G129", ("haas",)),
     Code("G10", "non-modal", set_offsets, "set offsets", g_codes("G10 L1, G10 L2, G10 L20"), takes_axes=True),
     Code("G52", "non-modal", shift, "local shift", g_codes("G52"), takes_axes=True),
     Code("G92", "non-modal", shift, "shift", g_codes("G92"), takes_axes=True),

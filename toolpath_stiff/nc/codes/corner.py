@@ -9,10 +9,10 @@ import math
 from dataclasses import replace
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.center_path import to_setup_of_program
+from toolpath_stiff.nc.codes.center_path import arc_about, to_setup_of_program
 from toolpath_stiff.nc.codes.code import FANUC, HAAS, family
 from toolpath_stiff.nc.elements import cut_off
-from toolpath_stiff.nc.moves import ARC, FEED, Arc
+from toolpath_stiff.nc.moves import ARC, FEED
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import CORNERS
 
@@ -22,9 +22,7 @@ SAME_MM = 1e-9
 def corner(state: State, block: CurrentBlock, code: str) -> None:
     """`,C` and `,R`: the corner to the next block is cut off or rounded."""
     word, size, recent = block.values[code], block.take(code) or 0.0, state.recorder.recent
-    block.refuse_if(
-        state.dialect.name == "linuxcnc", word, "is not a word of the dialect linuxcnc", "generic, fanuc or haas"
-    )
+    block.refuse_if(state.dialect.name == "linuxcnc", word, "is not a word of the dialect linuxcnc", "fanuc or haas")
     block.refuse_if(size <= 0.0, word, "is the size of a corner", "more than 0")
     after_feed = recent and recent[-1].line == block.line and recent[-1].motion == FEED
     alone = after_feed and len(block.values.keys() & {*CORNERS}) == 1 and state.feed_mode != "G93"
@@ -38,7 +36,7 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     assert pending is not None
     others = [group for group in block.groups if group not in ("motion", "distance") and not group.startswith("M ")]
     block.refuse_if(
-        others or before.dwell, None, f"the second move of the corner of line {pending.line} beside other codes", "G1"
+        others or before.dwell, None, f"the move behind the corner of line {pending.line} beside other codes", "G1"
     )
     state.corner = None
     begin, vertex, end = before.start, frames.to_setup(frames.position), frames.to_setup(target)
@@ -66,9 +64,7 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     before.end = in_setup(start)
     arc = None
     if center is not None:
-        x, y, z = in_setup(center)[:3]
-        turned = cmath.phase((stop - center) / (start - center))
-        arc = Arc((x, y, z), frames.turn_direction(geometry.normal_of(state.plane)), turned)
+        arc = arc_about(state, points[1], center, cmath.phase((stop - center) / (start - center)))
     bound, motion, beyond = before.from_machine[1], ARC if arc else FEED, in_setup(stop)
     state.recorder.add(
         replace(before, motion=motion, start=before.end, end=beyond, from_machine=(bound, bound), arc=arc)
@@ -76,10 +72,6 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     frames.position = [p + new - old for p, new, old in zip(frames.position, beyond, vertex, strict=True)]
 
 
-CORNER_CODES = family(
-    {",C": "chamfer to the next block", ",R": "rounding to the next block"},
-    "corner",
-    corner,
-    f"{FANUC}, Optional chamfering and corner R; {HAAS}, G01",
-    ("generic", "fanuc", "haas"),
-)
+_CORNERS = {",C": "chamfer to the next block", ",R": "rounding to the next block"}
+_SOURCE = f"{FANUC}, Optional chamfering and corner R; {HAAS}, G01"
+CORNER_CODES = family(_CORNERS, "corner", corner, _SOURCE, ("generic", "fanuc", "haas"))

@@ -5,38 +5,28 @@ import math
 from toolpath_stiff.nc.codes.center_path import settle, to_setup_of_program
 from toolpath_stiff.nc.codes.code import Code, family, g_codes
 from toolpath_stiff.nc.compensation import TYPE_A, RadiusCompensation
-from toolpath_stiff.nc.geometry import PLANES, ArcError
+from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.state import CurrentBlock, State
 
 LEFT, RIGHT = 1, -1
 SIDES = {"G41": LEFT, "G41.1": LEFT, "G42": RIGHT, "G42.1": RIGHT}
 # What may stand in a block while compensation is on: all that LinuxCNC allows there and that leaves its path defined.
-GROUPS = frozenset(
-    (
-        "motion", "cutter compensation", "distance", "arc distance", "feed mode", "spindle mode", "lathe diameter",
-        "M spindle", "M coolant", "M subprogram",
-    )
-)  # fmt: skip
+GROUPS = {
+    "motion", "cutter compensation", "distance", "arc distance", "feed mode", "spindle mode", "lathe diameter",
+    "M spindle", "M coolant", "M subprogram",
+}  # fmt: skip
 MOTIONS = ("G0", "G1", "G2", "G3")
-OTHER_CONTROLS = "cutter compensation, whose entry and corners differ from control to control"
-NAME_CONTROL = "name the control with --dialect (linuxcnc, fanuc, haas), or post the path of the tool centre"
 
 
 def switch_on(state: State, block: CurrentBlock, code: str) -> None:
     """G41, G42 D: the tool is left or right of the contour, by the diameter in the tool table; D of G41.1 is it."""
     word, frames = block.codes[code], state.frames
     straight = state.dialect.increments  # Fanuc, Haas
-    unknown = state.dialect.name == "generic" or (straight and code.endswith(".1"))
-    block.refuse_if(unknown, word, f"is {OTHER_CONTROLS}", hint=NAME_CONTROL)
     _check_codes(state, block, ("plane", "units", "M tool change"))
-    turned = frames.rotation is not None or state.polar is not None or frames.tip_held
+    turned = frames.rotation or state.polar or frames.tip_held or state.plane == "G19"
     block.refuse_if(state.cutter is not None, word, "while cutter compensation is on", "G40 in a block before it")
-    block.refuse_if(
-        state.plane == "G19" or turned, word, "in G19, or under G68, G16 or G43.4", "G17, G69, G15, G49 first"
-    )
-    block.refuse_if(
-        straight and "D" not in block.values, word, "without D, whose last value the control would take", "D"
-    )
+    block.refuse_if(turned, word, "in G19, or under G68, G16 or G43.4", "G17, G69, G15, G49 first")
+    block.refuse_if(straight and "D" not in block.values, word, "without D, whose last value would hold", "D")
     if straight and block.values["D"].value == 0:  # no offset: the programmed path is the tool centre's
         block.take("D")
         return
@@ -74,10 +64,8 @@ def switch_off(state: State, block: CurrentBlock, code: str) -> None:
     if cutter is None or cutter.position is None:
         return
     block.refuse_if(cutter.entering, code, "right after the first move of cutter compensation", "a contour between")
-    try:
+    with block.placing():
         settle(state, cutter, cutter.center)
-    except ArcError as error:
-        raise block.fail(None, error.found, error.expected) from None
     there, here = to_setup_of_program(frames, cutter.position), frames.to_setup(frames.position)
     state.beside = [t - h for t, h in zip(there, here, strict=True)]
 
@@ -98,7 +86,8 @@ def _check_codes(state: State, block: CurrentBlock, also: tuple[str, ...]) -> No
 
 _ON = {"G41": "cutter compensation, tool on the left", "G42": "cutter compensation, tool on the right"}
 _DYNAMIC = {
-    "G41.1": "the same by the diameter in D, on the left", "G42.1": "the same by the diameter in D, on the right",
+    "G41.1": "cutter compensation by the diameter in D, on the left",
+    "G42.1": "cutter compensation by the diameter in D, on the right",
 }  # fmt: skip
 _CUTTER = f"{g_codes('G41 G42')}; Fanuc, operator's manuals, Details of cutter compensation"
 CUTTER_CODES = (

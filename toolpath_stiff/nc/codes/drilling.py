@@ -39,12 +39,6 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     given = "motion" in block.groups
     if not given and not any(block.has(letter) for letter in AXES):
         return
-    if code == "G76" and not state.dialect.increments:
-        raise block.fail(
-            code,
-            "is a lathe's threading cycle on LinuxCNC, fine boring on Fanuc's and Haas' controls",
-            hint="name the control with --dialect, or leave threading out",
-        )
     elsewhere = code in TAPS and state.plane != "G17" and not state.dialect.increments
     block.refuse_if(elsewhere, None, f"{code} in {state.plane}: LinuxCNC's rs274 taps along another axis", "G17")
     normal = geometry.PLANES[state.plane][2]
@@ -110,11 +104,8 @@ def _keep_heights(state: State, block: CurrentBlock, code: str, normal: int) -> 
     if len(renewed) == 2 or keeps is False:
         return
     if keeps is None or renewed:
-        raise block.fail(
-            None,
-            f"{code} after a change between G90 and G91: controls differ in whether the hole keeps its heights",
-            f"R and {AXES[normal]} in the block, or --dialect",
-        )
+        problem = "after a change between G90 and G91: controls differ in whether the hole keeps its heights"
+        raise block.fail(None, f"{code} {problem}", f"R and {AXES[normal]} in the block, or --dialect")
     level = state.sticky["level"]
     heights = (retract, bottom) if state.absolute else (retract - level, bottom - retract)
     state.sticky["R"], state.sticky["Z"] = heights
@@ -149,9 +140,7 @@ def _words_of_one_control(state: State, block: CurrentBlock, code: str) -> None:
         _shallower_pecks(state, block)
     if code in TAPS and haas and block.take("J") is not None:
         state.note(block.line, block.values["J"], "how much faster the tap comes out")
-    block.refuse_if(
-        code in TAPS and state.sticky.get("Q"), "Q", "is a tap in pecks, which depends on the control", "no Q"
-    )
+    block.refuse_if(code in TAPS and state.sticky.get("Q"), "Q", "is a tap in pecks: controls differ", "no Q")
     for letter in "QIJ" if code == "G76" else "":
         block.take(letter)
         if letter in block.values:
@@ -174,9 +163,7 @@ def _shallower_pecks(state: State, block: CurrentBlock) -> None:
 
 def _check_cycle(state: State, block: CurrentBlock, code: str, normal: int) -> None:
     for letter, what in (("Z", AXES[normal]), ("R", "R")):
-        block.refuse_if(
-            letter not in state.sticky, None, f"{code} without {what}", f"{what} in the cycle's first block"
-        )
+        block.refuse_if(letter not in state.sticky, None, f"{code} without {what}", f"{what} in its first block")
     block.refuse_if(code in PECKS and not state.sticky.get("Q", 0.0) > 0.0, None, f"{code} without a peck", "Q above 0")
     if code in DWELLS:
         dwell = state.sticky.get("P")

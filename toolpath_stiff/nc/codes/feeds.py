@@ -7,7 +7,7 @@ from toolpath_stiff.nc.frames import Numbers
 from toolpath_stiff.nc.moves import Arc, Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
-from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
+from toolpath_stiff.units import MM_PER_INCH
 
 LONG_PAUSE = 100.0  # s; a longer one may count milliseconds
 SLOWEST = 1e-6  # mm/min, or 1/min: slower is a slip, and its time beyond all numbers
@@ -124,9 +124,7 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
     if long and "." not in block.values["P"].text:
         text = f"G4 {block.values['P'].text} is a pause of as many seconds; Marlin and Mach3 may count milliseconds"
         state.warnings.append(Remark(text, block.line))
-    if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
-        raise block.fail(code, "needs its time", "P with the seconds, 0 or more")
-    state.recorder.add_dwell(seconds)
+    state.pause(block, code, seconds, "P with the seconds, 0 or more")
 
 
 def time_word(state: State, block: CurrentBlock, letter: str) -> float | None:
@@ -143,19 +141,13 @@ def time_word(state: State, block: CurrentBlock, letter: str) -> float | None:
 
 
 _FEEDS = {"G93": "inverse-time feed", "G94": "feed per minute", "G95": "feed per revolution"}
+_DWELL = f"{g_codes('G4')}; {FANUC}, Dwell; Marlin, G004; Fagor, G04; Siemens, G4"
 _SPINDLE, _UNUSED = g_codes("G96 G97"), "constant surface speed: the spindle speed does not enter"
 FEED_CODES = (
     Code("F", "F", feed_word, "feed", "LinuxCNC, Other Codes, F: Set Feed Rate"),
     Code("S", "S", speed_word, "spindle speed", "LinuxCNC, Other Codes, S: Set Spindle Speed"),
     *family(_FEEDS, "feed mode", feed_mode, g_codes("G93 G94 G95")),
     Code("G96", "spindle mode", surface_speed, "constant surface speed", _SPINDLE, listed=_UNUSED),
-    Code(
-        "G4",
-        "non-modal",
-        dwell,
-        "dwell",
-        f"{g_codes('G4')}; {FANUC}, Dwell; Marlin, G004; Fagor, G04; Siemens, G4",
-        step="dwell",
-    ),
+    Code("G4", "non-modal", dwell, "dwell", _DWELL, step="dwell"),
     Code("G97", "spindle mode", surface_speed, "spindle speed in revolutions", _SPINDLE),
 )

@@ -7,15 +7,7 @@ from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, State
 def call(state: State, block: CurrentBlock, code: str) -> None:
     """M98 P L: run a subprogram; M97 P L (Haas): from that N number. The block's moves first."""
     word = block.codes[code]
-    if code == "M97" and not state.dialect.local_calls:
-        raise block.fail(
-            word,
-            "is Haas' call of a block by its N number",
-            hint="give --dialect haas if it is that, or make it a subprogram (O number, M98, M99)",
-        )
-    block.refuse_if(
-        block.groups.get("non-modal") in ("G4", "G10"), word, "beside a code that uses the P word too", "two blocks"
-    )
+    block.refuse_if(block.groups.get("non-modal") in ("G4", "G10"), word, "beside another code with P", "two blocks")
     block.refuse_if(block.has("Q"), "Q", f"beside {word.text} names a block", "a subprogram of its own (O, M99)")
     number = block.whole("P", word)
     if number is None:

@@ -16,13 +16,12 @@ def units(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def no_units(state: State, block: CurrentBlock, code: str) -> None:
-    """G70, G71: G20 and G21 where dialect or controller file say so, or no cycle's word is beside them."""
-    if state.dialect.name == "generic" and not block.values.keys() - {*"FS"}:
-        state.assume("G70 and G71 without the words of a cycle are inch and mm (Siemens, Fagor, Mach3)")
-        units(state, block, INCH_METRIC[code])
-        return
-    what, hint = state.dialect.g70
-    raise block.fail(code, f"is {what}, which is not supported", hint=hint)
+    """G70, G71 that are not G20 and G21 by dialect or controller file: without a cycle's words beside them they are."""
+    what = "is inch or metric units on some controls, a cycle on others"
+    hint = 'write G20 or G21, or give a controller file with inch_metric = "G70 G71"'
+    block.refuse_if(block.values.keys() - {*"FS"}, code, what, hint=hint)
+    state.assume("G70 and G71 without the words of a cycle are inch and mm (Siemens, Fagor, Mach3)")
+    units(state, block, INCH_METRIC[code])
 
 
 def plane(state: State, block: CurrentBlock, code: str) -> None:

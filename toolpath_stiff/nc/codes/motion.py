@@ -9,7 +9,7 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from toolpath_stiff.nc import geometry
-from toolpath_stiff.nc.codes.center_path import offset_move
+from toolpath_stiff.nc.codes.center_path import arc_about, offset_move
 from toolpath_stiff.nc.codes.code import FANUC, Code, g_codes
 from toolpath_stiff.nc.codes.corner import cut_corner
 from toolpath_stiff.nc.codes.feeds import feed_of_move
@@ -133,11 +133,8 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
     block.refuse_if(turns > MOST_TURNS, "P", "is not a number of turns", f"a whole number from 1 to {MOST_TURNS}")
     center = _center(state, block, start, end, clockwise, words)
     sweep = geometry.sweep_about(center, start, end, clockwise, state.inch, turns)
-    middle = list(here)
-    middle[first], middle[second] = center
-    x, y, z = frames.to_setup(frames.to_control(middle))[:3]
-    turned = frames.turn_direction(geometry.normal_of(state.plane))
-    record(state, block, ARC, control_point(state, block, here, words), words, arc=Arc((x, y, z), turned, sweep))
+    about = arc_about(state, here, complex(*center), sweep)
+    record(state, block, ARC, control_point(state, block, here, words), words, arc=about)
 
 
 def _center(
@@ -157,19 +154,15 @@ def _center(
         block.take(off_plane)  # posts write all three
     block.refuse_if(block.has(off_plane), off_plane, f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
     offsets = [block.take(letter) for letter in in_plane]
-    geometry.refuse_arc_if(
-        state.polar is not None and offsets != [None, None], "an arc with I, J or K in polar mode (G16)", "R"
-    )
+    geometry.refuse_arc_if(state.polar and offsets != [None, None], "an arc with I, J or K in polar mode (G16)", "R")
     if radius is not None:
         block.refuse_if(offsets != [None, None], "R", "and a centre (I, J, K) are both given", "one of them")
         ends = {first, second} & words.keys()
         geometry.refuse_arc_if(not ends, "an arc with R and without an end point", "an axis word of the plane")
         return geometry.center_from_radius(start, end, radius * state.length_scale, clockwise)
     if offsets == [None, None] or (state.arc_absolute and None in offsets):
-        raise geometry.ArcError(
-            "an arc without a centre, or with one word of an absolute one (G90.1)",
-            f"{in_plane[0]} and {in_plane[1]}, or R",
-        )
+        problem = "an arc without a centre, or with one word of an absolute one (G90.1)"
+        raise geometry.ArcError(problem, f"{in_plane[0]} and {in_plane[1]}, or R")
     a, b = ((offset or 0.0) * state.length_scale for offset in offsets)
     return (a, b) if state.arc_absolute else (start[0] + a, start[1] + b)
 

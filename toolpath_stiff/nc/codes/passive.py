@@ -63,6 +63,7 @@ _COOLANT = {"M7": "mist coolant on", "M8": "flood coolant on", "M9": "coolant of
 _OVERRIDES = dict.fromkeys(("M48", "M49", "M50", "M51", "M52", "M53"), "speed and feed overrides")
 _WATCHED = {"G25": "spindle speed not watched", "G26": "spindle speed watched"}
 _DYNAMIC = {"G254": "dynamic work offset", "G255": "no dynamic work offset"}
+_G13 = f"{FANUC}, G13.1"
 _AHEAD = {"G103": "limit of the look-ahead", "G187": "smoothness"}
 PASSIVE_CODES = (
     Code("G8", "lathe diameter", take_words, "lathe radius mode; with P: look-ahead", f"{g_codes('G8')}; {FANUC}, G08"),
@@ -82,15 +83,7 @@ PASSIVE_CODES = (
     *family(_BOTH, "M spindle", turn_spindle, f"{FANUC}, builders' M codes", FANUC_ONLY, listed="coolant"),
     *family(_COOLANT, "M coolant", holds_anyway, m_codes("M7 M8 M9"), listed="coolant"),
     *family(_OVERRIDES, "M overrides", holds_anyway, m_codes("M48 - M53"), listed="overrides"),
-    Code(
-        "G13.1",
-        "polar interpolation",
-        holds_anyway,
-        "polar interpolation off",
-        f"{FANUC}, G13.1",
-        FANUC_ONLY,
-        listed=_OFF,
-    ),
+    *family({"G13.1": "polar interpolation off"}, "polar interpolation", holds_anyway, _G13, FANUC_ONLY, _OFF),
     Code("G50.1", "mirror image", holds_anyway, "mirror image off", f"{FANUC}, G50.1", FANUC_ONLY, listed=_OFF),
     Code("G100", "mirror image", holds_anyway, "mirror image off", f"{HAAS}, G100", HAAS_ONLY, listed=_OFF),
     Code("G22", "stroke check", take_words, "stored stroke check on", f"{FANUC}, G22", FANUC_ONLY, None, True, _ZONE),

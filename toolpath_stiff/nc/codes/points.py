@@ -84,9 +84,7 @@ def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle:
     if angle is not None:
         polar[1] = angle if state.absolute else polar[1] + angle
     half = math.isnan(polar[0]) or math.isnan(polar[1])
-    block.refuse_if(
-        half, letter, "is half of a polar point, and nothing before it gives the other half", "both, in G90"
-    )
+    block.refuse_if(half, letter, "is half of a polar point, without the other half", "both, in G90")
     state.unsettled = None
     turn = math.radians(polar[1])
     return (polar[0] * math.cos(turn), polar[0] * math.sin(turn))
@@ -100,16 +98,12 @@ def forget_polar(state: State) -> None:
 
 def refuse_while_rotated(state: State, block: CurrentBlock, word: Word | str, what: str) -> None:
     """Refuse what Fanuc's controls forbid between G68 and G69."""
-    block.refuse_if(
-        state.frames.rotation is not None, word, f"{what} while the coordinate system is rotated (G68)", "G69 before it"
-    )
+    block.refuse_if(state.frames.rotation is not None, word, f"{what} while a rotation is on (G68)", "G69 before it")
 
 
 def know_place(state: State, block: CurrentBlock, word: Word) -> None:
     """Refuse what depends on the present X and Y, after a G10 that turned the offset in force."""
-    block.refuse_if(
-        state.unsettled == "G10", word, f"depends on the present X and Y. {TURNED}", "a move with both before it"
-    )
+    block.refuse_if(state.unsettled == "G10", word, f"depends on the present X and Y. {TURNED}", "both before it")
 
 
 def _settle(state: State, block: CurrentBlock, words: dict[int, float]) -> None:

@@ -6,7 +6,7 @@ Codes and modal groups follow LinuxCNC (its manual, "G-Code Overview", modal gro
 the results are compared with; polar words and rotation, which it does not have, follow Fanuc's controls.
 """
 
-from toolpath_stiff.nc.codes.code import FANUC, HAAS, Code, Refused, g_codes
+from toolpath_stiff.nc.codes.code import FANUC, HAAS, Code, g_codes, refused
 from toolpath_stiff.nc.codes.coordinates import COORDINATE_CODES
 from toolpath_stiff.nc.codes.corner import CORNER_CODES
 from toolpath_stiff.nc.codes.cutter import CUTTER_CODES
@@ -36,36 +36,29 @@ _POLAR = (
 _PLANE = ("a plane of the U, V, W axes", "this machine has X, Y, Z, A, B, C", g_codes("G17 - G19.1"))
 _LATHE_CYCLE = ("a lathe cycle", "this is a mill", g_codes("G70 Lathe finishing cycle; G71 G72 Lathe roughing cycles"))
 
-REFUSED: dict[str, Refused] = {
-    name: Refused(name, what, hint, source)
-    for names, what, hint, source in (
-        ("G5.2 G5.3", "a NURBS curve", _LINES_AND_ARCS, g_codes("G5.2 G5.3")),
-        ("G7", "lathe diameter mode", "this is a mill", g_codes("G7")),
-        (
-            "G12 G13",
-            *("a circular pocket, drawn in the manual without numbers", _LINES_AND_ARCS, f"{HAAS}, G12 and G13"),
-        ),
-        ("G12.1", *_POLAR),
-        ("G17.1 G18.1 G19.1", *_PLANE),
-        ("G31", "a move up to a signal (skip, probing)", "leave probing out", f"{FANUC}, Skip function (G31)"),
-        ("G33 G33.1", "motion synchronised with the spindle", "leave threading and rigid tapping out", g_codes("G33")),
-        ("G38.2 G38.3 G38.4 G38.5", *("probing", "leave probing out", g_codes("G38.2 - G38.5"))),
-        ("G43.2", "an added tool length", "put the whole length into the tool table", g_codes("G43.2")),
-        ("G44", "a tool length counted the other way", "G43 with the length's other sign", f"{FANUC}, G43, G44"),
-        ("G47", "engraving in the control's own letters", _LINES_AND_ARCS, f"{HAAS}, G47"),
-        ("G51", "scaling", "post the program at its size", f"{FANUC}, Scaling (G50, G51)"),
-        ("G51.1", "mirror image", _AS_CUT, f"{FANUC}, Programmable mirror image (G50.1, G51.1)"),
-        ("G53.1", "the tool turned to a tilted work plane", _TIP, f"{FANUC}, Tool axis direction control (G53.1)"),
-        ("G68.2", "a tilted work plane", _TIP, f"{FANUC}, Tilted working plane indexing (G68.2)"),
-        ("G71.1 G71.2 G72 G72.1 G72.2", *_LATHE_CYCLE),
-        ("G87", "back boring", _MOVES, g_codes("G87")),
-        ("G88", "boring with manual feed out", _MOVES, g_codes("G88")),
-        ("G101", "mirror image", _AS_CUT, f"{HAAS}, G101"),
-        ("G107", "cylindrical mapping", "post X, Y, Z, A of the tool tip", f"{HAAS}, G107"),
-        ("G150", "a pocket cycle around a subprogram's contour", _LINES_AND_ARCS, f"{HAAS}, G150"),
-    )
-    for name in names.split()
-}
+REFUSED = refused((
+    ("G5.2 G5.3", "a NURBS curve", _LINES_AND_ARCS, g_codes("G5.2 G5.3")),
+    ("G7", "lathe diameter mode", "this is a mill", g_codes("G7")),
+    ("G12 G13", "a circular pocket, drawn in the manual without numbers", _LINES_AND_ARCS, f"{HAAS}, G12 and G13"),
+    ("G12.1", *_POLAR),
+    ("G17.1 G18.1 G19.1", *_PLANE),
+    ("G31", "a move up to a signal (skip, probing)", "leave probing out", f"{FANUC}, Skip function (G31)"),
+    ("G33 G33.1", "motion synchronised with the spindle", "leave threading and rigid tapping out", g_codes("G33")),
+    ("G38.2 G38.3 G38.4 G38.5", "probing", "leave probing out", g_codes("G38.2 - G38.5")),
+    ("G43.2", "an added tool length", "put the whole length into the tool table", g_codes("G43.2")),
+    ("G44", "a tool length counted the other way", "G43 with the length's other sign", f"{FANUC}, G43, G44"),
+    ("G47", "engraving in the control's own letters", _LINES_AND_ARCS, f"{HAAS}, G47"),
+    ("G51", "scaling", "post the program at its size", f"{FANUC}, Scaling (G50, G51)"),
+    ("G51.1", "mirror image", _AS_CUT, f"{FANUC}, Programmable mirror image (G50.1, G51.1)"),
+    ("G53.1", "the tool turned to a tilted work plane", _TIP, f"{FANUC}, Tool axis direction control (G53.1)"),
+    ("G68.2", "a tilted work plane", _TIP, f"{FANUC}, Tilted working plane indexing (G68.2)"),
+    ("G71.1 G71.2 G72 G72.1 G72.2", *_LATHE_CYCLE),
+    ("G87", "back boring", _MOVES, g_codes("G87")),
+    ("G88", "boring with manual feed out", _MOVES, g_codes("G88")),
+    ("G101", "mirror image", _AS_CUT, f"{HAAS}, G101"),
+    ("G107", "cylindrical mapping", "post X, Y, Z, A of the tool tip", f"{HAAS}, G107"),
+    ("G150", "a pocket cycle around a subprogram's contour", _LINES_AND_ARCS, f"{HAAS}, G150"),
+))  # fmt: skip
 
 
 def code_meaning(name: str) -> str:

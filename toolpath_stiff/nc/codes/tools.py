@@ -72,11 +72,6 @@ def tool_length(state: State, block: CurrentBlock, code: str) -> None:
         hold_tip(state, block, code, True)
 
 
-def no_such_control(state: State, block: CurrentBlock, code: str) -> None:
-    """G234: Haas' G43.4, which the dialect haas takes it for."""
-    raise block.fail(code, "is tool centre point control of Haas' controls", hint="name the control with --dialect")
-
-
 def hold_tip(state: State, block: CurrentBlock, code: str, hold: bool) -> None:
     """Switch tool centre point control: the machine stands still, the numbers of the present point change."""
     frames = state.frames
@@ -101,21 +96,15 @@ def _length_in_table(state: State, block: CurrentBlock, code: str) -> float:
     number = block.whole("H", block.codes[code], 0)
     if number == 0 and state.dialect.increments:
         return math.nan
-    if number == 0 and state.dialect.name != "linuxcnc":
-        raise block.fail(
-            "H",
-            "is no offset on some controls, on LinuxCNC that of the tool",
-            "H or G49",
-            "name the control with --dialect",
-        )
+    problem, hint = "is no offset on some controls, on LinuxCNC that of the tool", "name the control with --dialect"
+    block.refuse_if(number == 0 and state.dialect.name != "linuxcnc", "H", problem, "H or G49", hint)
     other = not number and (state.renamed or state.named_length not in (None, state.tool))
     problem = "without H after M61, or after another H: controls differ in whose length it takes"
     block.refuse_if(other, code, problem, f"G43 H{state.tool}, or T and M6")
     tool = number or state.tool  # LinuxCNC's H0 too (find_tool_pocket(0))
     if state.tools is None:
-        raise block.fail(
-            code, f"needs the length of tool {tool}, and there is no tool table", hint=tool_table_hint(tool)
-        )
+        problem = f"needs the length of tool {tool}, and there is no tool table"
+        raise block.fail(code, problem, hint=tool_table_hint(tool))
     length = tool_of(state.tools, tool).length
     block.refuse_if(math.isnan(length), code, f"needs the length of tool {tool}", hint=ADD_IT)
     return length
@@ -129,8 +118,6 @@ TOOL_CODES = (
     Code("G43", "tool length", tool_length, "tool length", g_codes("G43")),
     Code("G43.1", "tool length", tool_length, "tool length in the block", g_codes("G43.1"), takes_axes=True),
     Code(HOLDS_TIP, "tool length", tool_length, "tool centre point control", _TCP, ("generic", "linuxcnc", "fanuc")),
-    Code(
-        "G234", "tool length", no_such_control, "tool centre point control (Haas), as G43.4", f"{HAAS}, G234", ("haas",)
-    ),
+    Code("G234", "tool length", tool_length, "tool centre point control (Haas), as G43.4", f"{HAAS}, G234", ("haas",)),
     Code("G49", "tool length", tool_length, "tool length off", g_codes("G49")),
 )

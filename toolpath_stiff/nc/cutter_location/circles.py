@@ -8,10 +8,12 @@
 - `INDIRV/i,j,k` before `CIRCLE/x,y,z,r` or `TLON,GOFWD/(CIRCLE/...)`: the direction at the start.
 """
 
+import cmath
 import math
 from dataclasses import dataclass
 
-from toolpath_stiff.nc.geometry import RELATIVE_TOLERANCE, ArcError, Point2, Vector, check_bulge
+from toolpath_stiff.nc.elements import meetings
+from toolpath_stiff.nc.geometry import RELATIVE_TOLERANCE, ArcError, Vector, check_bulge, refuse_arc_if
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -67,8 +69,7 @@ def _in_plane(circle: Circle, start: Vector) -> tuple[Vector, Vector]:
     out = minus(start, circle.center)
     out = along(out, circle.axis, -dot(out, circle.axis))
     length = math.sqrt(dot(out, out))
-    if length < SAME_POINT:
-        raise ArcError("a circle whose centre is the tool's position", "a centre apart from it")
+    refuse_arc_if(length < SAME_POINT, "a circle whose centre is the tool's position", "a centre apart from it")
     first = (out[0] / length, out[1] / length, out[2] / length)
     return first, cross(circle.axis, first)
 
@@ -77,37 +78,31 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
     """The arc from start to end. Raises `ArcError` where they do not lie on the circle within its tolerance."""
     first, second = _in_plane(circle, start)
     from_center, to_end = minus(start, circle.center), minus(end, circle.center)
-    here = (dot(from_center, first), 0.0)
-    there = (dot(to_end, first), dot(to_end, second))
-    radius, last = here[0], math.hypot(*there)
+    radius, there = dot(from_center, first), complex(dot(to_end, first), dot(to_end, second))
     allowed = min(max(ROUNDING_MM, RELATIVE_TOLERANCE * radius), LARGEST_DIFFERENCE)
+    expected, last = f"radii that agree within {allowed:.4f} mm", abs(there)
     if last < SAME_POINT or abs(last - radius) > allowed:
-        raise ArcError(
-            f"an arc whose end lies {abs(last - radius):.4f} mm off its circle (radius {radius:.4f} mm at the start, "
-            f"{last:.4f} mm at the end)",
-            f"radii that agree within {allowed:.4f} mm",
+        problem = (
+            f"an arc whose end lies {abs(last - radius):.4f} mm off its circle (radius {radius:.4f} mm at the start"
         )
+        raise ArcError(f"{problem}, {last:.4f} mm at the end)", expected)
     if abs(circle.radius - radius) > allowed:  # never, if the file gives no radius
-        raise ArcError(
-            f"a circle of radius {circle.radius:.4f} mm whose centre lies {radius:.4f} mm from the tool's position",
-            f"radii that agree within {allowed:.4f} mm",
-        )
+        problem = f"whose centre lies {radius:.4f} mm from the tool's position"
+        raise ArcError(f"a circle of radius {circle.radius:.4f} mm {problem}", expected)
     center = along(circle.center, circle.axis, dot(from_center, circle.axis))
-    sweep = _sweep(circle, here, there)
+    sweep = _sweep(circle, radius, there)
     check_bulge(radius, sweep)
     return Arc(center, circle.axis, sweep)
 
 
-def _sweep(circle: Circle, here: Point2, there: Point2) -> float:
-    angle = math.atan2(there[1], there[0])
-    angle = angle + math.tau if math.dist(here, there) < SAME_POINT_MM else angle % math.tau
+def _sweep(circle: Circle, here: float, there: complex) -> float:
+    angle = cmath.phase(there)
+    angle = angle + math.tau if abs(there - here) < SAME_POINT_MM else angle % math.tau
     if circle.sweep is not None:
         angle += math.tau * round((math.radians(circle.sweep) - angle) / math.tau)
         if angle <= 0.0 or abs(math.degrees(angle) - circle.sweep) > SWEEP_TOLERANCE_DEG:
-            raise ArcError(
-                f"an arc of {math.degrees(angle % math.tau):.3f} degrees where ANGLE says {circle.sweep:g}",
-                "an end that is that far along the circle",
-            )
+            problem = f"an arc of {math.degrees(angle % math.tau):.3f} degrees where ANGLE says {circle.sweep:g}"
+            raise ArcError(problem, "an end that is that far along the circle")
     return angle
 
 
@@ -133,28 +128,19 @@ def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which
         1 or 2: APT's `ON,(LINE/...)` and `ON,2,INTOF,(LINE/...)`.
     """
     first, second = _in_plane(circle, start)
-    a, b = (minus(point, circle.center) for point in line)
-    p, q = (dot(a, first), dot(a, second)), (dot(b, first), dot(b, second))
-    length = math.dist(p, q)
-    if length < SAME_POINT:
-        raise ArcError("a line of no length", "two points")
-    u = ((q[0] - p[0]) / length, (q[1] - p[1]) / length)
-    foot = -(p[0] * u[0] + p[1] * u[1])
-    miss = abs(p[0] * u[1] - p[1] * u[0])
+    apart, near = [minus(point, circle.center) for point in line], 10.0 * SAME_POINT_MM
+    p, q = (complex(dot(point, first), dot(point, second)) for point in apart)
+    refuse_arc_if(abs(q - p) < SAME_POINT, "a line of no length", "two points")
     radius = dot(minus(start, circle.center), first)
-    if miss > radius:
-        raise ArcError("a line that does not meet its circle", "one that does")
-    half = math.sqrt(radius * radius - miss * miss)
-    met = [(p[0] + (foot + s * half) * u[0], p[1] + (foot + s * half) * u[1]) for s in (-1.0, 1.0)]
+    places = meetings((p, q, None, 0), (complex(radius), complex(radius), 0j, 1))
+    refuse_arc_if(not places, "a line that does not meet its circle", "one that does")
     # The start itself, if the line goes through it, is met after a whole turn.
-    order = sorted(met, key=lambda m: math.atan2(m[1], m[0]) % math.tau or math.tau)
-    order.sort(key=lambda m: math.dist(m, (radius, 0.0)) < 10.0 * SAME_POINT_MM)
-    x, y = order[which - 1]
-    if abs(math.hypot(*q) - radius) < 10.0 * SAME_POINT_MM and math.dist(q, (x, y)) > 10.0 * SAME_POINT_MM:
-        raise ArcError(
-            "a line whose second point lies on the circle, where the motion does not end",
-            "that point at the intersection that is asked for",
-        )
+    order = sorted(places, key=lambda place: cmath.phase(place) % math.tau or math.tau)
+    order.sort(key=lambda place: abs(place - radius) < near)
+    place = order[which - 1]
+    if abs(abs(q) - radius) < near < abs(q - place):
+        problem = "a line whose second point lies on the circle, where the motion does not end"
+        raise ArcError(problem, "that point at the intersection that is asked for")
     rise = dot(minus(start, circle.center), circle.axis)
-    flat = along(along(circle.center, first, x), second, y)
+    flat = along(along(circle.center, first, place.real), second, place.imag)
     return along(flat, circle.axis, rise)

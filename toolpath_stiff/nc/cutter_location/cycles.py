@@ -55,9 +55,7 @@ def cycle(state: CutterLocationState, statement: MajorStatement) -> None:
     if kind in ("BORE", "REAM"):
         state.assume(BORES)
     for needed in ("DEPTH", "feed", "CLEAR"):
-        state.refuse_if(
-            needed not in values, f"{statement.shown} without {needed}", "DEPTH, CLEAR and a feed as MMPM,100", EXPAND
-        )
+        state.refuse_if(needed not in values, f"{statement.shown} without {needed}", "DEPTH, CLEAR, MMPM,100", EXPAND)
     _check_cycle(state, KINDS[kind], values)
     scale, dwell = state.scale, values.get("DWELL", 0.0)
     state.hole = Drilling(
@@ -91,26 +89,12 @@ def _check_cycle(state: CutterLocationState, code: str, values: dict[str, float]
     shown, pecks = state.statement.shown, code in ("G73", "G83")
     depth, clear, step, dwell = (values.get(name, 0.0) for name in ("DEPTH", "CLEAR", "STEP", "DWELL"))
     back = values.get("RETURN", clear)
-    state.refuse_if(
-        not depth or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= dwell <= SECONDS_PER_DAY,
-        shown,
-        "DEPTH and feed above 0, CLEAR and DWELL of 0 or more",
-    )
-    state.refuse_if(
-        "RETURN" in values and (back < clear or not back > 0.0),
-        f"RETURN,{back:g}: a plane of the CAM system's, or below CLEAR",
-        "CLEAR or more",
-        EXPAND,
-    )
-    state.refuse_if(
-        back != clear and {"FEDTO", "CLEAR"} <= {*state.statement.words},
-        "CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate",
-        "DEPTH",
-        EXPAND,
-    )
-    state.refuse_if(
-        bool(step) != pecks or (pecks and not 0.0 < (clear + abs(depth)) / step <= MOST_STROKES),
-        shown,
-        f"STEP above 0 with DEEP or BRKCHP alone, for up to {MOST_STROKES} strokes",
-    )
+    wrong = not depth or clear < 0.0 or not values["feed"] > 0.0 or not 0.0 <= dwell <= SECONDS_PER_DAY
+    state.refuse_if(wrong, shown, "DEPTH and feed above 0, CLEAR and DWELL of 0 or more")
+    low = "RETURN" in values and (back < clear or not back > 0.0)
+    state.refuse_if(low, f"RETURN,{back:g}: a plane of the CAM system's, or below CLEAR", "CLEAR or more", EXPAND)
+    problem = "CLEAR and RETURN that differ beside FEDTO: Autodesk's post makes the first a coordinate"
+    state.refuse_if(back != clear and {"FEDTO", "CLEAR"} <= {*state.statement.words}, problem, "DEPTH", EXPAND)
+    wrong = bool(step) != pecks or (pecks and not 0.0 < (clear + abs(depth)) / step <= MOST_STROKES)
+    state.refuse_if(wrong, shown, f"STEP above 0 with DEEP or BRKCHP alone, for up to {MOST_STROKES} strokes")
     state.refuse_if(dwell and pecks, "DWELL in a cycle with pecks", "no DWELL", EXPAND)

@@ -12,15 +12,9 @@ from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY, SECONDS_PER_MINUT
 MM_PER_FOOT = 12.0 * MM_PER_INCH
 # FEDRAT: mm of its unit (None: the file's length unit), and whether per revolution.
 FEED_UNITS: dict[str, tuple[float | None, bool]] = {
-    "MMPM": (1.0, False),
-    "IPM": (MM_PER_INCH, False),
-    "FPM": (MM_PER_FOOT, False),
-    "PERMIN": (None, False),
-    "MMPR": (1.0, True),
-    "IPR": (MM_PER_INCH, True),
-    "FPR": (MM_PER_FOOT, True),
-    "PERREV": (None, True),
-}
+    "MMPM": (1.0, False), "IPM": (MM_PER_INCH, False), "FPM": (MM_PER_FOOT, False), "PERMIN": (None, False),
+    "MMPR": (1.0, True), "IPR": (MM_PER_INCH, True), "FPR": (MM_PER_FOOT, True), "PERREV": (None, True),
+}  # fmt: skip
 INCH_FEEDS = {"IPM", "IPR", "FPM", "FPR"}
 LENGTH_UNITS = {"MM": 1.0, "INCH": MM_PER_INCH, "INCHES": MM_PER_INCH, "IN": MM_PER_INCH}
 COMPENSATES = (
@@ -42,40 +36,27 @@ def units(state: CutterLocationState, statement: MajorStatement) -> None:
     if scale is None:
         raise state.fail(statement.shown, "UNITS/MM or UNITS/INCHES")
     state.no_circle("UNITS/")
-    state.refuse_if(
-        not state.units_given and len(state.recorder) and scale != 1.0,
-        "UNITS/ after the first points, which were taken as mm",
-        "UNITS/ before any point",
-    )
+    late = not state.units_given and len(state.recorder) and scale != 1.0
+    state.refuse_if(late, "UNITS/ after the first points, which were taken as mm", "UNITS/ before any point")
     state.scale, state.units_given = scale, True
 
 
 def fedrat(state: CutterLocationState, statement: MajorStatement) -> None:
     """The feed: a number, and its unit before or after it."""
     words = statement.words
-    state.refuse_if(
-        state.rapid,
-        f"a feed after the RAPID of line {state.rapid}, before its motion",
-        "one of them",
-        "whether the motion is rapid is not certain",
-    )
+    problem = f"a feed after the RAPID of line {state.rapid}, before its motion"
+    state.refuse_if(state.rapid, problem, "one of them", "whether the motion is rapid is not certain")
     if words[:1] == ["INVERS"]:  # Creo: whether the post makes inverse-time feeds; the numbers stay per minute
         state.refuse_if(words[1:] not in (["AUTO"], ["OFF"]), statement.shown, "a feed per minute or per revolution")
         state.note("how the post processor writes feeds")
         return
     values = [word for word in words if is_number(word)]
     units = [word for word in words if not is_number(word)]
-    state.refuse_if(
-        len(values) != 1 or len(units) > 1 or not FEED_UNITS.keys() >= set(units),
-        statement.shown,
-        f"FEDRAT/ with a number and one of {', '.join(FEED_UNITS)}",
-    )
-    state.refuse_if(
-        not state.units_given and INCH_FEEDS.intersection(units),
-        f"{', '.join(units)} in a file that names no UNITS: are its points in inches?",
-        "UNITS/INCHES or UNITS/MM before it",
-        "add the line at the beginning of the file",
-    )
+    wrong = len(values) != 1 or len(units) > 1 or not FEED_UNITS.keys() >= set(units)
+    state.refuse_if(wrong, statement.shown, f"FEDRAT/ with a number and one of {', '.join(FEED_UNITS)}")
+    problem = f"{', '.join(units)} in a file that names no UNITS: are its points in inches?"
+    expected, hint = "UNITS/INCHES or UNITS/MM before it", "add the line at the beginning of the file"
+    state.refuse_if(not state.units_given and INCH_FEEDS.intersection(units), problem, expected, hint)
     value = state.number(values[0])
     state.refuse_if(value < 0.0, f"a feed of {value:g}", "a feed above 0")
     factor, state.per_revolution = FEED_UNITS[units[0]] if units else (None, False)
@@ -106,9 +87,7 @@ def delay(state: CutterLocationState, statement: MajorStatement) -> None:
     state.refuse_if(words[1:] not in ([], ["REV"]), statement.shown, "the seconds, or the revolutions and REV")
     time = state.number(statement.arguments[0]) if words else math.nan
     if words[1:]:
-        state.refuse_if(
-            not state.speed > 0.0, "a pause in revolutions without a spindle speed", "SPINDL/ with RPM before it"
-        )
+        state.refuse_if(not state.speed > 0.0, "a pause in revolutions without a spindle speed", "SPINDL/ with RPM")
         time *= SECONDS_PER_MINUTE / state.speed
     state.refuse_if(not 0.0 <= time <= SECONDS_PER_DAY, statement.shown, "the seconds, 0 or more")
     state.recorder.add_dwell(time)
@@ -140,11 +119,8 @@ def one_frame(state: CutterLocationState, kind: str, numbers: tuple[float, ...],
     before = state.frames.get(kind, numbers)
     same = len(before) == len(numbers) and all(abs(a - b) < 1e-6 for a, b in zip(before, numbers, strict=True))
     if not same and state.point is not None:
-        raise state.fail(
-            f"{shown}: another coordinate system than the one before",
-            "one system for the whole file",
-            "write each of them to a file of its own",
-        )
+        problem, hint = f"{shown}: another coordinate system than the one before", "write each to a file of its own"
+        raise state.fail(problem, "one system for the whole file", hint)
     state.frames[kind] = numbers
 
 

@@ -35,9 +35,7 @@ def goto(state: CutterLocationState, statement: MajorStatement) -> None:
 
 def more_points(state: CutterLocationState, statement: MajorStatement) -> None:
     """A line of numbers alone after GOTO: the next point (Creo writes arcs so)."""
-    state.refuse_if(
-        state.last_word != "GOTO", f"{statement.text[:30]!r} is not a statement", "a word, / and its arguments"
-    )
+    state.refuse_if(state.last_word != "GOTO", f"{statement.text[:30]!r} is not a statement", "a word, /, arguments")
     state.circle = state.followed
     to_point(state, state.numbers(statement, 3, 6))
 
@@ -59,11 +57,8 @@ def _axis_of(state: CutterLocationState, numbers: list[float]) -> Vector:
     """The tool axis that comes with a point, or that in force."""
     if len(numbers) == 6:
         axis = unit_axis(numbers[3:])
-        state.refuse_if(
-            state.multax is False and axis != VERTICAL,
-            "a tilted tool axis after MULTAX/OFF",
-            "MULTAX/ON before it, or x,y,z alone",
-        )
+        tilted = state.multax is False and axis != VERTICAL
+        state.refuse_if(tilted, "a tilted tool axis after MULTAX/OFF", "MULTAX/ON before it, or x,y,z alone")
         state.next_axis = axis
     if state.next_axis is None:
         raise state.fail("a point without its tool axis after MULTAX/OFF and a tilted tool", "x,y,z,i,j,k or TLAXIS")
@@ -124,7 +119,7 @@ def circle(state: CutterLocationState, statement: MajorStatement) -> None:
 def movarc(state: CutterLocationState, statement: MajorStatement) -> None:
     """A circle by the right hand, and the angle that is cut."""
     state.refuse_if(
-        len(statement.words) != 9 or statement.words[7] != "ANGLE", statement.shown, "MOVARC/x,y,z,i,j,k,r,ANGLE,a"
+        statement.words[7:8] != ["ANGLE"] or statement.words[9:], statement.shown, "MOVARC/x,y,z,i,j,k,r,ANGLE,a"
     )
     *arguments, _, last = statement.arguments
     angle = state.number(last)
@@ -140,9 +135,7 @@ def indirv(state: CutterLocationState, statement: MajorStatement) -> None:
 
 def _await_circle(state: CutterLocationState, numbers: list[float], sweep: float | None = None) -> Circle:
     """The circle that the next point ends, turned as INDIRV says."""
-    state.refuse_if(
-        state.rapid, f"an arc after the RAPID of line {state.rapid}", "a rapid to a point, or an arc at a feed"
-    )
+    state.refuse_if(state.rapid, f"an arc after the RAPID of line {state.rapid}", "a rapid to a point")
     state.refuse_if(state.hole, "an arc within a drilling cycle", "CYCLE/OFF before it")
     state.no_circle("a circle")
     if state.point is None:
@@ -180,11 +173,9 @@ def _arc_through(state: CutterLocationState, targets: list[Vector], axis: Vector
         arc = circles.arc_to(circle, state.point, target)
         move(state, ARC, target, axis, arc)
         state.swept += arc.sweep
-        state.refuse_if(
-            circle.sweep is None and state.swept > math.tau + ROUNDING,
-            "points of an arc that do not follow each other in its direction",
-            "points in the order of the cut",
-        )
+        problem = "points of an arc that do not follow each other in its direction"
+        beyond = circle.sweep is None and state.swept > math.tau + ROUNDING
+        state.refuse_if(beyond, problem, "points in the order of the cut")
 
 
 def tlon(state: CutterLocationState, statement: MajorStatement) -> None:
@@ -201,9 +192,7 @@ def tlon(state: CutterLocationState, statement: MajorStatement) -> None:
     ends = _numbers(END.fullmatch(texts[2]) or PLANE.fullmatch(texts[2]))
     state.refuse_if(len(ends) != 6, f"TLON,GOFWD/ up to {texts[2][:40]}", "(LINE/x,y,z,x,y,z)")
     numbers = _numbers(CIRCLE.fullmatch(texts[0]))
-    state.refuse_if(
-        len(numbers) not in (4, 7), f"TLON,GOFWD/ along {texts[0][:40]}", "(CIRCLE/x,y,z,r) or (CYLNDR/x,y,z,i,j,k,r)"
-    )
+    state.refuse_if(len(numbers) not in (4, 7), f"TLON,GOFWD/ along {texts[0][:40]}", "(CIRCLE/x,y,z,r), (CYLNDR/...)")
     circle = _await_circle(state, numbers)
     assert state.point is not None
     line = state.scaled(ends[:3]), state.scaled(ends[3:])

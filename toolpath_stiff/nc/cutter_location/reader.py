@@ -9,17 +9,20 @@ A file is read to `ReadProgram`, the same contract as the reader of G code, or c
 import copy
 import math
 import re
+from typing import Any
 
-from toolpath_stiff.errors import InputError, ProgramError
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.cutter_location.modes import one_frame
 from toolpath_stiff.nc.cutter_location.motion import to_point
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, frame_in_comment, plain_point, read_statement
-from toolpath_stiff.nc.cutter_location.vocabulary import execute
+from toolpath_stiff.nc.cutter_location.vocabulary import execute, meaning_of
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.languages import any_statement
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram, Remark
+from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import Request
+from toolpath_stiff.nc.run_records import Tally
 
 NO_UNITS = "the file names no UNITS; its numbers are taken as mm"
 # CATIA's heading of an operation, a comment; NX and Autodesk's posts have TOOL PATH/ and CSI_TOOL_PATH/.
@@ -39,13 +42,8 @@ def not_for(request: Request) -> list[Remark]:
     return [Remark(f"{what} mean nothing to a cutter-location file") for what in given if given[what]]
 
 
-def read(request: Request) -> ReadProgram:
-    r"""Read a cutter-location file; lengths of the tool table win over the file's.
-
-    Raises
-    ------
-    InputError
-        With line and column, what was found and what was expected.
+class CutterLocationRun(ProgramRun):
+    r"""A run of a cutter-location file; parameters as of `ProgramRun`. Lengths of the tool table win over the file's.
 
     Examples
     --------
@@ -53,62 +51,76 @@ def read(request: Request) -> ReadProgram:
     >>> parse_program("UNITS/MM\nFEDRAT/600,MMPM\nFROM/0,0,50\nGOTO/0,0,0\nGOTO/40,0,0\nFINI\n", "part.apt")
     <ReadProgram part.apt: 2 moves, read as cutter-location file>
     """
-    state = CutterLocationState(request.name, copy.deepcopy(request.controller.tools), request.controller.feed)
-    for error in run(state, request.lines):
-        raise error
-    return program_of(state, request)
 
+    meaning = staticmethod(meaning_of)
+    cuts_by = "GOTO/ after FEDRAT/, not after RAPID"
+    state: Any  # a `CutterLocationState`
 
-def program_of(state: CutterLocationState, request: Request) -> ReadProgram:
-    """What a run made of a file."""
-    return ReadProgram(
-        name=request.name,
-        path=request.path,
-        source=request.lines,
-        moves=state.recorder.moves(),
-        origin=request.default_origin if request.origin is None else request.origin,
-        origin_source="default" if request.origin is None else "option",
-        unsupported=tuple(state.noted.values()),
-        warnings=(*not_for(request), *state.warnings),
-        assumptions=tuple(state.assumptions),
-        tools=tuple(state.used_tools.values()),
-        dialect=CUTTER_LOCATION,
-        marks=tuple(state.marks),
-    )
+    def __init__(self, request: Request, tally: Tally | None = None) -> None:
+        self.request, self.lines, self.name, self.tally = request, request.lines, request.name, tally
+        self.state = CutterLocationState(request.name, copy.deepcopy(request.controller.tools), request.controller.feed)
 
+    def program(self, ending: list[Remark]) -> ReadProgram:
+        """What the run has made of the file."""
+        request, state = self.request, self.state
+        return ReadProgram(
+            name=request.name,
+            path=request.path,
+            source=request.lines,
+            moves=state.recorder.moves(),
+            origin=request.default_origin if request.origin is None else request.origin,
+            origin_source="default" if request.origin is None else "option",
+            unsupported=tuple(state.noted.values()),
+            warnings=(*not_for(request), *state.warnings),
+            assumptions=tuple(state.assumptions),
+            tools=tuple(state.used_tools.values()),
+            dialect=CUTTER_LOCATION,
+            marks=tuple(state.marks),
+        )
 
-def run(state: CutterLocationState, lines: tuple[str, ...], most_errors: int = 1) -> list[InputError]:
-    """Execute all lines in order, from what is in force in `state`, up to so many errors, which are returned."""
-    index, errors = 0, list[InputError]()
-    while index < len(lines) and not state.ended and len(errors) < most_errors:
-        if len(state.recorder.recent) > PACKED_AT:
-            state.recorder.pack()
-        here = index
-        statement: MajorStatement | None = MajorStatement(here + 1, 1, "GOTO")
-        point, index = plain_point(lines[here]), here + 1
+    def run(self) -> list[Remark]:
+        """Execute all lines in order."""
+        state, lines, index = self.state, self.lines, 0
+        while index < len(lines) and not state.ended:
+            if len(state.recorder.recent) > PACKED_AT:
+                state.recorder.pack()
+            here, index = index, index + 1
+            statement: MajorStatement | None = MajorStatement(here + 1, 1, "GOTO")
+            point = plain_point(lines[here])
+            try:
+                if point is None:
+                    statement, index = read_statement(lines, here, self.name)
+                if statement is None:
+                    _take_comment(state, lines, here)
+                else:
+                    self._execute_statement(statement, point)
+            except InputError as error:
+                if state.last_word == "END" and not any_statement(lines[here:]):  # notes of a CAM system behind it
+                    state.warnings.append(Remark("what follows END is no statement, and not read", here + 1))
+                    break
+                if self.tally is None:
+                    raise
+                self.tally.keep(error)
+        if state.ended and any(line.strip() and not line.lstrip().startswith("$$") for line in lines[index:]):
+            state.warnings.append(Remark("FINI ends the file; what follows is not read", index))
+        self._tried(state.no_circle, "the end of the file", None)
+        _conclude(state)
+        return []
+
+    def _execute_statement(self, statement: MajorStatement, point: list[float] | None) -> None:
+        """Execute a statement, whose numbers are known if it is a plain GOTO; geometry's errors get its place."""
+        state, word = self.state, statement.word
+        state.statement = statement
+        if word and self.tally is not None:
+            self.tally.add(word, statement.line, 1)
         try:
             if point is None:
-                statement, index = read_statement(lines, here, state.name)
-            if statement is None:
-                _take_comment(state, lines, here)
+                execute(state, statement)
             else:
-                _execute(state, statement, point)
-        except InputError as error:
-            if state.last_word == "END" and not any_statement(lines[here:]):  # notes that a CAM system writes behind it
-                state.warnings.append(Remark("what follows END is no statement, and not read", here + 1))
-                break
-            errors.append(error)
-    if len(errors) >= most_errors:
-        return errors
-    if state.ended and any(line.strip() and not line.lstrip().startswith("$$") for line in lines[index:]):
-        state.warnings.append(Remark("FINI ends the file; what follows is not read", index))
-    if state.circle is not None:
-        problem = f"the end of the file while the circle of line {state.circle.line} waits for its GOTO"
-        errors.append(state.fail(problem, "GOTO/"))
-    if not errors and not state.recorder.cuts:
-        errors = [ProgramError("no cutting move", expected="GOTO/ after FEDRAT/, not after RAPID", file=state.name)]
-    _conclude(state)
-    return errors
+                to_point(state, point)
+        except ArcError as error:
+            raise state.fail(error.found, error.expected) from None
+        state.last_word = word or state.last_word
 
 
 def _take_comment(state: CutterLocationState, lines: tuple[str, ...], index: int) -> None:
@@ -120,21 +132,6 @@ def _take_comment(state: CutterLocationState, lines: tuple[str, ...], index: int
     elif frame is not None:
         state.statement = MajorStatement(index + 1, 1, frame[0])
         one_frame(state, *frame, lines[index].strip()[:40])
-
-
-def _execute(state: CutterLocationState, statement: MajorStatement, point: list[float] | None) -> None:
-    """Execute a statement, whose numbers are known if it is a plain GOTO; geometry's errors get its place."""
-    state.statement = statement
-    if statement.word:
-        state.used_words.setdefault(statement.word, [statement.line, 0])[1] += 1
-    try:
-        if point is None:
-            execute(state, statement)
-        else:
-            to_point(state, point)
-    except ArcError as error:
-        raise state.fail(error.found, error.expected) from None
-    state.last_word = statement.word or state.last_word
 
 
 def _conclude(state: CutterLocationState) -> None:

@@ -76,7 +76,6 @@ class CutterLocationState:
     # What the file holds.
     recorder: Recorder = field(default_factory=Recorder)
     used_tools: dict[int, ToolEntry] = field(default_factory=dict)
-    used_words: dict[str, list[int]] = field(default_factory=dict)  # line of the first, count
     marks: list[tuple[int, str]] = field(default_factory=list)  # line and name of each operation
     assumptions: list[str] = field(default_factory=list)
     warnings: list[Remark] = field(default_factory=list)
@@ -167,10 +166,7 @@ def move(state: CutterLocationState, motion: int, target: Vector, axis: Vector, 
     feed = math.nan
     if motion != RAPID:
         if state.feed is None:
-            raise state.fail(
-                "a cut before any feed",
-                "FEDRAT/ with a feed above 0, or --feed MM_PER_MIN for such cuts",
-            )
+            raise state.fail("a cut before any feed", "FEDRAT/ with a feed above 0, or --feed MM_PER_MIN for such cuts")
         # Of a tip that stands still the same number of degrees per minute.
         feed = state.feed_per_minute(state.feed, state.per_revolution)
         if still and arc is None:
@@ -197,11 +193,9 @@ def move(state: CutterLocationState, motion: int, target: Vector, axis: Vector, 
 
 def drill(state: CutterLocationState, target: Vector, axis: Vector, hole: Drilling) -> None:
     """The hole of the cycle in force at a point, along the tool axis."""
-    state.refuse_if(
-        state.point is not None and axis != state.axis,
-        "a hole with another tool axis than the move before",
-        "a GOTO/ before the cycle that turns the tool",
-    )
+    leans = state.point is not None and axis != state.axis
+    expected = "a GOTO/ before the cycle that turns the tool"
+    state.refuse_if(leans, "a hole with another tool axis than the move before", expected)
     feed = state.feed_per_minute(state.hole_feed, state.hole_per_revolution)
     if state.hole_from is not None:
         hole = replace(hole, clear=max(hole.retract, dot(minus(state.hole_from, target), axis)))

@@ -84,18 +84,15 @@ def read_statement(lines: tuple[str, ...], index: int, name: str) -> tuple[Major
     while True:
         code, continues, rest = lines[index].partition("$$")[0].partition("$")
         if rest.strip():
-            raise Place(name, index + 1, len(code) + 2).fail(
-                f"{rest.strip()[:20]!r} after a $, which continues a statement on the next line",
-                "nothing, or $$ and a comment",
-            )
+            problem = f"{rest.strip()[:20]!r} after a $, which continues a statement on the next line"
+            raise Place(name, index + 1, len(code) + 2).fail(problem, "nothing, or $$ and a comment")
         joined += code[begin:]
         index, begin = index + 1, 0
         if not continues:
             return _parse(joined.strip(), place), index
         if index == len(lines) or _NEW_STATEMENT.match(lines[index]):
-            raise Place(name, index, len(code) + 1).fail(
-                "a $ at the end of a line, and no line that continues the statement", "the rest of the statement"
-            )
+            problem = "a $ at the end of a line, and no line that continues the statement"
+            raise Place(name, index, len(code) + 1).fail(problem, "the rest of the statement")
 
 
 def _after_comment(lines: tuple[str, ...], index: int) -> int:
@@ -138,11 +135,8 @@ def _parse(text: str, place: Place) -> MajorStatement | None:
     head = _WORD.match(text)
     if head is None:
         hint = "definitions and computations need APT's processor: give the file that it or the CAM system writes"
-        raise place.fail(
-            f"{text[:40]!r} is not a statement of a cutter-location file",
-            "a word, or a word and / and its arguments",
-            hint if "=" in text else "",
-        )
+        problem = f"{text[:40]!r} is not a statement of a cutter-location file"
+        raise place.fail(problem, "a word, or a word and / and its arguments", hint if "=" in text else "")
     word = re.sub(r"\s*,\s*", ",", re.sub(r"\s+", " ", head[1].strip().upper()))
     if head[2]:
         return MajorStatement(line, column, word, _arguments(text[head.end() :]))

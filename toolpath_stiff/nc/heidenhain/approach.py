@@ -11,7 +11,7 @@ from functools import partial
 
 from toolpath_stiff.nc.codes.cutter import switch_off
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import SIDES, begin_compensation, go
+from toolpath_stiff.nc.heidenhain.contour import SIDES, begin_compensation, go, take_side
 from toolpath_stiff.nc.heidenhain.points import feed, in_plane, named, plane_of_pole, polar, present
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
@@ -55,7 +55,7 @@ def begin_contour(
     contour, start, to_arc = complex(there[first], there[second]), in_plane(state, present(state)), code.endswith("LCT")
     rapid = state.plain.fast and not to_arc
     state.feed = rate if to_arc else modal
-    side = next((word for word in ("R0", "RL", "RR") if block.take(word) is not None), "R0")
+    side = take_side(block) or "R0"
     block.refuse_if(side == "R0" and not code.endswith("LT"), None, "without a side", "RL or RR")
     if side != "R0":
         begin_compensation(state, block, side)
@@ -70,8 +70,8 @@ def begin_contour(
         _go(state, block, apex, center, -turn)
     if cutter is not None:  # the tool stands beside the contour's first point, from where that goes on
         cutter.position = state.frames.to_program(state.frames.position)
-        cutter.anchor = (apex.real, apex.imag)
-        state.frames.position = state.frames.to_control(cutter.moved(cutter.position, (contour.real, contour.imag)))
+        cutter.anchor = apex
+        state.frames.position = state.frames.to_control(cutter.moved(cutter.position, contour))
     state.cutter = cutter
     unused = next(iter(block.free), None)
     block.refuse_if(unused, unused, f"is no word of {code}", "its own words")

@@ -8,24 +8,26 @@ import cmath
 import math
 
 from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.center_path import arc_about
 from toolpath_stiff.nc.codes.cutter import LEFT, RIGHT, switch_off
 from toolpath_stiff.nc.codes.motion import machine_move, record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
 from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
 from toolpath_stiff.nc.elements import direction as direction_of
-from toolpath_stiff.nc.geometry import PLANES, ArcError
+from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.points import (
     ON_CIRCLE_MM,
     feed,
     in_plane,
     inch_tenths,
     named,
+    outside_contour,
     plane_of_pole,
     polar,
     present,
 )
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Remark
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, Word
@@ -36,6 +38,7 @@ COMPENSATED = (
     "RL, RR (G41, G42) begin and end perpendicular to the first and the last contour element and round outside corners"
 )
 SIDES = {"RL": LEFT, "RR": RIGHT}
+UNKNOWN_POINT = "goes to a point of the machine that the program does not give: left out of the path"
 
 
 def pole(state: State, block: CurrentBlock, code: str) -> None:
@@ -49,10 +52,14 @@ def pole(state: State, block: CurrentBlock, code: str) -> None:
     state.plain.pole = plane, complex(point[first], point[second])
 
 
+def take_side(block: CurrentBlock) -> str | None:
+    """R0, RL or RR of a statement, taken; None without one."""
+    return next((word for word in ("R0", *SIDES) if block.take(word) is not None), None)
+
+
 def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:
     """R0, RL, RR of a straight statement: the tool on the contour, left of it, right of it."""
-    side = next((word for word in ("R0", "RL", "RR") if block.take(word) is not None), None)
-    cutter = state.cutter
+    side, cutter = take_side(block), state.cutter
     if state.plain.approach is not None:  # which says the side
         block.refuse_if(side == "R0", side, "behind an APPR", "no R0")
         return
@@ -134,21 +141,15 @@ def move(
     control = frames.to_control([there.get(axis, value) for axis, value in enumerate(here)])
     if not frames.rotated:  # an axis that is not named keeps its number to the last digit
         control = [control[axis] if axis in there else value for axis, value in enumerate(frames.position)]
-    try:
-        if center is None:
-            record(state, block, RAPID if rapid else FEED, control, there)
-            return
-        block.refuse_if(state.beside, None, "is an arc right after R0", "a straight statement (L) between")
-        first, second, _ = PLANES[state.plane]
-        end = there.get(first, here[first]), there.get(second, here[second])
-        middle, start = (center.real, center.imag), (here[first], here[second])
-        sweep = geometry.sweep_about(middle, start, end, turn < 0, state.inch, turns)
-        here[first], here[second] = middle
-        x, y, z = frames.to_setup(frames.to_control(here))[:3]
-        normal = frames.turn_direction(geometry.normal_of(state.plane))
-        record(state, block, ARC, control, there, arc=Arc((x, y, z), normal, sweep))
-    except ArcError as error:
-        raise block.fail(None, error.found, error.expected) from None
+    if center is None:
+        record(state, block, RAPID if rapid else FEED, control, there)
+        return
+    block.refuse_if(state.beside, None, "is an arc right after R0", "a straight statement (L) between")
+    first, second, _ = PLANES[state.plane]
+    end = there.get(first, here[first]), there.get(second, here[second])
+    middle, start = (center.real, center.imag), (here[first], here[second])
+    sweep = geometry.sweep_about(middle, start, end, turn < 0, state.inch, turns)
+    record(state, block, ARC, control, there, arc=arc_about(state, here, center, sweep))
 
 
 def _approach(state: State, block: CurrentBlock, ahead: complex) -> None:
@@ -177,46 +178,46 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
     block.refuse_if(all(inner[:2]), None, "under cycle 8 and cycle 10: their order decides the path", "one of them")
     if plain.held_tip and state.frames.posted is None:
         leans = any(state.frames.position[3:]) or any(there.get(axis) for axis in (3, 4, 5))
-        block.refuse_if(
-            leans, None, "turns rotary axes under tool centre point control (M128, TRAORI)", hint=HOLDS_HINT
-        )
+        block.refuse_if(leans, None, "turns rotary axes under tool centre point control (M128)", "", HOLDS_HINT)
 
 
 def line(state: State, block: CurrentBlock, code: str) -> None:
     """L: straight to a point. In machine coordinates under M91."""
     plain, there, rapid = state.plain, named(state, block), feed(state, block)
     if plain.tilt is not None and there.keys() & {3, 4, 5}:
-        block.refuse_if(
-            there.keys() & {0, 1, 2} and not rapid, None, "turns rotary axes in a tilted plane", "FMAX, or no A, B, C"
-        )
+        block.refuse_if(there.keys() & {0, 1, 2} and not rapid, None, "turns rotary axes in a tilted plane", "FMAX")
         for axis in there.keys() & {3, 4, 5}:
             word = block.values.get(AXES[axis]) or block.values[f"I{AXES[axis]}"]
             state.note(block.line, word, "turns the machine's axes to the tilted plane, which gives the tool's axis")
             del there[axis]
-    if block.take("M92") is not None:
-        block.refuse_if(not rapid, "M92", "in a cut: the machine builder says where its points are", "FMAX")
-        state.warnings.append(
-            Remark("M92 goes to points that the machine builder sets: left out of the path", block.line)
-        )
-        plain.unknown |= there.keys() & {0, 1, 2}
-        block.take("R0")
-        return
-    if block.take("M91") is not None:
-        block.refuse_if(
-            state.cutter or plain.held or plain.to_corner, "M91", "beside a contour with compensation or a corner"
-        )
-        block.refuse_if(any(letter[0] == "I" for letter in block.values), "M91", "with steps", "coordinates")
-        block.take("R0")
-        unit = state.length_scale
-        values = {AXES[a]: Word(AXES[a], v / unit if a < 3 else v, 1, AXES[a]) for a, v in there.items()}
-        current = CurrentBlock(block.name, block.block, {"G53": block.values["M91"]}, {}, values, set(values))
-        state.motion, plain.heading, plain.pole = "G0" if rapid else "G1", None, None
-        plain.unknown -= there.keys() if plain.tilt is None else set()
-        machine_move(state, current, "G53")
+    machine = next((code for code in ("M91", "M92") if block.take(code) is not None), "")
+    if machine:
+        _to_machine(state, block, machine, there, rapid)
         return
     compensate(state, block, there)
     if there:
         go(state, block, there, rapid=rapid)
+
+
+def _to_machine(state: State, block: CurrentBlock, code: str, there: dict[int, float], rapid: bool) -> None:
+    """M91: machine coordinates; those that are not known, and the points of M92, are left out of the path."""
+    plain, unit = state.plain, state.length_scale
+    block.take("R0")
+    lost = {axis for axis, value in there.items() if code == "M92" or math.isnan(value)}
+    if lost:
+        block.refuse_if(not rapid, code, "in a cut: the machine builder says where its points are", "FMAX")
+        state.warnings.append(Remark(UNKNOWN_POINT, block.line))
+        plain.unknown |= lost & {0, 1, 2}
+    words = {axis: value for axis, value in there.items() if axis not in lost}
+    if not words:
+        return
+    outside_contour(state, block, code, plain.to_corner)
+    block.refuse_if(any(letter[0] == "I" for letter in block.values), code, "with steps", "coordinates")
+    values = {AXES[a]: Word(AXES[a], v / unit if a < 3 else v, 1, AXES[a]) for a, v in words.items()}
+    current = CurrentBlock(block.name, block.block, {"G53": block.values[code]}, {}, values, set(values))
+    state.motion, plain.heading, plain.pole = "G0" if rapid else "G1", None, None
+    plain.unknown -= words.keys() if plain.tilt is None else set()
+    machine_move(state, current, "G53")
 
 
 def polar_line(state: State, block: CurrentBlock, code: str) -> None:
@@ -246,7 +247,7 @@ def _round(
 ) -> None:
     rapid = feed(state, block)
     block.refuse_if(rapid, "FMAX", "on an arc", "F with a number")
-    side = next((word for word in ("R0", "RL", "RR") if block.take(word) is not None), None)
+    side = take_side(block)
     same = side is None or SIDES.get(side, 0) == (state.cutter.side if state.cutter else 0)
     block.refuse_if(not same or state.beside, side, "changes on an arc", "a straight statement (L) for it")
     go(state, block, there, center, turn, turns)
@@ -266,11 +267,8 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
         raise block.fail(None, "without its radius", "R")
     start = in_plane(state, present(state))
     end = in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
-    try:
-        places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
-        center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
-    except ArcError as error:
-        raise block.fail(None, error.found, error.expected) from None
+    places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
+    center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
     _round(state, block, there, center, turn)
 
 
@@ -323,10 +321,8 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
         size /= 2.0 * max(math.cos(turned / 2.0), STRAIGHT_ON)
     lines = held[2] is None and element[2] is None
     corner_block.refuse_if(not rounded and not lines, None, "beside an arc", "CHF between two lines")
-    try:
+    with corner_block.placing():
         cut = cut_off(held, element, size, rounded)
-    except ArcError as error:
-        raise corner_block.fail(None, error.found, error.expected) from None
     begin, end, center, turn = cut or (held[1], held[1], None, 0)
     state.feed = rate
     move(state, block, {first: begin.real, second: begin.imag}, held[2], held[3])

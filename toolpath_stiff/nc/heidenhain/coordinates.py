@@ -10,11 +10,13 @@ from toolpath_stiff.nc.codes import tools
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.frames import rotate, rotation_matrix
 from toolpath_stiff.nc.geometry import PLANES, roll_pitch_of_axis
+from toolpath_stiff.nc.heidenhain.points import outside_contour
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
 Matrix = list[list[float]]
+UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 TIP_TURNS = (
     "PLANE, cycle 19 and CYCLE800 turn the tool about its tip where it stands: how the machine's axes turn is not known"
 )
@@ -29,26 +31,29 @@ def product(a: Matrix, b: Matrix) -> Matrix:
     return [[sum(x * y for x, y in zip(row, column, strict=True)) for column in zip(*b, strict=True)] for row in a]
 
 
-def apply(state: State, block: CurrentBlock) -> None:
-    """Put what is in force into the frames; the tool stands still, its numbers change."""
+def put(state: State, block: CurrentBlock, inner: Matrix) -> None:
+    """Put a turn, mirror image and scale, the tilting and the shifts into force; the tool stands still meanwhile."""
     plain, frames = state.plain, state.frames
-    waits = state.cutter is not None or state.beside is not None or plain.held is not None or plain.approach is not None
-    block.refuse_if(waits, None, "inside a contour with compensation or a corner", "R0 and a positioning before it")
-    inner = [[plain.scale * float(row == column) for column in range(3)] for row in range(3)]
+    outside_contour(state, block, "changes coordinates", state.beside is not None or plain.side)
+    whole, shift = inner, plain.shift
+    if plain.tilt is not None:
+        whole, shift = product(plain.tilt, inner), rotate(plain.tilt, plain.shift)
+    frames.linear = None if whole == UNIT else whole
+    frames.g92 = [*(a + b for a, b in zip(plain.outer, shift, strict=True)), 0.0, 0.0, 0.0]
+    plain.pole = plain.heading = None
+
+
+def apply(state: State, block: CurrentBlock) -> None:
+    """Put what is in force into the frames."""
+    plain = state.plain
+    inner = [[plain.scale * v for v in row] for row in UNIT]
     if plain.angle:
         turn = [0.0, 0.0, 0.0]
         turn[PLANES[state.plane][2]] = plain.angle
         inner = product(rotation_matrix(turn), inner)
     for axis in plain.mirrored:
         inner[axis] = [-v for v in inner[axis]]
-    shift = plain.shift
-    if plain.tilt is not None:
-        shift = rotate(plain.tilt, plain.shift)
-        inner = product(plain.tilt, inner)
-    unit = [[float(row == column) for column in range(3)] for row in range(3)]
-    frames.linear = None if inner == unit else inner
-    frames.g92 = [*(a + b for a, b in zip(plain.outer, shift, strict=True)), 0.0, 0.0, 0.0]
-    plain.pole = plain.heading = None
+    put(state, block, inner)
     settled = not plain.angle and not plain.mirrored and plain.scale == 1.0 and plain.tilt is None
     plain.doubt = "" if settled else plain.doubt
 
@@ -68,9 +73,7 @@ def shift(state: State, block: CurrentBlock, code: str) -> None:
     turned = next((letter for letter in "ABC" if block.take(letter)), None)
     block.refuse_if(turned, turned, "shifts a rotary axis", "X, Y, Z")
     above = plain.tilt is not None and any(plain.outer)
-    block.refuse_if(
-        above and any(values), None, "shifts a datum that was shifted before the tilting", "PLANE RESET first"
-    )
+    block.refuse_if(above and any(values), None, "shifts a datum shifted before the tilting", "PLANE RESET first")
     if above or (values != plain.shift and (plain.angle or plain.mirrored or plain.scale != 1.0)):
         plain.doubt = (
             f"after {code} in a tilted plane, or under cycle 8, 10 or 11: the order decides where the datum is"
@@ -116,10 +119,10 @@ def tilt(state: State, block: CurrentBlock, code: str) -> None:
     leans = (a, b, c) != (0.0, 0.0, 0.0)
     if not leans and plain.tilt is None:
         return
+    by_axes = code == "PLANE AXIAL"
+    block.refuse_if(by_axes, None, "by angles of the machine's axes, which are not known here", "PLANE SPATIAL")
     block.refuse_if(state.plane != "G17", None, f"with the tool in {state.plane}", "the tool axis Z")
-    block.refuse_if(
-        frames.posted is not None, None, "beside [kinematics]: it gives the tool's axis itself", "no --controller"
-    )
+    block.refuse_if(frames.posted, None, "beside [kinematics]: it gives the tool's axis itself", "no --controller")
     inner = plain.angle or plain.mirrored or plain.scale != 1.0 or (plain.tilt is not None and any(plain.shift))
     block.refuse_if(inner, None, "while cycle 7, 8, 10 or 11 is in force in the plane", "their reset before it")
     if code != "PLANE SPATIAL" and leans:

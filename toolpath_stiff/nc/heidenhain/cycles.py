@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.contour import check_known, go
-from toolpath_stiff.nc.heidenhain.points import inch_tenths, named, present
+from toolpath_stiff.nc.heidenhain.points import inch_tenths, named, outside_contour, present
 from toolpath_stiff.nc.moves import CYCLE, RAPID
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
@@ -101,8 +101,7 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
     plain, normal = state.plain, PLANES[state.plane][2]
     if plain.cycle is None:
         raise block.fail(None, "calls a cycle, and none is defined", "CYCL DEF before it")
-    waits = state.cutter is not None or plain.held is not None or plain.approach is not None
-    block.refuse_if(waits, None, "calls a cycle inside a contour", "R0 before it")
+    outside_contour(state, block, "calls a cycle")
     unit, (number, values) = state.length_scale, plain.cycle
     values = values | (change or {})
     if "Q203" not in values:  # an older one
@@ -118,15 +117,9 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
     block.refuse_if(plain.unknown, None, "calls a cycle where X or Y is not known", "X and Y before it")
     block.refuse_if(number in TAPS and state.speed <= 0.0, None, "taps without a speed", "S above 0")
     pitch = unit if number in TAPS else inch_tenths(state)
-    auto = plain.tool_feed or 0.0
-    plunge(
-        state,
-        block,
-        (
-            (height * unit, None if rate in (None, MAX) else auto if rate == AUTO else rate * pitch, wait)
-            for height, rate, wait in strokes(number, values, state.speed)
-        ),
-    )
+    path = strokes(number, values, state.speed)
+    feeds = {None: None, MAX: None, AUTO: plain.tool_feed or 0.0}
+    plunge(state, block, ((at * unit, feeds.get(rate, (rate or 0.0) * pitch), wait) for at, rate, wait in path))
 
 
 def plunge(state: State, block: CurrentBlock, path: Iterable[Stroke]) -> None:

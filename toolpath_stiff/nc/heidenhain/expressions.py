@@ -15,6 +15,7 @@ from toolpath_stiff.nc.place import Place
 _TOKEN = re.compile(rf"\s*({NUMBER}|Q[LR]?\d+|DIV|LEN|ANG|[A-Z]+|[-+*/^()])")
 _RANKS = {"+": 1, "-": 1, "*": 2, "/": 2, "DIV": 2, "^": 3, "LEN": 1, "ANG": 1}
 _DEEPEST = 50
+PARAMETER = re.compile(r"Q[LR]?\d+")
 _ASSIGNED = re.compile(r"\s*(Q[LR]?\d+)?\s*=\s*(.+)$")
 _JUMP = re.compile(r'\s*IF\s*(.+?)\s*(EQU|NE|GT|LT)\s*(.+?)\s*GOTO\s*LBL\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*$')
 CONDITIONS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
@@ -45,12 +46,12 @@ OPERATORS: dict[str, Callable[[float, float], float]] = {
 }  # fmt: skip
 
 
-def assigned(head: str, rest: str, parameter: Callable[[str], float], place: Place) -> tuple[str, float]:
-    """Name and value of an assignment: `Q5 = ...`, with the name as its head, or `FN 1: Q5 = ...`."""
+def assigned(head: str, rest: str, place: Place) -> tuple[str, str]:
+    """Name and formula of an assignment: `Q5 = ...`, with the name as its head, or `FN 1: Q5 = ...`."""
     formula = _ASSIGNED.match(rest)
     if formula is None or not (formula[1] or head[0] == "Q"):
         raise place.fail(f"{head}{rest[:40]} is no assignment", "Q5 = +10")
-    return formula[1] or head, work_out(formula[2], parameter, place)
+    return formula[1] or head, formula[2]
 
 
 def condition(

@@ -8,14 +8,13 @@ import math
 from toolpath_stiff.nc.codes.feeds import feed_mode
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle, unit_axis
-from toolpath_stiff.nc.geometry import PLANES, ArcError, Vector
+from toolpath_stiff.nc.geometry import PLANES, Vector
 from toolpath_stiff.nc.heidenhain.contour import compensate, go
 from toolpath_stiff.nc.heidenhain.coordinates import hold_tip
 from toolpath_stiff.nc.heidenhain.points import feed, named, present
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
-from toolpath_stiff.units import SECONDS_PER_DAY
 
 # M functions that are those of the one table of codes.
 SHARED = ("M0", "M1", "M2", "M3", "M4", "M5", "M7", "M8", "M9", "M13", "M14", "M19", "M30")
@@ -71,8 +70,7 @@ def miscellaneous(state: State, block: CurrentBlock) -> None:
                 for other in (*OF_M, *AXES) if letter == "M118" else OF_M:
                     block.take(other)
         else:
-            state.note(block.line, word, "an M function of one control, not acted upon")
-            state.warnings.append(Remark(f"what {word.text} does on its control is not known", block.line))
+            state.note_unknown(block.line, word)
 
 
 def retract(state: State, block: CurrentBlock) -> None:
@@ -105,12 +103,9 @@ def vectors(state: State, block: CurrentBlock, code: str) -> None:
         return
     other = state.frames.posted is not None or state.plain.tilt is not None or there.keys() & {3, 4, 5} or None in axis
     block.refuse_if(other, None, "LN with A, B, C, in a tilted plane, or beside [kinematics]", "TX, TY and TZ alone")
-    try:
-        target = unit_axis([component or 0.0 for component in axis])
-        start, here = _axis(state), present(state)
-        parts = division(start, target)
-    except ArcError as error:
-        raise block.fail(None, error.found, error.expected) from None
+    target = unit_axis([component or 0.0 for component in axis])
+    start, here = _axis(state), present(state)
+    parts = division(start, target)
     held, state.plain.held_tip = state.plain.held_tip, False  # the vectors say what M128 holds
     for part in range(1, parts + 1):
         share = part / parts
@@ -129,10 +124,7 @@ def _axis(state: State) -> Vector:
 
 def dwell(state: State, block: CurrentBlock, code: str) -> None:
     """CYCL DEF 9.1: a pause in seconds."""
-    seconds = block.take("#")
-    if seconds is None or not 0.0 <= seconds <= SECONDS_PER_DAY:
-        raise block.fail(None, "without its time", "CYCL DEF 9.1 DWELL 1.5")
-    state.recorder.add_dwell(seconds)
+    state.pause(block, "", block.take("#"), "CYCL DEF 9.1 DWELL 1.5")
 
 
 def units(state: State, block: CurrentBlock, code: str) -> None:

@@ -30,6 +30,14 @@ def present(state: State) -> list[float]:
     return here
 
 
+def outside_contour(state: State, block: CurrentBlock, what: str, also: object = False) -> None:
+    """Refuse what cannot be in a contour: with compensation, before the element behind a corner, or behind APPR."""
+    plain = state.plain
+    waits = state.cutter is not None or plain.held is not None or plain.approach is not None or also
+    problem = f"{what} inside a contour with compensation or a corner"
+    block.refuse_if(waits, None, problem.strip(), "R0 or G40, and a positioning, before it")
+
+
 def in_plane(state: State, point: list[float]) -> complex:
     """A point's two coordinates of the plane."""
     first, second, _ = PLANES[state.plane]

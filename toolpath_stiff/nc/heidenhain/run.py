@@ -10,12 +10,13 @@ from contextlib import nullcontext, suppress
 from pathlib import PurePath
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.codes.code import Code
 from toolpath_stiff.nc.heidenhain.cycles import call
-from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, assigned, condition
+from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, PARAMETER, assigned, condition, work_out
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
 from toolpath_stiff.nc.heidenhain.plain_statements import EMPTY, as_g_code, corner_follows
-from toolpath_stiff.nc.heidenhain.points import WORDS_OF_AXES
 from toolpath_stiff.nc.heidenhain.statements import PlainStatement, labels, read_statement
+from toolpath_stiff.nc.heidenhain.system_data import SYSREAD, system_value
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up, meaning_of, refusal_of
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.plain_lines import PlainRun
@@ -24,13 +25,13 @@ from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.state import CurrentBlock, Flow
-from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import Block, Word
 
 CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*\d+)?)?\s*$')
 CONTOUR = frozenset(("RND", "CHF", "L", "LP", "C", "CP", "CR", "CT", "CTP", "LN"))
 FORMULAS = ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
 OF_CONTROL = ("FN18", "FN28")
+TO_MACHINE = ("M91", "M92")  # beside which FMAX may lead to a point that is not known
 TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control works out for a tilted plane
 
 
@@ -49,6 +50,7 @@ class HeidenhainRun(ProgramRun):
         self._repeats: dict[tuple[int, int], int] = {}
         self._locals: list[dict[str, float]] = [{}]  # QL, by the programs that run
         self._row = 0
+        self._to_machine = False  # the statement is a rapid in machine coordinates
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
         """Count plain statements, which are all L."""
@@ -57,10 +59,7 @@ class HeidenhainRun(ProgramRun):
             self._count(self._statement(first + int(rows[0])))
             self.tally.count["L"] += len(rows) - 1
 
-    @staticmethod
-    def meaning(code: str) -> str:
-        """What a statement, or an M function, is taken for."""
-        return meaning_of(code)
+    meaning = staticmethod(meaning_of)
 
     def _statement(self, row: int) -> PlainStatement:
         if row not in self._statements:
@@ -96,8 +95,7 @@ class HeidenhainRun(ProgramRun):
         ms = [word for word in statement.words if word.letter[0] == "M" and word.letter[1:].isdigit()]
         for code, column in [(name, statement.column), *((word.letter, word.column) for word in ms)]:
             if code != "M":
-                self.tally.first.setdefault(code, (statement.line, column))
-                self.tally.count[code] += 1
+                self.tally.add(code, statement.line, column)
 
     def _acted(self, row: int, statement: PlainStatement) -> int:
         head, code, plain = statement.head, look_up(statement.head), self.state.plain
@@ -108,6 +106,14 @@ class HeidenhainRun(ProgramRun):
         plain.to_corner = corner_follows(self.lines, statement.after)
         if plain.held is not None and head not in CONTOUR and not head.startswith("DEP"):
             raise block.fail(None, "stands between a corner (CHF, RND) and the element behind it", "the element")
+        with block.placing():
+            self._act(block, head, code)
+        flow = self._flow(row, statement, block)
+        return len(self.lines) if block.flow is Flow.END or flow is None else flow
+
+    def _act(self, block: CurrentBlock, head: str, code: Code) -> None:
+        """Carry out a statement, its M functions, and the cycle that it calls."""
+        plain = self.state.plain
         miscellaneous(self.state, block)
         if block.has("M140"):
             retract(self.state, block)
@@ -121,12 +127,12 @@ class HeidenhainRun(ProgramRun):
         if once is not None or ((modal is not None or plain.modal) and positioned):
             call(self.state, block)
         plain.modal = (plain.modal or modal is not None) and once is None
-        flow = self._flow(row, statement, block)
-        return len(self.lines) if block.flow is Flow.END or flow is None else flow
 
     def _block_of(self, row: int, statement: PlainStatement) -> CurrentBlock:
         """The statement with the numbers of its words."""
         words = list(statement.words)
+        letters = {word.letter for word in words}
+        self._to_machine = "FMAX" in letters and not letters.isdisjoint(TO_MACHINE)
         for place, text in statement.computed.items():
             word = words[place]
             # Of axes that the control turns to a plane 0, which counts in an untilted one alone.
@@ -139,12 +145,7 @@ class HeidenhainRun(ProgramRun):
         head = Word("", 0.0, statement.column, statement.head)
         block = CurrentBlock(self.name, Block(line, (head, *words), optional=statement.optional))
         for word in words:
-            if word.letter in block.values:
-                raise block.fail(word, "repeats a word of its statement", "each word once")
-            if abs(word.value) > (LARGEST_MM if word.letter in WORDS_OF_AXES else LARGEST_WORD):
-                raise block.fail(word, "is beyond 100 m, or any number of a control")
-            block.values[word.letter] = word
-        block.free = set(block.values)
+            block.add(word.letter, word)
         return block
 
     def _value(self, row: int, text: str, column: int) -> float:
@@ -157,17 +158,25 @@ class HeidenhainRun(ProgramRun):
         return (-1.0 if text[0] == "-" else 1.0) * self._parameter(text.lstrip("+-"))
 
     def _parameter(self, name: str) -> float:
-        values = self._locals[-1] if name.startswith("QL") else self.state.plain.parameters
-        if name in values:
-            return values[name]
+        value = self._scope(name).get(name)
+        if value is not None and (self._to_machine or not math.isnan(value)):
+            return value
         known = {"Q108": self.state.plain.radius, "Q113": float(self.state.inch)}.get(name)
+        if self._to_machine:
+            return math.nan
         if known is None or math.isnan(known):
             reason = "a control keeps it from earlier programs, or works it out itself"
             raise self._fail(self._row, f"{name} is read before it is set: {reason}", f"FN 0: {name} = ... before")
         return known
 
-    def _assign(self, name: str, value: float) -> None:
-        (self._locals[-1] if name.startswith("QL") else self.state.plain.parameters)[name] = value
+    def _scope(self, name: str) -> dict[str, float]:
+        """Where a parameter is kept; nan: the control has given it a value that is not known."""
+        return self._locals[-1] if name.startswith("QL") else self.state.plain.parameters
+
+    def _work_out(self, row: int, formula: str) -> float:
+        """The value of a formula; nan where one of its parameters has a value that is not known."""
+        unknown = any(math.isnan(self._scope(name).get(name, 0.0)) for name in PARAMETER.findall(formula))
+        return math.nan if unknown else work_out(formula, self._parameter, self._place(row))
 
     def _flow(self, row: int, statement: PlainStatement, block: CurrentBlock) -> int | None:
         """Where the run goes on after a statement, whose parameters and jumps are carried out; None: nowhere."""
@@ -175,7 +184,7 @@ class HeidenhainRun(ProgramRun):
         if head.startswith("CYCL DEF 2"):
             for word in block.values.values():
                 if word.letter[0] == "Q" and not word.text.endswith(("MAX", "AUTO")):
-                    self._assign(word.letter, word.value)
+                    self._scope(word.letter)[word.letter] = word.value
         elif head in CONDITIONS:
             holds, number, name = condition(head, rest, self._parameter, self._place(row))
             return self._jump_back(row, self._label(row, number, name)) if holds else after
@@ -183,11 +192,16 @@ class HeidenhainRun(ProgramRun):
             raise self._fail(row, f"{head}{rest}: turning is not supported", "FUNCTION MODE MILL")
         elif head == "FN14":
             raise self._fail(row, f"the program stops with its error {rest.strip()}", "a program that runs through")
-        elif head in OF_CONTROL or head.startswith("TCH"):  # what it reads is not known from here on
-            for name in re.findall(r"Q\d+", rest):
-                self.state.plain.parameters.pop(name, None)
+        elif head in OF_CONTROL or head.startswith("TCH"):  # what it reads is not known from here on, but for some
+            reads = SYSREAD.match(rest) if head == "FN18" else None
+            for name in PARAMETER.findall(rest) if reads is None else ():
+                self._scope(name)[name] = math.nan
+            if reads is not None:
+                index = self._work_out(row, reads[4] or "0")
+                self._scope(reads[1])[reads[1]] = system_value(self.state, reads[2], reads[3], index)
         elif head[0] == "Q" or head in FORMULAS:
-            self._assign(*assigned(head, rest, self._parameter, self._place(row)))
+            name, formula = assigned(head, rest, self._place(row))
+            self._scope(name)[name] = self._work_out(row, formula)
         elif head == "CALL LBL":
             return self._call(row, statement)
         elif head == "CALL PGM":
@@ -248,9 +262,7 @@ class HeidenhainRun(ProgramRun):
         stem = name.removesuffix(".H")
         first = next((first for first, _, file in self._files if PurePath(file).stem.upper() == stem), None)
         if first is None:
-            files = sorted(self.folder.iterdir()) if self.folder and stem else ()
-            named = [file.name for file in files if file.suffix.upper() in (".H", "") and file.stem.upper() == stem]
-            first = self._load(named, ("END PGM",))  # which ends what has no END PGM before it
+            first = self._load(self._files_called(stem, (".H", "")), ("END PGM",))  # which ends what has no END PGM
             if first is None:
                 problem = f"CALL PGM {name}: no folder of programs has it"
                 raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=statement.column)

@@ -99,9 +99,7 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
     if begin.end() == len(text) or text[begin.end()] in "*(%":
         return PlainStatement(row + 1, "", 1, (), {}, "", False, after)
     if head is None:
-        raise place.fail(
-            f"{text[begin.end() :][:20]!r} is no statement", "Heidenhain's plain language", "", begin.end() + 1
-        )
+        raise place.fail(f"{text[begin.end() :][:20]!r} is no statement", "plain language", "", begin.end() + 1)
     shown, special, has_words = _form(head[0])
     if len(text) > LONGEST_BLOCK:
         raise place.fail(f"a statement of {len(text)} characters", f"at most {LONGEST_BLOCK}")

@@ -6,7 +6,7 @@ HEIDENHAIN, user's manual of the iTNC 530, "Tool data", "Defining the blank form
 import math
 
 from toolpath_stiff.nc.codes.tools import change_tool
-from toolpath_stiff.nc.heidenhain.points import inch_tenths
+from toolpath_stiff.nc.heidenhain.points import inch_tenths, outside_contour
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import ToolEntry, tool_of
 from toolpath_stiff.nc.words import AXES
@@ -18,8 +18,7 @@ FIRST_NAMED = 10_001  # the number of the first tool that the program calls by i
 def tool_call(state: State, block: CurrentBlock, code: str) -> None:
     """TOOL CALL: the tool with its length and radius, its axis, S and F; DL and DR add to the table's."""
     plain = state.plain
-    waits = state.cutter is not None or plain.held is not None or plain.approach is not None
-    block.refuse_if(waits, None, "inside a contour", "R0 and a positioning before it")
+    outside_contour(state, block, "")
     plane = next((TOOL_PLANES[letter] for letter in TOOL_PLANES if block.take(letter) is not None), None)
     if plane is not None and plane != state.plane:
         block.refuse_if(plain.tilt is not None or plain.angle, None, "takes another tool axis under PLANE or cycle 10")
@@ -40,9 +39,7 @@ def tool_call(state: State, block: CurrentBlock, code: str) -> None:
     plain.radius = entry.diameter / 2.0 + wider
     frames, length = state.frames, entry.length + longer
     state.tool_length = length
-    block.refuse_if(
-        plain.tilt is not None and not math.isnan(length), None, "in a tilted plane", "PLANE RESET before it"
-    )
+    block.refuse_if(plain.tilt and not math.isnan(length), None, "in a tilted plane", "PLANE RESET before it")
     frames.set_tool(0.0 if math.isnan(length) else length)
     plain.heading = None
 

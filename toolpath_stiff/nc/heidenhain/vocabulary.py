@@ -7,11 +7,10 @@ FN). M functions that mean what they mean in G code are the one table's (`codes.
 import re
 from functools import lru_cache
 
-from toolpath_stiff.nc.codes.code import Act, Code, Refused, holds_anyway
+from toolpath_stiff.nc.codes.code import Code, Rows, holds_anyway, refused, table
 from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, functions, tools
 from toolpath_stiff.nc.heidenhain.contour import MANUAL, PATHS, POLAR
-from toolpath_stiff.nc.state import Group
 
 CONTROLS = ("heidenhain",)
 _CYCLES = "HEIDENHAIN, user's manual Cycles of the iTNC 530"
@@ -25,7 +24,7 @@ _SPECIAL = f"{_CYCLES}, Special cycles"
 
 _SILENT, _LISTED = functions.nothing, functions.listed
 # Modal group, source, and names with function and meaning.
-_ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
+_ROWS: Rows = (
     ("units", _BASICS, (("BEGIN PGM", functions.units, "begin, with the unit of length"),)),
     ("motion", PATHS, (
         ("L", contour.line, "straight"),
@@ -65,6 +64,7 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
     ("dynamic offset", _PLANE, (
         ("PLANE SPATIAL", coordinates.tilt, "tilted plane by spatial angles"),
         ("PLANE RESET", coordinates.tilt, "no tilted plane"),
+        ("PLANE AXIAL", coordinates.tilt, "tilted plane by the machine's axes: angles of 0 alone"),
     )),
     ("tool length", f"{MANUAL}, FUNCTION TCPM", (
         ("FUNCTION TCPM|FUNCTION RESET TCPM", coordinates.hold_tip, "tool centre point control"),
@@ -99,7 +99,8 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
         ("Q|FN0|FN1|FN2|FN3|FN4|FN5|FN6|FN7|FN8|FN13", _SILENT, "Q parameter"),
         ("FN9|FN10|FN11|FN12", _SILENT, "jump on a condition"),
         ("FN14", _SILENT, "error: the program stops"),
-        ("FN18|FN28", _LISTED, "data of the control: the parameter is not known from there on"),
+        ("FN18", _LISTED, "data of the control: tool, datum shift, rotation, scale; others are not known"),
+        ("FN28", _LISTED, "data of the control: the parameter is not known from there on"),
         ("FN15|FN16|FN19|FN20|FN29|FN37|FN38", _LISTED, "message, PLC: changes no path"),
     )),
     ("non-modal", _BASICS, (
@@ -108,33 +109,24 @@ _ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
          _LISTED, "changes no path"),
     )),
 )  # fmt: skip
-STATEMENTS: dict[str, Code] = {
-    name: Code(name, group, act, meaning, source, CONTROLS)
-    for group, source, rows in _ROWS
-    for names, act, meaning in rows
-    for name in names.split("|")
-}
+STATEMENTS = table(_ROWS, CONTROLS, "|")
 OWN = {
     "M89": "the cycle after each positioning", "M99": "the cycle here", "M91": "machine coordinates",
     "M92": "points of the machine builder", "M126": "rotary axes go the shorter way", "M127": "they go as programmed",
     "M128": "tool centre point control", "M129": "tool centre point control off", "M140": "retract along the tool",
 }  # fmt: skip
-_BY_MOVES = "post the moves of the cycle"
+_BY_MOVES, _FK = "post the moves of the cycle", f"{MANUAL}, FK"
 _REFUSED = (
-    ("FL FLT FC FCT FPOL FSELECT FCTP FLP", "free contour programming (FK)", "post lines and arcs", f"{MANUAL}, FK"),
-    ("PLANE-PROJECTED PLANE-EULER PLANE-VECTOR PLANE-POINTS PLANE-RELATIV PLANE-RELATIVE PLANE-AXIAL",
+    ("FL, FLT, FC, FCT, FPOL, FSELECT, FCTP, FLP", "free contour programming (FK)", "post lines and arcs", _FK),
+    ("PLANE PROJECTED, PLANE EULER, PLANE VECTOR, PLANE POINTS, PLANE RELATIV, PLANE RELATIVE",
      "a tilted plane given otherwise", "PLANE SPATIAL", _PLANE),
-    ("CYCL-DEF-204", "back boring", _BY_MOVES, _DRILLING),
-    ("CYCL-DEF-208", "a helix whose way in the manual draws without numbers", _BY_MOVES, _DRILLING),
-    ("SEL PATTERN CALL CYCL-CALL-PAT", "points of other files or patterns", "post the points one by one", _PATTERNS),
-    ("FN17 FN26 FN27", "data of the control or of a table", "put the numbers into the program", _Q),
+    ("CYCL DEF 204", "back boring", _BY_MOVES, _DRILLING),
+    ("CYCL DEF 208", "a helix whose way in the manual draws without numbers", _BY_MOVES, _DRILLING),
+    ("SEL, PATTERN, CALL, CYCL CALL PAT", "points of other files or patterns", "post the points one by one", _PATTERNS),
+    ("FN17, FN26, FN27", "data of the control or of a table", "put the numbers into the program", _Q),
     ("SPL", "a spline", "post lines and arcs", PATHS),
 )  # fmt: skip
-REFUSED: dict[str, Refused] = {
-    name.replace("-", " "): Refused(name.replace("-", " "), what, hint, source)
-    for names, what, hint, source in _REFUSED
-    for name in names.split()
-}
+REFUSED = refused(_REFUSED, ", ")
 
 
 _BUILDERS = re.compile(r"CYCL DEF 3\d\d")

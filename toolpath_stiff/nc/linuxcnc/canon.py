@@ -277,12 +277,8 @@ class Follower:
         if self.first_motion is None:
             self.first_motion = self.line
         if self.turned_by and not {"X", "Y"} <= set(self._words(self.line)):
-            raise self.fail(
-                "G10 turns the work offset in force, and the next move does not name both X and Y: "
-                "LinuxCNC's rs274 would take the old numbers for them",
-                "X and Y in the move that follows",
-                line=self.turned_by,
-            )
+            problem = "G10 turns the work offset in force: LinuxCNC's rs274 would take the old numbers of X and Y"
+            raise self.fail(problem, "X and Y in the move that follows", line=self.turned_by)
         self.turned_by = 0
         if self.frame_changed:  # the same place in other numbers, up to the digits printed
             near = SAME_PLACE * self.scale

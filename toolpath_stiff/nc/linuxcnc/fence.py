@@ -77,11 +77,9 @@ def refuse_other_programs(lines: Iterable[Line], name: str) -> None:
         _take_subprogram(line, name, calls, defined)
     for key, number in calls:
         if key not in defined:
-            raise Place(name, number).fail(
-                f"subprogram O{key} is not in the program",
-                "subprograms in the same file, or as name.ngc in a folder",
-                "--subprograms FOLDER",
-            )
+            expected = "subprograms in the same file, or as name.ngc in a folder"
+            problem = f"subprogram O{key} is not in the program"
+            raise Place(name, number).fail(problem, expected, "--subprograms FOLDER")
 
 
 def _refused(problem: str, place: Place) -> ProgramError:

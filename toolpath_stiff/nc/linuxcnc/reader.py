@@ -166,15 +166,8 @@ class _Session:
         )
 
     def _follow(self, run: Run, reference: Sequence[float] = NO_SHIFT) -> Follower:
-        request = self.request
-        follower = Follower(
-            request.name,
-            self.lines,
-            request.controller.tools,
-            request.controller.kinematics,
-            self.tool_numbers,
-            reference,
-        )
+        request, control = self.request, self.request.controller
+        follower = Follower(request.name, self.lines, control.tools, control.kinematics, self.tool_numbers, reference)
         follower.follow(run.canon)
         if run.refusal:
             raise ProgramError(run.refusal, file=request.name, line=self.callers.get(run.line or 0, run.line))

@@ -176,12 +176,8 @@ class Scanner:
         """Which variable a `#` means: a number, the number that another one holds, an expression, a name."""
         column = self.column
         name = self.take(NAME)[1:-1]
-        self.refuse_if(
-            name and self.family == MACRO_B,
-            f"#<{name}> is a named variable, which Macro B does not have",
-            "#1 to #999",
-            column=column,
-        )
+        problem = f"#<{name}> is a named variable, which Macro B does not have"
+        self.refuse_if(name and self.family == MACRO_B, problem, "#1 to #999", column=column)
         if name:
             return lambda variables: name
         inner = self._unsigned()
@@ -220,11 +216,8 @@ class Scanner:
         column, family = self.column, self.family
         if name == "EXISTS":
             return self._exists()
-        self.refuse_if(
-            name == "ROUND" and self.of_word and family == MACRO_B,
-            "ROUND in a word, where it rounds to the least increment",
-            "it in an assignment",
-        )
+        in_word = name == "ROUND" and self.of_word and family == MACRO_B
+        self.refuse_if(in_word, "ROUND in a word, where it rounds to the least increment", "it in an assignment")
         if name in ("ATAN", "POW"):
             return self._of_two(name, column)
         argument = self.bracket()

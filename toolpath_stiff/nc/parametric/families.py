@@ -56,9 +56,7 @@ def family_of(lines: tuple[str, ...], dialect: Dialect, name: str) -> str:
         next((number for number, text in _bare(lines) if sign.search(text)), 0) for sign in (_NGC_SIGN, _MACRO_SIGN)
     )
     if ngc and macro:
-        raise Place(name, max(ngc, macro)).fail(
-            f"line {ngc} is of LinuxCNC's language (O words, #<name>, **), line {macro} of Macro B (IF GOTO, WHILE DO, "
-            "G65)",
-            hint="name the control with --dialect",
-        )
+        ours, theirs = "LinuxCNC's language (O words, #<name>, **)", "Macro B (IF GOTO, WHILE DO, G65)"
+        problem = f"line {ngc} is of {ours}, line {macro} of {theirs}"
+        raise Place(name, max(ngc, macro)).fail(problem, hint="name the control with --dialect")
     return NGC if ngc else MACRO_B if macro else EITHER

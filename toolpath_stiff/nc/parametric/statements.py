@@ -167,23 +167,17 @@ def _loop_label(scanner: Scanner, loop: str, column: int) -> str:
 def _o_word(scanner: Scanner) -> Steering:
     """`o100 while [...]`, `o<name> call [1] [2]`."""
     column = scanner.column
-    scanner.refuse_if(
-        scanner.family == MACRO_B, f"{scanner.rest()} is no program number", "O and digits, or --dialect linuxcnc"
-    )
+    scanner.refuse_if(scanner.family == MACRO_B, f"{scanner.rest()} is no number of a program", "--dialect linuxcnc")
     scanner.position += 1
     label = scanner.take(_O_LABEL)
     scanner.refuse_if(not label, f"{scanner.rest()} is no label of an O word", "O with a number, or a name as <name>")
     label = label if label[0] == "<" else label.lstrip("0") or "0"
     kind = scanner.take(_NGC_WORD)
-    scanner.refuse_if(
-        not kind, f"the O word {label} without what it does: {scanner.rest()}", ", ".join(NGC_WORDS).lower()
-    )
+    scanner.refuse_if(not kind, f"the O word {label} without what it does", ", ".join(NGC_WORDS).lower())
     values = []
     while kind == "CALL" and scanner.begins("["):
         values.append(scanner.bracket())
-    scanner.refuse_if(
-        len(values) > MOST_VALUES, f"a call with {len(values)} values", f"at most {MOST_VALUES}", column=column
-    )
+    scanner.refuse_if(len(values) > MOST_VALUES, f"a call with {len(values)} values", f"at most {MOST_VALUES}")
     if kind in ("IF", "ELSEIF", "WHILE", "REPEAT") or (kind in ("ENDSUB", "RETURN") and not scanner.done):
         values.append(scanner.bracket())
     return Steering(kind, label, f"o{label} {kind}".lower(), column, tuple(values))

@@ -123,9 +123,7 @@ class Variables:
             word = Word("#", 0.0, place.column or 1, f"#{which}")
             self.state.note(place.line, word, "single block, feed hold or a message: the path does not depend on it")
         elif self.family == MACRO_B and which == ALARM:
-            raise place.fail(
-                f"the program stops with its alarm {value or 0.0:g} (#3000)", "a program that runs through"
-            )
+            raise place.fail(f"the program stops with its alarm {value or 0.0:g} (#3000)", "no alarm")
         else:
             known = f"#31 to #{NGC_LAST}" if self.family == NGC else "#1 to #33, #100 to #199, #500 to #999"
             raise place.fail(f"#{which} cannot be set here", f"{known}; G10 for work offsets and tool lengths")

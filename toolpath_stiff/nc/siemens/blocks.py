@@ -1,14 +1,12 @@
 """A block in Siemens' language: its words sorted, its codes in their order, then its move, then its cycles."""
 
 from toolpath_stiff.nc.codes.code import code_name
-from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.run_records import Tally
 from toolpath_stiff.nc.siemens.cycles import repeated
 from toolpath_stiff.nc.siemens.motion import move, moves
 from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS
 from toolpath_stiff.nc.state import STEPS, CurrentBlock, State
-from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
-from toolpath_stiff.nc.words import AXES, Block
+from toolpath_stiff.nc.words import Block
 
 SINGLE = ("motion", "distance", "plane", "cutter compensation", "work offset", "units", "feed mode")
 BETWEEN = frozenset((*SINGLE[:2], "F", "S", "look-ahead", "M coolant", "M stop"))  # the moves of a corner
@@ -28,8 +26,7 @@ def sort_words(state: State, block: Block, tally: Tally | None) -> CurrentBlock:
         code = TABLE.get(name) if coded or letter in acting or len(name) > 1 else None
         if code is None and coded:
             current.refuse_if(letter == "G", word, "is not a G code that is known", hint="post it without it")
-            state.note(block.line, word, "an M code of one control, not acted upon")
-            state.warnings.append(Remark(f"what {word.text} does on its control is not known", block.line))
+            state.note_unknown(block.line, word)
         if code is not None:
             other = current.groups.setdefault(code.group, name)
             current.refuse_if(other != name and code.group in SINGLE, word, f"and {other} act alike", "one of them")
@@ -37,14 +34,10 @@ def sort_words(state: State, block: Block, tally: Tally | None) -> CurrentBlock:
             if code.listed:
                 state.note(block.line, word, code.listed)
             if tally is not None and not coded and letter not in acting:
-                tally.first.setdefault(name, (block.line, word.column))
-                tally.count[name] += 1
+                tally.add(name, block.line, word.column)
         if not coded and (code is None or letter in acting):
-            current.refuse_if(letter in current.values, word, "repeats a word of its block", "each word once")
-            largest = LARGEST_MM if letter.lstrip("I@") in AXES else LARGEST_WORD
-            current.refuse_if(abs(word.value) > largest, word, "is beyond 100 m, or any number of a control")
-            current.values[letter] = word
-    current.free = set() if numbers & {"G25", "G26"} else set(current.values)
+            current.add(letter, word)
+    current.free -= current.free if numbers & {"G25", "G26"} else set()
     return current
 
 

@@ -9,30 +9,22 @@ from toolpath_stiff.nc.codes import coordinates as settable
 from toolpath_stiff.nc.codes import tools
 from toolpath_stiff.nc.frames import rotation_matrix
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.coordinates import Matrix, product, turn_tool
-from toolpath_stiff.nc.heidenhain.points import present
+from toolpath_stiff.nc.heidenhain.coordinates import UNIT, product, put, turn_tool
+from toolpath_stiff.nc.heidenhain.points import outside_contour, present
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import WORK_OFFSETS, WorkOffset
 from toolpath_stiff.nc.words import AXES
 
-UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 BASE_IS_ZERO = "G500 (no settable offset) is program zero: the program takes no other one"
 FIRST_ADDITIONAL, LAST_ADDITIONAL = 505, 599
 G70_INCH = "under G70 F counts inches a minute too, as on a control whose basic system is inch"
 
 
 def apply(state: State, block: CurrentBlock) -> None:
-    """Put the programmable and the swivelled frame into force; the tool stands still, its numbers change."""
-    plain, frames = state.plain, state.frames
-    waits = state.cutter is not None or state.beside is not None or plain.held is not None or plain.side
-    block.refuse_if(waits, None, "changes coordinates in a contour with compensation or a corner", "G40 before it")
-    tilt = plain.tilt or UNIT
-    inner = product(tilt, plain.inner)
-    frames.linear = None if inner == UNIT else inner
-    shift = [row[0] for row in product(tilt, [[v] for v in plain.shift])]
-    frames.g92 = [*(a + b for a, b in zip(plain.outer, shift, strict=True)), 0.0, 0.0, 0.0]
-    plain.pole = plain.heading = None
+    """Put the programmable and the swivelled frame into force."""
+    plain = state.plain
+    put(state, block, plain.inner)
     (a, b, c), (d, e, f), (g, h, i) = plain.inner
     volume = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
     plain.scale, plain.mirrored = abs(volume) ** (1.0 / 3.0), frozenset({0} if volume < 0.0 else ())
@@ -67,8 +59,7 @@ def frame(state: State, block: CurrentBlock, code: str) -> None:
 def offset(state: State, block: CurrentBlock, code: str) -> None:
     """G54 to G57, and G505 to G599, the fifth settable offset and on; G500: none."""
     plain, frames = state.plain, state.frames
-    waits = state.cutter is not None or plain.held is not None
-    block.refuse_if(waits, code, "in a contour with compensation or a corner", "G40 before it")
+    outside_contour(state, block, code)
     if code == "G500":
         plain.base = "machine" if plain.offsets_named else "zero"
         if not plain.offsets_named:

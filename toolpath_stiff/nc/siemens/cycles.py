@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.contour import check_known, go
 from toolpath_stiff.nc.heidenhain.cycles import Stroke, Values, plunge
-from toolpath_stiff.nc.heidenhain.points import in_plane, present
+from toolpath_stiff.nc.heidenhain.points import in_plane, outside_contour, present
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
 from toolpath_stiff.nc.words import Word
@@ -91,8 +91,7 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
 def drill(state: State, block: CurrentBlock, values: Values) -> None:
     """A cycle at the present point."""
     plain = state.plain
-    waits = state.cutter is not None or plain.held is not None or plain.side
-    block.refuse_if(waits, None, "a cycle inside a contour with compensation or a corner", "G40 before it")
+    outside_contour(state, block, "a cycle", plain.side)
     check_known(state, block, {PLANES[state.plane][2]: 0.0}, rapid=True)
     block.refuse_if(plain.unknown, None, "a cycle where X or Y is not known", "X and Y before it")
     turns = state.speed if state.feed_mode == "G95" and state.speed else 1.0  # feeds of taps are then a turn's

@@ -7,7 +7,7 @@ XOR, OR (those of bits are not read), the concatenation <<, and comparisons last
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 from operator import add, ge, gt, le, lt, mul, sub, truediv
 
@@ -123,8 +123,11 @@ class SiemensScanner(Scanner):
         self.refuse_if(not self.sign("]"), "an index that is not closed", "]", column=column)
         return f"[{','.join(parts)}]"
 
-    def arguments(self) -> list[Value | None]:
-        """The values in the brackets that come next, separated by commas; None for one that is left out."""
+    def arguments(self, named: Container[int] = ()) -> list[Value | None]:
+        """The values in the brackets that come next, separated by commas; None for one that is left out.
+
+        Of those at the places `named` the name of the variable.
+        """
         column, values = self.column, list[Value | None]()
         self.sign("(")
         while not self.sign(")"):
@@ -132,7 +135,7 @@ class SiemensScanner(Scanner):
             if self.sign(","):
                 values.append(None)
                 continue
-            values.append(self.result())
+            values.append(self.part(NAME) + self.index() if len(values) in named else self.result())
             self.refuse_if(not self.sign(",") and not self.begins(")"), f"{self.rest()} in the brackets", ", or )")
         return values
 

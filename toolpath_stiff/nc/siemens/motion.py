@@ -13,10 +13,10 @@ import numpy as np
 
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
-from toolpath_stiff.nc.geometry import PLANES, ArcError
+from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain import contour, functions
-from toolpath_stiff.nc.heidenhain.points import in_plane, named, plane_of_pole, polar, present
-from toolpath_stiff.nc.moves import ARC, Arc, Remark
+from toolpath_stiff.nc.heidenhain.points import in_plane, named, outside_contour, plane_of_pole, polar, present
+from toolpath_stiff.nc.moves import ARC, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Word
 
@@ -29,7 +29,6 @@ CORNERS = ("RND", "CHF", "CHR")
 SIDES = {"G40": "R0", "G41": "RL", "G42": "RR"}
 MACHINE = ("SUPA", "G53", "G153")
 ENDS = "from tool axis to tool axis the tool goes on a great circle (ORIVECT), whatever leads it on the control"
-UNKNOWN_HOME = "goes to a machine position in a variable of the machine builder's: left out of the path"
 CHORDS = "a spline is taken as straight lines through its points"
 
 
@@ -62,13 +61,10 @@ def move(state: State, block: CurrentBlock) -> None:
     plain.to_corner = size > 0.0
     once = next((name for name in MACHINE if name in block.codes), "G500" if plain.base == "machine" else "")
     _name_steps(state, block)
-    try:
-        if once:
-            _machine(state, block, once, mode)
-        else:
-            MOTIONS[mode](state, block, mode)
-    except ArcError as error:
-        raise block.fail(None, error.found, error.expected) from None
+    if once:
+        _machine(state, block, once, mode)
+    else:
+        MOTIONS[mode](state, block, mode)
     if plain.to_corner and plain.held is not None:
         head = Word("", size, block.values[corner].column, "RND" if corner == "RND" else "CHF")
         plain.corner = CurrentBlock(block.name, type(block.block)(block.line, (head,)))
@@ -218,26 +214,18 @@ def _no_side(state: State, block: CurrentBlock) -> None:
 def _machine(state: State, block: CurrentBlock, code: str, mode: str) -> None:
     """SUPA, G53, G153, and G500 where other offsets are in use: coordinates of the machine, of the tool's tip."""
     plain, frames, moved = state.plain, state.frames, {axis for axis, letter in enumerate(AXES) if block.has(letter)}
-    waits = state.cutter or plain.held or plain.to_corner or plain.side
-    block.refuse_if(waits, None, f"{code} beside a contour with compensation or a corner", "G40 before it")
+    outside_contour(state, block, code, plain.to_corner or plain.side)
     cut = mode != "G0" and (code == "G500" or mode != "G1")
     block.refuse_if(cut, None, f"{code} in a cut: where the work sits on the machine is not known", "G0")
     framed = code == "G500" and (frames.linear is not None or any(frames.g92))
     block.refuse_if(framed, None, "a frame under G500 (no settable offset)", "TRANS, or G54 before it")
-    lost = {axis for axis in moved if math.isnan(block.values[AXES[axis]].value)}
-    if lost:
-        state.warnings.append(Remark(UNKNOWN_HOME, block.line))
-        block.free -= {AXES[axis] for axis in lost}
     mark(block, "M91", code)
     if mode == "G0" or state.feed is None:  # a control starts in G1
         mark(block, "FMAX")
     length, frames.tool = frames.tool, 0.0
-    if moved > lost:
-        contour.line(state, block, "L")
-    block.free -= {"M91", "FMAX"}
+    contour.line(state, block, "L")
     frames.tool = length
     plain.renumbered |= moved
-    plain.unknown |= lost & {0, 1, 2}
 
 
 MOTIONS = {

@@ -35,7 +35,7 @@ OF_LATHES = re.compile(r"\bG(?:18|96)(?!\d)|\bLIMS\b|\bDIAM(?:ON|90)\b")
 ALONG_Y = re.compile(r"(?<![A-Z_$])Y\s*[-+=\d.]")
 IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
 TIMES = re.compile(r"P(?=\s*[=\d(])")
-PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)(?:\s*=\s*([^,)]+))?", re.ASCII)
+PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (Fundamentals, "Blocks and block format")
@@ -97,10 +97,7 @@ class SiemensRun(ParametricRun):
             raise self._fail(row, f"a lathe's program: {self._of_lathe[0]} and never Y", "a mill's", LATHE_HINT)
         return super().run()
 
-    @staticmethod
-    def meaning(code: str) -> str:
-        """What a code, or a word, is taken for."""
-        return meaning_of(code)
+    meaning = staticmethod(meaning_of)
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
         super()._tally_plain(first, words)
@@ -149,8 +146,14 @@ class SiemensRun(ParametricRun):
 
     def _scope(self, name: str) -> tuple[Values, str]:
         """Where a variable is kept, R parameters for all programs, and its name there."""
-        parameter = re.fullmatch(r"R\[?(\d+)\]?", name)
-        return (self.variables.common, f"R{parameter[1]}") if parameter else (self.variables.levels[-1], name)
+        parameter, base = re.fullmatch(r"R\[?(\d+)\]?", name), name.partition("[")[0]
+        if parameter:
+            return self.variables.common, f"R{parameter[1]}"
+        called = next((level for level in reversed(self._levels) if level.stop < 0), None)
+        if called is not None and base in called.references:
+            scope, other = called.references[base]
+            return scope, other + name.removeprefix(base)
+        return self.variables.levels[-1], name
 
     def _variable(self, name: str, column: int) -> Value:
         """The value of a variable; nan for a machine builder's in a move in machine coordinates."""
@@ -172,7 +175,8 @@ class SiemensRun(ParametricRun):
 
     def _define(self, name: str, value: Value, column: int, kind: str) -> None:
         """Set a variable; `kind`: its type where it is declared."""
-        (scope, name), array = self._scope(name), _array(name)
+        scope, name = self._scope(name)
+        array = _array(name)
         if not (kind or scope is self.variables.common or scope.keys() & {name, array} or name in self._texts):
             problem = f"{name} is no variable that is declared, and no address that is known"
             raise self._fail(self._at, problem, f"DEF REAL {name}, R parameters", column=column)
@@ -192,7 +196,8 @@ class SiemensRun(ParametricRun):
         state, plain = self.state, self.state.plain
         try:
             current = sort_words(state, block, self.tally)
-            carry_out(state, current)
+            with current.placing():
+                carry_out(state, current)
         except InputError as error:
             error.file, error.line, _ = self._place(self._at)
             raise
@@ -307,38 +312,46 @@ class SiemensRun(ParametricRun):
     def _call_sub(self, row: int, steering: Steering) -> int | None:
         name, scanner = steering.label, self._scanner(row, self._begins[row].end())
         scanner.part(NAME)
-        values = scanner.arguments() if scanner.sign("") and scanner.begins("(") else []
-        times = self._times(scanner)
-        scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind the call of {name}", "a block of its own")
         if name not in self._subs:
             self._load_sub(name)
         if name not in self._subs:
             problem = f"{name} is no word that is known, and no subprogram of the file or of a folder"
             raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=steering.column)
         first = self._subs[name] + 1
-        level = Subprogram(name, first, row + 1, times - 1, self._bound(row, first - 1, values))
+        level = Subprogram(name, first, row + 1, 0)
+        level.arguments, level.references = self._bound(row, first - 1, scanner)
+        times = self._times(scanner)
+        scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind the call of {name}", "a block of its own")
+        level.again = times - 1
         if times:
             self._begin(level, row, steering.column)
         return first if times else None
 
-    def _bound(self, row: int, first: int, values: list[Value | None]) -> dict[str, float | None]:
-        """The parameters of PROC with the values of a call."""
+    def _bound(
+        self, row: int, first: int, scanner: SiemensScanner
+    ) -> tuple[dict[str, float | None], dict[str, tuple[Values, str]]]:
+        """The parameters of PROC with the values of a call; those by reference (VAR), with the variables they name."""
         heads = (PROGRAM.match(code_text(line)) for line in self.lines[first : first + 20])
         parameters = PARAMETER.findall(next((head[3] for head in heads if head is not None and head[2]), ""))
-        if len(values) > len(parameters) or any(by for by, *_ in parameters):
-            problem = f"a call with {len(values)} values; PROC has {len(parameters)}, or one by reference (VAR)"
-            raise self._fail(row, problem, "values of REAL, INT, BOOL")
-        bound = dict[str, float | None]()
-        for (_, kind, name, default), value in zip_longest(parameters, values):
+        named = {place for place, (by, *_) in enumerate(parameters) if by}
+        values = scanner.arguments(named) if scanner.sign("") and scanner.begins("(") else []
+        bound, references = dict[str, float | None](), dict[str, tuple[Values, str]]()
+        missing = any(values[place : place + 1] in ([], [None], [""]) for place in named)
+        by_value = any(array and not by for by, _, _, array, _ in parameters)
+        if len(values) > len(parameters) or missing or by_value:
+            problem = f"a call with {len(values)} values; PROC has {len(parameters)}"
+            raise self._fail(row, problem, "values of REAL, INT, BOOL, and the names of variables for VAR")
+        for (by, kind, name, _, default), value in zip_longest(parameters, values):
+            if by:
+                references[name] = self._scope(str(value))
+                continue
             given = self._scanner_of(row, default or "0").result() if value is None else value
             bound[name] = bool(given) if kind == "BOOL" else float(given)
-        return bound
+        return bound, references
 
     def _load_sub(self, name: str) -> None:
         """Read a subprogram's file from the folder, if it is there."""
-        files = sorted(self.folder.iterdir()) if self.folder is not None else []
-        fits = [file.name for file in files if file.suffix.upper() in SUFFIXES and file.stem.upper() == name]
-        if self._load(fits, (f"%_N_{name}_SPF",)) is not None:
+        if self._load(self._files_called(name, SUFFIXES), (f"%_N_{name}_SPF",)) is not None:
             self.lines = (*self.lines, END_OF_FILE)
             self._structure_known = None
             self._lex()

@@ -7,6 +7,7 @@ SIEMENS, SINUMERIK 840D sl, Programming Manual Fundamentals, "Tool change", "Too
 import math
 
 from toolpath_stiff.nc.codes.tools import change_tool
+from toolpath_stiff.nc.heidenhain.points import outside_contour
 from toolpath_stiff.nc.heidenhain.tools import tool_number
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import tool_of
@@ -28,8 +29,7 @@ def select(state: State, block: CurrentBlock, code: str) -> None:
 
 def change(state: State, block: CurrentBlock, code: str) -> None:
     """M6: the tool that T named, with its first cutting edge."""
-    waits = state.cutter is not None or state.plain.held is not None
-    block.refuse_if(waits, None, "another tool in a contour", "G40 before it")
+    outside_contour(state, block, "another tool")
     turn = state.turn
     change_tool(state, block, "M6")
     state.turn = turn if state.plain.changes_by_t else 0

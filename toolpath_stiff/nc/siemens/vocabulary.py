@@ -4,13 +4,13 @@ Codes that mean what they mean in G code are those of the one table (`codes.regi
 are those of the SINUMERIK 840D sl (Fundamentals, Job Planning) and of the 840D (Cycles, 11/2002).
 """
 
-from toolpath_stiff.nc.codes.code import Act, Code, Refused, holds_anyway
+from toolpath_stiff.nc.codes.code import Code, Rows, holds_anyway, refused, table
 from toolpath_stiff.nc.codes.feeds import time_word
 from toolpath_stiff.nc.codes.registry import CODES, code_meaning
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.siemens import coordinates, cycles, tools
 from toolpath_stiff.nc.siemens.motion import SIDES
-from toolpath_stiff.nc.state import CurrentBlock, Flow, Group, State
+from toolpath_stiff.nc.state import CurrentBlock, Flow, State
 
 CONTROLS = ("siemens",)
 MANUAL = "SIEMENS, SINUMERIK 840D"
@@ -50,9 +50,7 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
     if turns is not None:
         block.refuse_if(state.speed <= 0.0, "S", "counts turns of a spindle that stands", "S and M3 before it")
         seconds = 60.0 * turns / state.speed
-    if seconds is None or not 0.0 <= seconds <= 86_400.0:
-        raise block.fail(code, "without its time", "G4 F1.5")
-    state.recorder.add_dwell(seconds)
+    state.pause(block, code, seconds, "G4 F1.5")
 
 
 def fixed_point(state: State, block: CurrentBlock, code: str) -> None:
@@ -69,7 +67,7 @@ def back(state: State, block: CurrentBlock, code: str) -> None:
 
 _MOTION = ("G0", "G1", "G2", "G3", "CIP", "CT", "ASPLINE", "CSPLINE")
 _FRAMES = f"{BASICS}, Coordinate transformations (frames)"
-_ROWS: tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...] = (
+_ROWS: Rows = (
     ("motion", f"{BASICS}, Motion commands", (
         ("G0", mode, "rapid"), ("G1", mode, "feed"), ("G2", mode, "clockwise arc"),
         ("G3", mode, "counter-clockwise arc"), ("CIP", mode, "arc through a point"),
@@ -141,43 +139,34 @@ WORDS = frozenset((
     "DISC", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF",
 ))  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
-REFUSED: dict[str, Refused] = {
-    name: Refused(name, what, hint, source)
-    for names, what, hint, source in (
-        ("POCKET1 POCKET2 POCKET3 POCKET4 SLOT1 SLOT2 LONGHOLE CYCLE71 CYCLE72 CYCLE73 CYCLE74 CYCLE75 CYCLE76 CYCLE77 "
-         "CYCLE61 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 CYCLE90 CYCLE60 CYCLE899 CYCLE801",
-         "a cycle whose path the manual draws without numbers", _BY_MOVES, f"{CYCLES}, Milling cycles"),
-        ("CYCLE92 CYCLE93 CYCLE94 CYCLE95 CYCLE96 CYCLE97 CYCLE98 CYCLE99 CYCLE930 CYCLE940 CYCLE951 CYCLE952 DIAMON "
-         "DIAM90 G33 G34 G35", "a code of lathes", "post it for a mill", f"{CYCLES}, Turning cycles"),
-        ("CYCLE971 CYCLE976 CYCLE977 CYCLE978 CYCLE979 CYCLE996 CYCLE998 CYCLE982 MEAS MEAW MEASA", "probing",
-         "leave probing out", f"{MANUAL}, Measuring cycles"),
-        ("BSPLINE POLY PW PO", "a spline of coefficients", "post lines and arcs", f"{PLANNING}, Spline interpolation"),
-        ("TRANSMIT TRACYL TRAANG TRACON TOFRAME TOROT PAROT TCARR TCOFR CUTMOD", "a transformation of the machine's",
-         "post X, Y, Z, A3, B3, C3 of the tool's tip", f"{PLANNING}, Transformations"),
-        ("G58 G59", "an offset axis by axis", "TRANS, ATRANS", _FRAMES),
-        ("ROTS AROTS CROTS", "a rotation by spatial angles", "ROT, AROT", _FRAMES),
-        ("PRESETON PRESETONS", "another number of the machine's axis", "TRANS", f"{PLANNING}, Preset offset"),
-        ("ANG FB", "a line by its angle, or a feed of one block", "X, Y; F", f"{BASICS}, Motion commands"),
-        ("DEFINE", "a macro", "what it stands for", f"{PLANNING}, Macro technique"),
-        ("G63 G331 G332", "tapping without a cycle", "CYCLE84", f"{BASICS}, Tapping"),
-        ("G140 G141 G142 G143 G147 G148 G247 G248 G340 G341 G347 G348", "smooth approach and retraction",
-         "post its moves", f"{BASICS}, Smooth approach and retraction"),
-        ("G291", "the ISO dialect", "read it as G code: --dialect fanuc", f"{MANUAL}, ISO Milling"),
-        ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
-        ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
-         f"{PLANNING}, Orientation"),
-        ("WHEN WHENEVER EVERY DO ID IDS CASE", "a synchronised action, or a choice", "IF with GOTOF", PLANNING),
-        ("EXTCALL PCALL CALL CALLPATH ISOCALL", "a call by path", "the subprogram's name, with --subprograms",
-         f"{PLANNING}, Subprogram technique"),
-    )
-    for name in names.split()
-}  # fmt: skip
-TABLE: dict[str, Code] = {
-    name: Code(name, group, act, meaning, source, CONTROLS)
-    for group, source, rows in _ROWS
-    for names, act, meaning in rows
-    for name in names.split()
-}
+REFUSED = refused((
+    ("POCKET1 POCKET2 POCKET3 POCKET4 SLOT1 SLOT2 LONGHOLE CYCLE71 CYCLE72 CYCLE73 CYCLE74 CYCLE75 CYCLE76 CYCLE77 "
+     "CYCLE61 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 CYCLE90 CYCLE60 CYCLE899 CYCLE801",
+     "a cycle whose path the manual draws without numbers", _BY_MOVES, f"{CYCLES}, Milling cycles"),
+    ("CYCLE92 CYCLE93 CYCLE94 CYCLE95 CYCLE96 CYCLE97 CYCLE98 CYCLE99 CYCLE930 CYCLE940 CYCLE951 CYCLE952 DIAMON "
+     "DIAM90 G33 G34 G35", "a code of lathes", "post it for a mill", f"{CYCLES}, Turning cycles"),
+    ("CYCLE971 CYCLE976 CYCLE977 CYCLE978 CYCLE979 CYCLE996 CYCLE998 CYCLE982 MEAS MEAW MEASA", "probing",
+     "leave probing out", f"{MANUAL}, Measuring cycles"),
+    ("BSPLINE POLY PW PO", "a spline of coefficients", "post lines and arcs", f"{PLANNING}, Spline interpolation"),
+    ("TRANSMIT TRACYL TRAANG TRACON TOFRAME TOROT PAROT TCARR TCOFR CUTMOD", "a transformation of the machine's",
+     "post X, Y, Z, A3, B3, C3 of the tool's tip", f"{PLANNING}, Transformations"),
+    ("G58 G59", "an offset axis by axis", "TRANS, ATRANS", _FRAMES),
+    ("ROTS AROTS CROTS", "a rotation by spatial angles", "ROT, AROT", _FRAMES),
+    ("PRESETON PRESETONS", "another number of the machine's axis", "TRANS", f"{PLANNING}, Preset offset"),
+    ("ANG FB", "a line by its angle, or a feed of one block", "X, Y; F", f"{BASICS}, Motion commands"),
+    ("DEFINE", "a macro", "what it stands for", f"{PLANNING}, Macro technique"),
+    ("G63 G331 G332", "tapping without a cycle", "CYCLE84", f"{BASICS}, Tapping"),
+    ("G140 G141 G142 G143 G147 G148 G247 G248 G340 G341 G347 G348", "smooth approach and retraction",
+     "post its moves", f"{BASICS}, Smooth approach and retraction"),
+    ("G291", "the ISO dialect", "read it as G code: --dialect fanuc", f"{MANUAL}, ISO Milling"),
+    ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
+    ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
+     f"{PLANNING}, Orientation"),
+    ("WHEN WHENEVER EVERY DO ID IDS CASE", "a synchronised action, or a choice", "IF with GOTOF", PLANNING),
+    ("EXTCALL PCALL CALL CALLPATH ISOCALL", "a call by path", "the subprogram's name, with --subprograms",
+     f"{PLANNING}, Subprogram technique"),
+))  # fmt: skip
+TABLE = table(_ROWS, CONTROLS)
 TABLE |= {name: CODES[name] for name in SHARED}
 TABLE |= {
     name: Code(name, "look-ahead", holds_anyway, what, BASICS, CONTROLS, listed=what) for name, what in LISTED.items()

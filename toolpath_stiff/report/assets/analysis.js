@@ -20,12 +20,10 @@ const angles = data.angles && data.angles.map((text, axis) => unpack(text, data.
 const line = new Uint32Array(bytes(data.line)), s = new Float32Array(bytes(data.s));
 const kind = new Uint8Array(bytes(data.kind));
 const other = data.other && { s: new Float32Array(bytes(data.other.s)),
-  k: new Float32Array(bytes(data.other.stiffness)), plunge: new Uint8Array(bytes(data.other.plunge)) };
+  k: new Float32Array(bytes(data.other.stiffness)) };
 const cutting = (i) => (kind[i] & 7) !== RAPID;
-// Plunges along the tool axis: unless the switch is on they set neither the colours nor the axis of the profile.
-const rapidsBox = $("rapids"), plungesBox = $("plunges");
-$("plunges-label").hidden = data.scale_with_plunges === null;
-const setAside = (i) => !plungesBox.checked && (kind[i] & PLUNGE) !== 0;
+// Plunges along the tool axis set neither the colours nor the axis of the profile.
+const rapidsBox = $("rapids"), plunges = (i) => (kind[i] & PLUNGE) !== 0;
 const MOTIONS = data.motions;
 
 // Operations: each is a stretch of samples, [first, end).
@@ -35,37 +33,26 @@ const operationRange = (k) => [operations[k][0], k + 1 < operations.length ? ope
 const operationName = (k) => `${k + 1} ${operations[k][1]}`;
 const starts = operations.map(([start]) => start), operationOf = (i) => rowAt(starts, i + 1) - 1;
 // Colours.
-const CLASSES = data.colours.length;
-const scaleNow = () => plungesBox.checked && data.scale_with_plunges || data.scale;
-const coloursNow = () => (theme.dark ? data.colours_dark : data.colours);
-const classOf = (k) => classAt(k, scaleNow().ends, CLASSES);
-// Classes 0..CLASSES-1 of the scale, then rapids, plunges beside the scale, out of reach.
-const RAPIDS = CLASSES, PLUNGES = CLASSES + 1, UNREACHED = CLASSES + 2;
+const classOf = (k) => classAt(k, data.scale.ends, CLASSES);
 const path = new Path(xyz);
-function classify() {
-  path.classify((i) => {
-    const mean = (stiffness[i] + stiffness[i - 1]) / 2;
-    return !cutting(i) ? RAPIDS : Number.isNaN(mean) ? UNREACHED : setAside(i) ? PLUNGES : classOf(mean);
-  }, CLASSES + 3);
-}
-classify();
+path.classify((i) => {
+  const mean = (stiffness[i] + stiffness[i - 1]) / 2;
+  return !cutting(i) ? RAPIDS : Number.isNaN(mean) ? UNREACHED : plunges(i) ? PLUNGES : classOf(mean);
+});
 
-// First sample of every program line, lowest stiffness of its cuts and of its plunges; the lines that leave the
-// machine's reach.
-const firstOf = new Map(), lowestOf = new Map(), lowestPlungeOf = new Map(), unreached = new Set();
+// First sample of every program line, lowest stiffness of its cuts; lines that plunge, that leave the machine's reach.
+const firstOf = new Map(), lowestOf = new Map(), plunging = new Set(), unreached = new Set();
 for (let i = 0; i < n; i++) {
   if (!firstOf.has(line[i])) firstOf.set(line[i], i);
-  const lowest = kind[i] & PLUNGE ? lowestPlungeOf : lowestOf;
-  if (cutting(i) && !Number.isNaN(stiffness[i])) lowest.set(line[i], Math.min(stiffness[i], lowest.get(line[i])
-    ?? Infinity));
+  if (plunges(i)) plunging.add(line[i]);
+  else if (cutting(i) && stiffness[i]) lowestOf.set(line[i], Math.min(stiffness[i], lowestOf.get(line[i]) ?? Infinity));
   if (cutting(i) && kind[i] & OUT) unreached.add(line[i]);
 }
 // Colour of a line's bar; undefined where nothing is cut.
 function lineColour(number) {
   if (unreached.has(number)) return ink.bad;
   if (lowestOf.has(number)) return coloursNow()[classOf(lowestOf.get(number))];
-  if (!lowestPlungeOf.has(number)) return undefined;
-  return plungesBox.checked ? coloursNow()[classOf(lowestPlungeOf.get(number))] : ink.plunge;
+  return plunging.has(number) ? ink.plunge : undefined;
 }
 // What is pointed at.
 let here = -1, chosenLine = 0, part;
@@ -87,7 +74,7 @@ function point(i, stage) {
     const text = describe(i);
     status.textContent = text.join(" \u00b7 ");
     if (stage) stage.tell(stage === view ? path.at(i) : stage.at(i), text);
-    showLine(line[i]);
+    listing.show(line[i]);
   }
   if (machineBox.checked && !scene.heavy) view.redraw(); else view.drawOverlay();
   profile.drawOverlay();
@@ -95,15 +82,12 @@ function point(i, stage) {
 }
 function choose(number) {
   chosenLine = number;
-  const i = firstOf.get(number);
-  if (i !== undefined) point(i); else {
-    here = -1;
-    status.textContent =
-      `line ${number}: ${n < data.samples ? "no sample of it in this thinned drawing" : "no motion"}`;
-    showLine(number);
-    view.drawOverlay();
-    profile.drawOverlay();
-  }
+  const i = firstOf.get(number) ?? -1;
+  point(i);
+  if (i >= 0) return;
+  status.textContent =
+    `line ${number}: ${n < data.samples ? "no sample of it in this thinned drawing" : "no motion"}`;
+  listing.show(number);
 }
 function step(by) {
   let i = Math.max(0, Math.min(n - 1, here < 0 ? 0 : here + by));
@@ -130,41 +114,22 @@ const scene = {
     const i = here < 0 ? kind.findIndex((v) => (v & 7) !== RAPID) : here;
     if (machineBox.checked) paint(g, viewer, body.items(viewer, [...xyz, ...(angles ?? [])].map((of) => of[i] ?? 0)
       .concat(0, 0, 0).slice(0, 6), { work: data.box, close: true }), true);
+    const look = { width: viewer.coarse ? 1 : 1.7, skip: viewer.coarse ? 2.5 : 0.5, rapids: rapidsBox.checked };
     if (chosenOperation >= 0) {
       g.globalAlpha = 0.13;
-      this.drawPath(g, viewer, 0, n);
+      path.paint(g, look);
       g.globalAlpha = 1;
     }
-    this.drawPath(g, viewer, ...(chosenOperation < 0 ? [0, n] : operationRange(chosenOperation)));
+    const [first, end] = chosenOperation < 0 ? [0, n] : operationRange(chosenOperation);
+    path.paint(g, { ...look, first, end });
   },
-  drawPath(g, { coarse }, first, end) {
-    const stroke = (which, colour, width) => path.stroke(g, which, colour, width, coarse ? 2.5 : 0.5, first, end);
-    if (rapidsBox.checked) {
-      g.setLineDash([5, 4]);
-      stroke(RAPIDS, ink.rapid, 1);
-      g.setLineDash([]);
-    }
-    for (let c = CLASSES - 1; c >= 0; c--) stroke(c, coloursNow()[c], coarse ? 1 : 1.7);
-    stroke(PLUNGES, ink.plunge, 1.7);
-    stroke(UNREACHED, ink.bad, 2.4);
-  },
-  // The weakest places, ringed and named.
-  label(g) {
-    const taken = data.weakest.map((i) => { const [x, y] = path.at(i); return [x - 7, y, 14, 13]; });
-    aligned(g, "left", "middle");
-    for (const i of data.weakest) {
-      const [x, y] = path.at(i), text = `line ${line[i]}`, wide = g.measureText(text).width;
+  // The weakest places, ringed and named, from the top down; the names of near ones stand below each other.
+  label(g, viewer) {
+    let last = [-Infinity, -Infinity];
+    for (const [x, y, i] of data.weakest.map((i) => [...path.at(i), i]).sort((a, b) => a[1] - b[1])) {
       mark(g, x, y, 6, ink.ink, 1.6);
-      let ty = y - 14;
-      while (taken.some(([a, b, w, h]) => Math.abs(b - ty) < h && x + 11 < a + w + 6 && a < x + 11 + wide + 6)) ty +=
-        17;
-      taken.push([x + 11, ty, wide, 17]);
-      g.globalAlpha = 0.85;
-      g.fillStyle = ink.panel;
-      g.fillRect(x + 9, ty - 8, wide + 5, 16);
-      g.globalAlpha = 1;
-      g.fillStyle = ink.ink;
-      g.fillText(text, x + 11, ty);
+      last = [x, Math.abs(x - last[0]) < 80 ? Math.max(y - 14, last[1] + 17) : y - 14];
+      viewer.write(g, `line ${line[i]}`, x + 11, last[1]);
     }
   },
   overlay(g) {
@@ -183,20 +148,12 @@ const scene = {
   nearest: (x, y) => path.nearest(x, y, (i) => cutting(i) || rapidsBox.checked),
 };
 // Stiffness along the path.
-const curve = new Float32Array(n), plungeCurve = new Float32Array(n);
-// The curve, and beside it the plunges that neither belong to it nor set the axis.
-function split() {
-  for (let i = 0; i < n; i++) {
-    curve[i] = cutting(i) && !setAside(i) ? stiffness[i] : NaN;
-    plungeCurve[i] = setAside(i) ? stiffness[i] : NaN;
-  }
-  if (other) other.curve = other.k.map((k, i) => other.plunge[i] && !plungesBox.checked ? NaN : k);
-}
-split();
+const curve = stiffness.map((k, i) => (cutting(i) && !plunges(i) ? k : NaN));
+const plungeCurve = stiffness.map((k, i) => (plunges(i) ? k : NaN));
 const model = {
   s,
-  value: (i) => (setAside(i) ? plungeCurve[i] : curve[i]),
-  curves: () => [...(other ? [{ s: other.s, k: other.curve, colour: ink.second }] : []),
+  value: (i) => (cutting(i) ? stiffness[i] : NaN),
+  curves: () => [...(other ? [{ ...other, colour: ink.second }] : []),
     { s, k: curve, colour: ink.curve }],
   beside: () => ({ k: plungeCurve, colour: ink.plunge }),
   levels: () => [
@@ -219,110 +176,31 @@ const model = {
   },
   here: () => here,
 };
-// The program; only the rows in sight exist.
-const ROW = 19;
-const listing = $("listing"), space = $("listing-space");
-const source = data.source;
-let lineHere = 0;
-listing.style.setProperty("--digits", String(source.length).length);
-space.style.height = `${source.length * ROW}px`;
-$("program-note").textContent = `${group(source.length)} lines; the bar is the line's lowest stiffness`;
-function drawListing() {
-  const first = Math.max(0, Math.floor(listing.scrollTop / ROW) - 5);
-  const last = Math.min(source.length, Math.ceil((listing.scrollTop + listing.clientHeight) / ROW) + 5), rows = [];
-  for (let i = first; i < last; i++) {
-    const row = document.createElement("div"), label = document.createElement("span");
-    row.className = i + 1 === lineHere ? "row here" : "row";
-    row.style.top = `${i * ROW}px`;
-    row.dataset.line = i + 1;
-    label.className = "n";
-    label.textContent = i + 1;
-    const colour = lineColour(i + 1);
-    if (colour) label.style.borderLeftColor = colour;
-    row.append(label, document.createTextNode(source[i]));
-    rows.push(row);
-  }
-  space.replaceChildren(...rows);
-}
-function showLine(number) {
-  if (number === lineHere) return;
-  lineHere = number;
-  const top = (number - 1) * ROW;
-  if (top < listing.scrollTop || top + ROW > listing.scrollTop + listing.clientHeight)
-    listing.scrollTop = top - listing.clientHeight / 2;
-  drawListing();
-}
-listing.addEventListener("scroll", drawListing);
-listing.addEventListener("click", (e) => {
-  const row = e.target.closest(".row");
-  if (row) choose(Number(row.dataset.line));
-});
-listing.addEventListener("keydown", (e) => {
-  const by = { ArrowUp: -1, ArrowDown: 1, PageUp: -20, PageDown: 20 }[e.key];
-  if (by === undefined) return;
-  choose(Math.max(1, Math.min(source.length, (lineHere || 1) + by)));
-  e.preventDefault();
-});
-new ResizeObserver(drawListing).observe(listing);
+const listing = new Listing($("listing"), data.source, { colour: lineColour, choose });
 // Everything together.
-const legendRamp = $("legend-ramp");
-function retheme() {
-  legendRamp.style.background = ramp(coloursNow());
-  view.redraw();
-  part?.redraw();
-  profile.redraw();
-  drawListing();
-}
-let view, profile;
-watchTheme(() => retheme());
-view = new Viewer($("view"), scene, {
+const view = new Viewer($("view"), scene, {
   point: (i) => point(i, i < 0 ? null : view),
   pick: (i) => { chosenLine = i < 0 ? 0 : line[i]; point(i, i < 0 ? null : view); },
   step,
 });
-profile = new Profile($("profile"), model, {
+const profile = new Profile($("profile"), model, {
   point: (i) => point(i, profile),
   step,
   operation: (i) => chooseOperation(operationOf(i)),
 });
+watchTheme(() => {
+  for (const stage of [view, profile, part]) stage?.redraw();
+  listing.draw();
+});
 view.resize();
 profile.resize();
-retheme();
+listing.draw();
 for (const box of [rapidsBox, machineBox]) box.addEventListener("change", () => view.redraw());
 for (const button of document.querySelectorAll("button.place")) button.addEventListener("click", () => {
   chosenLine = Number(button.dataset.line);
   point(Number(button.dataset.sample), view);
   $("view-panel").scrollIntoView({ block: "nearest" });
 });
-function showLegend() {
-  const { ends: [low, high], beyond_low, beyond_high } = scaleNow();
-  $("legend-low").textContent = (beyond_low ? "\u2264 " : "") + group(low);
-  $("legend-high").textContent = (beyond_high ? "\u2265 " : "") + group(high);
-  document.querySelector(".rapid-key").hidden = !path.has(RAPIDS);
-  $("plunge-key").hidden = !path.has(PLUNGES);
-  $("out-key").hidden = !path.has(UNREACHED);
-  for (const entry of document.querySelectorAll("#profile-key .plunge-key")) entry.hidden = plungesBox.checked;
-}
-plungesBox.addEventListener("change", () => {
-  classify();
-  split();
-  retheme();
-  showLegend();
-});
-const key = $("profile-key");
-function addKey(kindOfLine, text) {
-  const entry = document.createElement("span");
-  entry.className = `key ${kindOfLine}`;
-  entry.textContent = text;
-  key.append(entry);
-}
-addKey("", data.machine);
-if (other) addKey("second-key", data.other.machine);
-if (data.mean !== null) addKey("mean-key", `mean ${group(data.mean)} N/mm`);
-if (data.required !== null) addKey("required-key", `required ${group(data.required)} N/mm`);
-if (data.scale_with_plunges) addKey("plunge-key",
-  `plunges ${group(data.plunges[0])} to ${group(data.plunges[1])} N/mm`);
-showLegend();
 // One operation alone: in the path, in the profile.
 const operationRows = [...document.querySelectorAll("[data-operation]")], operationShown = $("operation-shown");
 function chooseOperation(k) {
@@ -336,7 +214,7 @@ function chooseOperation(k) {
     operationShown.textContent = `\u2715 only ${operationName(chosenOperation)}`;
     if (end > first) {
       profile.show(s[first], s[end - 1]);
-      showLine(operations[chosenOperation][2]);
+      listing.show(operations[chosenOperation][2]);
     }
   }
   view.fit();

@@ -69,12 +69,13 @@ class MachineBody {
   // on its table; `close`: the work is looked at, what stands before it lets it show through; `floor`: mm, of the legs.
   items(view, pose, { work, close, floor }) {
     const { size, hangs } = this, items = [], front = view.project(pose.slice(0, 3))[2] + 0.02 * size;
+    const clear = close && hangs ? Math.max(0.1, Math.min(0.8, 1.2 - 0.5 * size * view.zoom / view.width)) : 1;
     const metal = mix(ink.rapid, ink.panel, 0.25), pale = mix(metal, ink.panel, 0.4);
     const dark = mix(metal, ink.plunge, 0.25), stand = mix(ink.rapid, ink.panel, 0.45);
-    const through = (place) => (close && view.project(place)[2] > front ? 0.3 : 1);
+    const through = (place) => Math.min(clear + 0.2, close && view.project(place)[2] > front ? 0.3 : 1);
     const colour = (link, name, plain) => (lit(this.lit, link, name) ? ink.accent : plain);
-    const add = (shape, a, b, radius, paint) => items.push(shape(view, a, b, radius * size, paint,
-      through(between(a, b, 0.5))));
+    const add = (shape, a, b, radius, paint, alpha = through(between(a, b, 0.5))) =>
+      items.push(shape(view, a, b, radius * size, paint, alpha));
     const joint = (place, radius, paint) => items.push(ball(view, place, radius * size, paint, through(place)));
     const bodies = this.at(pose).filter(({ points: [a, b] }) => Math.hypot(...minus(a, b)) > 1e-3);
     bodies.forEach(({ name, link, points }, k) => {
@@ -84,12 +85,12 @@ class MachineBody {
         const [nose, tip] = bodies[k + 1].points, thick = unit(minus(nose, tip)).map((v) => 0.035 * size * v);
         const body = lit(this.lit, "geometry") ? ink.accent : colour(link, "", mix(metal, ink.plunge, 0.35));
         const [lower, upper] = [-1, 1].map((side) => points.map((p) => p.map((v, i) => v + side * thick[i])));
-        items.push(prism(view, lower, upper, body, close ? 0.8 : 1));
+        items.push(prism(view, lower, upper, body, clear));
       } else if (name === "tool") {
         const neck = between(a, b, 0.45), held = hangs && between(centreOf(bodies[k - 1].points), a, -0.45);
         if (hangs) add(cylinder, held, a, 0.05, colour(link, "", dark));
-        add(cylinder, a, neck, 0.025, plain);
-        add(cylinder, neck, b, 0.005, lit(this.lit, "instrument") ? ink.accent : colour(link, "", ink.plunge));
+        add(cylinder, a, neck, 0.025, plain, close ? 0.75 : 1);
+        add(cylinder, neck, b, 0.005, lit(this.lit, "instrument") ? ink.accent : colour(link, "", ink.plunge), 1);
       } else if (hangs) {
         const cut = between(a, b, 0.58), ends = colour("joints", name, colour(link, name, ink.plunge));
         add(cylinder, a, cut, 0.03, plain);
@@ -114,7 +115,7 @@ class MachineBody {
     if (this.slides || !work && !hangs) return items;
     // The table, which all else stands on, and the part.
     const [x, y, z] = work ?? [...(this.data.reach?.[0][0] ?? pose).slice(0, 2), floor].map((v) => [v, v]);
-    const half = work ? 1.1 * Math.max(x[1] - x[0], y[1] - y[0]) : 0.22 * size, low = z[0] - (work ? 0.012 * size : 0);
+    const half = work ? 0.8 * Math.max(x[1] - x[0], y[1] - y[0]) : 0.22 * size, low = z[0] - (work ? 0.012 * size : 0);
     const about = (ends) => [-half, half].map((v) => (ends[0] + ends[1]) / 2 + v);
     const below = close || !hangs ? low - 0.04 * size : Math.min(floor, low - 0.05 * size);
     items.push({ ...block(view, [about(x), about(y), [below, low]], colour("table", "", pale)), depth: -1e9 });

@@ -1,14 +1,11 @@
 // A stiffness map: surfaces above their planes.
 const data = JSON.parse($("data").textContent);
-const { x: xs, y: ys, z: planes, values } = data, across = xs.length, deep = ys.length, CLASSES = data.colours.length;
+const { x: xs, y: ys, z: planes, values } = data, across = xs.length, deep = ys.length;
 const known = values.flat().filter((v) => v !== null);
 const least = known.reduce((a, b) => Math.min(a, b), Infinity), most = known.reduce((a, b) => Math.max(a, b),
   -Infinity);
 const share = (v) => (v - least) / (most - least || 1);
-const coloursNow = () => (theme.dark ? data.colours_dark : data.colours);
 const colourOf = (v) => coloursNow()[Math.min(CLASSES - 1, Math.floor(share(v) * CLASSES))];
-$("low").textContent = group(least);
-$("high").textContent = group(most);
 
 const span = Math.max(xs[across - 1] - xs[0], ys[deep - 1] - ys[0]);
 const bottom = Math.min(...planes), top = Math.max(...planes);
@@ -16,9 +13,7 @@ const apart = planes.length > 1 ? Math.min(...planes.slice(1).map((z, i) => Math
 const lift = planes.length > 1 ? 0.7 * apart : 0.45 * span;  // of the highest value above its plane
 let points = [], here = null;
 const scene = {
-  frame: false,
   beside: 210,  // room for the labels
-  heavy: false,
   squeeze: Math.min(1, 1.1 * span / (top - bottom + lift)),
   box: () => [[xs[0], xs[across - 1]], [ys[0], ys[deep - 1]], [bottom, top + lift]],
   draw(g, viewer) {
@@ -42,50 +37,34 @@ const scene = {
     g.lineWidth = 1;
     for (const { corners, v } of quads) fill(g, corners, colourOf(v));
   },
-  // Planes, their heights at the right, X and Y at the corners of the lowest; the hindmost corner is behind the
-  // surfaces.
+  // Planes, and their heights at the right.
   label(g, viewer) {
     const corners = [[0, 0], [across - 1, 0], [across - 1, deep - 1], [0, deep - 1]];
-    planes.forEach((z, layer) => {
+    for (const z of planes) {
       const at = corners.map(([i, j]) => viewer.project([xs[i], ys[j], z]));
       trace(g, at);
       g.globalAlpha = 0.45;
       stroke(g, ink.ink, 1);
       g.globalAlpha = 1;
-      const right = at.reduce((a, b) => (b[0] > a[0] ? b : a)), left = at.reduce((a, b) => (b[0] < a[0] ? b : a));
-      const behind = at.reduce((a, b) => (b[2] < a[2] ? b : a));
+      const right = at.reduce((a, b) => (b[0] > a[0] ? b : a));
       viewer.write(g, `z ${z} mm`, right[0] + 6, right[1] - 2);
-      if (z !== bottom) return;
-      at.forEach((p, i) => {
-        if (p === behind) return;
-        const side = p === left ? "right" : p === right ? "left" : "middle";
-        viewer.write(g, `X ${xs[corners[i][0]]} Y ${ys[corners[i][1]]}`, p[0] + (p === left ? -6 : p === right ? 6 : 0),
-          p[1] + 14, side);
-      });
-    });
+    }
   },
   overlay(g) {
     if (here) mark(g, here.seen[0], here.seen[1], 4);
   },
   // Of the points within 12 pixels the nearest, and of those that lie over each other the foremost.
   nearest(x, y) {
-    let best = 144, found = -1;
-    points.forEach(({ seen }, i) => {
-      const d = (seen[0] - x) ** 2 + (seen[1] - y) ** 2 - 0.001 * seen[2];
-      if (d < best) { best = d; found = i; }
-    });
-    return found;
+    const far = ({ seen: [px, py, near] }) => (px - x) ** 2 + (py - y) ** 2 - 0.001 * near;
+    return nearestOf(points.length, (i) => far(points[i]), 12);
   },
 };
-const retheme = () => { $("ramp").style.background = ramp(coloursNow()); view.redraw(); };
-let view;
-watchTheme(() => retheme());
-view = new Viewer($("view"), scene, {
+const view = new Viewer($("view"), scene, {
   point(i) {
     here = points[i] ?? null;
     if (here) $("status").textContent = `X ${here.x} Y ${here.y} Z ${here.z} mm: ${group(here.v)} N/mm`;
     view.drawOverlay();
   },
 });
+watchTheme(() => view.redraw());
 view.resize();
-retheme();

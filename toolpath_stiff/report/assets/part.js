@@ -3,7 +3,7 @@ const errors = data.part, corners = new Uint16Array(bytes(errors.corners)), made
 const errorOf = unpack(errors.error, errors.error_range), quadCount = made.length;
 const whereOf = new Float32Array(2 * quadCount);
 const errorColour = (e) => (Number.isNaN(e) ? ink.soft
-  : errors.colours[classAt(e, [-errors.limit, errors.limit], CLASSES)]);
+  : SCALES.error[classAt(e, [-errors.limit, errors.limit], CLASSES)]);
 const cornerOf = (q, c) => [0, 1, 2].map((axis) => {
   const [low, high] = errors.frame[axis];
   return low + corners[12 * q + 3 * c + axis] / 65535 * (high - low);
@@ -24,12 +24,8 @@ const partScene = {
   },
   // The quadrangle whose middle is nearest; of its error the tip tells, of its sample path, profile and program.
   nearest(x, y) {
-    let best = 20 * 20, found = -1;
-    for (let q = 0; q < quadCount; q++) {
-      const d = (whereOf[2 * q] - x) ** 2 + (whereOf[2 * q + 1] - y) ** 2;
-      if (d < best && made[q] >= 0) { best = d; found = q; }
-    }
-    return found;
+    const far = (q) => (whereOf[2 * q] - x) ** 2 + (whereOf[2 * q + 1] - y) ** 2;
+    return nearestOf(quadCount, far, 20, (q) => made[q] >= 0);
   },
 };
 function pointPart(q) {
@@ -45,7 +41,5 @@ part = new Viewer($("part"), partScene, {
   moved: () => view.follow(part, view.zoom),
 });
 view.on.moved = () => part.follow(view, part.zoom);
-$("error-ramp").style.background = ramp(errors.colours);
-$("error-low").textContent = `\u2264 ${group(-errors.limit, 1)}`;
-$("error-high").textContent = `\u2265 +${group(errors.limit, 1)}`;
+$("error-ramp").style.background = ramp(SCALES.error);
 part.resize();

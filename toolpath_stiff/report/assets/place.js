@@ -1,8 +1,5 @@
 // Placements: where the work sits, and what that brings.
 const d = JSON.parse($("data").textContent);
-const coloursNow = () => (theme.dark ? d.colours_dark : d.colours), CLASSES = d.colours.length;
-// The front is as wide as its element, so that letters keep their size.
-const widthOf = (svg) => Math.max(280, svg.clientWidth || 400);
 // Where the path and program zero are (p' = o + Q p), the program's axes there, the tool's direction where it leans.
 function placed(row, stiffness) {
   const zero = [row.x_mm, row.y_mm, row.z_mm], q = turnOf([...zero, row.a_deg, row.b_deg, row.rotation_deg]);
@@ -46,7 +43,6 @@ function sceneOf(placeNow) {
   return {
     paths: [path],
     path,
-    heavy: false,
     beside: 40,
     get frame() { return !whole(); },
     get iso() { return whole() ? body.iso : VIEWS.iso; },
@@ -55,8 +51,7 @@ function sceneOf(placeNow) {
     take() {
       const place = placeNow();
       path.move(place.xyz);
-      path.classify((i) => (known(i, place) ? classOf((place.stiffness[i] + place.stiffness[i - 1]) / 2) : -1),
-        CLASSES);
+      path.classify((i) => (known(i, place) ? classOf((place.stiffness[i] + place.stiffness[i - 1]) / 2) : -1));
     },
     draw(g, viewer) {
       const place = placeNow(), reach = Math.max(...viewer.box.map(([low, high]) => high - low)), close = !whole();
@@ -65,7 +60,7 @@ function sceneOf(placeNow) {
       if (bounded && whole()) viewer.edges(g, workspace, ink.muted, 1, [6, 4]);
       for (const { name, box } of d.keepouts) this.keepOut(g, viewer, name, [0, 1, 2]
         .map((k) => [box[0][k], box[1][k]]));
-      for (let c = CLASSES - 1; c >= 0; c--) path.stroke(g, c, coloursNow()[c], 2.2);
+      path.paint(g);
       place.axes.forEach((axis, k) => {
         const tip = place.zero.map((z, m) => z + 0.09 * reach * axis[m]), [x, y] = viewer.project(tip),
           [x0, y0] = viewer.project(place.zero);
@@ -93,14 +88,6 @@ const front = $("front"), rowsShown = d.front.concat(d.before ? [d.before] : [])
 const span = (values) => { const a = Math.min(...values), b = Math.max(...values), e = 0.06 * (b - a) || 1e-3 * b || 1;
   return [a - e, b + e]; };
 const meanSpan = span(rowsShown.map((r) => r.mean_N_per_mm)), rangeSpan = span(rowsShown.map((r) => r.range_N_per_mm));
-function grid(svg, { values, digits }, vertical, map, a, b) {
-  for (const v of values) {
-    const [x, y] = [map(v), b + 16];
-    svg.append(h("line", vertical ? { x1: x, x2: x, y1: a, y2: b, class: "grid" } : { x1: a, x2: b, y1: x, y2: x,
-      class: "grid" }), h("text", vertical ? { x, y, "text-anchor": "middle" } : { x: a - 6, y: x + 4,
-      "text-anchor": "end" }, group(v, digits)));
-  }
-}
 const weakest = rowsShown.map((r) => r.min_N_per_mm), weakEnds = [Math.min(...weakest), Math.max(...weakest)];
 const weakColour = (v) => coloursNow()[classAt(v, weakEnds, CLASSES)];
 const nameOf = (row, i) =>
@@ -108,33 +95,28 @@ const nameOf = (row, i) =>
     + `weakest ${group(row.min_N_per_mm)} N/mm` + (i === d.recommended ? ", recommended" : "");
 let dots = [];
 function drawFront() {
-  const W = widthOf(front), H = Math.round(Math.min(340, 0.85 * W)), [L, R, T, B] = [66, 14, 24, 44],
-    focused = document.activeElement && front.contains(document.activeElement);
+  const [W, H, L, R, T, B] = [400, 340, 66, 14, 24, 44];
   const X = (v) => L + (W - L - R) * (v - meanSpan[0]) / (meanSpan[1] - meanSpan[0]), Y = (v) => H - B
     - (H - B - T) * (v - rangeSpan[0]) / (rangeSpan[1] - rangeSpan[0]);
-  front.replaceChildren(); front.setAttribute("viewBox", `0 0 ${W} ${H}`); front.setAttribute("height", H);
-  grid(front, ticks(...meanSpan, W > 340 ? 5 : 3), true, X, T, H - B); grid(front, ticks(...rangeSpan, 4), false, Y, L,
-    W - R);
+  front.append(...grid(ticks(...meanSpan, 4), true, X, T, H - B).flat(), ...grid(ticks(...rangeSpan, 4), false, Y, L,
+    W - R).flat());
   dots = d.front.map((row, i) => h("circle", { cx: X(row.mean_N_per_mm), cy: Y(row.range_N_per_mm), r: 5, class: "dot",
-    fill: weakColour(row.min_N_per_mm), role: "radio", "aria-label": nameOf(row, i), onclick: () => choose(i, true) },
+    role: "radio", "aria-label": nameOf(row, i), onclick: () => choose(i, true) },
     h("title", {}, nameOf(row, i))));
   const best = d.front[d.recommended], now = d.before;
   front.append(h("text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" },
     "mean stiffness, N/mm (more is better)"), h("text", { x: 4, y: 14 }, "range, N/mm (less is better)"),
     now ? h("rect", { x: X(now.mean_N_per_mm) - 6, y: Y(now.range_N_per_mm) - 6, width: 12, height: 12,
-      fill: weakColour(now.min_N_per_mm), stroke: "currentColor", "stroke-width": 2 },
+      class: "now", stroke: "currentColor", "stroke-width": 2 },
       h("title", {}, `present placement, weakest ${group(now.min_N_per_mm)} N/mm`)) : "", ...dots,
     h("text", { x: X(best.mean_N_per_mm), y: Y(best.range_N_per_mm) - 8, "text-anchor": "middle", class: "star" },
       "\u2605"));
-  markChosen(); if (focused) dots[chosen].focus();
 }
 function markChosen() {
   dots.forEach((dot, k) => { dot.classList.toggle("on", k === chosen); dot.setAttribute("aria-checked", k === chosen);
-    dot.setAttribute("tabindex", k === chosen ? 0 : -1); });
+    dot.setAttribute("tabindex", k === chosen ? 0 : -1); dot.style.fill = weakColour(d.front[k].min_N_per_mm); });
+  for (const now of front.querySelectorAll(".now")) now.style.fill = weakColour(d.before.min_N_per_mm);
 }
-$("front-key").textContent = "\u2605 recommended" + (d.before ? "  \u25a1 present"
-  : ". No present placement to compare with: " + d.before_reason)
-  + ". No placement is better in mean, range and weakest place at once. Arrow keys step along the front.";
 front.addEventListener("keydown", (event) => {
   const step = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key],
     jump = { Home: 0, End: dots.length - 1 }[event.key];
@@ -143,9 +125,9 @@ front.addEventListener("keydown", (event) => {
     dots[chosen].focus();
 });
 // The profile.
-// Plunges along the tool axis are stiffer by far and would take all of the axis; a switch puts them on it. Between two
-// cuts stands a row without a value, so that the curve breaks there.
-const rows = [], plunges = $("plunges"), isPlunge = (i) => d.plunge !== null && d.plunge[i];
+// Plunges along the tool axis are stiffer by far and would take all of the axis: they stand beside it. Between two cuts
+// stands a row without a value, so that the curve breaks there.
+const rows = [], isPlunge = (i) => d.plunge !== null && d.plunge[i];
 for (let i = 0; i < n; i++) {
   if (i && d.cut[i] !== d.cut[i - 1]) rows.push(-1);
   rows.push(i);
@@ -154,40 +136,33 @@ const rowOf = new Map(rows.map((i, row) => [i, row])), s = Float32Array.from(row
   : i]);
 const valuesOf = (place, holds) => Float32Array.from(rows, (i) => (i < 0 || place.stiffness[i] === null || !holds(i)
   ? NaN : place.stiffness[i]));
-const onScale = (i) => plunges.checked || !isPlunge(i);
-$("plunge-switch").hidden = d.plunge === null;
 const model = {
   s,
   value: (row) => (rows[row] < 0 ? NaN : places[chosen].stiffness[rows[row]] ?? NaN),
-  curves: () => [...(before ? [{ s, k: valuesOf(before, onScale), colour: ink.muted }] : []),
-    { s, k: valuesOf(places[chosen], onScale), colour: ink.curve }],
-  beside: () => (d.plunge === null ? null : { k: valuesOf(places[chosen], (i) => !onScale(i)), colour: ink.plunge }),
+  curves: () => [...(before ? [{ s, k: valuesOf(before, (i) => !isPlunge(i)), colour: ink.muted }] : []),
+    { s, k: valuesOf(places[chosen], (i) => !isPlunge(i)), colour: ink.curve }],
+  beside: () => (d.plunge === null ? null : { k: valuesOf(places[chosen], isPlunge), colour: ink.plunge }),
   levels: () => [...(before ? [[before, ink.muted]] : []), [places[chosen], ink.curve]].map(([{ row }, colour]) =>
     ({ value: row.mean_N_per_mm, colour, dash: [7, 5] })),
   ends: () => d.scale,
   here: () => (here < 0 ? -1 : rowOf.get(here)),
 };
-plunges.addEventListener("change", () => profile.redraw());
 // Figures.
+// Label, key, digits; whether it is left out where there is none.
+const FACTS = [["mean, N/mm", "mean_N_per_mm", 0], ["range, N/mm", "range_N_per_mm", 0],
+  ["weakest, N/mm", "min_N_per_mm", 0], ["plunges along the tool axis: mean, N/mm", "plunge_mean_N_per_mm", 0, true],
+  [`mean deflection at ${d.force} N, \u00b5m`, "mean_deflection_um", 2], ["program zero X, mm", "x_mm", 3],
+  ["Y, mm", "y_mm", 3], ["Z, mm", "z_mm", 3], ["turned by, degrees", "rotation_deg", 3],
+  ["tilt A, degrees", "a_deg", 3, true], ["tilt B, degrees", "b_deg", 3, true],
+  ["strut law extrapolated, share of samples", "extrapolated_share", 3, true]];
 function drawFacts(row) {
-  const columns = d.before ? [row, d.before] : [row], table = $("facts"), figure = (key, digits) => columns
-    .map((r) => (r[key] === undefined || r[key] === null ? "\u2013" : group(r[key], digits)));
-  const rows = [["mean, N/mm", figure("mean_N_per_mm")], ["range, N/mm", figure("range_N_per_mm")],
-    ["weakest, N/mm", figure("min_N_per_mm")],
-    [`mean deflection at ${d.force} N, \u00b5m`, figure("mean_deflection_um", 2)], ["program zero X, mm",
-      figure("x_mm", 3)], ["Y, mm", figure("y_mm", 3)], ["Z, mm", figure("z_mm", 3)], ["turned by, degrees",
-      figure("rotation_deg", 3)]];
-  if (columns.some((r) => r.plunge_mean_N_per_mm !== null)) rows.splice(3, 0,
-    ["plunges along the tool axis: mean, N/mm", figure("plunge_mean_N_per_mm")]);
-  if (columns.some((r) => r.a_deg || r.b_deg)) rows.push(["tilt A, degrees", figure("a_deg", 3)], ["tilt B, degrees",
-    figure("b_deg", 3)]);
-  if (row.extrapolated_share !== undefined) rows.push(["strut law extrapolated, % of samples", columns
-    .map((r) => group(100 * r.extrapolated_share, 1))]);
+  const columns = d.before ? [row, d.before] : [row];
+  const shown = FACTS.filter(([, key, , omitted]) => !omitted || columns.some((r) => r[key]));
   const line = (name, cells, tag) => h("tr", {}, h("th", { scope: "row" }, name), cells.map((v) => h(tag, {}, v)));
-  const origin = [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg, row.rotation_deg].map((v) => +v.toFixed(6));
-  table.replaceChildren(h("thead", {}, line("", d.before ? ["shown", "present"] : ["shown"], "th")), h("tbody", {},
-    rows.map(([name, cells]) => line(name, cells, "td")), h("tr", {}, h("th", { colspan: columns.length + 1 },
-    h("code", {}, `--origin ${origin.join(",")}`)))));
+  const origin = ["x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "rotation_deg"].map((key) => +row[key].toFixed(6));
+  $("facts").replaceChildren(h("thead", {}, line("", d.before ? ["shown", "present"] : ["shown"], "th")),
+    h("tbody", {}, shown.map(([name, key, digits]) => line(name, columns.map((r) => group(r[key] ?? NaN, digits)),
+      "td")), h("tr", {}, h("th", { colspan: columns.length + 1 }, h("code", {}, `--origin ${origin.join(",")}`)))));
 }
 // What is pointed at, in both drawings and the profile.
 function point(i, stage) {
@@ -206,38 +181,25 @@ function point(i, stage) {
 }
 const step = (by) => point(Math.max(0, Math.min(n - 1, here + by)), profile);
 // Choosing.
-function refit() {
-  for (const view of views) { view.scene.take(); view.fit(); view.redraw(); }
-}
 function draw() {
   const place = places[chosen];
-  refit();
+  for (const view of views) { view.scene.take(); view.fit(); view.redraw(); }
   profile.redraw();
   drawFacts(place.row);
   markChosen();
   $("chosen-title").textContent = (chosen === d.recommended ? "Recommended placement, "
     : "Placement ") + `${chosen + 1} of ${places.length}`;
   chosenView.overlay.setAttribute("aria-label", "Path, coloured by stiffness; " + nameOf(place.row, chosen));
-  $("weak-ramp").style.background = $("ramp").style.background = ramp(coloursNow());
 }
-function drawAll() { drawFront(); draw(); }
 function choose(i, remember) { chosen = i; if (remember) history.replaceState(null, "", i === d.recommended
   ? "#recommended" : "#" + (i + 1)); draw(); }
-$("weak-low").textContent = group(weakEnds[0]);
-$("weak-high").textContent = group(weakEnds[1]);
 // #recommended or #7, the seventh of the front; a zoom may follow: #7,workspace
 function fromAddress() {
   const [name, zoom] = location.hash.slice(1).split(","), i = name === "recommended" ? d.recommended : Number(name) - 1;
   for (const radio of document.querySelectorAll("input[name=zoom]")) if (radio.value === zoom) radio.checked = true;
   choose(Number.isInteger(i) && i >= 0 && i < places.length ? i : d.recommended, false);
 }
-const { digits } = ticks(d.scale[0], d.scale[1], 30);
-$("low").textContent = (d.beyond[0] ? "\u2264 " : "") + group(d.scale[0], digits);
-$("high").textContent = (d.beyond[1] ? "\u2265 " : "") + group(d.scale[1], digits);
-if (!before) { $("before-panel").remove(); $("old-key").remove(); $("main").classList.add("alone"); }
 // Everything together.
-let ready = false;
-watchTheme(() => { if (ready) drawAll(); });
 // Turned or brought nearer, one placement takes the other along.
 const together = (moved) => { for (const view of views) if (view !== moved) view.follow(moved); };
 const viewerOf = (id, placeNow) => {
@@ -250,11 +212,10 @@ const chosenView = viewerOf("chosen", () => places[chosen]), beforeView = before
   : null;
 const views = [chosenView, ...(beforeView ? [beforeView] : [])];
 const profile = new Profile($("profile"), model, { point: (row) => point(rows[row], profile), step });
+watchTheme(draw);
 for (const stage of [...views, profile]) stage.resize();
 for (const radio of document.querySelectorAll("input[name=zoom]")) radio.addEventListener("change",
   () => { for (const view of views) view.turnTo("iso"); });
 addEventListener("hashchange", fromAddress);
-addEventListener("resize", drawFront);
-ready = true;
 drawFront();
 fromAddress();

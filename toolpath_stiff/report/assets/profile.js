@@ -123,9 +123,8 @@ class Profile extends Stage {
       g.globalAlpha = chosen ? 0.35 : 1;
       g.fillRect(a, top - this.strip, b - a, this.strip - 1);
       g.globalAlpha = 1;
-      const text = fitting(g, operations.name(k), String(k + 1), b - a - 8);
-      g.fillStyle = ink.ink;
-      if (text) g.fillText(text, a + 4, top - this.strip / 2);
+      g.fillStyle = ink.ink;  // what is longer than its place is painted over by the next
+      if (g.measureText(k + 1).width < b - a - 8) g.fillText(operations.name(k), a + 4, top - this.strip / 2);
     }
   }
   level(g, value, colour, dash) {

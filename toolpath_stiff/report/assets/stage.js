@@ -23,14 +23,6 @@ function rowAt(array, value) {
     else high = middle; }
   return low;
 }
-// The text, cut to so many pixels; if next to nothing of it is left, `least`, or nothing at all.
-function fitting(g, text, least, room) {
-  if (g.measureText(text).width <= room) return text;
-  let length = Math.floor(text.length * room / g.measureText(text).width);
-  while (length > least.length + 3 && g.measureText(`${text.slice(0, length)}\u2026`).width > room) length--;
-  if (length > least.length + 3) return `${text.slice(0, length).trimEnd()}\u2026`;
-  return g.measureText(least).width <= room ? least : "";
-}
 function ring(g, x, y, radius, colour, width) {
   g.beginPath();
   g.arc(x, y, radius, 0, 2 * Math.PI);
@@ -48,6 +40,15 @@ function fill(g, points, colour) {
   g.fillStyle = g.strokeStyle = colour;
   g.fill();
   g.stroke();
+}
+// The nearest of some points that are seen, -1 where none is within so many pixels; far(i): its distance squared.
+function nearestOf(count, far, within, seen = () => true) {
+  let best = within * within, found = -1;
+  for (let i = 0; i < count; i++) {
+    const d = far(i);
+    if (d < best && seen(i)) { best = d; found = i; }
+  }
+  return found;
 }
 // A ring that is seen on any ground.
 function mark(g, x, y, radius, colour = ink.accent, width = 2.5) {
@@ -71,6 +72,7 @@ function watchTheme(changed) {
     theme.dark = query.matches && !root.classList.contains("printing");
     const style = getComputedStyle(root);
     for (const [name, variable] of Object.entries(INKS)) ink[name] = style.getPropertyValue("--" + variable).trim();
+    root.style.setProperty("--scale", ramp(coloursNow()));
   };
   const again = (printing) => () => {
     if (printing !== undefined) root.classList.toggle("printing", printing);
@@ -83,6 +85,18 @@ function watchTheme(changed) {
   addEventListener("beforeprint", again(true));
   addEventListener("afterprint", again(false));
 }
+// Colours of the classes of a scale: of stiffness on light and on dark (viridis, weakest first; its lightest yellow
+// does not show on white, nor its darkest violet on black), of errors of a surface (RdYlBu, from cut too deep).
+const colours = (text) => text.match(/.{6}/g).map((colour) => `#${colour}`);
+const SCALES = {
+  light: colours("440154460b5e481769482173472a7a463480433e854046883c4f8a38588c355f8d31678e2e6f8e2b758e287d8e25848e"
+    + "228b8d20928c1f9a8a1fa18822a88429af7f32b67a3fbc734ec36b5ec9626ece5881d34d95d840a8db34bddf26d2e21b"),
+  dark: colours("3e49893c508b38588c355e8d32658e2f6b8e2d718e2a778e287d8e25838e23898e21908d1f958b1e9c891fa18722a785"
+    + "27ad812eb37c38b97742be7150c46a5cc8636ccd5a7ad15189d5489bd93caadc32bddf26cde11ddfe318efe51cfde725"),
+  error: colours("3d5ba7426cb04b7db85a8ec1679ec974add183b9d894c7dfa3d3e6b2ddebc3e5f0d1ecf4e0f3f8e9f6e8f2fad6fbfdc7"
+    + "fffbb9fff2acfee99dfee090fed283fdc576fdb567fca55df99355f67f4bf46d43ec5c3be44c34db382bd02927c21c27"),
+};
+const CLASSES = SCALES.light.length, coloursNow = () => SCALES[theme.dark ? "dark" : "light"];
 // The class of a value on a scale of so many colours.
 const classAt = (v, [low, high], count) =>
   Math.max(0, Math.min(count - 1, Math.floor((v - low) / (high - low || 1) * count)));

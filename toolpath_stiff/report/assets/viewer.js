@@ -28,9 +28,12 @@ class Viewer extends Stage {
   }
   // Unit vectors to the right and up on the screen, and towards whoever looks.
   axes() {
+    if (this.turned?.yaw === this.yaw && this.turned.pitch === this.pitch) return this.turned.axes;
     const a = this.yaw * Math.PI / 180, p = this.pitch * Math.PI / 180;
     const [sa, ca, sp, cp] = [Math.sin(a), Math.cos(a), Math.sin(p), Math.cos(p)];
-    return [[ca, sa, 0], [-sa * sp, ca * sp, cp], [sa * cp, -ca * cp, sp]];
+    const axes = [[ca, sa, 0], [-sa * sp, ca * sp, cp], [sa * cp, -ca * cp, sp]];
+    this.turned = { yaw: this.yaw, pitch: this.pitch, axes };
+    return axes;
   }
   // x and y on the screen, and how near it is.
   project([x, y, z]) {
@@ -82,30 +85,11 @@ class Viewer extends Stage {
     if (this.middle) this.scene.overlay?.(g, this);
   }
   drawBox(g) {
-    const flat = ["top", "front", "side"].find((name) => VIEWS[name][0] === this.yaw && VIEWS[name][1] === this.pitch);
     g.fillStyle = ink.muted;
     aligned(g, "left", "top");
     const text = this.box.map(([low, high], axis) => `${"XYZ"[axis]} ${low.toFixed(1)} to ${high.toFixed(1)}`)
       .join("    ");
     g.fillText(`${text}  mm`, 4, 4);
-    if (flat) this.drawTicks(g, ...{ top: [0, 1], front: [0, 2], side: [1, 2] }[flat]);
-  }
-  // Seen along an axis the box is a frame with a scale, as on a drawing.
-  drawTicks(g, across, up) {
-    const at = (axis, value) => this.project(this.box.map(([low], k) => (k === axis ? value : low)));
-    const [left, bottom] = this.project(this.box.map(([low]) => low)), [right] = at(across, this.box[across][1]),
-      [, top] = at(up, this.box[up][1]);
-    g.strokeStyle = ink.muted;
-    g.lineWidth = 1;
-    const line = (x, y, dx, dy) => { g.beginPath(); g.moveTo(x, y); g.lineTo(x + dx, y + dy); g.stroke(); };
-    const horizontal = ticks(...this.box[across], Math.max(2, Math.abs(right - left) / 60));
-    aligned(g, "center", "top");
-    for (const v of horizontal.values) { const [x] = at(across, v); line(x, bottom, 0, 4);
-      g.fillText(v.toFixed(horizontal.digits), x, bottom + 6); }
-    const vertical = ticks(...this.box[up], Math.max(2, Math.abs(bottom - top) / 40));
-    aligned(g, "right", "middle");
-    for (const v of vertical.values) { const [, y] = at(up, v); line(left, y, -4, 0);
-      g.fillText(v.toFixed(vertical.digits), left - 6, y); }
   }
   // The twelve edges of a box.
   edges(g, box, colour, width, dash = []) {
@@ -229,7 +213,8 @@ class Viewer extends Stage {
 function cornersOf(box) {
   return [0, 1, 2, 3, 4, 5, 6, 7].map((c) => box.map(([low, high], axis) => ((c >> axis) & 1 ? high : low)));
 }
-// A path: points, and the lines between them by class.
+// A path: points, and the lines between them by class: of the scale, then rapids, plunges beside it, out of reach.
+const RAPIDS = CLASSES, PLUNGES = CLASSES + 1, UNREACHED = CLASSES + 2;
 class Path {
   // xyz: three arrays of n coordinates, mm
   constructor(xyz) { this.move(xyz); }
@@ -241,8 +226,9 @@ class Path {
   }
   at(i) { return [this.sx[i], this.sy[i]]; }
   // Sort the lines (i - 1, i) by classOf(i), so that each class is one path to stroke; -1 is not drawn at all.
-  classify(classOf, count) {
-    const { n, xyz: [X, Y, Z] } = this, starts = new Int32Array(count + 1), of = this.of = new Int16Array(n).fill(-1);
+  classify(classOf) {
+    const { n, xyz: [X, Y, Z] } = this, count = UNREACHED + 1, starts = new Int32Array(count + 1);
+    const of = this.of = new Int16Array(n).fill(-1);
     for (let i = 1; i < n; i++) {
       if (X[i] === X[i - 1] && Y[i] === Y[i - 1] && Z[i] === Z[i - 1]) continue;
       of[i] = classOf(i);
@@ -263,8 +249,16 @@ class Path {
       sy[i] = cy - zoom * (x * u[0] + y * u[1] + (Z[i] - mz) * u[2]);
     }
   }
+  // All classes: rapids dashed where they are shown, the weakest of the scale last but for what has no colour of it.
+  paint(g, { width = 2, skip = 0.5, rapids = true, first = 0, end = this.n } = {}) {
+    const some = (which, colour, wide, dash) => this.stroke(g, which, colour, wide, skip, first, end, dash);
+    if (rapids) some(RAPIDS, ink.rapid, 1, [5, 4]);
+    for (let c = CLASSES - 1; c >= 0; c--) some(c, coloursNow()[c], width);
+    some(PLUNGES, ink.plunge, width);
+    some(UNREACHED, ink.bad, width + 0.7);
+  }
   // Lines of a class between two rows; those shorter than `skip` pixels are joined.
-  stroke(g, which, colour, width, skip = 0.5, first = 0, end = this.n) {
+  stroke(g, which, colour, width, skip, first, end, dash) {
     const { sx, sy, segments } = this;
     let last = -2, x = 0, y = 0, pending = -1;
     g.beginPath();
@@ -287,15 +281,9 @@ class Path {
       } else pending = i;
     }
     if (pending >= 0) g.lineTo(sx[pending], sy[pending]);
-    stroke(g, colour, width);
+    stroke(g, colour, width, dash);
   }
-  // The point within 15 pixels of a place, -1 where there is none; `seen` says which points there are.
-  nearest(x, y, seen = () => true) {
-    let best = 15 * 15, found = -1;
-    for (let i = 0; i < this.n; i++) {
-      const dx = this.sx[i] - x, dy = this.sy[i] - y, d = dx * dx + dy * dy;
-      if (d < best && seen(i)) { best = d; found = i; }
-    }
-    return found;
+  nearest(x, y, seen) {
+    return nearestOf(this.n, (i) => (this.sx[i] - x) ** 2 + (this.sy[i] - y) ** 2, 15, seen);
   }
 }

@@ -7,10 +7,8 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import quote
-
-from markupsafe import Markup
 
 from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.documents import Document, number
@@ -108,11 +106,6 @@ class StiffnessScale:
         """Place of a value, in percent of the width."""
         return 100.0 * (value - self.low) / (self.high - self.low)
 
-    def line(self, value: float, kind: str, ends: tuple[int, int] = (0, 22)) -> str:
-        """A line at a value."""
-        x = f"{self.at(value):.2f}%"
-        return f'<line class="{kind}" x1="{x}" x2="{x}" y1="{ends[0]}" y2="{ends[1]}"/>'
-
 
 def _scale(good: Sequence[ProgramOutcome]) -> StiffnessScale | None:
     """A scale that holds the bars and the required level; None where there is no bar.
@@ -134,29 +127,19 @@ def _scale(good: Sequence[ProgramOutcome]) -> StiffnessScale | None:
     return StiffnessScale(ticks[0], ticks[-1], ticks, good[0].figure("required_N_per_mm"))
 
 
-def _axis(scale: StiffnessScale) -> Markup:
-    shown = scale.ticks[:: 1 if len(scale.ticks) <= MOST_LABELS else 2]
-    texts = "".join(f'<text x="{scale.at(tick):.2f}%" y="14">{number(tick)}</text>' for tick in shown)
-    return Markup(f'<svg height="18" aria-hidden="true">{texts}</svg>')  # numbers and words of our own
-
-
-def _bar(outcome: ProgramOutcome, scale: StiffnessScale) -> Markup:
-    low, mean, high = (outcome.figure(f"{name}_N_per_mm") for name in ("min", "mean", "max"))
-    lines = "".join(scale.line(tick, "tick") for tick in scale.ticks)
+def _bar(outcome: ProgramOutcome, scale: StiffnessScale) -> Document:
+    """What is drawn of a program: span (kind, place and width) and lines, in per cent of the width."""
+    low, mean, high, other = (outcome.figure(f"{name}_N_per_mm") for name in ("min", "mean", "max", "compare_mean"))
+    lines, span = [("tick", tick) for tick in scale.ticks], None
     if low is not None and low <= scale.high and high >= scale.low:  # those of plunges alone may lie beyond
-        kind = "span plunge" if outcome.plunges_only else "span"
-        kind += " below" if outcome.figure("lines_below_required") else ""
-        x, width = scale.at(low), max(scale.at(high) - scale.at(low), 0.4)
-        lines += f'<rect class="{kind}" x="{x:.2f}%" width="{width:.2f}%" y="6" height="10" rx="2"/>'
-        lines += scale.line(mean, "mean", (3, 19))
-    if (other := outcome.figure("compare_mean_N_per_mm")) is not None:
-        lines += scale.line(other, "other", (3, 19))
-    if scale.required is not None:
-        lines += scale.line(scale.required, "required")
-    return Markup(f'<svg height="22" aria-hidden="true">{lines}</svg>')  # numbers and words of our own
+        kind = f"span{' plunge' * outcome.plunges_only}{' below' * bool(outcome.figure('lines_below_required'))}"
+        span = (kind, scale.at(low), max(scale.at(high) - scale.at(low), 0.4))
+        lines.append(("mean", mean))
+    lines += [(kind, value) for kind, value in (("other", other), ("required", scale.required)) if value is not None]
+    return {"span": span, "lines": [(kind, scale.at(value)) for kind, value in lines]}
 
 
-Cell = tuple[str, str]  # what it is sorted by, and what it shows
+Cell = tuple[str, Any]  # what it is sorted by, and what it shows
 
 
 class Column(NamedTuple):
@@ -220,7 +203,7 @@ def _table(good: Sequence[ProgramOutcome]) -> Document | None:
         "how": HOW_TO_READ,
         "key": key,
         "columns": columns,
-        "axis": _axis(scale),
+        "axis": [(scale.at(tick), number(tick)) for tick in scale.ticks[:: 1 + (len(scale.ticks) > MOST_LABELS)]],
         "rows": [[column.cell(outcome) for column in columns] for outcome in good],
     }
 

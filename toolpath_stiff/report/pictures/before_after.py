@@ -1,18 +1,18 @@
 """Where model and measurements differ before and after a fit, seen from above; measured against modelled."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.residuals import directions, planes
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, deviation_percent
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.report.colours import DIRECTIONS, INK, MUTED, RESIDUAL, WITHIN
+from toolpath_stiff.report.colours import DIRECTIONS, GREY, INK, MUTED, RESIDUAL, WITHIN
 from toolpath_stiff.report.pictures.style import Look, new_figure, panel, round_ticks
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, shortened
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
@@ -22,6 +22,7 @@ BAND = 0.10  # drawn about measured = modelled
 MAP = 2.05  # inch
 MAPS = "maps from above, X to the right; a point: mean of its readings"
 LEFT = 0.95  # inch
+EDGE = 0.035  # around a map, of its side
 
 
 def before_after(
@@ -73,17 +74,23 @@ def maps(
     """
     (rows, columns), (left, top, side) = panels(data), place
     along, levels, limit = directions(data), planes(data), limit or _limit([residual])
-    for i, j in np.ndindex(len(rows), len(columns)):
-        corner = left + side * j, top - side * (i + 1) + 0.1
-        axes, here = panel(figure, *corner, side - 0.15, side - 0.3, xticks=[], yticks=[]), levels == rows[i]
-        points = _map(axes, data, residual, here & (along == columns[j]), limit)
-        axes.set_title(columns[j] if i == 0 else "", size=9.5, color=MUTED)
-        if j == 0:
-            style: Look = {"rotation": 90, "ha": "right", "va": "center", "size": 9}
-            low, high = (f"{end:.0f}" for end in mm_from_m(np.quantile(data.position[here, 2], (0.0, 1.0))))
-            text = f"z {low} mm" if low == high else f"z {low} to {high} mm"
-            axes.text(-0.04, 0.5, text, transform=axes.transAxes, **style)
-    bar = panel(figure, left + side * len(columns), top - side * len(rows) + 0.1, 0.12, side * len(rows) - 0.3)
+    across, up = side * len(columns), side * len(rows)
+    # All maps stand in one frame, which takes a fraction of what a frame each would.
+    axes = panel(figure, left, top - up, across, up, xlim=(0.0, len(columns)), ylim=(len(rows), 0.0))
+    axes.set_axis_off()
+    style: Look = {"rotation": 90, "ha": "right", "va": "center", "size": 9}
+    drawn = []
+    for i, row in enumerate(rows):
+        here = levels == row
+        low, high = (f"{end:.0f}" for end in mm_from_m(np.quantile(data.position[here, 2], (0.0, 1.0))))
+        axes.text(-0.01, i + 0.5, f"z {low} mm" if low == high else f"z {low} to {high} mm", **style)
+        drawn += [_map(axes, data, residual, here & (along == name), (j, i)) for j, name in enumerate(columns)]
+    for j, name in enumerate(columns):
+        axes.text(j + EDGE, -0.03, name, size=9.5, weight="bold", color=MUTED)
+    spots, values = (np.concatenate(parts) for parts in zip(*drawn, strict=True))
+    colour: Look = {"cmap": RESIDUAL, "vmin": -limit, "vmax": limit, "edgecolors": INK, "linewidths": 0.5, "zorder": 3}
+    points = axes.scatter(spots[:, 0], spots[:, 1], c=values, s=78, **colour)
+    bar = panel(figure, left + across, top - up + EDGE * side, 0.12, up - 2 * EDGE * side)
     figure.colorbar(points, cax=bar, extend="both").set_label(f"{DEVIATION}, %", size=9)
     bar.grid(visible=False)
 
@@ -101,23 +108,25 @@ def _limit(halves: Sequence[FloatArray]) -> float:
     return max(float(np.quantile(sizes, SHOWN)), 1e-3) if len(sizes) else 1.0
 
 
-def _map(axes: Axes, data: Readings, residual: FloatArray, chosen: NDArray[np.bool_], limit: float) -> Any:
-    """One map: a disc a pose, readings of one pose averaged; poses above each other stand side by side."""
+def _map(
+    axes: Axes, data: Readings, residual: FloatArray, chosen: NDArray[np.bool_], corner: tuple[int, int]
+) -> tuple[FloatArray, FloatArray]:
+    """The frame of a map in the unit square at `corner`; its discs (m, 2) there and their residuals (m,), %.
+
+    A disc a pose, readings of one pose averaged; poses above each other stand side by side.
+    """
     everywhere, reach = mm_from_m(data.position[:, :2]), _reach(data)
     every = np.round(np.concatenate([data.position, data.angles], axis=1)[chosen], 6)
     poses, which = np.unique(every, axis=0, return_inverse=True)
     values = np.bincount(which.ravel(), deviation_percent(residual[chosen])) / np.bincount(which.ravel())
     centre = 0.5 * (everywhere.min(axis=0) + everywhere.max(axis=0))
-    places = _spread(mm_from_m(poses[:, :2]), 0.09 * reach)
-    style: Look = {"c": values, "s": 78, "edgecolors": INK, "linewidths": 0.5, "zorder": 3}
-    drawn = axes.scatter(places[:, 0], places[:, 1], cmap=RESIDUAL, vmin=-limit, vmax=limit, **style)
-    axes.plot(0.0, 0.0, "+", color=MUTED, ms=8, zorder=2)
-    axes.set(
-        xlim=(centre[0] - 1.2 * reach, centre[0] + 1.2 * reach),
-        ylim=(centre[1] - 1.2 * reach, centre[1] + 1.2 * reach),
-        aspect="equal",
+    scale, middle = np.array([1.0, -1.0]) * (0.5 - EDGE) / (1.2 * reach), np.add(corner, 0.5)
+    axes.plot(*(middle - scale * centre), "+", color=MUTED, ms=8, zorder=2)
+    size = 1.0 - 2.0 * EDGE
+    axes.add_patch(
+        Rectangle((corner[0] + EDGE, corner[1] + EDGE), size, size, fill=False, edgecolor=GREY, linewidth=0.8)
     )
-    return drawn
+    return middle + scale * (_spread(mm_from_m(poses[:, :2]), 0.09 * reach) - centre), values
 
 
 def _reach(data: Readings) -> float:

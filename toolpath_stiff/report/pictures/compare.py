@@ -20,7 +20,7 @@ from toolpath_stiff.units import n_per_mm_from_n_per_m
 SIDE = 2.6  # inches, of a map
 SIDES = 2.0  # standard deviations of the bars and bands: 95 %
 ACROSS = 5  # panels in a row
-LEAST_SHOWN = 2 * ACROSS  # panels of `variables`: two rows, or all that are significant
+LEAST_SHOWN = ACROSS  # panels of `variables`: a row, or all that are significant
 PITCH = 2.15  # inches from one row of panels to the next
 MOST_NAMES = 8  # levels of a label that are written out
 WIDE = 7.5  # median deviations, some 5 standard deviations: readings further off stand at the edge

@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from toolpath_stiff.comparison.residuals import directions
-from toolpath_stiff.diagnosis.examination import HypothesisRow
-from toolpath_stiff.diagnosis.result import Diagnosis
+from toolpath_stiff.diagnosis.examination import Diagnosis, HypothesisRow
 from toolpath_stiff.documents import json_number
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, deviation_percent
 from toolpath_stiff.inference.judgement import NONE
@@ -17,14 +16,14 @@ from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.portrait.words import term_words, variable_label
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.report.colours import BLUE, CHOSEN, DIRECTIONS, FAINT, GREY, INK, MUTED, ORANGE
-from toolpath_stiff.report.explanations import floor_text, probability_text, remark_text, size_texts
+from toolpath_stiff.report.explanations import floor_text, leading_rows, probability_text, remark_text, size_texts
 from toolpath_stiff.report.pictures.before_after import before_after
 from toolpath_stiff.report.pictures.style import Look, new_figure, open_frame, panel
 from toolpath_stiff.report.words import RESIDUAL_AXIS, counted, percent, plain, shortened
 
 MOST_BARS = 8
 ROW = 0.47  # inch a candidate
-MOST_PAIRS = 5  # of the ladder; all are in diagnose.json
+PLACES = ((0.14, 13.79), (4.9, 4.34), (9.66, 1.82))  # left edge and width of words, errors, probabilities, inches
 BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and arrows stand for more
 
 
@@ -34,45 +33,43 @@ def ladder(diagnosis: Diagnosis) -> Figure:
     As given, strut law refitted, what no effect describes (if it was weighed), then pairs and effects.
     """
     every, standing = diagnosis.rows, len(diagnosis.explanations)
-    rows = [every.as_given, every.refitted, *([every.outside] if every.outside.probability else [])]
-    rows += [*every.pairs[:MOST_PAIRS], *every.candidates]
+    rows, more = leading_rows(diagnosis)
+    rows[2:2] = [every.outside] if every.outside.probability else []
     shaded = f"shaded: {counted(standing, 'explanation')} left standing" if standing else "none left"
     figure = new_figure(
         14.0, 1.75 + ROW * len(rows), "Which effect explains the data, and how surely?",
         f"verdict: {diagnosis.verdict}   ·   {shaded}   ·   bar at a dot: standard error of its fall from the refitted "
-        "strut law   ·   grey: not offered",
+        f"strut law   ·   grey: not offered{f'   ·   {more} less likely in diagnose.json' if more else ''}",
     )  # fmt: skip
-    places = ((0.14, 13.79), (0.28, 4.76), (4.9, 4.34), (9.66, 1.82), (11.83, 2.1))
-    every_axes = [panel(figure, left, 0.62, width, ROW * len(rows) + 0.03) for left, width in places]
-    shade, labels, errors, chances, words = every_axes
-    for axes in (shade, labels, words):
-        axes.set_axis_off()
-        axes.set_xlim(0.0, 1.0)
-    for axes in every_axes:
+    height = ROW * len(rows) + 0.03
+    words, errors, chances = (panel(figure, left, 0.62, width, height) for left, width in PLACES)
+    words.set_axis_off()
+    words.set_xlim(0.0, PLACES[0][1])
+    for axes in (words, errors, chances):
         axes.set_ylim(len(rows) - 0.5, -0.5)
     for axes in (errors, chances):
         axes.patch.set_visible(False)
         axes.set_yticks([])
         axes.grid(visible=False, axis="y")
         open_frame(axes, "left")
-    _labels(labels, rows)
+    _words(words, rows)
     _errors(errors, rows, diagnosis)
     _chances(chances, rows)
-    for y, row in enumerate(rows):
-        lines = textwrap.wrap(remark_text(row).split(":")[0], 31, max_lines=2, placeholder=" ...")
-        words.text(0.0, y, "\n".join(lines), va="center", size=8.5, color=INK if row.offered else MUTED)
-        if row.standing:
-            shade.axhspan(y - 0.5, y + 0.5, color=CHOSEN, lw=0)
     return figure
 
 
-def _labels(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
+def _words(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
+    """What each row is, to the left of its figures, and how it stands, to their right; x in inches."""
     for y, row in enumerate(rows):
+        if row.standing:
+            axes.axhspan(y - 0.5, y + 0.5, color=CHOSEN, lw=0)
         small = ", ".join(size_texts(row, intervals=False)) or plain(row.title)
+        ink, muted = (INK, MUTED) if row.offered else (GREY, GREY)
         weight = "bold" if row.standing else "normal"
-        name_colour, small_colour = (INK, MUTED) if row.offered else (GREY, GREY)
-        axes.text(0.0, y - 0.16, shortened(plain(row.label), 58), va="center", color=name_colour, weight=weight)
-        axes.text(0.0, y + 0.21, shortened(small, 76), va="center", color=small_colour, size=8)
+        axes.text(0.14, y - 0.16, shortened(plain(row.label), 58), va="center", color=ink, weight=weight)
+        axes.text(0.14, y + 0.21, shortened(small, 76), va="center", color=muted, size=8)
+        lines = textwrap.wrap(remark_text(row).split(":")[0], 31, max_lines=2, placeholder=" ...")
+        axes.text(11.69, y, "\n".join(lines), va="center", size=8.5, color=INK if row.offered else MUTED)
 
 
 def _errors(axes: Axes, rows: Sequence[HypothesisRow], diagnosis: Diagnosis) -> None:

@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.transforms import IdentityTransform
 
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.report.analysis_tables import headline_text
@@ -15,58 +14,35 @@ from toolpath_stiff.report.colours import INK, MUTED
 from toolpath_stiff.report.pictures.style import Look
 from toolpath_stiff.report.words import plain, shortened
 
-Box = tuple[float, float, float, float]  # left, low, right, high in pixels
-
-REACHES = (16.0, 30.0, 48.0, 70.0)  # pixels between a place and its label
 CHARACTER, LINE = 7.2, 17.0  # pixels of a label: width of a character, height
-RING, RING_EDGE = 8.0, 7.0  # pixels around a place that no label covers; where the line to its label begins
+BESIDE = 12.0  # pixels from a place to its label
 
 
 def label_places(axes: Axes, places: Sequence[tuple[float, float]], texts: Sequence[str], below: bool = False) -> None:
-    """Ring places and write beside each, where no other label or ring nor the edge of the axes is in the way.
+    """Ring places and write beside each, from the top down so that near labels stand below each other.
 
-    `below`: rather below the place (a low point of a curve) than beside it.
+    `below`: rather below the place (a low point of a curve) than above it.
     """
-    spots = np.reshape(places, (-1, 2))
-    pixels = axes.transData.transform(spots)
-    taken = [(x - RING, y - RING, x + RING, y + RING) for x, y in pixels.tolist()]
+    spots, frame = np.reshape(places, (-1, 2)), axes.get_window_extent()
     ground = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-    leaders = []
-    for place, text in zip(pixels, texts, strict=True):
-        box = _free_box(axes, (float(place[0]), float(place[1])), CHARACTER * len(text) + 6.0, taken, below)
-        taken.append(box)
-        middle, half = np.add(box[:2], box[2:]) / 2.0, np.subtract(box[2:], box[:2]) / 2.0
-        axes.text(
-            middle[0], middle[1], text, transform=IdentityTransform(), ha="center", va="center", zorder=10, bbox=ground
-        )
-        way = middle - place
-        edge = np.min(half / np.maximum(np.abs(way), 1e-9))  # where the way meets the box
-        start = RING_EDGE / np.hypot(*way)
-        if start + edge < 1.0:
-            leaders += [place + start * way, middle - edge * way, (np.nan, np.nan)]
-    axes.plot(*np.reshape(leaders, (-1, 2)).T, color=INK, linewidth=0.8, transform=IdentityTransform(), zorder=10)
+    written: list[tuple[float, float]] = []  # the left end of a label and its height, in pixels
+    for (x, y), text in sorted(
+        zip(axes.transData.transform(spots).tolist(), texts, strict=True), key=lambda at: -at[0][1]
+    ):
+        wide = CHARACTER * len(text)
+        left = x + BESIDE if x + BESIDE + wide < frame.x1 else x - BESIDE - wide
+        level = y + (-LINE if below else LINE)
+        for other, height in written:
+            if abs(other - left) < wide and level > height - LINE:
+                level = height - LINE
+        written.append((left, level))
+        axes.annotate(
+            text, (x, y), (left, max(level, frame.y0 + LINE / 2)), xycoords="figure pixels", textcoords="figure pixels",
+            va="center", zorder=10, bbox=ground, arrowprops={"arrowstyle": "-", "color": INK, "linewidth": 0.8},
+        )  # fmt: skip
     for colour, width in (("white", 3.5), (INK, 1.6)):
         ring: Look = {"markeredgecolor": colour, "markeredgewidth": width, "markerfacecolor": "none"}
         axes.plot(*spots.T, marker="o", markersize=9.0, linestyle="none", zorder=10, **ring)
-
-
-def _free_box(axes: Axes, place: tuple[float, float], width: float, taken: Sequence[Box], below: bool) -> Box:
-    """Where a label of this width, in pixels, covers nothing that is taken."""
-    x, y = place
-    sides = [(1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1)]
-    if below:
-        sides.sort(key=lambda side: (side[1], abs(side[0])))
-    edge = axes.get_window_extent()
-    for reach in REACHES:
-        for dx, dy in sides:
-            left = x + dx * reach - (width if dx < 0 else width / 2 if dx == 0 else 0.0)
-            low = y + dy * reach - LINE / 2
-            right, high = left + width, low + LINE
-            inside = edge.x0 < left and right < edge.x1 and edge.y0 < low and high < edge.y1
-            free = all(right < box[0] or box[2] < left or high < box[1] or box[3] < low for box in taken)
-            if free and (inside or reach == REACHES[-1]):
-                return left, low, right, high
-    return x + 16.0, y + 16.0 - LINE / 2, x + 16.0 + width, y + 16.0 + LINE / 2
 
 
 def add_heading(figure: Figure, analysis: Analysis) -> None:

@@ -24,8 +24,8 @@ YAW, PITCH = 30.0, 40.0  # deg, from where the part is seen
 MOST_QUADS = 30_000  # of walls and of floors
 
 
-def part(analysis: Analysis, *, show_plunges: bool = False) -> Figure | None:
-    """The finished part seen from in front and above, whatever `show_plunges`; None without a cut."""
+def part(analysis: Analysis) -> Figure | None:
+    """The finished part seen from in front and above; None without a cut."""
     cut = analysis.cut
     if cut is None:
         return None

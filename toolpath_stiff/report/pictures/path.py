@@ -34,18 +34,16 @@ POINT = 0.05  # of the colour scale's length: the end beyond which there are val
 THINNEST = 0.38  # a view's shorter side, of the longest: a flat part still gets a readable side view
 
 
-def path(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
+def path(analysis: Analysis) -> Figure:
     """Three views of the path.
 
     Top (XY), below it front (XZ), beside that the view from +X (YZ), all at one scale and aligned as on a drawing,
     in machine coordinates. The views frame the cutting moves; rapids may leave them. Stiffer segments are drawn
     first: a weak one is never hidden beneath. Plunges beside the headline are grey and end in a dot, which is all
-    that is seen of them from above; with `show_plunges` they are on the colour scale like the rest.
+    that is seen of them from above.
     """
-    samples, limits = analysis.samples, scale_limits(analysis, show_plunges)
-    points, strokes, lines = _coloured_lines(
-        analysis, limits, colormaps[STIFFNESS](np.linspace(0.0, 1.0, CLASSES)), show_plunges
-    )
+    samples, limits = analysis.samples, scale_limits(analysis)
+    points, strokes, lines = _coloured_lines(analysis, limits, colormaps[STIFFNESS](np.linspace(0.0, 1.0, CLASSES)))
     middle, span = _frame(*cutting_box(samples))
     figure, views, corner = _lay_out(span)
     places = analysis.weakest_rows
@@ -66,12 +64,12 @@ def path(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
         spots = [(float(x), float(y)) for x, y in mm_from_m(samples.position[places][:, [across, up]])]
         label_places(axes, spots, [f"line {samples.line[row]}" for row in places])
     add_heading(figure, analysis)
-    _legend(figure, corner, analysis, limits, show_plunges)
+    _legend(figure, corner, analysis, limits)
     return figure
 
 
 def _coloured_lines(
-    analysis: Analysis, limits: tuple[float, float], colours: FloatArray, show_plunges: bool
+    analysis: Analysis, limits: tuple[float, float], colours: FloatArray
 ) -> tuple[FloatArray, list[tuple[IntArray, Any]], list[tuple[FloatArray, Look]]]:
     """Points of the path; segments and colour of each class, in drawing order; points and style of the other lines."""
     # A corner is two samples at one point: one of them is enough, and the line through it stays one line.
@@ -80,8 +78,7 @@ def _coloured_lines(
     points = mm_from_m(samples.position[np.append(moved, moved[-1] + 1 if len(moved) else 0)])
     rapid = ~samples.cutting[moved + 1]
     classes = segment_classes(n_per_mm_from_n_per_m(0.5 * (stiffness[moved] + stiffness[moved + 1])), limits)
-    if not show_plunges:
-        classes[analysis.set_aside[moved + 1]] = PLUNGE
+    classes[analysis.set_aside[moved + 1]] = PLUNGE
     if len(points) > MOST_POINTS:
         points, rapid, classes = _merged(points, rapid, classes)
     strokes = [
@@ -186,8 +183,7 @@ def _set_up(axes: Axes, across: int, up: int, middle: FloatArray, span: FloatArr
 
 
 def _legend(
-    figure: Figure, corner: tuple[float, float, float, float], analysis: Analysis, limits: tuple[float, float],
-    show_plunges: bool,
+    figure: Figure, corner: tuple[float, float, float, float], analysis: Analysis, limits: tuple[float, float]
 ) -> None:  # fmt: skip
     width, height = figure.get_size_inches()
     x, y, wide, tall = corner
@@ -204,7 +200,7 @@ def _legend(
     keys: list[tuple[Artist, str]] = []
     if not analysis.samples.cutting.all():
         keys.append((Line2D([], [], color=GREY, linewidth=0.8, linestyle=(0, (5, 4))), "rapid"))
-    if analysis.set_aside.any() and not show_plunges:
+    if analysis.set_aside.any():
         keys.append((Line2D([], [], color=SLATE, linewidth=1.5, marker=".", markersize=6), "plunge"))
     if analysis.out_of_reach.any():
         keys.append((Line2D([], [], color=RED, linewidth=2.2), "out of reach"))

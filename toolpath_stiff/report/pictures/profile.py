@@ -1,5 +1,7 @@
 """`profile.png`: stiffness along the path."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -21,27 +23,28 @@ WIDTH, HEIGHT = 14.0, 6.2  # inches
 LEFT, RIGHT, TOP, BOTTOM = 1.05, 0.45, 1.45, 0.75
 STEPS = (1, 2, 2.5, 5, 10)  # between ticks
 CURVE_BLUE = "#2b59c3"
+Curve = tuple[FloatArray, FloatArray]  # mm along the path, N/mm
 
 
-def profile(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
+def profile(analysis: Analysis) -> Figure:
     """Stiffness against path length; on the other machine a second curve; the required level, red below it.
 
-    With `show_plunges` the axis holds the plunges beside the headline, and they belong to the curve; else they are
-    grey.
+    Plunges beside the headline are grey and do not set the axis.
     """
     figure = new_figure(WIDTH, HEIGHT)
     axes = panel(figure, LEFT, BOTTOM, WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM)
-    s, k = profile_curve(analysis, show_plunges)
-    band = profile_band(analysis, show_plunges)
-    _set_limits(axes, analysis, band, show_plunges)
+    s, k = curve = profile_curve(analysis)
+    others = [] if analysis.on_other is None else [profile_curve(analysis.on_other)]
+    band = profile_band(analysis)
+    _set_limits(axes, analysis, [k, *(other[1] for other in others), *(band or ())])
     _shade(axes, s, ~analysis.samples.cutting, "#eef1f4", "rapid")
     _shade(axes, s, analysis.out_of_reach, "#f6c9c9", "out of reach")
     columns = int(axes.get_window_extent().width)
-    if (other := analysis.on_other) is not None:
-        _curve(axes, other, columns, (ORANGE, ORANGE, 3), "_", show_plunges)
+    if analysis.on_other is not None:
+        _curve(axes, analysis.on_other, others[0], columns, (ORANGE, ORANGE, 3), "_")
     if band is not None:
         _draw_band(axes, s, band, columns)
-    _curve(axes, analysis, columns, (CURVE_BLUE, SLATE, 4), "plunges", show_plunges)
+    _curve(axes, analysis, curve, columns, (CURVE_BLUE, SLATE, 4), "plunges")
     _levels(axes, analysis)
     _line_numbers(axes, analysis)
     places = analysis.weakest_rows
@@ -53,19 +56,19 @@ def profile(analysis: Analysis, *, show_plunges: bool = False) -> Figure:
 
 
 def _curve(
-    axes: Axes, analysis: Analysis, columns: int, look: tuple[str, str, int], plunges: str, show_plunges: bool
+    axes: Axes, analysis: Analysis, curve: Curve, columns: int, look: tuple[str, str, int], plunges: str
 ) -> None:
     """The curve of a machine; the plunges that it leaves out as thin lines.
 
-    `look`: colour of the curve and of the plunges, order. `plunges` that begins with "_" does not enter the legend
-    (matplotlib's rule).
+    `look`: colour of the curve and of the plunges, order. `plunges`: their name; one that
+    begins with "_" does not enter the legend (matplotlib's rule).
     """
     colour, aside, order = look
-    s, k = profile_curve(analysis, show_plunges)
+    s, k = curve
     keep = extremes_by_column(s, k, columns)
     name = shortened(plain(analysis.machine.name), 30)
     axes.plot(s[keep], k[keep], color=colour, linewidth=1.3, label=name, zorder=order)
-    if show_plunges or not analysis.set_aside.any():
+    if not analysis.set_aside.any():
         return
     k = np.where(analysis.set_aside, n_per_mm_from_n_per_m(analysis.at.stiffness), np.nan)
     keep = extremes_by_column(s, k, columns)
@@ -87,9 +90,7 @@ def _draw_band(axes: Axes, s: FloatArray, band: tuple[FloatArray, FloatArray], c
     axes.fill_between(s[keep], low[keep], high[keep], zorder=3, label="95 % band", **look)
 
 
-def _set_limits(axes: Axes, analysis: Analysis, band: tuple[FloatArray, FloatArray] | None, show_plunges: bool) -> None:
-    machines = [analysis, *([analysis.on_other] if analysis.on_other else [])]
-    curves = [*(profile_curve(machine, show_plunges)[1] for machine in machines), *(band or ())]
+def _set_limits(axes: Axes, analysis: Analysis, curves: Sequence[FloatArray]) -> None:
     low, high = float(min(np.nanmin(k) for k in curves)), float(max(np.nanmax(k) for k in curves))
     if analysis.required is not None:
         level = n_per_mm_from_n_per_m(analysis.required)

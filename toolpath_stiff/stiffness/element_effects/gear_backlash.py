@@ -44,7 +44,7 @@ class GearBacklash(Effect):
         if path.element_loads is None:
             return None
         more, torsion = path.element_zeros(), path.element(p["element"])[0].start + 5
-        weight, moment = path.weight_loads()[:, torsion], path.element_loads[:, torsion]
+        weight, moment = path.weight_loads[:, torsion], path.element_loads[:, torsion]
         moment = np.where(np.abs(moment) < SMALLEST, SMALLEST, moment)
         share = [m / np.hypot(m, max(p["closing"], SMALLEST)) for m in (weight + moment, weight)]
         more[:, torsion] = p["gap"] * (share[0] - share[1]) / moment

@@ -47,7 +47,6 @@ function effectsPanel(state, act) {
   }
   const on = state.effects.some((one) => one.on), fit = state.fit;
   return [
-    guide(act),
     h("h2", {}, "Which effect is missing?"),
     h("div", { class: "actions" }, button("Fit", () => act({ do: "fit" }), { id: "fit", class: "main live",
       disabled: !on || !state.readings }),
@@ -62,25 +61,11 @@ function effectsPanel(state, act) {
     rows,
     folded.length ? h("details", { id: "unlikely", open: unfolded, ontoggle: (e) => { unfolded = e.target.open; } },
       h("summary", {}, "further effects, each less likely than 1 %"), folded) : null,
-    ownEffects(state, act),
+    h("p", { class: "muted live" },
+      "Drop a Python file with an effect of your own on the page: it joins these; dropped again, it is replaced."),
   ];
 }
 let unfolded = false; // the unlikely effects
-// What one does first, until it is put away.
-const GUIDE = ["Read the verdict above: what is off, how sure that is, how large the error is against the noise.",
-  "Switch an effect on and move its slider: bars and dots show at once what it would explain.",
-  "Press Fit; what the data support can be accepted into the machine.",
-  "Where the verdict is open, Next says what to measure.",
-  "Program and Placement show what the part loses by it, and where it should sit."];
-let guided = false;
-try { guided = Boolean(localStorage.getItem("guided")); } catch { /* a page that may keep nothing */ }
-function guide(act) {
-  if (guided || act.readonly) return null;
-  const away = () => { guided = true; try { localStorage.setItem("guided", "yes"); } catch { /* as above */ }
-    act.redraw(); };
-  return h("div", { class: "guide", id: "guide" }, h("b", {}, "The loop in five steps"),
-    h("ol", {}, GUIDE.map((text) => h("li", {}, text))), button("Put this away", away, { id: "guided" }));
-}
 // What no effect explains, as far as the readings describe it.
 function portrait(p, act) {
   if (!p) return null;
@@ -98,30 +83,11 @@ function portrait(p, act) {
       { id: "draft" }), h("span", { class: "muted" },
       "a commented file that competes with the others; new readings must confirm it")) : null);
 }
-// Effects of one's own, edited here: each save is loaded, a fault stands below.
-function ownEffects(state, act) {
-  if (!state.own_effects.length) return h("p", { class: "muted live" },
-    "Drop a Python file with an effect of your own on the page: it joins these.");
-  return [h("h3", {}, "Effects of your own"), state.own_effects.map((own, k) => {
-    const area = h("textarea", { id: `own-${k}`, rows: 16, spellcheck: "false", "aria-label": `Text of ${own.file}`,
-      "aria-describedby": `own-fault-${k}` });
-    area.value = drafts.get(own.file) ?? own.text;
-    area.addEventListener("input", () => drafts.set(own.file, area.value));
-    const edit = () => { drafts.set(own.file, own.text); act.redraw(); };
-    const save = () => { drafts.delete(own.file); act({ do: "save_effect", file: own.file, text: area.value }); };
-    return h("div", { class: "own" }, h("code", {}, own.file), drafts.has(own.file) || own.fault
-      ? [h("p", { class: "muted" }, "Its code is run each time it is saved."), area,
-        h("div", { class: "actions" }, button("Save and load", save, { id: `own-save-${k}`, class: "main live" }))]
-      : h("div", { class: "actions" }, button("Edit", edit, { id: `own-edit-${k}` })),
-      own.fault ? h("p", { class: "warning", id: `own-fault-${k}`, role: "alert" }, own.fault) : null);
-  })];
-}
-const drafts = new Map(); // what was typed and not saved yet
 function effectRow(effect, act) {
   const id = `sw-${effect.name}`, on = effect.on !== null;
   const toggle = (e) => act({ do: "switch", effect: effect.name, values: e.target.checked
     ? Object.fromEntries(effect.sliders.map((s) => [s.key, s.start])) : null });
-  return h("div", { class: effect.probability === null ? "effect off-table" : "effect" }, h("div", { class: "row" },
+  return h("div", { class: "effect" }, h("div", { class: "row" },
     h("input", { type: "checkbox", role: "switch", class: "switch", id, checked: on, onchange: toggle,
       "aria-checked": String(on), disabled: act.readonly }),
     h("label", { class: "name", for: id }, effect.title, h("code", {}, effect.name)),
@@ -176,10 +142,6 @@ function whyPanel(state, act) {
         h("a", { class: "live", href: `/case/${c.result}/report.html`, target: "_blank", rel: "noreferrer" },
         "the whole comparison, with residuals against every variable")]
       : button("Where the model fails", () => act({ do: "compare" }), { id: "compare" }),
-    h("h3", {}, "What these data could show"),
-    table(["effect", "parameter", "smallest size shown", "change of readings (rms)"], v.detectable
-      .map((d) => [d.effect, d.parameter, d.detectable ? `${short(d.size)} ${d.unit}` : "none", percent(d.rms_percent,
-      1)])),
     h("h3", {}, "Assumed"), list(v.assumptions), v.notes.length ? [h("h3", {}, "Notes"), list(v.notes)] : null,
   ];
 }
@@ -191,15 +153,11 @@ function residuals(state, act) {
     || 1) * (W - pad - end), y = (v) => H / 2 - 8 - v / most * (H / 2 - 26);
   const pick = h("select", { id: "against", "aria-label": "Variable", onchange: (e) => { against = e.target.value;
     act.redraw(); } }, AGAINST.map(([key, label]) => h("option", { value: key, selected: key === against }, label)));
-  const marks = ticks(-most, most, 4).values
-    .map((v) => [h("line", { x1: pad, x2: W - end, y1: y(v), y2: y(v), stroke: "var(--line)" }),
-    h("text", { x: pad - 6, y: y(v) + 4, "text-anchor": "end" }, String(Number(v.toPrecision(3))))]);
-  const across = ticks(low, high > low ? high : low + 1, 6), feet = across.values
-    .map((v) => h("text", { x: x(v), y: H - 16, "text-anchor": "middle" }, v.toFixed(across.digits)));
   return [h("div", { class: "bar" }, h("label", { for: "against" }, "against "), pick),
     h("svg", { viewBox: `0 0 ${W} ${H}`, class: "drag", style: "cursor:default", role: "img",
     "aria-label": `Errors of ${used.length} readings against ${against}` },
-    marks, feet, h("line", { x1: pad, x2: W - end, y1: y(0), y2: y(0), stroke: "var(--muted)" }),
+    grid(ticks(-most, most, 4), false, y, pad, W - end), grid(ticks(low, high > low ? high : low + 1, 6), true, x, 20,
+      H - 32), h("line", { x1: pad, x2: W - end, y1: y(0), y2: y(0), stroke: "var(--muted)" }),
       h("text", { x: 4, y: 12 }, "error %"),
     used.map((i) => h("circle", { cx: x(values[i]).toFixed(1), cy: y(dev[i] ?? 0).toFixed(1), r: 3,
       fill: errorColour(dev[i] ?? 0, act.scene.scale), "fill-opacity": 0.8 })))];
@@ -254,7 +212,7 @@ function programPanel(state, act) {
     h("div", { class: "actions" }, h("label", { for: "require" }, "required N/mm "), need, s?.required
       ? h("span", { id: "below", class: s.required.lines?.length ? "bad" : "good" }, s.required.lines?.length
       ? `${s.required.lines.length} lines are below` : "every cut has it") : null),
-    h("div", { class: "text", id: "text", role: "group", "aria-label": "Program text" }),
+    h("div", { class: "listing", id: "text", tabindex: "0", role: "group", "aria-label": "Program text" }),
   ];
 }
 // The placement.
@@ -313,7 +271,7 @@ function placementFigures(now, state, id) {
   const before = state.placement?.before;
   const v = (key, of = (value) => group(value)) => {
     const [here, there] = [now, before].map((one) => (Number.isFinite(one?.[key]) ? of(one[key]) : "\u2013"));
-    return [here, there === here ? "" : ` before ${there}`];
+    return [here, ` before ${there}`];
   };
   const share = (value) => group(100 * value, 1);
   const shown = [["mean N/mm", v("mean_N_per_mm"), "pl-mean"], ["range N/mm", v("range_N_per_mm"), "pl-range"],

@@ -53,15 +53,17 @@ const hand = latest((on) => post("/do", JSON.stringify({ do: "hand", on })), (fo
   view.redraw();
 });
 // The path where the work would lie with program zero elsewhere.
-function carry(origin) {
-  const { path: p, origin: from } = state.program, [q, r] = [turnOf(from), turnOf(origin)], [path] = scene.paths;
-  if (!path) return;
-  const xyz = [0, 1, 2].map(() => new Float32Array(path.n));
-  for (let i = 0; i < path.n; i++) {
+function carried({ path: p, origin: from }, origin) {
+  const [q, r] = [turnOf(from), turnOf(origin)], xyz = [0, 1, 2].map(() => new Float32Array(p.x_mm.length));
+  for (let i = 0; i < p.x_mm.length; i++) {
     const d = minus([p.x_mm[i], p.y_mm[i], p.z_mm[i]], from);
     moved(origin, r, [0, 1, 2].map((k) => dot3(q.map((row) => row[k]), d))).forEach((v, k) => { xyz[k][i] = v; });
   }
-  path.move(xyz);
+  return xyz;
+}
+function carry(origin) {
+  if (!scene.paths[0]) return;
+  scene.paths[0].move(carried(state.program, origin));
   if (here < 0) scene.pose = [...origin.slice(0, 3), 0, 0, 0];
   view.redraw();
 }
@@ -85,7 +87,8 @@ Object.assign(act, {
     placed([...act.origin]);
     if (done) act.drop();
   },
-  drop: () => act({ do: "place_at", origin: act.origin.map((v) => Number(v.toFixed(3))) }),
+  drop: () => act({ do: "place_at", origin: act.origin.map((v) => Number(v.toFixed(3))) })
+    .then(() => { if (scene.focus === "part") view.turnTo("fit"); }),
 });
 // The machine, the profile.
 const view = new Viewer($("scene"), scene, { point, pick, step: (by) => stepReading(by) });
@@ -135,14 +138,13 @@ function classify() {
   const shown = curve(), known = shown.filter((v, i) => v !== null && path.cut[i] && !path.plunge[i]);
   let low = Infinity, high = -Infinity;
   for (const v of known) { low = Math.min(low, v); high = Math.max(high, v); }
-  const count = COLOURS.light.length;
   scene.ends = [low, high];
   scene.shifted = which === "shift" ? shifted(path) : null;
   lines.classify((i) => {
-    if (!path.cut[i]) return count;
-    if (shown[i] === null) return count + 2;
-    return path.plunge[i] ? count + 1 : classAt(shown[i], scene.ends, count);
-  }, count + 3);
+    if (!path.cut[i]) return RAPIDS;
+    if (shown[i] === null) return UNREACHED;
+    return path.plunge[i] ? PLUNGES : classAt(shown[i], scene.ends, CLASSES);
+  });
   scene.paths = [lines];
 }
 // Of a cut, what path and profile may show instead of stiffness: its unit and digits, what it is.
@@ -173,6 +175,7 @@ const numbers = (values, keep) => Float32Array.from(values, (v, i) => (v === nul
 function drawProfile() {
   const path = state.program?.path;
   $("profile-card").hidden = !path;
+  $("profile").classList.toggle("stale", Boolean(path?.stale));
   if (!path) { profile = null; return; }
   const s = Float32Array.from(path.s_mm), cut = (i) => path.cut[i] && !path.plunge[i], shown = numbers(curve(), cut);
   const curves = () => {
@@ -210,6 +213,7 @@ function goTo(i) {
   const path = state.program?.path;
   if (!path || !(i >= 0)) return;
   here = scene.sample = Math.round(i);
+  scene.selected = -1;
   scene.pose = ["x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"].map((k) => path[k][here]);
   $("scrub").value = here;
   const k = path.now[here];
@@ -225,27 +229,24 @@ function goTo(i) {
   profile?.drawOverlay();
   drawText(path.line[here]);
 }
-const lowest = { of: null, lines: new Map() };
+// The program's text; the bar of a line is its lowest stiffness, or what else the path shows at its worst.
+let listing = null, barred = null;
 function drawText(line) {
   const box = $("text"), p = state.program;
   if (!box || !p) return;
   const shown = p.path && (layer()[2] ? curve() : p.path.now), [unit, digits] = layer();
-  if (lowest.of !== shown) {
-    Object.assign(lowest, { of: shown, lines: new Map() });
-    const worse = (a, b) => (digits ? Math.abs(a) > Math.abs(b) : a < b);
+  if (listing?.element !== box || barred !== shown) {
+    const lowest = new Map(), worse = (a, b) => (digits ? Math.abs(a) > Math.abs(b) : a < b);
+    barred = shown;
     p.path?.line.forEach((n, i) => { if (p.path.cut[i] && shown[i] !== null
-      && (!lowest.lines.has(n) || worse(shown[i], lowest.lines.get(n)))) lowest.lines.set(n, shown[i]); });
+      && (!lowest.has(n) || worse(shown[i], lowest.get(n)))) lowest.set(n, shown[i]); });
+    listing = new Listing(box, p.lines, {
+      colour: (n) => (lowest.has(n) ? coloursNow()[classAt(lowest.get(n), scene.ends, CLASSES)] : undefined),
+      title: (n) => (lowest.has(n) ? `${group(lowest.get(n), digits)} ${unit}` : ""),
+      choose: (n) => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i); else listing.show(n); },
+    });
   }
-  const from = Math.max(1, Math.min(line - 8, p.lines.length - 16)), colours = coloursNow();
-  const focus = document.activeElement?.id;
-  box.replaceChildren(...p.lines.slice(from - 1, from + 16).map((text, k) => {
-    const n = from + k, v = lowest.lines.get(n), c = v === undefined ? "transparent"
-      : colours[classAt(v, scene.ends ?? [0, 1], colours.length)];
-    return h("button", { type: "button", id: `line-${n}`, class: n === line ? "here" : "", title: v === undefined ? ""
-      : `${group(v, digits)} ${unit}`, onclick: () => { const i = p.path?.line.indexOf(n) ?? -1; if (i >= 0) goTo(i);
-      else drawText(n); } }, h("i", { style: `background:${c}` }), h("span", {}, String(n)), h("span", {}, text));
-  }));
-  refocus(focus, "");
+  listing.show(line);
 }
 function play() {
   const path = state.program?.path;
@@ -262,7 +263,7 @@ function drawLegend() {
     style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }),
     `+${scene.scale} % stiffer`));
   if (state.program?.path) { const [unit, digits] = layer(); parts.push(h("div", {},
-    `path ${group(scene.ends[0], digits)}`, h("span", { class: "ramp", style: `background:${ramp(coloursNow())}` }),
+    `path ${group(scene.ends[0], digits)}`, h("span", { class: "ramp" }),
     `${group(scene.ends[1], digits)} ${unit}`)); }
   if (scene.shifted) parts.push(h("div", {}, `orange: compensated, its shift ${group(scene.shifted.times)} times`));
   $("legend").replaceChildren(...parts);
@@ -273,15 +274,10 @@ function drawPanel() {
     id: `tab-${name}`, "aria-selected": String(name === panel), "aria-controls": "panel", tabindex: name === panel ? "0"
     : "-1", onclick: () => open(name) }, label)));
   $("panel").setAttribute("aria-labelledby", `tab-${panel}`);
-  const within = $("panel").contains(typed), caret = typed?.tagName === "TEXTAREA" ? [typed.selectionStart,
-    typed.selectionEnd, typed.scrollTop] : null;
+  const within = $("panel").contains(typed);
   $("panel").replaceChildren(...[make(state, act)].flat(9).filter(Boolean));
   if (panel === "program") drawText(state.program?.path?.line[Math.max(0, here)] ?? 1);
   refocus(focus, within ? "panel" : "");
-  if (caret && document.activeElement?.id === focus) { // whoever types goes on where they were
-    document.activeElement.setSelectionRange(caret[0], caret[1]);
-    document.activeElement.scrollTop = caret[2];
-  }
 }
 // What was drawn anew takes the focus that it had; where it is gone or can no longer be used, its surroundings do.
 function refocus(id, instead) {
@@ -334,6 +330,7 @@ function draw() {
   drawProfile();
   drawLegend();
   drawPanel();
+  if (here >= 0 && scene.selected < 0) goTo(here);  // its figures are others now
   if (view.width) { if (!scene.fitted) { scene.fitted = true; view.turnTo("iso"); } view.redraw(); }
 }
 let began = { of: "", at: 0, done: 0 };  // the work that runs, when it was first seen, how far it was then
@@ -354,6 +351,12 @@ async function refresh() {
     try {
       const found = await (await fetch("/state")).json();
       if (found.error) { tell(found.error); return; }
+      const [was, now] = [state?.program, found.program];
+      // Until the program is analyzed anew its path stands where it lies now, with the figures of before, pale.
+      if (was?.path && now && !now.path && !now.error && was.name === now.name) {
+        const [x_mm, y_mm, z_mm] = carried(was, now.origin);
+        now.path = { ...was.path, x_mm, y_mm, z_mm, stale: true };
+      }
       state = found;
       version = found.version;
       drawJob(found.job);
@@ -399,6 +402,10 @@ async function take(file, run = false) {
     if (state.program && !/\.(csv|xlsx|toml|py)$/i.test(file.name)) open("program");
   } catch (error) { tell(error.message); }
 }
+// What one does first, until it is put away.
+const keep = (use) => { try { return use(localStorage); } catch { return null; } };  // a page may keep nothing
+$("guide").hidden = readonly || Boolean(keep((of) => of.getItem("guided")));
+$("guided").addEventListener("click", () => { $("guide").hidden = true; keep((of) => of.setItem("guided", "yes")); });
 window.tpsStudio = { spots: () => scene.spots.map((spot) => [...spot]) };  // where readings stand on the screen
 if (readonly) draw();
 else {
@@ -411,7 +418,7 @@ else {
   addEventListener("drop", async (e) => { e.preventDefault(); $("drop").hidden = true;
     for (const file of ordered(e.dataTransfer.files)) await take(file); });
   addEventListener("keydown", (e) => {
-    if (!(e.ctrlKey || e.metaKey) || e.target.matches("textarea, input[type=number], input[type=text]")) return;
+    if (!(e.ctrlKey || e.metaKey) || e.target.matches("input[type=number]")) return;
     if (e.key.toLowerCase() === "z") { e.preventDefault(); act({ do: "undo" }); }
   });
   const news = new EventSource("/events");

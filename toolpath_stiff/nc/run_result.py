@@ -1,0 +1,51 @@
+"""What a run made of a program: moves, warnings, assumptions, the blank."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from toolpath_stiff.nc.codes.increments import point_warning
+from toolpath_stiff.nc.languages import lathe_warning
+from toolpath_stiff.nc.moves import Blank, Jump, ReadProgram, Remark
+from toolpath_stiff.nc.request import ORIGIN_WINS, Request
+from toolpath_stiff.nc.state import START, State
+from toolpath_stiff.poses import pose_in_si
+from toolpath_stiff.units import m_from_mm
+
+
+def program_of(
+    state: State, request: Request, lines: Sequence[str], jumps: Sequence[Jump], ending: Sequence[Remark]
+) -> ReadProgram:
+    """The program of a run, with the warnings of its end; of a posted one the moves of its own machine."""
+    frames, warnings = state.frames, [*ending]
+    if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
+        warnings.append(ORIGIN_WINS)
+    moves = state.recorder.moves()
+    return ReadProgram(
+        name=request.name,
+        path=request.path,
+        source=request.lines,
+        moves=moves,
+        origin=pose_in_si(frames.origin),
+        origin_source=frames.source,
+        unsupported=tuple(state.unsupported),
+        warnings=(
+            *warnings,
+            *state.warnings,
+            *lathe_warning(state.turning, moves),
+            *point_warning(state, lines),
+        ),
+        assumptions=(START, *state.assumptions),
+        tools=tuple(state.used_tools.values()),
+        dialect=request.controller.label,
+        jumps=tuple(jumps),
+        stock=blank_of(state.plain.stock),
+    )
+
+
+def blank_of(stock: Mapping[str, Sequence[float]]) -> Blank | None:
+    """The corners of BLK FORM in m, where both are whole."""
+    corners = [[m_from_mm(v) for v in corner] for corner in stock.values()]
+    if len(corners) != 2 or any(map(math.isnan, [*corners[0], *corners[1]])):
+        return None
+    (a, b, c), (d, e, f) = corners
+    return (a, b, c), (d, e, f)
