@@ -186,10 +186,13 @@ class Update(FolderResult):
                     change = f"{100 * before.mean_error:.2f} to {100 * after.mean_error:.2f} %"
                     clauses.append(f"{words.format(value)} the error at left-out points rises, {change}")
         left, floor = 100 * last.mean_error, self.noise.floor_percent
-        if self.described and left > LACKING * floor:  # it stands for something else, which elsewhere does otherwise
-            clauses.append(
-                f"what was read off these readings leaves {left:.2f} % at left-out points, scatter {floor:.2f} %"
-            )
+        # A form that leaves more than scatter stands for something else, which elsewhere does otherwise; what it leaves
+        # of an instrument's error is taken for the machine's.
+        names, of_instrument = self.model.fit.names, self.model.instruments
+        beside = f"{joined(names)} together leave" if of_instrument and len(of_instrument) < len(names) else ""
+        of = "what was read off these readings leaves" if self.described else beside
+        if of and left > LACKING * floor:
+            clauses.append(f"{of} {left:.2f} % at left-out points, scatter {floor:.2f} %")
         return clauses
 
     @property
