@@ -18,7 +18,7 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect, base_fit, fit_effects, settled
 from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.least_squares import bounded_step
-from toolpath_stiff.inference.noise import GUESSES, STATED_FREEDOM, Noise, Scatter
+from toolpath_stiff.inference.noise import CONTRADICTED, GUESSES, STATED_FREEDOM, Noise, Scatter
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS
 from toolpath_stiff.inference.votes import outvoted
 from toolpath_stiff.machine.elements import turns
@@ -45,6 +45,7 @@ OTHER_UNIT = 100.0  # measured over modelled, or the inverse, from which the uni
 INVISIBLE = 1e-6  # of the readings' size, rms: what a candidate of its largest usual size must change at least
 VISIBLE = 5e-3  # the same of the geometry, which pulls hardly show
 ALIKE_FREEDOM = 20  # degrees of freedom within pulls that are alike, from which these tell scatter from a misfit
+SAME_PULL = 0.02  # by which components of a direction, and a force, relative, may differ between repeats
 NO_LAW = np.zeros(2)
 
 
@@ -164,9 +165,10 @@ class PullProblem(Problem):
         """Scatter of the readings over their size, root mean squares."""
         return float(np.linalg.norm(self.noise.repeat * self.pulls.size) / np.linalg.norm(self.pulls.size))
 
-    def error_percent(self, residual: FloatArray) -> float:
-        """Root mean square of (m,) residuals in m, of that of the readings, all components together."""
-        return float(100.0 * np.sqrt(((residual * self.pulls.size) ** 2).sum() / (self.pulls.value**2).sum()))
+    def error_percent(self, residual: FloatArray, wild: Sequence[int] = ()) -> float:
+        """Root mean square of (m,) residuals, of that of the readings, all components together, without the wild."""
+        error, value = (np.delete(part, wild) for part in (residual * self.pulls.size, self.pulls.value))
+        return float(100.0 * np.linalg.norm(error) / np.linalg.norm(value))
 
 
 def _says_more(fit: Fit, other: Fit, behind: Mapping[str, float]) -> bool:
@@ -218,15 +220,18 @@ def chi_square(fit: Fit) -> float:
 
 
 def chance(problem: PullProblem, fit: Fit) -> float:
-    """Probability of so large a misfit by scatter: stated, or estimated by what all candidates together leave.
+    """Probability of so large a misfit by scatter: stated, of repeats, or of what all candidates together leave.
 
-    Then what these take away more is held against what they leave (Fisher's F of nested models).
+    What these take away more is held against what they leave (Fisher's F of nested models), a misfit against repeats
+    (F, too).
     """
     from scipy.special import chdtrc, fdtrc
 
-    squares = chi_square(fit)
+    squares, left = chi_square(fit), max(len(fit.residual) - len(fit.free), 1)
     if np.isinf(problem.freedom):
-        return float(chdtrc(max(len(fit.residual) - len(fit.free), 1), squares))
+        return float(chdtrc(left, squares))
+    if not problem.together:
+        return float(fdtrc(left, problem.freedom, squares / left))
     more = max(problem.together - len(fit.free), 1)
     return float(fdtrc(more, problem.freedom, max(squares - problem.freedom, 0.0) / more))
 
@@ -253,42 +258,88 @@ def lack_of_fit(problem: PullProblem, fit: Fit) -> float:
     return float(fdtrc(freedom, within, ratio))
 
 
+def joints_say_more(problem: PullProblem, fit: Fit) -> bool:
+    """Whether the joints refitted all together foretell pose after pose better than an explanation, beyond chance."""
+    return bool(problem.torsions) and outvoted(-votes(problem, fit, {JOINTS: problem.joints_fitted})[JOINTS])
+
+
 def explanations(problem: PullProblem, before: Fit) -> list[Fit]:
     """Each candidate fitted on top of a fit, the likeliest first."""
     fits = [add_effect(problem, before, [candidate], law_free=False) for candidate in problem.candidates()]
     return sorted((fit for fit in fits if fit.sizes[-1].any()), key=lambda fit: -fit.log_posterior)
 
 
-def estimate_noise(problem: PullProblem) -> None:
-    """Take for scatter what all candidates together leave, each of at least its neutral size.
+def between_repeats(problem: PullProblem) -> tuple[FloatArray, int]:
+    """(m,) squared relative deviation of each reading from the mean of its repeats, and how many differences there are.
 
-    A reading's variance is that of its component (an indicator's own) and a share of the squared size of its pull:
-    both by weighted squares of what is left (iterated, Davidian and Carroll 1987, J. Am. Stat. Assoc. 82, 1079).
+    Repeats have one pose, component and force, to 2 %. The squares of n count n / (n - 1) times; nan where nothing was
+    repeated. Copies tell nothing.
+    """
+    pulls, observed = problem.pulls, problem.observed
+    force = np.linalg.norm(pulls.wrench[:, :3], axis=1, keepdims=True)
+    alike = np.round(np.hstack([pulls.along, pulls.wrench / force, np.log(force)]) / SAME_PULL)
+    groups = Groups(np.unique(np.column_stack([pulls.pose, alike]), axis=0, return_inverse=True)[1].reshape(-1))
+    counts = np.bincount(groups.of)
+    count, off = counts[groups.of], observed - (groups.sums(observed) / counts)[groups.of]
+    several = (count > 1) & bool(np.abs(off).max() > LEAST)
+    squares = np.where(several, off**2 * count / np.maximum(count - 1, 1), np.nan)
+    return squares, int(round(float((1.0 - 1.0 / count)[several].sum())))
+
+
+def contradicted(problem: PullProblem) -> bool:
+    """Whether repeats scatter by more than somebody states, beyond chance: scatter that differs by pose is none of
+    theirs, so that they may scatter by less."""
+    squares, differences = between_repeats(problem)
+    if differences < ALIKE_FREEDOM:
+        return False
+    ratio = np.sqrt(np.nanmean(np.minimum(squares / problem.noise.repeat**2, OFF**2)))
+    return bool(np.log(ratio) > CONTRADICTED * np.sqrt(0.5 / STATED_FREEDOM + 0.5 / differences))
+
+
+def estimate_noise(problem: PullProblem) -> None:
+    """Take for scatter what repeats differ by; without enough of them what all candidates together leave.
+
+    Each of these has at least its neutral size. A reading's variance is that of its component (an indicator's own) and
+    a share of the squared size of its pull: both by weighted squares of what is left (iterated, Davidian and Carroll
+    1987, J. Am. Stat. Assoc. 82, 1079).
     """
     from scipy.optimize import nnls
 
+    repeated, differences = between_repeats(problem)
+    by_repeats = differences >= ALIKE_FREEDOM
+    rows = np.isfinite(repeated) | (not by_repeats)
+    changes, least = (None, None) if by_repeats else _changes(problem)
+    size, names = problem.pulls.size, np.unique(problem.pulls.component)
+    variances = np.stack([*(problem.pulls.component == name for name in names), size**2]).astype(float)
+    variance, problem.freedom = (GUESSES["high"] * size) ** 2, float(differences)
+    for _ in range(REWEIGHTED):
+        weight, squares, more = size / np.sqrt(variance), repeated, 1.0
+        if changes is not None:
+            columns, observed = changes * weight[:, None], problem.observed * weight
+            columns = columns / np.linalg.norm(columns, axis=0).clip(min=1e-300)
+            rank = int(np.linalg.matrix_rank(columns))
+            if len(observed) - rank < FEWEST:
+                break
+            sizes = bounded_step(columns.T @ columns, columns.T @ observed, least, np.full(len(least), np.inf))
+            squares, more = (problem.observed - columns @ sizes / weight) ** 2, len(observed) / (len(observed) - rank)
+            problem.freedom, problem.together = float(len(observed) - rank), rank
+        squares = np.minimum(squares * weight**2, OFF**2)[rows]  # in units of the variance so far
+        shares = nnls((variances / variance)[:, rows].T, squares)[0] * more
+        variance = np.maximum(shares @ variances, (LEAST * size) ** 2)
+    share = float(np.sqrt(variance.sum() / (size**2).sum()))
+    words = f"{100 * share:.2g} % of the size of the displacements"
+    told = f"; {problem.noise.origin} is too little" if problem.noise.origin else ""
+    of_repeats = f"estimated from {differences} differences between repeats, {words}{told}"
+    words = of_repeats if by_repeats else f"estimated or guessed, {words} (say --noise)"
+    problem.noise_of(np.sqrt(variance) / size, problem.noise.strut_spread, words)
+
+
+def _changes(problem: PullProblem) -> tuple[FloatArray, FloatArray]:
+    """(m, k) what each parameter of each candidate changes, of its usual size; (k,) the least that it may be."""
     parts = [(c, j, part) for c in problem.candidates() for j, part in enumerate(c.components)]
     units = [c.active(np.eye(len(c.components))[j] * part.signs[-1] * part.typical()[1]) for c, j, part in parts]
-    least = np.array([-np.inf if len(part.signs) > 1 else 0.0 for *_, part in parts])
-    size, names = problem.pulls.size, np.unique(problem.pulls.component)
-    changes = np.stack([problem.observed - problem.residual(NO_LAW, [active]) for active in units], axis=1)
-    variances = np.stack([*(problem.pulls.component == name for name in names), size**2]).astype(float)
-    variance = (GUESSES["high"] * size) ** 2
-    for _ in range(REWEIGHTED):
-        weight = size / np.sqrt(variance)
-        columns, observed = changes * weight[:, None], problem.observed * weight
-        columns = columns / np.linalg.norm(columns, axis=0).clip(min=1e-300)
-        rank = int(np.linalg.matrix_rank(columns))
-        if len(observed) - rank < FEWEST:
-            break
-        sizes = bounded_step(columns.T @ columns, columns.T @ observed, least, np.full(len(least), np.inf))
-        squares = np.minimum((observed - columns @ sizes) ** 2, OFF**2)  # in units of the variance so far
-        shares = nnls((variances / variance).T, squares)[0] * len(observed) / (len(observed) - rank)
-        variance = np.maximum(shares @ variances, (LEAST * size) ** 2)
-        problem.freedom, problem.together = float(len(observed) - rank), rank
-    share = float(np.sqrt(variance.sum() / (size**2).sum()))
-    words = f"estimated or guessed, {100 * share:.2g} % of the size of the displacements (say --noise)"
-    problem.noise_of(np.sqrt(variance) / size, problem.noise.strut_spread, words)
+    changes = [problem.observed - problem.residual(NO_LAW, [active]) for active in units]
+    return np.stack(changes, axis=1), np.array([-np.inf if len(part.signs) > 1 else 0.0 for *_, part in parts])
 
 
 def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool) -> tuple[str, list[Fit]]:
@@ -308,9 +359,7 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
     if gain < GAIN and chance(problem, base) > WRONG and fits_alike:
         return "adequate", []
     explained = chance(problem, best) >= WRONG and gain >= GAIN and fits_alike
-    if explained and problem.torsions:  # no name where all joints together say far more
-        explained = not outvoted(-votes(problem, best, {JOINTS: problem.joints_fitted})[JOINTS])
-    if not explained:
+    if not explained or joints_say_more(problem, best):
         return "unexplained", []
     behind = {label_of(fit): 2.0 * (best.log_posterior - fit.log_posterior) for fit in fits}
     ballots = votes(problem, best, {label_of(fit): fit for fit in (base, *fits[1:])})

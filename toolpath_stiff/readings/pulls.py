@@ -7,7 +7,7 @@ acts and what is read may lie off the tip, in tip axes.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import ClassVar
 
@@ -44,8 +44,11 @@ FORCE_AXES, MOVED_AXES = (tuple(f"{what}_axes_{axis}_deg" for axis in "abc") for
 NOT_READ = ("nan", "n/a", "na", "-")  # cells that say so, as empty ones do
 FARTHEST = -1e6, 1e6  # um, of a dial
 SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
+ROLL_FIRST = "angles a, b, c turn about the base's X, then Y, then Z; controls that turn about Z first: --columns \"a=c_deg, c=a_deg\""
 SMALL_TURNS, SEVERAL = rad_from_deg(6.29), 3  # poses of which no joint turns by more are hardly in degrees
-SAME_PLACE = m_from_mm(1.0)  # by which a pose and the joints beside it may differ: both are rounded
+# By which a pose and the joints beside it may differ: rounded; or of a robot that sags and is not calibrated (some mm:
+# ISO 9283 counts its accuracy apart from its repeatability). Then the joints count, with a note.
+SAME_PLACE, NEAR_PLACE, NEAR_TURN = m_from_mm(1.0), m_from_mm(10.0), rad_from_deg(3.0)
 
 
 @dataclass(frozen=True)
@@ -134,20 +137,23 @@ class Pulls(ArrayColumns):
 def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> Pulls:
     """Pulls on a machine of elements, or its stiffnesses as pulls. Raises `InputError`, `InputErrors`."""
     joints, rows, notes = _joint_columns(machine), list[_Pull](), list[str]()
-    used = {*_further(machine), *POSITION, *ANGLES, *VECTOR, "direction", "force_N", "displacement_um", "sd_um"}
+    used = {*_further(machine), *POSITION, *ANGLES, *VECTOR, "direction", "force_N", "displacement_um", "sd_um", "repeat"}
     tables = pull_tables(files, machine, mapping)
     if not tables:
         return _of_stiffnesses(files, machine, mapping)
     if len(tables) < len(files):
         raise MeasurementError("pulls beside stiffnesses", hint="give one kind of files at a time")
     for table in tables:
-        _check_places(table, machine)
-        of_file, errors = parsed_rows(table, partial(_Pull.of, table.file, joints))
+        _check_columns(table, machine)
+        loaded = replace(table, rows=tuple(row for row in table.rows if not _unloaded(table.record(row[1]))))
+        of_file, errors = parsed_rows(loaded, partial(_Pull.of, table.file, joints))
         if errors:
             raise InputErrors(errors)
         rows += of_file
+        unloaded = len(table.rows) - len(loaded.rows)
         notes += [
             *table.notes,
+            *([f"{table.file}: {unloaded} rows of no force and no displacement are passed over"] if unloaded else []),
             *(f"{table.file}: column {name} is not used" for name in table.heading if name not in used),
         ]
     if not rows:
@@ -163,11 +169,17 @@ def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = No
     return [table for table in tables if not further.isdisjoint(table.heading)]
 
 
-def _check_places(table: Table, machine: MachineTool) -> None:
-    """Refuse a table that says neither poses nor all joints."""
+def _check_columns(table: Table, machine: MachineTool) -> None:
+    """Refuse a table that lacks poses or all joints, forces, or what moved."""
     if not {*POSITION} <= {*table.heading}:
         missing = [named for named in _names_of_joints(machine) if {*named}.isdisjoint(table.heading)]
         check_needed(table, [by_number for _, by_number in missing], f"all joints, or {', '.join(POSITION)}")
+    pulley = [TENSION, *CABLE]
+    if {*FORCE, "force_N"}.isdisjoint(table.heading):
+        needed = pulley if TENSION in table.heading else FORCE
+        check_needed(table, needed, f"{', '.join(FORCE)}; or {', '.join(pulley)}")
+    if {*MOVED, "displacement_um"}.isdisjoint(table.heading):
+        check_needed(table, MOVED, f"{', '.join(MOVED)}; or displacement_um along {', '.join(DIAL)}")
 
 
 @dataclass(frozen=True)
@@ -203,7 +215,8 @@ class _Pull:
         if not placed and np.isnan(values).any():
             expected = f"{', '.join(POSITION)}; or {', '.join(joints)}"
             raise MeasurementError("neither a pose nor all joints", expected=expected)
-        angles = tuple(rad_from_deg(number(record, name)) if record.get(name) else 0.0 for name in ANGLES)
+        blank = 0.0 if any(record.get(name) for name in ANGLES) else np.nan
+        angles = tuple(rad_from_deg(number(record, name)) if record.get(name) else blank for name in ANGLES)
         tension, vector = optional_number(record, TENSION), any(record.get(name) for name in FORCE)
         components = np.array([_component(record, name) if vector else np.nan for name in FORCE])
         along = direction_of(record) if record.get("force_N") and not vector and np.isnan(tension) else None
@@ -228,6 +241,12 @@ class _Pull:
         return cls(
             pose, tuple(values), force, moment, tension, pulley, tuple(moved), mm(PULL), mm(TARGET), sd, file, line
         )
+
+
+def _unloaded(record: Mapping[str, str]) -> bool:
+    """Whether a row says that nothing moved under no force: where the readings are counted from."""
+    cells = [record.get(name, "").strip() for name in (*FORCE, TENSION, "force_N", *MOVED, "displacement_um")]
+    return any(cells) and set("".join(cells)) <= set("+-.0")
 
 
 def _component(record: Mapping[str, str], name: str) -> float:
@@ -295,13 +314,23 @@ def _stances(
     Raises `InputErrors` for rows that cannot be.
     """
     by_joints, errors, notes = ~np.isnan(joints).any(axis=1), list[MeasurementError](), list[str]()
-    position, rotation, joints = pose[:, :3], rotation_matrices(pose[:, 3:]), joints.copy()
-    apart = np.full(len(rows), np.nan)
+    position, rotation, joints = pose[:, :3], rotation_matrices(np.nan_to_num(pose[:, 3:])), joints.copy()
+    apart, turned = np.full((2, len(rows)), np.nan)
     if by_joints.any():
-        apart[by_joints] = np.linalg.norm(machine.forward(joints[by_joints])[0] - position[by_joints], axis=1)
-    for row in np.flatnonzero(apart > SAME_PLACE).tolist():
-        text = f"pose and joints are {mm_from_m(float(apart[row])):.1f} mm apart"
-        errors.append(MeasurementError(text, file=rows[row].file, line=rows[row].line))
+        at, turn = machine.forward(joints[by_joints])
+        apart[by_joints] = np.linalg.norm(at - position[by_joints], axis=1)
+        cosine = (np.einsum("nij,nij->n", turn, rotation[by_joints]) - 1.0) / 2.0
+        turned[by_joints] = np.arccos(np.clip(cosine, -1.0, 1.0)) + 0.0 * pose[by_joints, 3]
+    def refuse(row: int, text: str) -> None:
+        hint = "" if np.isnan(pose[row, 3]) else ROLL_FIRST
+        errors.append(MeasurementError(text, hint=hint, file=rows[row].file, line=rows[row].line))
+
+    for row in np.flatnonzero((apart > NEAR_PLACE) | (turned > NEAR_TURN)).tolist():
+        by = f"{mm_from_m(float(apart[row])):.1f} mm"
+        by = by if apart[row] > NEAR_PLACE else f"{deg_from_rad(float(turned[row])):.1f} degrees"
+        refuse(row, f"pose and joints are {by} apart")
+    if (apart > SAME_PLACE).any():
+        notes.append(f"poses and joints are up to {mm_from_m(float(np.nanmax(apart))):.1f} mm apart: the joints count")
     if not by_joints.all():  # one configuration for all poses: of those that reach most, that farthest from limits
         alone = position[~by_joints], rotation[~by_joints]
         tried = [machine.solve(*alone, configuration=i).joints for i in range(len(machine.configurations))]
@@ -312,7 +341,7 @@ def _stances(
         if machine.configurations[kept]:
             notes.append(f"poses without joint values: taken in the configuration {machine.configurations[kept]}")
     for row in np.flatnonzero(np.isnan(joints).any(axis=1)).tolist():
-        errors.append(MeasurementError("no joint values lead to the pose", file=rows[row].file, line=rows[row].line))
+        refuse(row, "no joint values lead to the pose")
     turning = joints[by_joints][:, [kind != "linear" for kind in machine.joint_kinds]]
     if len(np.unique(turning, axis=0)) >= SEVERAL and turning.any() and np.abs(turning).max() < SMALL_TURNS:
         turned = f"no joint turns by more than {deg_from_rad(float(np.abs(turning).max())):.3g} deg"
