@@ -157,6 +157,8 @@ class ElementDiagnosis(FolderResult):
         text += " of the displacements (rms)"
         if self.verdict == "adequate" and problem.typical > GUESSES["low"] and problem.together:
             return f"{text}, all of which counts as scatter, since nobody says how pulls scatter (--noise, sd_um)."
+        if self.verdict == "ambiguous" and len(self.plausible) == 1 and problem.together:
+            text += ". Nobody says how pulls scatter (--noise, sd_um), without which it stands for no certain name"
         left = self.counted(self.left_out)
         if self.verdict == "identified" or question(problem) or not left < WORTHWHILE * self.error_as_given:
             return f"{text}."

@@ -22,7 +22,7 @@ from toolpath_stiff.inference.noise import CONTRADICTED, GUESSES, STATED_FREEDOM
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS
 from toolpath_stiff.inference.votes import outvoted
 from toolpath_stiff.machine.elements import turns
-from toolpath_stiff.readings.pulls import MOVED_AXES, Pulls
+from toolpath_stiff.readings.pulls import FRAMES, MOVED_AXES, Pulls
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import ELEMENT, Effect, LoadPath
@@ -40,6 +40,7 @@ WRONG = 1e-3  # probability of so large a misfit, below which something else is 
 REWEIGHTED = 8  # times that scatter is estimated
 OFF = 3.0  # standard deviations that one reading counts for at most in it
 LEAST = 1e-4  # relative sd of a reading: nobody measures better
+CLOSELY = 0.9  # the same from which nobody is asked
 FOLLOWS = 0.5  # correlation of measured with modelled components, joints refitted, below which it is another machine's
 OTHER_UNIT = 100.0  # measured over modelled, or the inverse, from which the unit is asked for
 INVISIBLE = 1e-6  # of the readings' size, rms: what a candidate of its largest usual size must change at least
@@ -186,6 +187,8 @@ def question(problem: PullProblem) -> str:
     pulls, best = problem.pulls, problem.joints_fitted if problem.torsions else problem.none
     modelled = pulls.value - best.residual * pulls.size
     alike = float((pulls.value @ modelled) / np.maximum(np.linalg.norm(pulls.value) * np.linalg.norm(modelled), 1e-300))
+    if alike < CLOSELY and (told := _in_tip_axes(pulls)):
+        return told
     if alike >= FOLLOWS:
         share = float(np.linalg.norm(pulls.value)) / max(float(np.linalg.norm(problem.predicted)), 1e-300)
         if 1.0 / OTHER_UNIT < share < OTHER_UNIT:
@@ -205,6 +208,26 @@ def question(problem: PullProblem) -> str:
     return (
         f"{text} Turned they would by {turned:.2f}: is the sensor in other axes? Roll, pitch, yaw of about {a:g}, "
         f"{b:g}, {c:g} degrees (columns {', '.join(MOVED_AXES)})."
+    )
+
+
+def _in_tip_axes(pulls: Pulls) -> str:
+    """That components stand in the tip's axes at each pose, where those would leave half the error; else ""."""
+    turn, length = pulls.stance.rotation, np.linalg.norm(pulls.value)
+    if turn is None:
+        return ""
+    force, read = (
+        np.stack([part, np.einsum("nij,nj->ni", turn, part)]) for part in (pulls.wrench[:, :3], pulls.direction)
+    )
+    modelled = np.einsum("ani,nij,bnj->abn", read, pulls.stance.tip_compliance()[:, :3, :3], force)
+    alike = modelled @ pulls.value / np.maximum(length * np.linalg.norm(modelled, axis=-1), 1e-300)
+    sensor, pull = np.unravel_index(int(alike.argmax()), alike.shape)
+    if 4.0 * (1.0 - alike.max() ** 2) > 1.0 - alike[0, 0] ** 2 or alike.max() < FOLLOWS:
+        return ""
+    said = ", ".join(f"{name}==tip" for name, turned in zip(FRAMES, (pull, sensor), strict=True) if turned)
+    return (
+        f"Are components in the tool's axes? In those measured and modelled ones correlate by {alike.max():.2f}, in the "
+        f'base\'s by {alike[0, 0]:.2f}: --columns "{said}".'
     )
 
 

@@ -41,10 +41,11 @@ MOMENT = ("mx_Nm", "my_Nm", "mz_Nm")  # about the tip, beside the force
 TENSION, CABLE = "tension_N", ("cable_x_mm", "cable_y_mm", "cable_z_mm")
 PULL, TARGET = (tuple(f"{what}_d{axis}_mm" for axis in "xyz") for what in ("pull", "target"))
 FORCE_AXES, MOVED_AXES = (tuple(f"{what}_axes_{axis}_deg" for axis in "abc") for what in ("force", "sensor"))
+FRAMES = "force_axes", "sensor_axes"  # of the components: "base", or "tip", the tip's own at each row
 NOT_READ = ("nan", "n/a", "na", "-")  # cells that say so, as empty ones do
 FARTHEST = -1e6, 1e6  # um, of a dial
 SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
-ROLL_FIRST = "angles a, b, c turn about the base's X, then Y, then Z; controls that turn about Z first: --columns \"a=c_deg, c=a_deg\""
+ROLL_FIRST = 'angles a, b, c turn about the base\'s X, then Y, then Z; controls that turn about Z first: --columns "a=c_deg, c=a_deg"'
 SMALL_TURNS, SEVERAL = rad_from_deg(6.29), 3  # poses of which no joint turns by more are hardly in degrees
 # By which a pose and the joints beside it may differ: rounded; or of a robot that sags and is not calibrated (some mm:
 # ISO 9283 counts its accuracy apart from its repeatability). Then the joints count, with a note.
@@ -137,7 +138,18 @@ class Pulls(ArrayColumns):
 def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> Pulls:
     """Pulls on a machine of elements, or its stiffnesses as pulls. Raises `InputError`, `InputErrors`."""
     joints, rows, notes = _joint_columns(machine), list[_Pull](), list[str]()
-    used = {*_further(machine), *POSITION, *ANGLES, *VECTOR, "direction", "force_N", "displacement_um", "sd_um", "repeat"}
+    used = {
+        *_further(machine),
+        *FRAMES,
+        *POSITION,
+        *ANGLES,
+        *VECTOR,
+        "direction",
+        "force_N",
+        "displacement_um",
+        "sd_um",
+        "repeat",
+    }
     tables = pull_tables(files, machine, mapping)
     if not tables:
         return _of_stiffnesses(files, machine, mapping)
@@ -163,7 +175,7 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
 
 def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> list[Table]:
     """The files that give forces as vectors or by cables, as tables; the others give stiffnesses along directions."""
-    known = Columns((*COLUMNS.numbers, *_further(machine)), COLUMNS.texts)
+    known = Columns((*COLUMNS.numbers, *_further(machine)), (*COLUMNS.texts, *FRAMES))
     tables = [mapped_table(name, "measurements", known, mapping) for name in files]
     further = {*FORCE, TENSION, *_joint_columns(machine)}
     return [table for table in tables if not further.isdisjoint(table.heading)]
@@ -195,6 +207,7 @@ class _Pull:
     moved: tuple[tuple[str, tuple[float, ...], float], ...]
     pull: tuple[float, ...]
     target: tuple[float, ...]
+    in_tip: tuple[bool, ...]  # of `FRAMES`
     sd: float
     file: str
     line: int
@@ -237,10 +250,13 @@ class _Pull:
             expected = f"{', '.join(MOVED)}; or displacement_um along {', '.join(DIAL)}"
             raise MeasurementError("nothing read", expected=expected)
         pose = (*mm(POSITION), *angles) if placed else (np.nan,) * 6
-        pulley, sd = mm(CABLE), m_from_um(optional_number(record, "sd_um"))
+        pulley, sd, frames = mm(CABLE), m_from_um(optional_number(record, "sd_um")), [record.get(f) for f in FRAMES]
+        if not {*frames} <= {None, "", "base", "tip"}:
+            raise MeasurementError(f"axes {' and '.join(filter(None, frames))}", expected="base or tip")
         return cls(
-            pose, tuple(values), force, moment, tension, pulley, tuple(moved), mm(PULL), mm(TARGET), sd, file, line
-        )
+            pose, tuple(values), force, moment, tension, pulley, tuple(moved), mm(PULL), mm(TARGET),
+            tuple(frame == "tip" for frame in frames), sd, file, line,
+        )  # fmt: skip
 
 
 def _unloaded(record: Mapping[str, str]) -> bool:
@@ -286,15 +302,20 @@ def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) 
     pull, target = (np.einsum("nij,nj->ni", turn, [getattr(row, name) for row in rows]) for name in ("pull", "target"))
     cable = np.array([row.pulley for row in rows]) - stance.position - pull
     by_cable = np.array([[row.tension] for row in rows]) * cable / np.linalg.norm(cable, axis=1, keepdims=True)
-    given = np.array([row.force for row in rows])
+    of_force, of_sensor = (
+        np.where(part[:, None, None], turn, np.eye(3)) for part in np.array([r.in_tip for r in rows]).T
+    )
+    given, moment = (
+        np.einsum("nij,nj->ni", of_force, part) for part in zip(*((r.force, r.moment) for r in rows), strict=True)
+    )
     force = np.where(np.isnan(given), by_cable, given)
     which = np.repeat(np.arange(len(rows)), [len(row.moved) for row in rows])
-    direction = np.array([axis for row in rows for _, axis, _ in row.moved])
+    direction = np.einsum("nij,nj->ni", of_sensor[which], [axis for row in rows for _, axis, _ in row.moved])
     distinct = np.unique(np.round(np.nan_to_num(np.hstack([stance.joints, stance.position]), nan=-1.0), 6), axis=0,
                          return_inverse=True)[1].reshape(-1)  # fmt: skip
     return Pulls(
         stance=stance.take(which),
-        wrench=np.hstack([force, np.cross(pull, force) + [row.moment for row in rows]])[which],
+        wrench=np.hstack([force, np.cross(pull, force) + moment])[which],
         along=np.hstack([direction, np.cross(target[which], direction)]),
         value=np.array([value for row in rows for *_, value in row.moved]),
         sd=np.array([row.sd for row in rows])[which],
@@ -321,6 +342,7 @@ def _stances(
         apart[by_joints] = np.linalg.norm(at - position[by_joints], axis=1)
         cosine = (np.einsum("nij,nij->n", turn, rotation[by_joints]) - 1.0) / 2.0
         turned[by_joints] = np.arccos(np.clip(cosine, -1.0, 1.0)) + 0.0 * pose[by_joints, 3]
+
     def refuse(row: int, text: str) -> None:
         hint = "" if np.isnan(pose[row, 3]) else ROLL_FIRST
         errors.append(MeasurementError(text, hint=hint, file=rows[row].file, line=rows[row].line))
