@@ -197,10 +197,10 @@ class ElementDiagnosis(FolderResult):
 
     @cached_property
     def wild_rows(self) -> list[int]:
-        """Readings that the likeliest explanation takes for wild; else those far off what refitted joints leave."""
+        """Readings that the likeliest explanation takes for wild; else of pulls far off what refitted joints leave."""
         if self.verdict != "unexplained":
             return sorted((self.plausible or [self.problem.none])[0].scatter.wild)
-        off = np.abs((self.joints or self.problem.none).residual)
+        off = np.sqrt(np.bincount(self.pulls.pull, (self.joints or self.problem.none).residual ** 2))[self.pulls.pull]
         return np.flatnonzero(off > FAR_OFF * SD_OF_MEDIAN * np.median(off)).tolist()
 
     @property
@@ -256,7 +256,7 @@ def pull_problem(
     spread: float = 0.0,
     effect_files: Sequence[str] = (),
 ) -> tuple[PullProblem, bool]:
-    """Pulls with their scatter, and whether it is known: stated by the rows or as a share of each pull's size, or repeats.
+    """Pulls with their scatter, and whether it is known: stated by rows or as a share of each pull's size, or repeats.
 
     `noise` is the standard deviation of a displacement relative to the size of its pull's, `spread` that of the
     elements' compliances, relative. Repeats that scatter by more than is stated overrule it. Where neither tells, it is

@@ -226,8 +226,8 @@ def _in_tip_axes(pulls: Pulls) -> str:
         return ""
     said = ", ".join(f"{name}==tip" for name, turned in zip(FRAMES, (pull, sensor), strict=True) if turned)
     return (
-        f"Are components in the tool's axes? In those measured and modelled ones correlate by {alike.max():.2f}, in the "
-        f'base\'s by {alike[0, 0]:.2f}: --columns "{said}".'
+        f"Are components in the tool's axes? In those measured and modelled ones correlate by {alike.max():.2f}, in "
+        f'the base\'s by {alike[0, 0]:.2f}: --columns "{said}".'
     )
 
 
@@ -267,10 +267,7 @@ def lack_of_fit(problem: PullProblem, fit: Fit) -> float:
     """
     from scipy.special import fdtrc
 
-    pulls, covariance = problem.pulls, fit.scatter.covariance
-    along = np.round(pulls.wrench / np.linalg.norm(pulls.wrench[:, :3], axis=1, keepdims=True), 2)
-    labels = np.column_stack([pulls.pose, np.unique(pulls.component, return_inverse=True)[1], along])
-    groups = Groups(np.unique(labels, axis=0, return_inverse=True)[1].reshape(-1))
+    covariance, groups = fit.scatter.covariance, _alike(problem.pulls)
     own = np.clip(np.sqrt(covariance.own_variance) * fit.scatter.precision.times(fit.residual), -OFF, OFF)
     counts = np.bincount(groups.of)
     mean, several = groups.sums(own) / counts, counts > 1
@@ -292,31 +289,31 @@ def explanations(problem: PullProblem, before: Fit) -> list[Fit]:
     return sorted((fit for fit in fits if fit.sizes[-1].any()), key=lambda fit: -fit.log_posterior)
 
 
-def between_repeats(problem: PullProblem) -> tuple[FloatArray, int]:
-    """(m,) squared relative deviation of each reading from the mean of its repeats, and how many differences there are.
+def _alike(pulls: Pulls, *further: FloatArray) -> Groups:
+    """Readings of one pose and component under forces along one direction, and alike in what (m, ...) is given."""
+    along = pulls.wrench / np.linalg.norm(pulls.wrench[:, :3], axis=1, keepdims=True)
+    labels = [pulls.pose, *(np.round(part / SAME_PULL) for part in (pulls.along, along, *further))]
+    return Groups(np.unique(np.column_stack(labels), axis=0, return_inverse=True)[1].reshape(-1))
 
-    Repeats have one pose, component and force, to 2 %. The squares of n count n / (n - 1) times; nan where nothing was
-    repeated. Copies tell nothing.
+
+def between_repeats(problem: PullProblem) -> tuple[FloatArray, int]:
+    """(m,) squared deviation, relative, of each reading from the mean of its repeats, and how many differences.
+
+    Repeats are alike, their forces too. The squares of n count n / (n - 1) times; nan without repeats, or of copies.
     """
-    pulls, observed = problem.pulls, problem.observed
-    force = np.linalg.norm(pulls.wrench[:, :3], axis=1, keepdims=True)
-    alike = np.round(np.hstack([pulls.along, pulls.wrench / force, np.log(force)]) / SAME_PULL)
-    groups = Groups(np.unique(np.column_stack([pulls.pose, alike]), axis=0, return_inverse=True)[1].reshape(-1))
-    counts = np.bincount(groups.of)
-    count, off = counts[groups.of], observed - (groups.sums(observed) / counts)[groups.of]
+    groups = _alike(problem.pulls, np.log(np.linalg.norm(problem.pulls.wrench[:, :3], axis=1)))
+    count = groups.spread(np.bincount(groups.of).astype(float))
+    off = problem.observed - groups.spread(groups.sums(problem.observed)) / count
     several = (count > 1) & bool(np.abs(off).max() > LEAST)
-    squares = np.where(several, off**2 * count / np.maximum(count - 1, 1), np.nan)
-    return squares, int(round(float((1.0 - 1.0 / count)[several].sum())))
+    return np.where(several, off**2 * count / np.maximum(count - 1, 1), np.nan), round((1 - 1 / count)[several].sum())
 
 
 def contradicted(problem: PullProblem) -> bool:
-    """Whether repeats scatter by more than somebody states, beyond chance: scatter that differs by pose is none of
-    theirs, so that they may scatter by less."""
+    """Whether repeats scatter by more than is stated, beyond chance; by less they may: poses differ besides."""
     squares, differences = between_repeats(problem)
-    if differences < ALIKE_FREEDOM:
-        return False
-    ratio = np.sqrt(np.nanmean(np.minimum(squares / problem.noise.repeat**2, OFF**2)))
-    return bool(np.log(ratio) > CONTRADICTED * np.sqrt(0.5 / STATED_FREEDOM + 0.5 / differences))
+    ratio = np.nanmean(np.minimum(squares / problem.noise.repeat**2, OFF**2)) if differences else 0.0
+    chance = CONTRADICTED * np.sqrt(0.5 / STATED_FREEDOM + 0.5 / max(differences, 1))
+    return bool(differences >= ALIKE_FREEDOM and ratio > np.exp(2.0 * chance))
 
 
 def estimate_noise(problem: PullProblem) -> None:

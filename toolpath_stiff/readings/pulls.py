@@ -41,11 +41,12 @@ MOMENT = ("mx_Nm", "my_Nm", "mz_Nm")  # about the tip, beside the force
 TENSION, CABLE = "tension_N", ("cable_x_mm", "cable_y_mm", "cable_z_mm")
 PULL, TARGET = (tuple(f"{what}_d{axis}_mm" for axis in "xyz") for what in ("pull", "target"))
 FORCE_AXES, MOVED_AXES = (tuple(f"{what}_axes_{axis}_deg" for axis in "abc") for what in ("force", "sensor"))
+USED = "direction", "force_N", "displacement_um", "sd_um", "repeat"  # beside vectors
 FRAMES = "force_axes", "sensor_axes"  # of the components: "base", or "tip", the tip's own at each row
 NOT_READ = ("nan", "n/a", "na", "-")  # cells that say so, as empty ones do
 FARTHEST = -1e6, 1e6  # um, of a dial
 SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
-ROLL_FIRST = 'angles a, b, c turn about the base\'s X, then Y, then Z; controls that turn about Z first: --columns "a=c_deg, c=a_deg"'
+ROLL_FIRST = 'angles turn about X, then Y, then Z of the base; where a, b, c begin with Z: --columns "a=c_deg, c=a_deg"'
 SMALL_TURNS, SEVERAL = rad_from_deg(6.29), 3  # poses of which no joint turns by more are hardly in degrees
 # By which a pose and the joints beside it may differ: rounded; or of a robot that sags and is not calibrated (some mm:
 # ISO 9283 counts its accuracy apart from its repeatability). Then the joints count, with a note.
@@ -138,18 +139,7 @@ class Pulls(ArrayColumns):
 def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> Pulls:
     """Pulls on a machine of elements, or its stiffnesses as pulls. Raises `InputError`, `InputErrors`."""
     joints, rows, notes = _joint_columns(machine), list[_Pull](), list[str]()
-    used = {
-        *_further(machine),
-        *FRAMES,
-        *POSITION,
-        *ANGLES,
-        *VECTOR,
-        "direction",
-        "force_N",
-        "displacement_um",
-        "sd_um",
-        "repeat",
-    }
+    used = {*_further(machine), *FRAMES, *POSITION, *ANGLES, *VECTOR, *USED}
     tables = pull_tables(files, machine, mapping)
     if not tables:
         return _of_stiffnesses(files, machine, mapping)
@@ -302,11 +292,10 @@ def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) 
     pull, target = (np.einsum("nij,nj->ni", turn, [getattr(row, name) for row in rows]) for name in ("pull", "target"))
     cable = np.array([row.pulley for row in rows]) - stance.position - pull
     by_cable = np.array([[row.tension] for row in rows]) * cable / np.linalg.norm(cable, axis=1, keepdims=True)
-    of_force, of_sensor = (
-        np.where(part[:, None, None], turn, np.eye(3)) for part in np.array([r.in_tip for r in rows]).T
-    )
+    in_tip = np.array([row.in_tip for row in rows])[..., None, None]
+    of_force, of_sensor = (np.where(in_tip[:, i], turn, np.eye(3)) for i in range(len(FRAMES)))
     given, moment = (
-        np.einsum("nij,nj->ni", of_force, part) for part in zip(*((r.force, r.moment) for r in rows), strict=True)
+        np.einsum("nij,nj->ni", of_force, [getattr(r, name) for r in rows]) for name in ("force", "moment")
     )
     force = np.where(np.isnan(given), by_cable, given)
     which = np.repeat(np.arange(len(rows)), [len(row.moved) for row in rows])
@@ -348,9 +337,8 @@ def _stances(
         errors.append(MeasurementError(text, hint=hint, file=rows[row].file, line=rows[row].line))
 
     for row in np.flatnonzero((apart > NEAR_PLACE) | (turned > NEAR_TURN)).tolist():
-        by = f"{mm_from_m(float(apart[row])):.1f} mm"
-        by = by if apart[row] > NEAR_PLACE else f"{deg_from_rad(float(turned[row])):.1f} degrees"
-        refuse(row, f"pose and joints are {by} apart")
+        by = [f"{mm_from_m(float(apart[row])):.1f} mm", f"{deg_from_rad(float(turned[row])):.1f} degrees"]
+        refuse(row, f"pose and joints are {by[not apart[row] > NEAR_PLACE]} apart")
     if (apart > SAME_PLACE).any():
         notes.append(f"poses and joints are up to {mm_from_m(float(np.nanmax(apart))):.1f} mm apart: the joints count")
     if not by_joints.all():  # one configuration for all poses: of those that reach most, that farthest from limits
