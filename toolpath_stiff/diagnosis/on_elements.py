@@ -200,7 +200,9 @@ class ElementDiagnosis(FolderResult):
         """Readings that the likeliest explanation takes for wild; else of pulls far off what refitted joints leave."""
         if self.verdict != "unexplained":
             return sorted((self.plausible or [self.problem.none])[0].scatter.wild)
-        off = np.sqrt(np.bincount(self.pulls.pull, (self.joints or self.problem.none).residual ** 2))[self.pulls.pull]
+        pulls, error = self.pulls, (self.joints or self.problem.none).residual * self.pulls.size
+        left, moved = (np.bincount(pulls.pull, part**2)[pulls.pull] for part in (error, pulls.value - error))
+        off = np.sqrt(left / np.maximum(moved, 1e-300))
         return np.flatnonzero(off > FAR_OFF * SD_OF_MEDIAN * np.median(off)).tolist()
 
     @property

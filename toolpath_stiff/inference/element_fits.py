@@ -274,7 +274,8 @@ def lack_of_fit(problem: PullProblem, fit: Fit) -> float:
     freedom, within = int(several.sum()) - len(fit.free), len(own) - len(counts)
     if within < ALIKE_FREEDOM or freedom < 1:
         return np.nan
-    ratio = (counts * mean**2)[several].sum() / freedom * within / ((own - groups.spread(mean)) ** 2).sum()
+    apart = float(((own - groups.spread(mean)) ** 2).sum())
+    ratio = (counts * mean**2)[several].sum() / freedom * within / max(apart, 1e-300)
     return float(fdtrc(freedom, within, ratio))
 
 
