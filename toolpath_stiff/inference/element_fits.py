@@ -329,13 +329,13 @@ def estimate_noise(problem: PullProblem) -> None:
     repeated, differences = between_repeats(problem)
     by_repeats = differences >= ALIKE_FREEDOM
     rows = np.isfinite(repeated) | (not by_repeats)
-    changes, least = (None, None) if by_repeats else _changes(problem)
+    changes, least = (np.empty(0), np.empty(0)) if by_repeats else _changes(problem)
     size, names = problem.pulls.size, np.unique(problem.pulls.component)
     variances = np.stack([*(problem.pulls.component == name for name in names), size**2]).astype(float)
     variance, problem.freedom = (GUESSES["high"] * size) ** 2, float(differences)
     for _ in range(REWEIGHTED):
         weight, squares, more = size / np.sqrt(variance), repeated, 1.0
-        if changes is not None:
+        if not by_repeats:
             columns, observed = changes * weight[:, None], problem.observed * weight
             columns = columns / np.linalg.norm(columns, axis=0).clip(min=1e-300)
             rank = int(np.linalg.matrix_rank(columns))

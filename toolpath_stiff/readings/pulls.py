@@ -354,9 +354,9 @@ def _stances(
         refuse(row, "no joint values lead to the pose")
     turning = joints[by_joints][:, [kind != "linear" for kind in machine.joint_kinds]]
     if len(np.unique(turning, axis=0)) >= SEVERAL and turning.any() and np.abs(turning).max() < SMALL_TURNS:
-        turned = f"no joint turns by more than {deg_from_rad(float(np.abs(turning).max())):.3g} deg"
+        small = f"no joint turns by more than {deg_from_rad(float(np.abs(turning).max())):.3g} deg"
         hint = 'columns in radians are named by --columns "joint_1=joint_1_deg:rad, ..." (columns=)'
-        errors.append(MeasurementError(turned, expected="degrees", hint=hint, file=rows[0].file))
+        errors.append(MeasurementError(small, expected="degrees", hint=hint, file=rows[0].file))
     if errors:
         raise InputErrors(errors)
     return machine.standing(joints), notes
