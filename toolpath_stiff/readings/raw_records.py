@@ -22,6 +22,7 @@ from toolpath_stiff.readings.rows import (
     number,
     optional_number,
     parsed_rows,
+    refuse_pulls,
 )
 from toolpath_stiff.stiffness.measuring_loop import TIP, MeasuringLoop, measuring_loop
 from toolpath_stiff.tables import Columns, Table
@@ -129,6 +130,7 @@ def read_raw(table: Table) -> tuple[list[Loop], list[str]]:
     InputErrors
         Bad records, all of them.
     """
+    refuse_pulls(table)
     check_needed(table, _needed(table.heading), LAYOUTS)
     parsed, errors = parsed_rows(table, _record)
     if errors:
