@@ -167,7 +167,7 @@ def evaluate_cut(
     spindle = spindle_of(setup, program, samples)
     feed_per_tooth = _feed_per_tooth(samples, cutters, spindle)
     samples = _along_teeth(samples, program.moves, feed_per_tooth)
-    stock = stock_of(setup, program.moves, cutters)
+    stock = stock_of(setup, program, cutters)
     seen = samples_seen(samples, tilt, turns)
     try:
         engaged, works = engage_tilts(stock, program.moves, seen, cutters, tilts, turns, progress)

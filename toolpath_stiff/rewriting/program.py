@@ -19,6 +19,7 @@ from toolpath_stiff.nc.controller import LANGUAGES, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.lines import read_text, split_lines
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
+from toolpath_stiff.nc.parametric.families import line_with_variables
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import Offsets
@@ -34,6 +35,7 @@ from toolpath_stiff.units import mm_from_m
 
 LINE_END = re.compile("\r\n|\n|\r")
 PLAIN_DIALECTS = ("generic", "linuxcnc")
+TOOL_CENTRE = "post it as G code for this machine: the moves of the tool centre, one a block, without variables"
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
 
@@ -132,14 +134,12 @@ def rewrite_program(
     M30
     """
     placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
-    if program.dialect in LANGUAGES and not program.kinematics:
-        text, encoding = _text(program)
-        turn = Turn(placement, original)
-        written = text if placement == original else write_placed(program, text, turn, decimals, control)
-        return RewrittenProgram(program.name, written, encoding, [])
     check_rewritable(program)
-    if placement == original:
-        return RewrittenProgram(program.name, *_text(program), [])
+    if placement == original or program.dialect in LANGUAGES:
+        text, encoding = _text(program)
+        if placement != original:
+            text = write_placed(program, text, Turn(placement, original), decimals, control)
+        return RewrittenProgram(program.name, text, encoding, [])
     controls = _controls(program, control, placement, original, decimals)
     controls.linearise = linearise and mm_from_m(linearise)
     return _rewritten(program, controls, control)
@@ -191,7 +191,7 @@ def shift_program(
     >>> rows, fixed
     ([0, 1, 2], {})
     """
-    check_rewritable(program)
+    check_rewritable(program, shifted=True)
     place = pose_in_mm(origin)
     controls = _controls(program, control, place, place, decimals)
     controls.courses = courses
@@ -224,27 +224,30 @@ def _rewritten(program: ReadProgram, controls: Controls, control: Controller) ->
     return RewrittenProgram(program.name, "".join(lines), encoding, sorted(controls.notes))
 
 
-def check_rewritable(program: ReadProgram) -> None:
-    """Raise `InputError` for a program whose blocks are not what a control of this machine executes."""
+def check_rewritable(program: ReadProgram, shifted: bool = False) -> None:
+    """Raise `InputError` for a program whose blocks are not what a control of this machine executes.
+
+    A frame places programs of Heidenhain's and Siemens' languages; `shifted` to one side they cannot be written.
+    """
+    if program.dialect in LANGUAGES and not (program.kinematics or shifted):
+        return
     control = f"read by {program.interpreter!r} as {program.dialect!r}, not as one of {', '.join(PLAIN_DIALECTS)},"
+    location = program.dialect == CUTTER_LOCATION
     refused = (
         (
             bool(program.kinematics),
             f"posted for another kinematics ({program.kinematics})",
             ", set the work so in the CAM system, and post it for this machine",
         ),
-        (program.parametric, "with variables", ", and set the work offset that is printed (G10)"),
-        (
-            program.dialect == CUTTER_LOCATION,
-            "for a post processor (a cutter-location file)",
-            ", or place the posted program",
-        ),
+        (program.parametric, "with variables or O words", ", and set the work offset that is printed (G10)"),
+        (location, "for a post processor (a cutter-location file)", ", or place the posted program"),
         (program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS, control, ""),
     )
     for holds, what, instead in refused:
         if holds:
-            hint = f"place it without --write{instead}"
-            raise ProgramError(f"a program {what} cannot be rewritten", hint=hint, file=program.name)
+            hint = TOOL_CENTRE if shifted else f"place it without --write{instead}"
+            line = line_with_variables(program.source) if program.parametric else None
+            raise ProgramError(f"a program {what} cannot be rewritten", hint=hint, file=program.name, line=line)
 
 
 def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
