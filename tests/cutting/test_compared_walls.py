@@ -101,6 +101,7 @@ def test_a_row_of_units_in_inch(tmp_path):
     [
         (["0,0,0,0,0,0,1"], HEADING, "a normal of no length"),
         (["0,0,zero,0,0,1,1"], HEADING, "z_mm = 'zero'"),
+        (["0,0,0,0,0,1,1", "1,2"], HEADING, r"points.csv:3: row with 2 cells; expected 7"),
         (["0,0,0,1"], "x_mm,y_mm,z_mm,nx", "column ny is missing"),
         (["100,100,0,1,0,0,1"], HEADING, "no measured point lies on a final wall"),
         ([], HEADING, "no measured point"),

@@ -26,8 +26,9 @@ def cut_setup(cut: Cutting, material: Material, stock_mm: StockBox) -> CutSetup 
         return None
     if material is None:
         raise InputError("--stock without --material", hint="say --material NAME, or --cut FILE with both")
-    given = stock_mm is None or isinstance(stock_mm, str)
-    return setup_of(material, stock_mm if given else ",".join(map(str, stock_mm)))
+    if stock_mm is None or isinstance(stock_mm, str):
+        return setup_of(material, stock_mm)
+    return setup_of(material, ",".join(map(str, stock_mm)))
 
 
 def cut_template(file: str | Path = "cut.toml") -> TextFile:
