@@ -287,16 +287,15 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
     Where no single effect passes, something outside the catalogue is weighed, too: then with the form of discrepancy
     that stands out, in words, else "".
     """
-    families = candidates.families
     if gates.enough:
-        return _posterior(problem, noise, candidates, True, [f.name for f in families]), ""
+        return _posterior(problem, noise, candidates, True, [f.name for f in candidates.families]), ""
     outside, form = (-np.inf, "") if gates.singles else _outside(problem, candidates)
 
     def posterior(standing: Sequence[Fit]) -> dict[str, float]:
         if gates.singles:
             return _posterior(problem, noise, candidates, gates.none_stands, gates.singles, standing)
         evidences = {OUTSIDE: outside} | {several.name: several.log_evidence for several in standing}
-        prior = {several.name: _prior(families, len(several.names)) for several in standing}
+        prior = {several.name: _prior(candidates.families, len(several.names)) for several in standing}
         return probabilities(evidences, {OUTSIDE: PRIOR_OUTSIDE} | prior)
 
     posteriors = _sparing(gates, posterior)
@@ -337,13 +336,12 @@ def _posterior(
     pairs: Sequence[Fit] = (),
 ) -> dict[str, float]:
     """Probabilities of the base model (if it stands), of single effects and of pairs; 0 for all others."""
-    families = candidates.families
     hypotheses = {NONE: (candidates.base.log_evidence, candidates.base)}
-    hypotheses |= {family.name: (family.log_evidence, family.best or candidates.base) for family in families}
+    hypotheses |= {family.name: (family.log_evidence, family.best or candidates.base) for family in candidates.families}
     hypotheses |= {pair.name: (pair.log_evidence, pair) for pair in pairs}
     prior = {NONE: PRIOR_NONE} if none else {}
-    prior |= {name: _prior(families, 1) for name in names}
-    prior |= {pair.name: _prior(families, len(pair.names)) for pair in pairs}
+    prior |= {name: _prior(candidates.families, 1) for name in names}
+    prior |= {pair.name: _prior(candidates.families, len(pair.names)) for pair in pairs}
     return probabilities({name: _with_unknown_noise(problem, noise, *of) for name, of in hypotheses.items()}, prior)
 
 
@@ -387,10 +385,10 @@ def put_to_vote(
     """Verdict and explanations (`decide`) after the votes of the readings, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer. A name that has not outvoted every rival of another part is
-    one of several: beside it stand those that are likely, what a strut law that had to move may stand for, and the
-    closest of the others. A model that passes is not the only explanation where its nuisances have taken up more than
-    they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would hide is
-    told instead.
+    one of several: beside it stand those that are likely, then the closest of the others and of what a strut law that
+    had to move may stand for. A model that passes is not the only explanation where its nuisances have taken up more
+    than they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would
+    hide is told instead.
     """
     verdict, explanations = decide(gates, probability)
     base, data, ballots = candidates.base, problem.predictor.data, dict[str, FloatArray]()
@@ -423,11 +421,12 @@ def put_to_vote(
     gates.fits |= instead
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
-    # What a law that had to move may stand for is as likely as the explanation that it moved in.
+    ballots = closest(ballots, of_law)
+    sure = [name for name in standing if name == standing[0] or probability.get(name, 0.0) >= STANDS]
     return (
         "ambiguous" if instead or verdict == "adequate" else verdict,
-        shortened(problem, fits | instead, (standing[0], *instead, *standing[1:])),
-        closest(ballots, of_law),
+        shortened(problem, fits | instead, (*sure, *(n for n in ballots if n in {*standing, *instead}), *standing)),
+        ballots,
     )
 
 
