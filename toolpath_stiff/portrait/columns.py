@@ -45,6 +45,7 @@ BUMPS, MOST_EDGES = 5, 5
 SHORTEST_PITCH = 8e-3  # m, period in a strut's length: screws of mills have leads of 5 to 40 mm
 MOST_TURNS = 5  # of a wave over a place: clamps and grooves of a table
 TURNED = 0.1  # rms change of stiffness at which a resistance to turning is looked for: it is not linear in its size
+MOST_HELD = 1000  # readings of which the dictionary keeps columns; of more shapes alone, with seven digits
 PHASES = 3  # of half a turn; the other half is the other sign's
 
 
@@ -281,8 +282,10 @@ class Ground:
         if key not in self._shapes:
             values = values if strut is None else values[:, strut - 1]
             named = tuple(shapes_of(variable, values, signed, column if variable == "tilt" else ""))
-            rows = [shape_values(shape, values, dict(constants), signed) for shape, constants in named]
-            self._shapes[key] = named, np.stack(rows) if rows else np.zeros((0, *values.shape))
+            rows = np.empty((len(named), *values.shape), float if len(values) <= MOST_HELD else np.float32)
+            for row, (shape, constants) in zip(rows, named, strict=True):
+                row[...] = shape_values(shape, values, dict(constants), signed)
+            self._shapes[key] = named, rows
         return self._shapes[key]
 
     def columns(self, term: Term, share: FloatArray, shapes: FloatArray) -> FloatArray:

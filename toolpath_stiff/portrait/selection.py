@@ -194,7 +194,8 @@ class Selection:
     @cached_property
     def _squares(self) -> FloatArray:
         """(N,) information of each term by itself under the base fit's scatter."""
-        return self.base.scatter.precision.squares(self.dictionary.columns)
+        precision = self.base.scatter.precision
+        return np.concatenate([precision.squares(block) for block in self.dictionary.columns()])
 
     def _gains(self, residuals: FloatArray, before: Description) -> FloatArray:
         """(s, N) twice the gain in log likelihood for residuals (s, n), where the size goes to an allowed side.
@@ -204,9 +205,11 @@ class Selection:
         projected = before.fit.projected
         weights = set_wild_aside(projected.times(residuals), projected)[0]
         weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
-        root = inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
-        columns, alone = self.dictionary.columns, self._squares
-        slope, information = -weights @ columns.T, alone - ((columns @ weighted.T @ root) ** 2).sum(axis=1)
+        across = weighted.T @ inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
+        parts = [(weights @ block.T, ((block @ across) ** 2).sum(axis=1)) for block in self.dictionary.columns()]
+        slopes, taken = zip(*parts, strict=True)
+        slope, alone = -np.concatenate(slopes, axis=1), self._squares
+        information = alone - np.concatenate(taken)
         allowed = self.dictionary.signed | (slope > 0.0)
         seen = information > 1e-6 * alone
         return np.asarray(np.where(allowed & seen, slope**2 / np.where(seen, information, 1.0), 0.0))
