@@ -249,7 +249,8 @@ class Ground:
             springs = spring_stiffness(term, self.path, size * shape)
         else:
             weights = size * strut_share(_plain(term), self.path) * shape.reshape(len(shape), -1)
-            springs = np.einsum("nk,nkai,nkaj->nij", weights, self._rotations, self._rotations)
+            rows = self._rotations.reshape(len(shape), -1, 6)
+            springs = np.swapaxes(rows, 1, 2) @ (weights[:, :, None, None] * self._rotations).reshape(rows.shape)
         wrench = self.forces[:, 6:, None]
         moved = np.linalg.solve(np.eye(6) + self._flexibility @ springs, self._flexibility @ wrench)
         change = ((moved - self._flexibility @ wrench) * wrench).sum(axis=(1, 2))

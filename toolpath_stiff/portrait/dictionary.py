@@ -171,15 +171,14 @@ def dictionary_of(ground: Ground) -> Dictionary:
                     continue
                 relative = _relative(ground, plain, variable, column)
                 scale = np.sqrt((relative**2).mean(axis=1))
-                shaped = [local.term(variable, shape, constants, column) for shape, constants in named]
-                limits = np.array([max(map(abs, term.bounds)) * term.si for term in shaped])
+                limit = max(map(abs, plain.bounds)) * plain.si
                 # A term that changes every reading alike is the strut law's affair.
-                kept = np.flatnonzero((scale * limits > NOTHING) & (relative.std(axis=1) > 1e-6 * scale))
+                kept = np.flatnonzero((scale * limit > NOTHING) & (relative.std(axis=1) > 1e-6 * scale))
                 held = len(ground.data) <= MOST_HELD or plain.action in PARALLEL  # dear ones are kept
                 blocks.append(relative[kept] if held else partial(_relative, ground, plain, variable, column, kept))
                 kinds = Counter(shape for shape, _ in named)
                 log = priors[variable] - float(np.log(len(kinds) * len(names)))
-                terms += [shaped[i] for i in kept]
+                terms += [local.term(variable, *named[i], column) for i in kept]
                 logs += [log - float(np.log(kinds[named[i][0]])) for i in kept]
     signed = np.array([term.signed for term in terms], dtype=bool)
     return Dictionary(tuple(terms), tuple(blocks), np.array(logs), signed)
