@@ -2,6 +2,7 @@
 
 import os
 import platform
+import re
 import subprocess
 import sys
 from importlib.metadata import version
@@ -35,10 +36,7 @@ def describe_machine() -> str:
     """Processor and versions."""
     model = platform.processor() or platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        names = [
-            line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if line.startswith("model name")
-        ]
-        model = names[0] if names else model
+    if cpuinfo.exists() and (named := re.search(r"model name\s*: *(.*)", cpuinfo.read_text())):
+        model = named[1]
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "openseespy"))
     return f"{model}; Python {platform.python_version()}; {packages}; one core; all seconds are of CPU, user and system"
