@@ -283,10 +283,9 @@ class Ground:
         if key not in self._shapes:
             values = values if strut is None else values[:, strut - 1]
             named = tuple(shapes_of(variable, values, signed, column if variable == "tilt" else ""))
-            rows = np.empty((len(named), *values.shape), float if len(values) <= MOST_HELD else np.float32)
-            for row, (shape, constants) in zip(rows, named, strict=True):
-                row[...] = shape_values(shape, values, dict(constants), signed)
-            self._shapes[key] = named, rows
+            kind = float if len(values) <= MOST_HELD else np.float32
+            rows = [shape_values(shape, values, dict(at), signed).astype(kind) for shape, at in named]
+            self._shapes[key] = named, np.stack(rows) if rows else np.zeros((0, *values.shape))
         return self._shapes[key]
 
     def columns(self, term: Term, share: FloatArray, shapes: FloatArray) -> FloatArray:

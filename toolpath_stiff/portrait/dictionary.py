@@ -169,7 +169,7 @@ def dictionary_of(ground: Ground) -> Dictionary:
                 named = ground.shapes(variable, column, plain.signed, local.where)[0]
                 if not named:
                     continue
-                relative = _relative(ground, plain, variable, column)
+                relative = _relative(ground, plain, variable, column, slice(None))
                 scale = np.sqrt((relative**2).mean(axis=1))
                 limit = max(map(abs, plain.bounds)) * plain.si
                 # A term that changes every reading alike is the strut law's affair.
@@ -184,9 +184,7 @@ def dictionary_of(ground: Ground) -> Dictionary:
     return Dictionary(tuple(terms), tuple(blocks), np.array(logs), signed)
 
 
-def _relative(
-    ground: Ground, plain: Term, variable: str, column: str, kept: IntArray | slice = slice(None)
-) -> FloatArray:
+def _relative(ground: Ground, plain: Term, variable: str, column: str, kept: IntArray | slice) -> FloatArray:
     """(m, n) change of compliance over the compliance, of the shapes that are kept."""
     shapes = ground.shapes(variable, column, plain.signed, plain.where)[1]
     return ground.columns(plain, ground.share(plain), shapes)[kept] / ground.compliance

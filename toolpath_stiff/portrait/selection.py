@@ -194,8 +194,7 @@ class Selection:
     @cached_property
     def _squares(self) -> FloatArray:
         """(N,) information of each term by itself under the base fit's scatter."""
-        precision = self.base.scatter.precision
-        return np.concatenate([precision.squares(block) for block in self.dictionary.columns()])
+        return np.concatenate([self.base.scatter.precision.squares(block) for block in self.dictionary.columns()])
 
     def _gains(self, residuals: FloatArray, before: Description) -> FloatArray:
         """(s, N) twice the gain in log likelihood for residuals (s, n), where the size goes to an allowed side.
@@ -206,10 +205,9 @@ class Selection:
         weights = set_wild_aside(projected.times(residuals), projected)[0]
         weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
         across = weighted.T @ inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
-        parts = [(weights @ block.T, ((block @ across) ** 2).sum(axis=1)) for block in self.dictionary.columns()]
-        slopes, taken = zip(*parts, strict=True)
-        slope, alone = -np.concatenate(slopes, axis=1), self._squares
-        information = alone - np.concatenate(taken)
+        parts = [(-weights @ block.T, ((block @ across) ** 2).sum(axis=1)) for block in self.dictionary.columns()]
+        slope, taken = (np.concatenate(column, axis=-1) for column in zip(*parts, strict=True))
+        alone, information = self._squares, self._squares - taken
         allowed = self.dictionary.signed | (slope > 0.0)
         seen = information > 1e-6 * alone
         return np.asarray(np.where(allowed & seen, slope**2 / np.where(seen, information, 1.0), 0.0))

@@ -122,9 +122,7 @@ def _picture(name: str, drawn: Mapping[str, bytes], questions: Mapping[str, tupl
     if not (picture := drawn.get(name)):
         return Markup()
     (width,) = struct.unpack(">I", picture[16:20])  # of the header, in pixels of the PNG
-    return _macro(
-        "picture", name, *questions[name], base64.b64encode(picture).decode("ascii"), round(width / FINER)
-    )
+    return _macro("picture", name, *questions[name], base64.b64encode(picture).decode("ascii"), round(width / FINER))
 
 
 def render(
