@@ -146,7 +146,8 @@ def compliance_with_effects(
         turn = None if upright else path.rotation.reshape(-1, 9).T
         forces, along = np.empty((len(path), 6)), direction[:, rows]
         good = closed_form.compliance_along_columns(kernel, path.position.T, along, turn, forces)[3]
-        compliance[rows][good] = exact.compliance_along(model, path.take(good), along.T[good], forces[good])
+        some = path if good.all() else path.take(good)  # copies, which take as long as the effects
+        compliance[rows][good] = exact.compliance_along(model, some, along.T[good], forces[good])
     return compliance
 
 
