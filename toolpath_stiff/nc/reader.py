@@ -139,14 +139,8 @@ def read(request: Request) -> ReadProgram:
         try:
             return by_linuxcnc(request)
         except InputError as second:
-            raise ProgramError(
-                error.found,
-                expected=error.expected,
-                hint=f"LinuxCNC's interpreter does not read it either: {second}",
-                file=error.file,
-                line=error.line,
-                column=error.column,
-            ) from None
+            error.hint = f"LinuxCNC's interpreter does not read it either: {second}"
+            raise error from None
 
 
 def recognised(request: Request) -> tuple[str, str]:

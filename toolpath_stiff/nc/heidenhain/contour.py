@@ -18,6 +18,7 @@ from toolpath_stiff.nc.elements import direction as direction_of
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.points import (
     ON_CIRCLE_MM,
+    end_of,
     feed,
     in_plane,
     inch_tenths,
@@ -265,8 +266,7 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
     turn, there, radius = direction(block), named(state, block), block.take("R")
     if not radius:
         raise block.fail(None, "without its radius", "R")
-    start = in_plane(state, present(state))
-    end = in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
+    start, end = in_plane(state, present(state)), end_of(state, there)
     places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
     center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
     _round(state, block, there, center, turn)
@@ -282,8 +282,7 @@ def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
     else:
         with plane_of_pole(state, block) as pole:
             there = polar(state, block, pole)
-    start = in_plane(state, present(state))
-    end = in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
+    start, end = in_plane(state, present(state)), end_of(state, there)
     ahead = heading / abs(heading)
     chord = (end - start) / ahead  # seen along the path
     block.refuse_if(abs(chord) < ON_CIRCLE_MM, None, "to its own start", "another point")

@@ -216,9 +216,6 @@ class ParametricRun(ProgramRun):
         self._repeats[len(self._levels), row] = round(count)
         return self._again(row)
 
-    def _end_repeat(self, row: int, steering: Steering) -> int | None:
-        return self._again(self._structure.start[row])
-
     def _again(self, start: int) -> int:
         """Where a repeat goes on, from its beginning and from its end."""
         left = self._repeats.get((len(self._levels), start), 0)
@@ -257,9 +254,6 @@ class ParametricRun(ProgramRun):
             line = self._place(self._marks[leave]).line
             problem = f"after the {leave.lower()} in line {line} LinuxCNC's interpreter {what}"
             raise self._fail(row, problem, "if and endif in place of it")
-
-    def _sub(self, row: int, steering: Steering) -> int | None:
-        return self._structure.end[row] + 1
 
     def _return_sub(self, row: int, steering: Steering) -> int | None:
         if not self._levels:
@@ -339,9 +333,10 @@ class ParametricRun(ProgramRun):
 STEPS: dict[str, Step] = {
     "IF": ParametricRun._if, "ELSEIF": ParametricRun._else, "ELSE": ParametricRun._else,
     "WHILE": ParametricRun._while, "ENDWHILE": ParametricRun._back,
-    "REPEAT": ParametricRun._repeat, "ENDREPEAT": ParametricRun._end_repeat,
+    "REPEAT": ParametricRun._repeat, "ENDREPEAT": lambda run, row, steering: run._again(run._structure.start[row]),
     "BREAK": ParametricRun._break, "CONTINUE": ParametricRun._continue,
-    "SUB": ParametricRun._sub, "ENDSUB": ParametricRun._return_sub, "RETURN": ParametricRun._return_sub,
+    "SUB": lambda run, row, steering: run._structure.end[row] + 1,
+    "ENDSUB": ParametricRun._return_sub, "RETURN": ParametricRun._return_sub,
     "CALL": ParametricRun._call_sub,
     "IF GOTO": ParametricRun._if_goto, "IF THEN": ParametricRun._if_then, "GOTO": ParametricRun._goto,
     "WHILE LOOP": ParametricRun._while, "END": ParametricRun._back,

@@ -9,6 +9,7 @@ import re
 from itertools import zip_longest
 
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.formulas import Value
 from toolpath_stiff.nc.heidenhain.statements import code_text
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.expressions import Value as Number
@@ -20,7 +21,7 @@ from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.siemens.blocks import carry_out, sort_words
-from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner, Value
+from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
 from toolpath_stiff.nc.siemens.words import read_words, steering_of
 from toolpath_stiff.nc.state import LATHE_HINT, Flow, GoTo, Then
@@ -38,7 +39,6 @@ TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
-LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (Fundamentals, "Blocks and block format")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
 RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
 
@@ -108,14 +108,11 @@ class SiemensRun(ParametricRun):
     def _scanner(self, row: int, begin: int) -> SiemensScanner:
         text = self._begins[row].string
         columns, place = range(1, len(text) + 2), self._place(row)
-        return SiemensScanner(text, columns, place, "Siemens' language", False, begin, self._variable)
+        return SiemensScanner(text, columns, place, "Siemens' language", False, begin, lookup=self._variable)
 
     def _statement(self, row: int) -> Statement:
         if row not in self._statements:
             begin = self._begins[row]
-            if len(begin.string) > LONGEST_BLOCK or begin.string.count("(") > MOST_BRACKETS:
-                problem = f"a block of {len(begin.string)} characters, or with too many brackets"
-                raise self._fail(row, problem, f"at most {LONGEST_BLOCK}, {MOST_BRACKETS} of them")
             slash = begin[1] or begin[4] or ""
             block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
             steering = None
