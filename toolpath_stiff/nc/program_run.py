@@ -71,6 +71,7 @@ class ProgramRun:
         self._passes: dict[int, str] = {}  # by the line that jumps back: what changes often, as it was there
         self._moved = (0, 0)  # moves at the last step back after a move, and the blocks that had run by then
 
+    _at, _main_lines = 0, 1  # the line that runs, and how many lines the file itself has
     meaning = staticmethod(code_meaning)  # what a code, or a word of the language, is taken for
     cuts_by = "a feed move (G1, G2, G3 or a cycle)"
 
@@ -82,6 +83,7 @@ class ProgramRun:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
         row, begun, numbered = 0, False, False  # from the first word on, a tape mark is the last one
         while row < len(self.lines):
+            self._at = row
             words = self._plain.execute(row) if self._plain is not None and not self._levels else None
             if words is not None:
                 self._tally_plain(row, words)
@@ -122,6 +124,8 @@ class ProgramRun:
         try:
             return act(argument)
         except InputError as error:
+            if self._at >= self._main_lines and error.file == self.name:  # its block stands on the line of the call
+                error.file, error.line, _ = self._place(self._at)
             if self.tally is None:
                 raise
             self.tally.keep(error)

@@ -50,7 +50,6 @@ class HeidenhainRun(ProgramRun):
         self._labels: dict[int, dict[str, list[int]]] = {}  # by the first line of their program
         self._repeats: dict[tuple[int, int], int] = {}
         self._locals: list[dict[str, float]] = [{}]  # QL, by the programs that run
-        self._row = 0
         self._to_machine = False  # the statement is a rapid in machine coordinates
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
@@ -71,16 +70,8 @@ class HeidenhainRun(ProgramRun):
 
     def _steered(self, row: int) -> int:
         """Carry out the statement in a line; where the run goes on."""
-        self._row = row
         self._count_block(row)
-        try:
-            return self._carried_out(row, self._statement(row))
-        except InputError as error:
-            if row >= self._main_lines:  # its block stands on the line that calls its file
-                error.file, error.line, _ = self._place(row)
-            raise
-
-    def _carried_out(self, row: int, statement: PlainStatement) -> int:
+        statement = self._statement(row)
         if not statement.head or (statement.optional and 1 in self.switches):
             return statement.after
         self._count(statement)
@@ -167,7 +158,7 @@ class HeidenhainRun(ProgramRun):
             return math.nan
         if known is None or math.isnan(known):
             reason = "a control keeps it from earlier programs, or works it out itself"
-            raise self._fail(self._row, f"{name} is read before it is set: {reason}", f"FN 0: {name} = ... before")
+            raise self._fail(self._at, f"{name} is read before it is set: {reason}", f"FN 0: {name} = ... before")
         return known
 
     def _scope(self, name: str) -> dict[str, float]:
@@ -277,7 +268,7 @@ class HeidenhainRun(ProgramRun):
         """A warning about what follows END PGM; an error where a corner or an approach still waits."""
         plain = self.state.plain
         if plain.held is not None or plain.approach is not None:
-            raise self._fail(self._row, "the program ends before the element behind a corner or an APPR", "the element")
-        statement = self._statements.get(self._row)
-        rest = [line for line in self.lines[self._row + 1 : self._main_lines] if not EMPTY.fullmatch(line)]
-        return beyond_the_end("END PGM", self._row, len(rest)) if statement and statement.head == "END PGM" else []
+            raise self._fail(self._at, "the program ends before the element behind a corner or an APPR", "the element")
+        statement = self._statements.get(self._at)
+        rest = [line for line in self.lines[self._at + 1 : self._main_lines] if not EMPTY.fullmatch(line)]
+        return beyond_the_end("END PGM", self._at, len(rest)) if statement and statement.head == "END PGM" else []

@@ -46,7 +46,6 @@ class ParametricRun(ProgramRun):
         self._statements: dict[int, Statement] = {}
         self._structure_known: Structure | None = None
         self._modal: Call | None = None
-        self._at = 0  # the block that runs
         self._began = False  # a variable was set, or the flow steered
         self._repeats: dict[tuple[int, int], int] = {}  # left of a loop, by the calls that run and its line
         self._marks: dict[str, int] = {}  # lines of BREAK and CONTINUE that LinuxCNC's interpreter has not forgotten
@@ -79,13 +78,9 @@ class ParametricRun(ProgramRun):
     def _execute(self, block: Block) -> Then:
         codes = [code_name("G", word.value) if word.letter == "G" else "" for word in block.words]
         place = next((index for index, code in enumerate(codes) if code in MACRO_CALLS), None)
-        try:
-            if place is None or self.family == NGC:  # LinuxCNC has none: refused where the codes are sorted
-                return self._act(block)
-            return self._macro_call(block, codes[place], place)
-        except InputError as error:
-            error.file, error.line, _ = self._place(self._at)  # the block stands on the line that calls its file
-            raise
+        if place is None or self.family == NGC:  # LinuxCNC has none: refused where the codes are sorted
+            return self._act(block)
+        return self._macro_call(block, codes[place], place)
 
     def _act(self, block: Block) -> Then:
         """Carry out a block; after a move the call of G66 follows."""
@@ -138,7 +133,6 @@ class ParametricRun(ProgramRun):
 
     def _steered(self, row: int) -> int | None:
         """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
-        self._at = row
         if self._ends_before(row):
             return len(self.lines)
         self._count_block(row)

@@ -8,7 +8,6 @@ import math
 import re
 from itertools import zip_longest
 
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.formulas import Value
 from toolpath_stiff.nc.heidenhain.statements import code_text
 from toolpath_stiff.nc.moves import Remark
@@ -191,13 +190,9 @@ class SiemensRun(ParametricRun):
 
     def _execute(self, block: Block) -> Then:
         state, plain = self.state, self.state.plain
-        try:
-            current = sort_words(state, block, self.tally)
-            with current.placing():
-                carry_out(state, current)
-        except InputError as error:
-            error.file, error.line, _ = self._place(self._at)
-            raise
+        current = sort_words(state, block, self.tally)
+        with current.placing():
+            carry_out(state, current)
         slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
         self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
         called = any(level.stop < 0 for level in self._levels)
