@@ -125,9 +125,9 @@ class ProgramRun:
             return act(argument)
         except InputError as error:
             if self._at >= self._main_lines and error.file == self.name:  # its block stands on the line of the call
-                error.file, error.line, _ = self._place(self._at)
+                error = self._fail(self._at, error.found, error.expected, error.hint, error.column)
             if self.tally is None:
-                raise
+                raise error from None
             self.tally.keep(error)
             return instead
 

@@ -199,6 +199,8 @@ class Conversational:
         Axes of the plane whose position is not known until they are named.
     tool_feed, radius, held_tip, shorter
         F of TOOL CALL (mm/min), the tool's radius with its DR, M128 and M126 in force.
+    led_to
+        Angles to which vectors (LN) led the tool last: under M128 it keeps them while X, Y, Z move; None: none have.
     preset, names, stock, parameters
         The datum of cycle 247; numbers given to tools of a name; the corners of the blank; Q parameters.
     inner
@@ -233,6 +235,7 @@ class Conversational:
     tool_feed: float | None = None
     radius: float = math.nan
     held_tip: bool = False
+    led_to: list[float] | None = None
     shorter: bool = False
     preset: float | None = None
     names: dict[str, int] = field(default_factory=dict)

@@ -178,7 +178,8 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
     plain.doubt = ""
     block.refuse_if(all(inner[:2]), None, "under cycle 8 and cycle 10: their order decides the path", "one of them")
     if plain.held_tip and state.frames.posted is None:
-        leans = any(state.frames.position[3:]) or any(there.get(axis) for axis in (3, 4, 5))
+        turned = any(state.frames.position[3:]) and state.frames.position[3:] != plain.led_to
+        leans = turned or any(there.get(axis) for axis in (3, 4, 5))
         block.refuse_if(leans, None, "turns rotary axes under tool centre point control (M128)", "", HOLDS_HINT)
 
 
