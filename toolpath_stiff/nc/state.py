@@ -6,7 +6,7 @@ mm, degrees, mm/min.
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from enum import Enum
 from typing import Literal, get_args
 
@@ -17,7 +17,7 @@ from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
-from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD, ToolEntry
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD, ToolEntry, tool_of
 from toolpath_stiff.nc.words import AXES, Block, Word
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
@@ -285,6 +285,11 @@ class Record:
     unsupported: list[Unsupported] = field(default_factory=list)
     warnings: list[Remark] = field(default_factory=list)
     assumptions: list[str] = field(default_factory=list)
+
+    def note_tool(self) -> None:
+        """Keep the tool in the spindle among those that moved."""
+        if self.tool not in self.used_tools:
+            self.used_tools[self.tool] = replace(tool_of(self.tools, self.tool))
 
     def assume(self, sentence: str) -> None:
         """Note an assumption, once."""
