@@ -24,7 +24,7 @@ from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.run_result import program_of
-from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, Then
+from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, Then
 from toolpath_stiff.nc.words import Block, Word, read_block
 
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
@@ -279,11 +279,11 @@ class ProgramRun:
             raise self._fail(row, f"{what} N{number:g}, {other}", "one block with that number", column=column)
         return rows[0]
 
-    def _return(self, row: int, flow: Flow | GoTo) -> int | None:
+    def _return(self, row: int, flow: Flow | Word) -> int | None:
         """The line at which M99 goes on; None where that is the beginning of the program, or before this line."""
-        if not isinstance(flow, GoTo):
+        if not isinstance(flow, Word):
             return self._leave(row) if self._levels else None
-        to = self._block_numbered(row, "M99 P goes to", flow.number, flow.column)
+        to = self._block_numbered(row, "M99 P goes to", flow.value, flow.column)
         if not self._levels:
             return to if to > row else None
         level = self._pop_level(row)

@@ -63,15 +63,7 @@ class Call:
     modal: bool = False
 
 
-@dataclass(frozen=True)
-class GoTo:
-    """M99 P: go on at the block with that N number, of the caller or of the main program; the column of its P."""
-
-    number: int
-    column: int
-
-
-Then = Flow | Call | GoTo  # what runs after a block
+Then = Flow | Call | Word  # what runs after a block; the P of M99: the block of the caller with that N number
 
 
 @dataclass

@@ -7,15 +7,13 @@ two squares, ANG the angle of two sides from 0 to 360 degrees; angles are in deg
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from operator import truediv
 from typing import ClassVar
 
-from toolpath_stiff.nc.formulas import BLANK, FormulaScanner, Value, trimmed, whole
-from toolpath_stiff.nc.formulas import FUNCTIONS as COMMON
 from toolpath_stiff.nc.heidenhain.statements import NUMBER
-from toolpath_stiff.nc.parametric.expressions import ARITHMETIC
+from toolpath_stiff.nc.parametric.expressions import ARITHMETIC, Scanner
 from toolpath_stiff.nc.place import Place
 
 PARAMETER = re.compile(r"Q[LR]?\d+")
@@ -24,6 +22,28 @@ _JUMP = re.compile(r'\s*IF\s*(.+?)\s*(EQU|NE|GT|LT)\s*(.+?)\s*GOTO\s*LBL\s*(?:(\
 CONDITIONS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
 EQUAL = 1e-9
 KNOWN = "numbers, Q parameters, functions, + - * / ^ ( )"
+Value = float | str  # a truth value is a bool, which is a number
+Lookup = Callable[[str, int], Value]  # the value of a variable, and the column where it stands
+BLANK = re.compile(r"\s*")
+LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (SIEMENS, Fundamentals, "Blocks and block format")
+
+
+def whole(value: float) -> float:
+    """Without what stands behind the point."""
+    return float(math.trunc(value))
+
+
+def trimmed(degrees: float) -> float:
+    """Without the noise beyond the digits of a control: SIN 180 is 0."""
+    return float(f"{degrees:.12g}") if abs(degrees) > 1e-14 else 0.0
+
+
+COMMON: dict[str, Callable[..., float]] = {
+    "SIN": lambda v: trimmed(math.sin(math.radians(v))), "COS": lambda v: trimmed(math.cos(math.radians(v))),
+    "TAN": lambda v: math.tan(math.radians(v)), "ASIN": lambda v: trimmed(math.degrees(math.asin(v))),
+    "ACOS": lambda v: trimmed(math.degrees(math.acos(v))), "SQRT": math.sqrt, "LN": math.log, "EXP": math.exp,
+    "ABS": abs,
+}  # fmt: skip
 FUNCTIONS: dict[str, Callable[..., float]] = {
     **COMMON, "ATAN": lambda v: trimmed(math.degrees(math.atan(v))), "SQ": lambda v: v * v, "LOG": math.log10,
     "NEG": lambda v: -v, "INT": whole, "FRAC": lambda v: v - whole(v), "SGN": lambda v: float((v > 0) - (v < 0)),
@@ -53,26 +73,98 @@ def condition(
 
 
 @dataclass
-class _Formula(FormulaScanner):
-    literal = re.compile(NUMBER)
-    operator = re.compile(r"DIV|LEN|ANG|[-+*/^]")
-    name = re.compile(rf"{PARAMETER.pattern}|[A-Z]+")
-    ranks: ClassVar = {"+": 1, "-": 1, "*": 2, "/": 2, "DIV": 2, "^": 3, "LEN": 1, "ANG": 1}
-    operations: ClassVar = {
+class Formula(Scanner):
+    """A block in upper case without its comment; blanks between its parts are passed over. `lookup`: variables."""
+
+    lookup: Lookup = field(kw_only=True)
+
+    literal: ClassVar = re.compile(NUMBER)
+    operator: ClassVar = re.compile(r"DIV|LEN|ANG|[-+*/^]")
+    name: ClassVar = re.compile(rf"{PARAMETER.pattern}|[A-Z]+")
+    ranks: ClassVar[Mapping[str, int]] = {
+        "+": 1,
+        "-": 1,
+        "*": 2,
+        "/": 2,
+        "DIV": 2,
+        "^": 3,
+        "LEN": 1,
+        "ANG": 1,
+    }  # how tightly an operator binds
+    operations: ClassVar[Mapping[str, Callable[[float, float], float]]] = {
         **ARITHMETIC, "DIV": truediv, "^": math.pow, "LEN": math.hypot,
         "ANG": lambda a, b: trimmed(math.degrees(math.atan2(a, b)) % 360.0),
     }  # fmt: skip
 
+    def __post_init__(self) -> None:
+        problem = f"a block of {len(self.text)} characters, or with too many brackets"
+        long = len(self.text) > LONGEST_BLOCK or self.text.count("(") > MOST_BRACKETS
+        self.refuse_if(long, problem, f"at most {LONGEST_BLOCK}, {MOST_BRACKETS} of them")
+
+    def part(self, pattern: re.Pattern[str]) -> str:
+        """What matches next behind blanks, then read."""
+        self.take(BLANK)
+        return self.take(pattern)
+
+    def sign(self, text: str) -> bool:
+        """Whether that comes next behind blanks; it is then read."""
+        self.take(BLANK)
+        return self.next(text)
+
+    def result(self, tightest: int = 0) -> Value:
+        """Values and operators that bind tighter than `tightest`."""
+        left = self.operand()
+        while True:
+            begin, column = self.position, self.column
+            operator = self.part(self.operator)
+            if self.ranks.get(operator, 0) <= tightest:
+                self.position = begin
+                return left
+            left = self.operated(operator, left, self.result(self.ranks[operator]), column)
+
+    def real(self) -> float:
+        """A number. Raises `InputError` where it is none."""
+        column = self.column
+        return float(self.number(self.result(), column))
+
     def operand(self) -> Value:
-        negative, value = self.begins("-", " -"), super().operand()
-        self.refuse_if(negative and self.sign("^"), "a sign before ^, which may belong to either", "brackets")
-        return value
+        """A value with its sign: a number, an expression in brackets, what a name stands for."""
+        self.take(BLANK)
+        column = self.column
+        self.next("+")
+        if self.sign("("):
+            value = self.result()
+            self.refuse_if(not self.sign(")"), "a bracket that is not closed", ")", column=column)
+            return value
+        if self.next("-"):
+            self.refuse_if(self.begins("-"), "a sign after a sign", "brackets")
+            value = -self.number(self.operand(), column)
+            self.refuse_if(self.sign("^"), "a sign before ^, which may belong to either", "brackets", column=column)
+            return value
+        literal = self.take(self.literal)
+        if literal:
+            return float(literal.replace("EX", "E").replace(",", "."))
+        name = self.take(self.name)
+        self.refuse_if(not name, f"{self.rest()} is not a value", "a value", column=column)
+        return self.named(name, column)
 
     def named(self, name: str, column: int) -> Value:
+        """The value of a name, with what belongs to it: of a function, of a Q parameter."""
         if name in FUNCTIONS:
             return self.finite(name, column, FUNCTIONS[name], self.operand())
         self.refuse_if(name != "PI" and not PARAMETER.fullmatch(name), f"{name} in a formula", KNOWN, column=column)
         return math.pi if name == "PI" else self.lookup(name, column)
+
+    def operated(self, operator: str, left: Value, right: Value, column: int) -> Value:
+        """The value of an operator."""
+        values = self.number(left, column), self.number(right, column)
+        return self.finite(operator, column, self.operations[operator], *values)
+
+    def number(self, value: Value, column: int) -> float:
+        """The number that a value is."""
+        if isinstance(value, str):
+            raise self.fail(f"{value!r} is no number", "a number", column=column)
+        return value
 
 
 def work_out(text: str, parameter: Callable[[str], float], place: Place) -> float:
@@ -86,7 +178,7 @@ def work_out(text: str, parameter: Callable[[str], float], place: Place) -> floa
     10.0
     """
     begin = place.column or 1
-    scanner = _Formula(text, range(begin, begin + len(text) + 1), place, "", lookup=lambda name, _: parameter(name))
+    scanner = Formula(text, range(begin, begin + len(text) + 1), place, "", lookup=lambda name, _: parameter(name))
     value = scanner.real()
     scanner.take(BLANK)
     scanner.refuse_if(not scanner.done, f"{scanner.rest()} in a formula", KNOWN)

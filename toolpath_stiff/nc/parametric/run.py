@@ -25,7 +25,7 @@ from toolpath_stiff.nc.parametric.variables import Variables
 from toolpath_stiff.nc.program_run import HEAD, ProgramRun
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
-from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
+from toolpath_stiff.nc.state import Call, Flow, Then
 from toolpath_stiff.nc.words import Block, Word
 
 Step = Callable[[Any, int, Steering], int | None]  # of a run: its line, what it steers; where the run goes on
@@ -166,12 +166,12 @@ class ParametricRun(ProgramRun):
     def _jump(self, row: int, to: int) -> int:
         return super()._jump(row, to) if to != row + 1 and max(row, to) < self._main_lines else to
 
-    def _return(self, row: int, flow: Flow | GoTo) -> int | None:
+    def _return(self, row: int, flow: Flow | Word) -> int | None:
         """M99; with P it goes on at that block of the caller, wherever that is."""
-        if not isinstance(flow, GoTo) or not self._levels:
+        if not isinstance(flow, Word) or not self._levels:
             return super()._return(row, flow)
         self._levels[-1].again = 0
-        return self._go_on(self._leave(row) - 1, flow.number, flow.column)
+        return self._go_on(self._leave(row) - 1, flow.value, flow.column)
 
     def _value(self, steering: Steering, which: int = 0) -> float:
         return number(steering.values[which](self.variables))

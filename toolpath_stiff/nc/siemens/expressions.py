@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from operator import ge, gt, le, lt
 from typing import ClassVar
 
-from toolpath_stiff.nc.formulas import FUNCTIONS as COMMON
-from toolpath_stiff.nc.formulas import FormulaScanner, Value, whole
+from toolpath_stiff.nc.heidenhain.expressions import COMMON, Formula, Value, whole
 from toolpath_stiff.nc.parametric.expressions import ARITHMETIC
 
 STRING = re.compile(r'"[^"]*"')
@@ -33,12 +32,12 @@ CONSTANTS: dict[str, Value] = {"TRUE": True, "FALSE": False, "$PI": math.pi}
 
 
 @dataclass
-class SiemensScanner(FormulaScanner):
+class SiemensScanner(Formula):
     """A block in Siemens' language."""
 
-    literal = re.compile(r"(?:\d++\.?\d*|\.\d+)(?:EX[+-]?\d+)?", re.ASCII)
-    operator = re.compile(r"<<|<>|<=|>=|==|[-+*/<>]|(?:DIV|MOD|AND|XOR|OR)\b")
-    name = re.compile(rf'"|{NAME.pattern}', re.ASCII)
+    literal: ClassVar = re.compile(r"(?:\d++\.?\d*|\.\d+)(?:EX[+-]?\d+)?", re.ASCII)
+    operator: ClassVar = re.compile(r"<<|<>|<=|>=|==|[-+*/<>]|(?:DIV|MOD|AND|XOR|OR)\b")
+    name: ClassVar = re.compile(rf'"|{NAME.pattern}', re.ASCII)
     ranks: ClassVar = {
         **dict.fromkeys((*COMPARISONS, "==", "<>"), 1), "<<": 2, "OR": 3, "XOR": 4, "AND": 5, "+": 6, "-": 6,
         **dict.fromkeys(("*", "/", "DIV", "MOD"), 7),

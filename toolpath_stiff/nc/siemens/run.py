@@ -8,7 +8,7 @@ import math
 import re
 from itertools import zip_longest
 
-from toolpath_stiff.nc.formulas import Value
+from toolpath_stiff.nc.heidenhain.expressions import Value
 from toolpath_stiff.nc.heidenhain.statements import code_text
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.expressions import Value as Number
@@ -23,8 +23,8 @@ from toolpath_stiff.nc.siemens.blocks import carry_out, sort_words
 from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
 from toolpath_stiff.nc.siemens.words import read_words, steering_of
-from toolpath_stiff.nc.state import LATHE_HINT, Flow, GoTo, Then
-from toolpath_stiff.nc.words import AXES, Block
+from toolpath_stiff.nc.state import LATHE_HINT, Flow, Then
+from toolpath_stiff.nc.words import AXES, Block, Word
 
 HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
 PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
@@ -213,7 +213,7 @@ class SiemensRun(ParametricRun):
             return self._leave(row)
         return super()._steered(row)
 
-    def _return(self, row: int, flow: Flow | GoTo) -> int:
+    def _return(self, row: int, flow: Flow | Word) -> int:
         """M17, RET, the end of a program: back to the call, or the end of all."""
         while self._levels and self._levels[-1].stop >= 0:
             self._levels.pop()

@@ -7,7 +7,7 @@ absolute and incremental dimensions"; Job Planning, "Definition of user variable
 import re
 from collections.abc import Callable
 
-from toolpath_stiff.nc.formulas import BLANK, Value
+from toolpath_stiff.nc.heidenhain.expressions import BLANK, Value
 from toolpath_stiff.nc.parametric.expressions import Value as Number
 from toolpath_stiff.nc.parametric.statements import Steering
 from toolpath_stiff.nc.siemens.cycles import SIGNATURES
