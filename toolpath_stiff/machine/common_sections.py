@@ -39,11 +39,8 @@ def _entries(toml: MachineToml, kind: str) -> tuple[EffectEntry, ...]:
 
     What the parameters mean, and their bounds, is known to the effects themselves (the room above).
     """
-    rows = toml.data.get(kind, [])
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise toml.fault("", kind, f" is not a list of tables; write [[{kind}]]")
     entries = []
-    for nth, row in enumerate(rows):
+    for nth, row in enumerate(toml.rows(kind)):
         places = {key: toml.line_of(kind, key, nth) for key in ("", *row)}
         lines = {key: line for key, line in places.items() if line is not None}
         name, provenance = row.get("name"), row.get("provenance", {})

@@ -11,7 +11,7 @@ from toolpath_stiff.machine.common_sections import common_fields, pose_of
 from toolpath_stiff.machine.elements import Element
 from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections
-from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
+from toolpath_stiff.machine.serial_elements import ELEMENT, read_elements
 from toolpath_stiff.units import m_from_mm, m_from_nm
 
 STILL: tuple[tuple[()], tuple[()]] = ((), ())  # no joints on either side: base and tip alone
@@ -46,7 +46,7 @@ def shared_fields(toml: MachineToml, values: Sections) -> dict[str, Any]:
         **common,
         "limits": limits,
         "reference_tool_length": m_from_mm(values.get("reference_tool", {}).get("length_mm", np.nan)),
-        "bodies": read_bodies(toml, STILL)[0],
+        "bodies": tuple(read_elements(toml, STILL).bodies[0]),
         "least_index": singularity.get("min_index", 0.0),
     }
 
