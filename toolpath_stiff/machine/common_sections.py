@@ -54,7 +54,7 @@ def _entries(toml: MachineToml, kind: str) -> tuple[EffectEntry, ...]:
             text, line = f"[[{kind}]] {key}{mistake}", lines.get(key, lines.get(""))
             raise InputError(text, expected=expected, file=toml.file, line=line)
         parameters = {key: value for key, value in row.items() if key not in ("name", "provenance")}
-        entries.append(EffectEntry(name, parameters, provenance, toml.file, lines))
+        entries.append(EffectEntry(str(name), parameters, provenance, toml.file, lines))
     return tuple(entries)
 
 

@@ -19,7 +19,7 @@ from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.joint_values import joint_margin
 from toolpath_stiff.machine.model import MachineTool
-from toolpath_stiff.readings.mapping import check_needed, mapped_table
+from toolpath_stiff.readings.mapping import check_needed, mapped_table, unused
 from toolpath_stiff.readings.measurements import lacking_columns, read_measurements
 from toolpath_stiff.readings.rows import (
     ANGLES,
@@ -146,10 +146,7 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
         if errors:
             raise InputErrors(errors)
         rows += of_file
-        notes += [
-            *table.notes,
-            *(f"{table.file}: column {name} is not used" for name in table.heading if name not in used),
-        ]
+        notes += [*table.notes, *unused(table, used)]
     if not rows:
         raise MeasurementError("no rows below the heading", file=tables[0].file)
     return _of_rows(rows, machine, notes)

@@ -53,7 +53,8 @@ def _scaled(limit: float, *names: str) -> Grow:
     """Parameters in proportion to the strength and to share or sign in the shape, beside what else that has."""
 
     def grow(strength: float, shape: Shape) -> Shape:
-        sizes = {name: limit * strength * float(shape.get(name, shape.get("sign", 1.0))) for name in names}
+        shares = {**dict.fromkeys(names, shape.get("sign", 1.0)), **shape}
+        sizes = {name: limit * strength * float(shares[name]) for name in names}
         return {key: value for key, value in shape.items() if key != "sign"} | sizes
 
     return grow

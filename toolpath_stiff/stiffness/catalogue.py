@@ -14,20 +14,17 @@ from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.stiffness import effects, element_effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect
 from toolpath_stiff.stiffness.declarations import check_declarations
 from toolpath_stiff.stiffness.effect_source import line_in, line_of
 from toolpath_stiff.stiffness.term_file import effects_of_terms
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every save is one
 
@@ -174,7 +171,7 @@ class EffectCatalogue(Result):
         """What each effect declares, in its own units."""
         return {"effects": [self.view.describe_effect(effect) for effect in self.effects]}
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row an effect: link of the load path, name, title, equation, source."""
         return frame_of(self.to_dict()["effects"])[["link", "name", "title", "equation", "source", "load_dependent"]]
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from toolpath_stiff.machine.elements import turns
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach, solved
 from toolpath_stiff.machine.model import Hexapod, MachineTool
-from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import effects_from_file
@@ -29,9 +29,6 @@ from toolpath_stiff.stiffness.core import solver_of
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model, load_path
 from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 POSES, DRAWN = 24, 600
 AROUND = 0.3  # m around the default origin of a machine of elements
@@ -250,7 +247,7 @@ class EffectCheck(Result):
         rows = [{"effect": name, "passed": all_passed(made), "checks": to_dict(made)} for name, made in trials]
         return {"file": self.file, "machine": self.machine, "passed": self.passed, "effects": rows}
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a check."""
         trials = self.trials.items()
         return frame_of([{"effect": name, **check} for name, made in trials for check in to_dict(made)])
