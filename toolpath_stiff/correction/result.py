@@ -152,7 +152,8 @@ class Update(FolderResult):
     @property
     def changed(self) -> bool:
         """True where there is something to be written."""
-        return bool(self.steps[-1].fit.names) or self.task.strut_law
+        law = any(support.effect == LAW_REFITTED for support in self.supports)
+        return bool(self.steps[-1].fit.names) or self.task.strut_law or law
 
     @property
     def worse(self) -> bool:
