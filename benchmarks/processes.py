@@ -1,6 +1,7 @@
 """Whole processes and what they cost; the machine that they ran on."""
 
 import platform
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -32,12 +33,8 @@ def describe_machine() -> str:
     """Processor and versions."""
     from importlib.metadata import version
 
-    model = platform.processor() or platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        names = [
-            line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if line.startswith("model name")
-        ]
-        model = names[0] if names else model
+    found = re.search(r"^model name\s*:\s*(.*)", cpuinfo.read_text() if cpuinfo.exists() else "", re.MULTILINE)
+    model = found[1].strip() if found else platform.processor() or platform.machine()
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "openseespy"))
     return f"{model}; Python {platform.python_version()}; {packages}; one core"
