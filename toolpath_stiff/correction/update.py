@@ -43,7 +43,7 @@ from toolpath_stiff.inference.candidates import Candidate, testable_effects
 from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import add_effect, base_fit, baseline, refine, with_given_law
+from toolpath_stiff.inference.fits import add_effect, base_fit, baseline, refine
 from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import Family, score_families, signatures, tables_of
@@ -315,7 +315,8 @@ def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Suppo
     """Judge the refitted strut law of a step; the same effects beside the file's law."""
     task.progress("judging the strut law")
     fit, problem = after.fit, task.problem
-    given = LadderStep.of(LAW_GIVEN, with_given_law(problem, fit), task.data)
+    groups = [[candidate] for candidate in fit.candidates]  # anew: beside a refitted law some may be absent
+    given = LadderStep.of(LAW_GIVEN, fitted_with(task, base_fit(problem, law_free=False), groups), task.data)
     differences = votes(problem, fit, {LAW_GIVEN: given.fit})[LAW_GIVEN]
     reasons, instruments = [], dict[str, str]()
     if outvoted(differences):
