@@ -130,8 +130,7 @@ class Result(ABC):
 
     def _picture(self, **look: Any) -> bytes:
         """The same as a PNG."""
-        picture: bytes = _door().picture(self, **look)
-        return picture
+        return bytes(_door().picture(self, **look))
 
     def _cannot(self, what: str, hint: str) -> InputError:
         return InputError(f"{type(self).__name__} {what}", hint=hint)
@@ -157,8 +156,7 @@ class FolderResult(Result):
         self, plots: bool, omit: Collection[str] = (), **look: Any
     ) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of the result but for `omit`."""
-        contents: Mapping[str, Content | Callable[[], Content]] = _door().files(self, plots=plots, omit=omit, **look)
-        return contents
+        return dict(_door().files(self, plots=plots, omit=omit, **look))
 
     def save(
         self,
