@@ -42,6 +42,8 @@ class Menu:
         Names of set-ups; the first is on the table now.
     waits
         s between zeroing and the first reading; more than one lets a drift show.
+    oblique
+        Whether readings along the diagonals XY, XZ, YZ may be planned.
     rounds
         How often a reading may be taken in one clamping.
     measured
@@ -67,6 +69,7 @@ class Menu:
     tool_extensions: tuple[float, ...] = (0.0, 0.15)
     setups: tuple[str, ...] = ("",)
     waits: tuple[float, ...] = (0.0, 10.0 * MINUTE)
+    oblique: bool = True
     rounds: int = 2
     measured: FloatArray = field(default_factory=lambda: np.zeros((0, 6)))
     labels: tuple[str, ...] = ()

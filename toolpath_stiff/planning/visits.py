@@ -155,7 +155,7 @@ def possible_visits(machine: MachineTool, menu: Menu, matters: Collection[str], 
         )
     which, extension, setup, wait = (np.array(column) for column in zip(*places, strict=True))
     loads, every_round = menu.loads if "force_N" in matters else (menu.usual_load,), range(1, menu.rounds + 1)
-    named = [AXES, AXES + DIAGONALS]
+    named = [AXES, AXES + DIAGONALS] if menu.oblique else [AXES]
     rounds, names, forces = (np.array(column) for column in zip(*product(every_round, named[-1], loads), strict=True))
     axes = np.isin(names, AXES)
     groups = [np.flatnonzero((rounds == last) & (axes == first)) for last, first in product(every_round, (True, False))]
