@@ -34,9 +34,8 @@ def whole_command(arguments: list[str], folder: str = ".", allowed: tuple[int, .
 
 def describe_machine() -> str:
     """Processor and versions."""
-    model = platform.processor() or platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists() and (named := re.search(r"model name\s*: *(.*)", cpuinfo.read_text())):
-        model = named[1]
+    found = re.search(r"^model name\s*:\s*(.*)", cpuinfo.read_text() if cpuinfo.exists() else "", re.MULTILINE)
+    model = found[1].strip() if found else platform.processor() or platform.machine()
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "openseespy"))
     return f"{model}; Python {platform.python_version()}; {packages}; one core; all seconds are of CPU, user and system"
