@@ -9,6 +9,7 @@ from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Diagnosis
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
+from toolpath_stiff.inference.discrepancies import RANGE_LENGTH
 from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
@@ -169,10 +170,15 @@ def _hidden(diagnosis: Diagnosis) -> str:
 
 
 def _unread(diagnosis: Diagnosis) -> str:
-    """The widest stretch of a strut's travel that lies between two readings, a sentence with the space before it."""
+    """The widest stretch of a strut's travel that lies between two readings, if it is wide enough to hide a fault.
+
+    A sentence with the space before it, else "".
+    """
     lengths = np.sort(np.round(mm_from_m(diagnosis.predictor.strut_lengths()), 3), axis=0)
     row, strut = np.unravel_index(np.diff(lengths, axis=0).argmax(), (len(lengths) - 1, lengths.shape[1]))
     first, last = lengths[row : row + 2, strut].tolist()
+    if last - first < mm_from_m(RANGE_LENGTH):
+        return ""
     return f" No reading has strut {strut + 1} between {first:.0f} and {last:.0f} mm: a fault there does not show."
 
 
