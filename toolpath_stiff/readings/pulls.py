@@ -19,7 +19,7 @@ from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.joint_values import joint_margin
 from toolpath_stiff.machine.model import MachineTool
-from toolpath_stiff.readings.mapping import check_needed, mapped_table
+from toolpath_stiff.readings.mapping import check_needed, mapped_table, unused
 from toolpath_stiff.readings.measurements import lacking_columns, read_measurements
 from toolpath_stiff.readings.rows import (
     ANGLES,
@@ -156,7 +156,7 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
         notes += [
             *table.notes,
             *([f"{table.file}: {unloaded} rows of no force and no displacement are passed over"] if unloaded else []),
-            *(f"{table.file}: column {name} is not used" for name in table.heading if name not in used),
+            *unused(table, used),
         ]
     if not rows:
         raise MeasurementError("no rows below the heading", file=tables[0].file)
