@@ -106,7 +106,6 @@ def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
         **path,
     }
     weakest = [row.min_N_per_mm for row in rows]
-    errors = placed.surface_error_um
     digits = max(0, 2 - int(np.log10(path["scale"][1] - path["scale"][0])))  # soft machines have decimals
     return render(
         "place.html",
@@ -115,7 +114,7 @@ def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
         data=data,
         title=f"Placements of {placed.best.program.name}",
         about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
-        objective=placed.task.rules.objective + (f" · {_error_words(errors)}" if errors else ""),
+        objective=placed.task.rules.objective + (f" · {_error_words(e)}" if (e := placed.surface_error_um) else ""),
         load=str(best.load),
         note=note,
         warnings=placed.warnings,

@@ -32,7 +32,6 @@ from toolpath_stiff.units import mm_from_m
 
 LINE_END = re.compile("\r\n|\n|\r")
 PLAIN_DIALECTS = ("generic", "linuxcnc")
-TOOL_CENTRE = "post it as G code for this machine: the moves of the tool centre, one a block, without variables"
 SLASHED = "blocks that begin with / were rewritten as executed: run the written program with the switch off"
 
 
@@ -237,7 +236,7 @@ def check_rewritable(program: ReadProgram, shifted: bool = False) -> None:
     )
     for holds, what, instead in refused:
         if holds:
-            hint = TOOL_CENTRE if shifted else f"place it without --write{instead}"
+            hint = "post it as G code of the tool centre" if shifted else f"place it without --write{instead}"
             line = line_with_variables(program.source) if program.parametric else None
             raise ProgramError(f"a program {what} cannot be rewritten", hint=hint, file=program.name, line=line)
 
