@@ -142,6 +142,11 @@ def test_an_option_like_none_suggests_the_nearest(part, capsys):
     assert capsys.readouterr().err == "tps: error: tps path does not know '--stp'. Did you mean --step?\n"
 
 
+def test_an_option_is_not_abbreviated(part, capsys):
+    assert main(["compensate", str(part), "--cut", "cut.toml", "--out", "there"]) == 2
+    assert "tps compensate does not know '--out'" in capsys.readouterr().err
+
+
 def test_input_errors_are_one_line_without_traceback(part, capsys):
     part.write_text("G1 X10\n")  # a feed move before any F
     assert main(["path", "part.nc"]) == 2

@@ -62,7 +62,9 @@ class Command:
     def parser(self, title: str) -> Parser:
         """The parser of its arguments."""
         about, _, examples = (inspect.getdoc(self.run) or "").partition(PARAMETERS)[0].partition("\n\n")
-        parser = Parser(title, None, about, examples.rstrip(), formatter_class=argparse.RawDescriptionHelpFormatter)
+        shown = argparse.RawDescriptionHelpFormatter
+        # Without abbreviations: --out, a folder elsewhere, would be --output of a command that has none.
+        parser = Parser(title, None, about, examples.rstrip(), formatter_class=shown, allow_abbrev=False)
         parser._negative_number_matcher = NEGATIVE_VALUE
         for argument in self.arguments.values():
             parser.add(argument)
