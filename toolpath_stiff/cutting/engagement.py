@@ -19,11 +19,14 @@ from toolpath_stiff.cutting.stations import (
     BLOCK,
     STATION,
     TOUCH,
+    around,
     blocks_of_stations,
     heights_around,
     pieces_at,
+    samples_seen,
     stations_between,
 )
+from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.workpiece import Workpiece
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.path.sampling import Samples
@@ -80,15 +83,13 @@ def engage(
     samples: Samples,
     cutters: Mapping[int, Cutter],
     progress: Progress | None = None,
-    seen: BoolArray | None = None,
 ) -> Engagement:
-    """The engagement of samples, or those `seen` (n,) upright, in the frame that `moves` are in.
+    """The engagement of samples; `stages` are those of `workpiece.stages_of` the moves, `cutters` by number of the tool.
 
-    `stages` are those of `workpiece.stages_of` the moves, `cutters` by number of the tool.
+    A rapid whose tool turns on the way is not looked at.
     """
     count, parts, tell = len(samples), [NO_PATCHES], counter(progress, "engagement")
     source, removed, struck = np.arange(count), np.zeros(count), np.zeros(count, dtype=bool)
-    moving = np.flatnonzero((samples.tangent != 0.0).any(axis=1) & (True if seen is None else seen))
     regime = np.zeros(count, dtype=np.int64)  # changes of what forces hang on besides the path
     for column in (samples.tool, samples.feed, samples.spindle):
         regime[1:] += np.nan_to_num(column[1:]) != np.nan_to_num(column[:-1])
@@ -97,9 +98,12 @@ def engage(
     last["move"] = -1
     piece: IntArray | None = None
     for work in stages:
-        piece = pieces_at(work, samples.move[moving], samples.s[moving]) if piece is None else piece
+        if piece is None:
+            tilt, seen = samples_seen(work, samples)
+            moving = np.flatnonzero((samples.tangent != 0.0).any(axis=1) & (tilt != TURNING))
+            piece = pieces_at(work, samples.move[moving], samples.s[moving])
         end = int(np.searchsorted(piece, work.until)) if work.until < len(work.pieces) else len(moving)
-        for rows, stations in blocks_of_stations(work, samples, cutters, moving[begin:end]):
+        for rows, stations in blocks_of_stations(work, seen, tilt, cutters, moving[begin:end]):
             patches, own, rate = _contact_along(work, stations, regime[rows])
             rapid = stations["recent"] == len(work.pieces)
             struck[rows], rate[rapid] = rapid & (rate > 0.0), 0.0
@@ -195,10 +199,10 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
     corner = stations["reach"] - stations["flat"]
     rows = np.flatnonzero(~stations["end_alone"])
     wall, low = (stations["reach"][rows] - TOUCH)[:, None], corner[rows, None]
-    around = heights_around(work, stations[rows], wall, np.pi * SIDES[None, :], enough=low)
-    beyond = (around[0] > low).any(axis=1)  # the corner
-    rows, around = rows[beyond], (around[0][beyond], around[1][beyond])
-    borders = _levels(around, corner[rows, None], stations["longest"][rows, None], 1 if work.has_levels else PARTS)
+    beside = heights_around(work, stations[rows], wall, np.pi * SIDES[None, :], np.inf, low)
+    beyond = (beside[0] > low).any(axis=1)  # the corner
+    rows, beside = rows[beyond], (beside[0][beyond], beside[1][beyond])
+    borders = _levels(beside, corner[rows, None], stations["longest"][rows, None], 1 if work.has_levels else PARTS)
     reached = np.full(len(stations), 0.5 * np.pi)
     below = np.setdiff1d(np.flatnonzero((corner > 0.0) & ~stations["end_alone"]), rows)
     reached[below] = _reached(work, stations[below], corner[below])
@@ -219,8 +223,8 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
             inside = _cuts(work, own, radius[:, None], ring, height[:, None])
         else:
             ring = np.broadcast_to(np.pi * SIDES, (len(row), AROUND))
-            inside = (around[0][row] > height[:, None]) & (around[1][row] < height[:, None])
-            if work.others:  # which may leave gaps between
+            inside = (beside[0][row] > height[:, None]) & (beside[1][row] < height[:, None])
+            if work.tilted:  # there may be gaps between
                 inside = _cuts(work, own, radius[:, None], ring, height[:, None])
         which, entry, exit_ = _arcs(work, own, radius, height, ring, inside, HALVINGS[round_part])
         parts.append(Patches(some[row][which], low[which], high[which], entry, exit_))
@@ -231,8 +235,10 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
 
 def _cuts(work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray, height: FloatArray) -> BoolArray:
     """Whether material stands above points of the envelope."""
-    top, bottom = heights_around(work, stations, radius, angle, height + TOUCH, height, at=True)
-    return np.asarray((top > height) & (bottom < height))
+    x, y, tilt, window = around(stations, radius, angle)
+    shape = np.broadcast_shapes(radius.shape, angle.shape)
+    z = height + stations["z"].reshape((-1,) + (1,) * (len(shape) - 1))
+    return work.standing(np.stack([x, y, np.broadcast_to(z, shape).ravel()]), tilt, window).reshape(shape)
 
 
 def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatArray:
@@ -331,8 +337,10 @@ def _rates(stations: AnyArray, patches: Patches) -> FloatArray:
     )
     outer, inner = (stations["flat"] + corner * np.sin(angle) for angle in (second, first))
     downward = np.where(rounded, 0.5 * (outer**2 - inner**2), 0.0) * (patches.exit - patches.entry)
-    turned = np.cos(patches.entry) - np.cos(patches.exit)
-    return np.asarray(stations["level"] * turned * sideways + stations["down"] * downward)
+    turned, aside = np.cos(patches.entry) - np.cos(patches.exit), np.sin(patches.exit) - np.sin(patches.entry)
+    arm = 0.5 * ((patches.high - corner) ** 2 - (patches.low - corner) ** 2) * np.where(rounded, 0.0, stations["reach"])
+    swing = stations["swing_ahead"] * turned + stations["swing_left"] * aside
+    return np.asarray(stations["level"] * turned * sideways + stations["down"] * downward + arm * swing)
 
 
 def _end_area(work: Workpiece, stations: AnyArray) -> FloatArray:
