@@ -336,11 +336,13 @@ def _rates(stations: AnyArray, patches: Patches) -> FloatArray:
         rounded, stations["flat"], stations["reach"]
     )
     outer, inner = (stations["flat"] + corner * np.sin(angle) for angle in (second, first))
-    downward = np.where(rounded, 0.5 * (outer**2 - inner**2), 0.0) * (patches.exit - patches.entry)
+    below = np.where(rounded, 0.5 * (outer**2 - inner**2), 0.0)
+    downward = below * (patches.exit - patches.entry)
     turned, aside = np.cos(patches.entry) - np.cos(patches.exit), np.sin(patches.exit) - np.sin(patches.entry)
-    arm = 0.5 * ((patches.high - corner) ** 2 - (patches.low - corner) ** 2) * np.where(rounded, 0.0, stations["reach"])
+    beside = 0.5 * stations["reach"] * ((patches.high - corner) ** 2 - (patches.low - corner) ** 2)
     swing = stations["swing_ahead"] * turned + stations["swing_left"] * aside
-    return np.asarray(stations["level"] * turned * sideways + stations["down"] * downward + arm * swing)
+    swing *= np.where(rounded, stations["flat"] * below, beside)
+    return np.asarray(stations["level"] * turned * sideways + stations["down"] * downward + swing)
 
 
 def _end_area(work: Workpiece, stations: AnyArray) -> FloatArray:
@@ -349,12 +351,16 @@ def _end_area(work: Workpiece, stations: AnyArray) -> FloatArray:
     Counted over a spiral of even points (Vogel 1979), which turns along the path: its errors cancel.
     """
     area = np.zeros(len(stations))
-    rows = np.flatnonzero(stations["end_alone"] | ((stations["down"] > 0.0) & (stations["flat"] > 0.0)))
+    swings = (stations["swing_ahead"] != 0.0) | (stations["swing_left"] != 0.0)
+    rows = np.flatnonzero(stations["end_alone"] | (((stations["down"] > 0.0) | swings) & (stations["flat"] > 0.0)))
     some, number = stations[rows], np.arange(END_POINTS)
     widest = np.where(some["end_alone"], some["reach"], some["flat"])
     radius = widest[:, None] * np.sqrt((number + 0.5) / END_POINTS)[None, :]
     angle = np.pi * (3.0 - np.sqrt(5.0)) * number[None, :] + (some["path"] / np.maximum(some["reach"], TOUCH))[:, None]
     height = rise(some["reach"][:, None], some["flat"][:, None], radius) + TOUCH
-    area[rows] = np.pi * widest**2 * _cuts(work, some, radius, angle, height).mean(axis=1)
-    rapid = stations["recent"] == len(work.pieces)
-    return area * np.where(rapid, 1.0, np.maximum(stations["down"], 0.0))
+    cut = _cuts(work, some, radius, angle, height)
+    ahead, left = (some[name][:, None] for name in ("swing_ahead", "swing_left"))
+    fall = some["down"][:, None] + radius * (np.sin(angle) * ahead + np.cos(angle) * left)
+    fall = np.where((some["recent"] == len(work.pieces))[:, None], 1.0, np.maximum(fall, 0.0))
+    area[rows] = np.pi * widest**2 * (cut * fall).mean(axis=1)
+    return area

@@ -158,16 +158,19 @@ def lower(
             part = pieces[piece[entry]]
             arc, smaller = part["turn"] != 0.0, slack if piece[entry] >= slack_from[i] else 0.0
             x, y, z = px[i], py[i], pz[i]
+            least: float = part["z"] + min(part["slope"] * part["extent"], 0.0)
             if tilted:
                 turn = turns[part["tilt"]]
-                x = px[i] * turn[0, 0] + py[i] * turn[1, 0] + pz[i] * turn[2, 0]
-                y = px[i] * turn[0, 1] + py[i] * turn[1, 1] + pz[i] * turn[2, 1]
-                z = px[i] * turn[0, 2] + py[i] * turn[1, 2] + pz[i] * turn[2, 2]
                 if smaller == 0.0 and part["tilt"] != tilt[i]:
                     smaller = -slack
+                z = px[i] * turn[0, 2] + py[i] * turn[1, 2] + pz[i] * turn[2, 2]
+                if least + smaller - z >= best:
+                    continue
+                x = px[i] * turn[0, 0] + py[i] * turn[1, 0] + pz[i] * turn[2, 0]
+                y = px[i] * turn[0, 1] + py[i] * turn[1, 1] + pz[i] * turn[2, 1]
+            least += smaller - z
             along, beside, spoke = foot(part, x, y, arc)
             near = distance(beside, within(along, part["extent"]) - along, spoke, arc)
-            least: float = part["z"] + min(part["slope"] * part["extent"], 0.0) + smaller - z
             if near > part["reach"] - smaller or least + rise(part["reach"], part["flat"], near) >= best:
                 continue
             sloped, bull = part["slope"] != 0.0, 0.0 < part["flat"] < part["reach"]

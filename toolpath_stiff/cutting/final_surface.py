@@ -6,8 +6,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter
-from toolpath_stiff.cutting.envelopes import down_slope, foot, rise
-from toolpath_stiff.cutting.envelopes import within as nearest
+from toolpath_stiff.cutting.envelopes import down_slope, foot, rise, within
 from toolpath_stiff.cutting.stations import blocks_of_stations, points_around
 from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.workpiece import Workpiece, in_frames
@@ -16,6 +15,7 @@ from toolpath_stiff.path.sampling import Samples
 
 BESIDE = 2e-6  # m, outside of a wall, where it must stand; and how far above the finished surface still is that surface
 FACETS = 5e-5  # m, the same beside a tool that turns on its way, whose pieces are facets
+COLUMNS, DEEP = 32, 1e9  # of cells at a time; m, below everything
 MADE = 5.0  # times that, along a tool, within which the piece lies that made a surface
 TOUCHED = 2e-7  # m, within which a later pass touches a surface, and makes it: less than any surface error
 LATER, LATER_TURNING = 0.1, 1.0  # radii of the cutter along the path from where on a pass is another one
@@ -40,7 +40,11 @@ def walls_of_passes(
         sides, reach = np.array([[0.0, np.pi]]), stations["reach"][:, None]
         far = _beside(work, stations)
         x, y = points_around(stations, reach + far[:, None], sides)
-        every, tip, own_tilt = np.full(len(x), len(work.pieces)), np.repeat(stations["z"], 2), np.repeat(stations["tilt"], 2)
+        every, tip, own_tilt = (
+            np.full(len(x), len(work.pieces)),
+            np.repeat(stations["z"], 2),
+            np.repeat(stations["tilt"], 2),
+        )
         other = stations["path"] + np.where(far > BESIDE, LATER_TURNING, LATER) * stations["reach"]
         later = np.repeat(np.searchsorted(work.pieces["before"], other, "right"), 2)
         limits = tip + np.repeat(stations["reach"] - stations["flat"], 2), tip + np.repeat(stations["longest"], 2)
@@ -109,23 +113,24 @@ def finished_surface(
         for corner, edge, count in zip(work.stock.corner, size, np.ceil(size / cell).astype(np.int64), strict=True)
     )
     top, owner = np.empty((len(x), len(y))), np.empty((len(x), len(y)), dtype=np.int64)
-    upright = np.zeros(len(y), dtype=np.int64)
-    whole = upright, np.full(len(y), len(work.pieces))
-    for i in range(len(x)):
-        column = np.full(len(y), x[i])
+    for rows in (slice(start, start + COLUMNS) for start in range(0, len(x), COLUMNS)):
+        across, along = (places.ravel() for places in np.meshgrid(x[rows], y, indexing="ij"))
+        upright = np.zeros(len(across), dtype=np.int64)
+        whole = upright, np.full(len(across), len(work.pieces))
         if work.tilted:
-            top[i] = work.span(column, y, upright, (-np.inf, np.inf), whole)[1]
-            within = np.stack([column, y, top[i] - BESIDE])
-            piece = work.lowest(within, upright, whole, np.full(len(y), MADE * BESIDE))[1]
-            top[i, (piece < 0) & (top[i] < work.stock.tops(column, y) - BESIDE)] = -np.inf
+            high = work.span(across, along, upright, (-np.inf, np.inf), whole)[1]
+            below = np.stack([across, along, np.maximum(high, -DEEP) - BESIDE])
+            piece = work.lowest(below, upright, whole, np.full(len(across), MADE * BESIDE))[1]
+            high[(piece < 0) & (high < work.stock.tops(across, along) - BESIDE)] = -np.inf
         else:
-            top[i], piece = work.tops(column, y, whole)
+            high, piece = work.tops(across, along, whole)
         part: AnyArray = work.pieces[piece]
-        x_seen, y_seen, _ = in_frames(np.stack([column, y, top[i]]), work.turns, part["tilt"])
-        along = np.where(part["turn"] != 0.0, *(foot(part, x_seen, y_seen, arc)[0] for arc in (True, False)))
-        share = nearest(along, part["extent"]) / np.where(part["extent"] > 0.0, part["extent"], 1.0)
+        seen = in_frames(np.stack([across, along, np.maximum(high, -DEEP)]), work.turns, part["tilt"])[:2]
+        place = np.where(part["turn"] != 0.0, *(foot(part, *seen, arc)[0] for arc in (True, False)))
+        share = within(place, part["extent"]) / np.where(part["extent"] > 0.0, part["extent"], 1.0)
         path = part["before"] + share * (part["after"] - part["before"])
-        owner[i] = np.where(piece < 0, -1, np.searchsorted(0.5 * (samples.s[1:] + samples.s[:-1]), path))
+        made = np.where(piece < 0, -1, np.searchsorted(0.5 * (samples.s[1:] + samples.s[:-1]), path))
+        top[rows], owner[rows] = high.reshape(-1, len(y)), made.reshape(-1, len(y))
     return x, y, np.where(top <= work.stock.bottom.min(), -np.inf, top), owner
 
 

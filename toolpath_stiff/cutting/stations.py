@@ -68,7 +68,9 @@ def stations_at(
         part: AnyArray = work.pieces[np.minimum(stations["piece"], len(work.pieces) - 1)]
         x, y, ahead_x, ahead_y = part["swing_x"], part["swing_y"], stations["ahead_x"], stations["ahead_y"]
         stations["swing_ahead"], stations["swing_left"] = x * ahead_x + y * ahead_y, y * ahead_x - x * ahead_y
-        run = np.maximum.accumulate(np.where(work.pieces["tilt"] > work.tilts.max(), 0, np.arange(1, len(work.pieces) + 1)))
+        run = np.maximum.accumulate(
+            np.where(work.pieces["tilt"] > work.tilts.max(), 0, np.arange(1, len(work.pieces) + 1))
+        )
         until = np.maximum(recent, run[np.maximum(stations["piece"] - 1, 0)])
         stations["until"] = np.where(turning, np.minimum(until, stations["piece"]), stations["piece"])
     return stations

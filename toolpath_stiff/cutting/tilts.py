@@ -24,7 +24,9 @@ def tilts_of(moves: Moves, orient: Orient) -> tuple[IntArray, FloatArray, FloatA
     along = [axes_along(moves, every, np.full(len(moves), share), orient) for share in SHARES]
     programmed = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).sum(axis=1)
     chords = [np.linalg.norm(second - first, axis=1) for first, second in zip(along, along[1:], strict=False)]
-    swing = np.where(programmed < WHOLE, sum(2.0 * np.arcsin(0.5 * np.minimum(chord, 2.0)) for chord in chords), programmed)
+    swing = np.where(
+        programmed < WHOLE, sum(2.0 * np.arcsin(0.5 * np.minimum(chord, 2.0)) for chord in chords), programmed
+    )
     still = np.logical_and.reduce([np.abs(axis - along[0]).max(axis=1) < 10.0**-DIGITS for axis in along[1:]])
     axes = np.round(np.concatenate([[[0.0, 0.0, 1.0]], along[0][still]]), DIGITS)
     axes, number = np.unique(axes, axis=0, return_inverse=True)

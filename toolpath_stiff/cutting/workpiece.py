@@ -51,7 +51,9 @@ BEFORE = 1024  # pieces: between a station of the stage before and the first of 
 Window = tuple[IntArray, ...]  # (n,) the first piece, the one after the last; the first of those just before
 # A piece in a cell, and m, bounds of the height that it leaves there.
 ENTRY = np.dtype([("cell", np.int32), ("piece", np.int32), ("below", np.float64), ("above", np.float64)])
-OFFSET = np.array([0.3819e-3, 0.2764e-3, 0.1459e-3])  # m: walls at round coordinates shall not run along borders of cells
+OFFSET = np.array(
+    [0.3819e-3, 0.2764e-3, 0.1459e-3]
+)  # m: walls at round coordinates shall not run along borders of cells
 
 
 @dataclass(frozen=True)
@@ -196,10 +198,14 @@ class Workpiece:
             place = np.stack([x[some], y[some], base[some] + share * size[some]])
             return self.standing(place, tilt[some], tuple(values[some] for values in window))
 
-        found = np.array([stands(rows, np.full(len(rows), share)) for share in SHARES])
-        high[rows[~found.any(axis=0)]] = -np.inf
-        for limit, order in ((low, 1), (high, -1)):
-            first, shares = found[::order].argmax(axis=0), SHARES[::order]
+        for limit, shares in ((high, SHARES[::-1]), (low, SHARES)):
+            first = np.full(len(rows), len(shares))
+            for number, share in enumerate(shares):
+                rest = np.flatnonzero(first == len(shares))
+                found = stands(rows[rest], np.full(len(rest), share))
+                first[rest[found]] = number
+            high[rows[first == len(shares)]] = -np.inf
+            rows, first = rows[first < len(shares)], first[first < len(shares)]
             cut = np.flatnonzero(first > 0)
             inner, outer, some = shares[first[cut]], shares[first[cut] - 1], rows[cut]
             for _ in range(HALVINGS):
@@ -263,9 +269,7 @@ def stages_of(
         yield Workpiece(stock, pieces, first, until, tilts, turns, *grid, index, quick)
 
 
-def _bounded(
-    pieces: AnyArray, turns: FloatArray, piece: IntArray, cell: IntArray, grid: Grid, quick: bool
-) -> AnyArray:
+def _bounded(pieces: AnyArray, turns: FloatArray, piece: IntArray, cell: IntArray, grid: Grid, quick: bool) -> AnyArray:
     """Entries (k,) of pieces in cells that they pass, some of those (e, 3) given."""
     corner, size, (wide, deep) = grid
     tilted = len(turns) > 1
@@ -324,7 +328,9 @@ def _boxes(pieces: AnyArray, turns: FloatArray, stock: Stock) -> tuple[FloatArra
     if len(turns) == 1:
         points = np.stack([place.T * (1.0, 1.0, 0.0) for place in places])
         return points.min(axis=0) - margin, points.max(axis=0) + margin
-    points = np.stack([np.stack(in_frames(place, np.swapaxes(turns, 1, 2), pieces["tilt"]), axis=1) for place in places])
+    points = np.stack(
+        [np.stack(in_frames(place, np.swapaxes(turns, 1, 2), pieces["tilt"]), axis=1) for place in places]
+    )
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     # Along the tool, as far as the stock is.
     axis = turns[pieces["tilt"], :, 2]
