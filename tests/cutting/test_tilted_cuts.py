@@ -1,5 +1,6 @@
 """Tools that stand aslant: a cut turned as a whole is the same cut; operations of several tilts against manifold3d."""
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -66,7 +67,8 @@ def test_a_cut_turned_as_a_whole_is_the_same_cut(monkeypatch, abc, corner):
     upright, tilted = Tilted(moves, 80.0, corner), Tilted(as_a_whole(moves, abc), 120.0, corner)
     body = upright.samples.line > text[: text.index(BODY)].count("\n")
     np.testing.assert_allclose(tilted.removed[body].sum(), upright.removed[body].sum(), rtol=2e-5)
-    np.testing.assert_allclose(tilted.removed[body], upright.removed[body], atol=2e-3)
+    resolved = 2e-3 if corner < 5.0 else 2e-2  # round a ball arcs are halved down to 2.5e-3 rad
+    np.testing.assert_allclose(tilted.removed[body], upright.removed[body], atol=resolved)
     sizes = [
         np.bincount(cut.patches.station, (cut.patches.exit - cut.patches.entry) * (cut.patches.high - cut.patches.low))
         for cut in (upright, tilted)
@@ -180,3 +182,39 @@ def test_a_mill_that_turns_the_work_gives_way_along_the_axes_of_the_work(tmp_pat
     axes = np.stack([feed, np.cross(tool[:, 2], feed), tool[:, 2]], axis=1)
     expected = axes.T @ base @ axes @ found.cut.mean_force[row]
     np.testing.assert_allclose(found.cut.deflection[row], expected, rtol=1e-5)
+
+
+def posed(place, rotary):
+    """Axes of the tool and its tip, (3, 4), mm."""
+    return np.column_stack([rotation_matrices(np.radians(rotary)), place])
+
+
+@pytest.mark.parametrize("corner", [0.0, 1.5])
+def test_a_tool_that_turns_on_its_way_removes_what_manifold3d_says(corner):
+    """Wave after wave, tilted up to 15 degrees each way: hulls of the cutter every half degree."""
+    manifold3d = pytest.importorskip("manifold3d")
+    low, high, corners, radius = (-25, -12, -8), (10, 12, 0), 64, 5.0
+    radius /= np.sqrt(np.sin(2.0 * np.pi / corners) / (2.0 * np.pi / corners))
+    tool = manifold3d.Manifold.cylinder(60.0 - corner, radius, radius, corners).translate((0, 0, corner))
+    if corner:
+        ball = manifold3d.Manifold.sphere(corner, corners)
+        around = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+        rim = [ball.translate(((5 - corner) * np.cos(a), (5 - corner) * np.sin(a), corner)) for a in around]
+        tool = manifold3d.Manifold.batch_hull([*rim, tool])
+    x = np.linspace(-31.0, 10.0, 8)
+    places = np.stack([x, -2.0 + 0.0 * x, -2.0 + 0.5 * np.sin(x / 5.0)], axis=1)
+    rotary = np.stack([-15.0 * np.sin(x / 12.0), 15.0 * np.cos(x / 16.0), 0.0 * x], axis=1)
+    rows = zip(places, rotary, strict=True)
+    words = ["X{:.6f} Y{:.6f} Z{:.6f} A{:.6f} B{:.6f}".format(*place, *turn[:2]) for place, turn in rows]
+    text = HEAD + "G0 Z40\n" + "\n".join([f"G0 {words[0]}", *(f"G1 {word}" for word in words[1:]), "G0 Z40\nM30\n"])
+    cut = Tilted(parse_program(text).moves, 0.0, corner, low, high)
+    left, moves = manifold3d.Manifold.cube(tuple(np.subtract(high, low))).translate(low), cut.moves
+    removed = np.bincount(cut.samples.move, cut.removed, len(moves))[np.flatnonzero(moves.motion != 0)]
+    for row, volume in enumerate(removed):
+        ends, before = (places[row : row + 2], rotary[row : row + 2]), left.volume()
+        shares = np.linspace(0.0, 1.0, int(np.ceil(np.abs(np.diff(ends[1], axis=0)).max() / 0.5)) + 1)
+        poses = [tool.transform(posed(*(end[0] + share * (end[1] - end[0]) for end in ends))) for share in shares]
+        left -= manifold3d.Manifold.batch_boolean(
+            [manifold3d.Manifold.batch_hull(list(pair)) for pair in itertools.pairwise(poses)], manifold3d.OpType.Add
+        )
+        assert volume == pytest.approx(before - left.volume(), rel=0.015, abs=0.1)

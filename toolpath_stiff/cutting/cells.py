@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from toolpath_stiff.arrays import IntArray, numbered, portions
 
 PORTION = 20_000  # entries at a time: the arrays stay in the processor's cache

@@ -16,9 +16,9 @@ from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.passes import walls_of_all_passes
 from toolpath_stiff.cutting.patches import Contact, Patches, of_stations
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
+from toolpath_stiff.cutting.stations import samples_seen
 from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
-from toolpath_stiff.cutting.stations import samples_seen
 from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
 from toolpath_stiff.cutting.workpiece import Workpiece, stages_of

@@ -84,7 +84,7 @@ def engage(
     cutters: Mapping[int, Cutter],
     progress: Progress | None = None,
 ) -> Engagement:
-    """The engagement of samples; `stages` are those of `workpiece.stages_of` the moves, `cutters` by number of the tool.
+    """The engagement of samples; `stages` as of `workpiece.stages_of` the moves, `cutters` by number of the tool.
 
     A rapid whose tool turns on the way is not looked at.
     """

@@ -125,8 +125,8 @@ def finished_surface(
         else:
             high, piece = work.tops(across, along, whole)
         part: AnyArray = work.pieces[piece]
-        seen = in_frames(np.stack([across, along, np.maximum(high, -DEEP)]), work.turns, part["tilt"])[:2]
-        place = np.where(part["turn"] != 0.0, *(foot(part, *seen, arc)[0] for arc in (True, False)))
+        u, v, _ = in_frames(np.stack([across, along, np.maximum(high, -DEEP)]), work.turns, part["tilt"])
+        place = np.where(part["turn"] != 0.0, foot(part, u, v, True)[0], foot(part, u, v, False)[0])
         share = within(place, part["extent"]) / np.where(part["extent"] > 0.0, part["extent"], 1.0)
         path = part["before"] + share * (part["after"] - part["before"])
         made = np.where(piece < 0, -1, np.searchsorted(0.5 * (samples.s[1:] + samples.s[:-1]), path))

@@ -15,8 +15,8 @@ from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.path.sampling import Samples
 
 BLOCK = 8192  # stations at a time
-# Radii of the cutter along the path, whose pieces are those just before. Where the tool turns on its way, these count as
-# not yet cut: a piece ends with the tool turned back a little from where the next begins.
+# Radii of the cutter along the path, whose pieces are those just before. Where the tool turns on its way, these count
+# as not yet cut: a piece ends with the tool turned back a little from where the next begins.
 RECENT, RECENT_TURNING = 0.05, 0.25
 TOUCH = 1e-9  # m, by which the envelope is taken for smaller: what it only touches is not in cut
 

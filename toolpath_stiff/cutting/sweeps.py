@@ -1,7 +1,7 @@
 """What the cutter sweeps, piece by piece of the path: straight lines and arcs in the plane, with a slope.
 
-Each in the frame of its tilt, in which the tool stands upright. Where the tool turns on its way, a piece is a chord with
-the tool as it stands in its middle, which goes where the middle of the cutter's corner goes: so a ball stays where it is.
+Each in the frame of its tilt, in which the tool stands upright. Where the tool turns on its way, a piece is a chord
+with the tool as it stands in its middle, along which the middle of the cutter's corner goes: a ball stays where it is.
 """
 
 from collections.abc import Mapping
@@ -82,15 +82,12 @@ def sweeps_of(
     tilt = tilts[move]
     turning = np.flatnonzero(tilt == TURNING)
     if len(turning):
-        of, at, span = move[turning], share[turning], part[turning]
-        first_axis, axis, last_axis = (axes_along(moves, of, at + half * span, orient) for half in (0.0, 0.5, 1.0))
-        corner = (radius - flat)[of, None]
-        start[turning] += corner * (first_axis - axis)
-        end[turning] += corner * (last_axis - axis)
+        of, share, part = move[turning], share[turning], part[turning]
+        axes = [axes_along(moves, of, share + half * part, orient) for half in (0.0, 0.5, 1.0)]
+        start[turning] += (radius - flat)[of, None] * (axes[0] - axes[1])
+        end[turning] += (radius - flat)[of, None] * (axes[2] - axes[1])
         tilt[turning] = len(turns) + np.arange(len(turning))
-        turns = np.concatenate([turns, upright_frames(axis)])
-        path = np.where(length[of] > 0.0, span * length[of], np.inf)
-        swing = product((last_axis - first_axis)[:, None], turns[tilt[turning]])[:, 0, :2] / path[:, None]
+        turns = np.concatenate([turns, upright_frames(axes[1])])
     if len(turns) > 1:
         start, end = (product(ends[:, None], turns[tilt])[:, 0] for ends in (start, end))
     along = end - start
@@ -98,11 +95,13 @@ def sweeps_of(
     plunge = level < 1e-9
     pieces = np.zeros(len(move), dtype=PIECE)
     pieces["tilt"] = tilt
-    if len(turning):
-        pieces["swing_x"][turning], pieces["swing_y"][turning] = swing.T
     pieces["reach"], pieces["flat"] = radius[move], flat[move]
-    pieces["before"] = (np.cumsum(length) - length)[move] + share * length[move]
+    pieces["before"] = (np.cumsum(length) - length)[move] + number / counts[move] * length[move]
     pieces["after"] = pieces["before"] + length[move] / counts[move]
+    if len(turning):
+        path = np.where(pieces["after"] > pieces["before"], pieces["after"] - pieces["before"], np.inf)[turning]
+        swing = product((axes[2] - axes[0])[:, None], turns[tilt[turning]])[:, 0]
+        pieces["swing_x"][turning], pieces["swing_y"][turning] = swing[:, :2].T / path
     pieces["x"], pieces["y"] = start[:, 0], start[:, 1]
     pieces["z"] = np.where(plunge, np.minimum(start, end)[:, 2], start[:, 2])
     pieces["heading"] = np.arctan2(along[:, 1], along[:, 0])
@@ -111,14 +110,20 @@ def sweeps_of(
     rows = np.flatnonzero(plane[move])
     if len(rows):
         of = move[rows]
-        frame, sweep, part = arc_frame(moves, of), moves.arc_sweep[of], np.abs(moves.arc_sweep[of]) / counts[of]
-        center = product(frame.center[:, None], turns[tilts[of]])[:, 0]
-        spoke = start[rows] - center
-        pieces["x"][rows], pieces["y"][rows] = center[:, 0], center[:, 1]
-        pieces["turn"][rows] = np.sign(sweep * upward[of])
-        pieces["heading"][rows] = np.arctan2(spoke[:, 1], spoke[:, 0])
-        pieces["extent"][rows], pieces["slope"][rows] = part, along[rows, 2] / part
-        pieces["radius"][rows] = np.hypot(spoke[:, 0], spoke[:, 1])
-        pieces["growth"][rows] = (frame.radius_end - frame.radius_start) / np.abs(sweep)
+        _enter_arcs(pieces, rows, moves.take(of), turns[tilts[of]], upward[of] / counts[of])
     pieces["cos"], pieces["sin"] = np.cos(pieces["heading"]), np.sin(pieces["heading"])
     return pieces, first, tilts, turns
+
+
+def _enter_arcs(pieces: AnyArray, rows: IntArray, arcs: Moves, turns: FloatArray, upward: FloatArray) -> None:
+    """Make arcs (k,) of the lines in some rows; (k, 3, 3) frames, (k,) side of the normal over the number of pieces."""
+    frame, sweep = arc_frame(arcs, np.arange(len(rows))), arcs.arc_sweep
+    x, y = product(frame.center[:, None], turns)[:, 0, :2].T
+    part, beside = np.abs(sweep * upward), (pieces["x"][rows] - x, pieces["y"][rows] - y)
+    climb = pieces["slope"][rows] * pieces["extent"][rows]
+    pieces["x"][rows], pieces["y"][rows] = x, y
+    pieces["turn"][rows] = np.sign(sweep * upward)
+    pieces["heading"][rows] = np.arctan2(beside[1], beside[0])
+    pieces["extent"][rows], pieces["slope"][rows] = part, climb / part
+    pieces["radius"][rows] = np.hypot(*beside)
+    pieces["growth"][rows] = (frame.radius_end - frame.radius_start) / np.abs(sweep)

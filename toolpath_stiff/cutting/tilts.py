@@ -1,5 +1,7 @@
 """Tools that do not stand along Z: the directions that they have, and frames in which they stand upright."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
@@ -23,7 +25,7 @@ def tilts_of(moves: Moves, orient: Orient) -> tuple[IntArray, FloatArray, FloatA
     every = np.arange(len(moves))
     along = [axes_along(moves, every, np.full(len(moves), share), orient) for share in SHARES]
     programmed = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).sum(axis=1)
-    chords = [np.linalg.norm(second - first, axis=1) for first, second in zip(along, along[1:], strict=False)]
+    chords = [np.linalg.norm(second - first, axis=1) for first, second in pairwise(along)]
     swing = np.where(
         programmed < WHOLE, sum(2.0 * np.arcsin(0.5 * np.minimum(chord, 2.0)) for chord in chords), programmed
     )

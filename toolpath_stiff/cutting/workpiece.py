@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered, portions, product
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered, portions
 from toolpath_stiff.cutting.cells import PORTION, cells_of_boxes
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import (
@@ -115,7 +115,7 @@ class Workpiece:
         ceiling: FloatArray | float = np.inf,
         enough: FloatArray | float = -np.inf,
     ) -> tuple[FloatArray, IntArray]:
-        """(n,) m, height of what some pieces of upright tools leave, and (n,) the last piece that left it; -1: the stock.
+        """(n,) m, height of what some pieces of upright tools leave, (n,) the last piece that left it; -1: the stock.
 
         A `ceiling` (n,) stands for what is higher; a height below `enough` (n,) may be any that is. Owners are right
         without them.
@@ -135,8 +135,8 @@ class Workpiece:
         if self.quick:
             grid = self.corner, self.size, *self.columns
             compiled()[1](
-                (self.pieces, self.turns), grid, self.index, (*places, tilt), (first, last), (late, SLACK), (top, owner),
-                np.full(len(top), enough),
+                (self.pieces, self.turns), grid, self.index, (*places, tilt), (first, last), (late, SLACK),
+                (top, owner), np.full(len(top), enough),
             )  # fmt: skip
             return top, owner
         low, high = self._entries(places, first, last)
@@ -173,7 +173,7 @@ class Workpiece:
         rows = np.flatnonzero(stands)
         some = tuple(values[rows] for values in window)
         stands[rows] = self.lowest(places[:, rows], tilt[rows], some, np.full(len(rows), np.inf), 0.0)[0] > 0.0
-        return stands
+        return np.asarray(stands)
 
     def span(
         self,
