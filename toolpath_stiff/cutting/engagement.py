@@ -15,13 +15,12 @@ from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, num
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import rise
 from toolpath_stiff.cutting.patches import Patches
+from toolpath_stiff.cutting.rings import around, heights_around
 from toolpath_stiff.cutting.stations import (
     BLOCK,
     STATION,
     TOUCH,
-    around,
     blocks_of_stations,
-    heights_around,
     pieces_at,
     samples_seen,
     stations_between,

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray, numbered, product
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered, product
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.tilts import TURNING, axes_along, tilts_of, upright_frames
 from toolpath_stiff.errors import ProgramError
@@ -66,15 +66,7 @@ def sweeps_of(
         flat[cuts & (moves.tool == tool)] = cutters[tool].radius - cutters[tool].corner_radius
     upward = moves.arc_normal[:, 2] if len(turns) == 1 else (moves.arc_normal * turns[tilts, :, 2]).sum(axis=1)
     plane = cuts & (moves.arc_sweep != 0.0) & (np.abs(upward) > 1.0 - 1e-9) & (tilts != TURNING)
-    bent = cuts & (moves.arc_sweep != 0.0) & ~plane
-    counts = np.where(cuts, np.maximum(np.ceil(length / (STRAIGHT * np.where(cuts, radius, 1.0)) - 1e-9), 1.0), 0.0)
-    arcs = np.flatnonzero(cuts & (moves.arc_sweep != 0.0))
-    if len(arcs):
-        frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
-        turn = np.where(frame.radius_start < radius[arcs], NARROW_TURN, ARC_TURN)
-        turn = np.where(bent[arcs], np.sqrt(8.0 * SAGITTA / frame.radius_start), turn)
-        counts[arcs] = np.ceil(sweep / turn - 1e-9)
-    counts = np.where(cuts, np.maximum(counts, np.ceil(angle / PIECE_TURN - 1e-9)), 0.0)
+    counts = _counts(moves, length, radius, angle, cuts, cuts & (moves.arc_sweep != 0.0) & ~plane)
     first = np.append(0, np.cumsum(counts.astype(np.int64)))
     move, number = numbered(counts.astype(np.int64))
     share, part = number / counts[move], 1.0 / counts[move]
@@ -127,3 +119,17 @@ def _enter_arcs(pieces: AnyArray, rows: IntArray, arcs: Moves, turns: FloatArray
     pieces["extent"][rows], pieces["slope"][rows] = part, climb / part
     pieces["radius"][rows] = np.hypot(*beside)
     pieces["growth"][rows] = (frame.radius_end - frame.radius_start) / np.abs(sweep)
+
+
+def _counts(
+    moves: Moves, length: FloatArray, radius: FloatArray, angle: FloatArray, cuts: BoolArray, bent: BoolArray
+) -> FloatArray:
+    """(n,) number of pieces of each move; `bent` arcs are chords, `angle` is what the tool turns by."""
+    counts = np.where(cuts, np.maximum(np.ceil(length / (STRAIGHT * np.where(cuts, radius, 1.0)) - 1e-9), 1.0), 0.0)
+    arcs = np.flatnonzero(cuts & (moves.arc_sweep != 0.0))
+    if len(arcs):
+        frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
+        turn = np.where(frame.radius_start < radius[arcs], NARROW_TURN, ARC_TURN)
+        turn = np.where(bent[arcs], np.sqrt(8.0 * SAGITTA / frame.radius_start), turn)
+        counts[arcs] = np.ceil(sweep / turn - 1e-9)
+    return np.where(cuts, np.maximum(counts, np.ceil(angle / PIECE_TURN - 1e-9)), 0.0)
