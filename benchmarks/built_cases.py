@@ -29,7 +29,6 @@ BUILT = ("fem", "springs")
 POSES = (12, 28)  # fewest and most of a campaign
 PAIR_SIZES = (0.10, 0.05)  # rms change of ln k of the two
 SERIES = {"joints", "struts", "one strut"}  # all in series along a strut: the tip cannot tell them apart
-WORTH_A_LAW = 1.0  # points of mean error from which on the law of an adequate model is refitted
 PLANNED = 6  # visits of a plan
 
 
@@ -110,6 +109,8 @@ def _judged(job: Job, folder: Path) -> Record:
         more = planned(diagnosis, file, case, np.random.default_rng([job.seed, 5]))
         again = tps.diagnose([file, *more])
         record["planned"] = answer_of(again) | along_path(updated(again, [file, *more], folder), path)
+    if truths and not any("instrument" in truth["links"] for truth in truths):
+        record["believed"] = along_path(updated(diagnosis, [file], folder, believe="machine"), path)["after"]
     return record | answer_of(diagnosis) | along_path(updated(diagnosis, [file], folder), path)
 
 
@@ -207,8 +208,10 @@ def _percent(model: FloatArray, true: FloatArray, rows: FloatArray) -> float:
     return round(float(100.0 * np.mean(np.abs(model / true - 1.0)[rows])), 3)
 
 
-def updated(diagnosis: tps.Diagnosis, files: Sequence[Path], folder: Path) -> tps.Update | None:
-    """The update that a verdict leads to: its first explanation, a draft, or the strut law; None for none."""
+def updated(
+    diagnosis: tps.Diagnosis, files: Sequence[Path], folder: Path, believe: str | None = None
+) -> tps.Update | None:
+    """The update that a verdict leads to: its first explanation, what `auto` finds, or a draft; None for none."""
     said = diagnosis.to_dict()
     try:
         if said["verdict"] == "unexplained":
@@ -217,13 +220,10 @@ def updated(diagnosis: tps.Diagnosis, files: Sequence[Path], folder: Path) -> tp
                 return None
             (folder / "missing.toml").write_text(draft.text)
             with_draft = tps.Machine.load("nist", effects=[folder / "missing.toml"])
-            return tps.update(files, with_draft, add=list(draft.effects))
+            return tps.update(files, with_draft, add=list(draft.effects), believe=believe)
         first = next((words for words in said["explanations"] if words != "none"), "")
-        if said["verdict"] == "adequate":
-            law = tps.update(files, strut_law=True)
-            errors = law.to_frame()["mean_abs_error_percent"]
-            return law if errors.iloc[0] > errors.iloc[-1] + WORTH_A_LAW else None
-        return tps.update(files, add=first.split(" + "))
+        named = tps.update(files, add=first.split(" + "), believe=believe) if said["verdict"] != "adequate" else None
+        return named if named is not None and named.accepted else tps.update(files, auto=True, believe=believe)
     except tps.InputError:
         return None
 

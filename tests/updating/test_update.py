@@ -11,7 +11,7 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.correction.additions import parse_addition
-from toolpath_stiff.correction.task import UpdateTask
+from toolpath_stiff.correction.task import MACHINE, UpdateTask
 from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.prediction import Predictor
@@ -80,6 +80,30 @@ def test_auto_adds_what_is_hidden_and_then_stops(two):
     assert held[-1] < 1.3 * MEAN_OVER_SD * found.noise.typical
     assert found.turned_down
     assert not any(one.supported for one in found.turned_down)
+
+
+@pytest.fixture(scope="module")
+def soft():
+    """24 tilted poses of a sound rig machine whose joints give way as well: to the tip a strut law that is off."""
+    data = campaign(100, "tilted", "none")[0]
+    predictor = Predictor(nist(), data)
+    gives = predictor.log_stiffness((0.0, 0.0), [active("joint_compliance", compliance=3e-9)])
+    return replace(data, stiffness=data.stiffness * np.exp(gives - predictor.log_stiffness()))
+
+
+@pytest.mark.parametrize("asked", [{"add": ("joint_compliance",)}, {"auto": True}], ids=["add", "auto"])
+def test_what_effect_and_law_may_both_be_is_taken_away_by_either(soft, asked):
+    found = build_ladder(UpdateTask(nist(), soft, believe=MACHINE, **asked))
+    assert found.accepted and found.last.fit.names == asked.get("add", ())
+    assert found.steps[0].held.mean_error > 0.08
+    assert found.last.held.mean_error < 1.3 * MEAN_OVER_SD * found.noise.typical
+    # The law stays as given beside the effect, and moves without it.
+    assert bool(found.last.fit.law.any()) == (not found.last.fit.names)
+
+
+def test_an_instrument_for_which_the_law_may_stand_is_not_corrected(soft):
+    found = build_ladder(UpdateTask(nist(), soft, ("load_cell_curvature",)))
+    assert not found.accepted
 
 
 def test_auto_finds_the_hidden_sizes(two):

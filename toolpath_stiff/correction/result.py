@@ -152,7 +152,8 @@ class Update(FolderResult):
     @property
     def changed(self) -> bool:
         """True where there is something to be written."""
-        return bool(self.steps[-1].fit.names) or self.task.strut_law
+        law = any(support.effect == LAW_REFITTED for support in self.supports)
+        return bool(self.steps[-1].fit.names) or self.task.strut_law or law
 
     @property
     def worse(self) -> bool:
@@ -386,8 +387,9 @@ class Update(FolderResult):
             ]
         sentences.append(
             f"an effect is kept if the error at left-out points falls by more than {NEEDED:g} standard error, no "
-            "parameter ends at its bound, and its gain in likelihood, the strut law refitted with and without it, is "
-            "beyond what the best of all candidates gains by chance once in twenty campaigns"
+            "parameter ends at its bound, and its gain in likelihood is beyond what the best of all candidates gains "
+            "by chance once in twenty campaigns: the strut law refitted with and without it, or kept with and without "
+            "it where a refitted one foretells left-out points no better"
         )
         if self.widening > 1.0:
             sentences.append(

@@ -14,7 +14,10 @@ An effect is supported if
   by chance in one campaign of twenty: the relative gate of the diagnosis. The gain is counted in units of the scatter
   that remains, so that data which no effect explains do not lend every effect significance.
 
-Of several effects each is judged beside the others.
+Of several effects each is judged beside the others. Effects of the machine that a refitted law can stand for are judged
+beside the file's law, with and without them, where that law foretells with them as well as a refitted one: which of the
+two gives way the readings do not tell, but either takes the error away. Where `--auto` finds no effect it does so with
+the law.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -40,7 +43,7 @@ from toolpath_stiff.inference.candidates import Candidate, testable_effects
 from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
-from toolpath_stiff.inference.fits import add_effect, base_fit, baseline, with_given_law
+from toolpath_stiff.inference.fits import add_effect, base_fit, baseline, refine
 from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import Family, score_families, signatures, tables_of
@@ -128,13 +131,7 @@ def build_ladder(task: UpdateTask) -> Update:
     refitted = LadderStep.of(LAW_REFITTED, law_refitted, task.data)
     steps = [LadderStep.of(AS_GIVEN, as_given, task.data), *([] if task.keep_strut_law else [refitted])]
     steps += ladder_of(task, steps[-1], wanted)
-    full, supports, tried = steps[-1].fit, list[Support](), list[Support]()
-    for j, name in enumerate(full.names):
-        others = [[candidate] for k, candidate in enumerate(full.candidates) if k != j]
-        before = LadderStep.of(
-            "", fitted_with(task, base_fit(task.problem, not task.keep_strut_law), others), task.data
-        )
-        supports.append(support_of(task, _field_of(task, before.fit), before, full, j, by_name[name]))
+    tried, supports = list[Support](), _supports(task, steps[-1].fit, list(by_name.values()))
     while task.auto and len(steps[-1].fit.candidates) < MOST_EFFECTS:
         better, tried = next_effect(task, steps[-1], _field_of)
         if better is None:
@@ -142,14 +139,30 @@ def build_ladder(task: UpdateTask) -> Update:
         steps.append(better)
         supports.append(tried[-1])
         tried = []
-    if steps[-1].fit.law_free and (steps[-1].fit.names or task.strut_law):
+    names = steps[-1].fit.names
+    if steps[-1].fit.law_free and (names or task.strut_law or task.auto):
         given, law = _law_support(task, steps[-1])
-        kept = not (law.supported or task.force) and steps[-1].fit.names
+        kept = not (law.supported or task.force) and names
+        if kept and not all(support.supported for support in supports):
+            beside_given = _supports(task, given.fit, [[candidate] for candidate in given.fit.candidates])
+            supports = beside_given if all(support.supported for support in beside_given) else supports
         steps += [given] if kept else []
-        (tried if kept else supports).append(law)
+        asked = names or task.strut_law or law.supported or law.instruments
+        (tried if kept or not asked else supports).append(law)
     return Update(
         task, tuple(steps), refitted, tuple(supports), turned_down=tuple(tried), drawn=_drawn(task, steps[-1].fit)
     )
+
+
+def _supports(task: UpdateTask, full: Fit, groups: Sequence[Sequence[Candidate]]) -> list[Support]:
+    """Of each effect of a fit beside the others; each is one of the candidates of its group."""
+    by_name, supports = {candidates[0].name: candidates for candidates in groups}, []
+    for j, name in enumerate(full.names):
+        others = [[candidate] for k, candidate in enumerate(full.candidates) if k != j]
+        alone = fitted_with(task, base_fit(task.problem, full.law_free), others)
+        before = LadderStep.of("", alone, task.data)
+        supports.append(support_of(task, _field_of(task, before.fit), before, full, j, by_name[name]))
+    return supports
 
 
 def _check(task: UpdateTask, names: Sequence[str]) -> None:
@@ -168,7 +181,7 @@ def _check(task: UpdateTask, names: Sequence[str]) -> None:
 def fitted_with(task: UpdateTask, fit: Fit, groups: Iterable[Sequence[Candidate]]) -> Fit:
     """A fit with one effect of each group on top."""
     for candidates in groups:
-        fit = add_effect(task.problem, fit, candidates, not task.keep_strut_law)
+        fit = add_effect(task.problem, fit, candidates, fit.law_free)
     return fit
 
 
@@ -247,11 +260,14 @@ def _field_of(task: UpdateTask, others: Fit) -> Field:
 def support_of(
     task: UpdateTask, others: Field, before: LadderStep, fit: Fit, j: int, candidates: Sequence[Candidate]
 ) -> Support:
-    """Judge effect j of a fit against the model with the other effects."""
+    """Judge effect j of a fit against the model with the other effects, the strut law as free as in that fit."""
     after = LadderStep.of("", fit, task.data)
     in_se = gain_in_standard_errors(before.held, after.held)
-    alone = add_effect(others.problem, others.none, candidates, law_free=True)
-    gained = 2.0 * (alone.log_posterior - others.none.log_posterior) / dispersion(alone)
+    believed = INSTRUMENT if fit.candidates[j].effect.is_instrument else MACHINE
+    as_free = fit.law_free == others.none.law_free
+    none = others.none if as_free else base_fit(others.problem, fit.law_free)
+    alone = add_effect(others.problem, none, candidates, fit.law_free)
+    gained = 2.0 * (alone.log_posterior - none.log_posterior) / dispersion(alone)
     reasons = []
     if not fit.sizes[j].any():
         reasons.append("it fits best when it is absent")
@@ -271,11 +287,23 @@ def support_of(
             f"twice the log likelihood rises by {gained:.1f}: the best of all candidates gains {others.threshold:.1f} "
             "by chance once in twenty campaigns"
         )
+    if not as_free:
+        refitted = refine(task.problem, before.fit)
+        if outvoted(votes(task.problem, refitted, {LAW_GIVEN: fit})[LAW_GIVEN]):
+            reasons.append(f"the {LAW_REFITTED} alone foretells left-out poses better")
+        elif believed == INSTRUMENT != task.believe and not outvoted(votes(task.problem, fit, {"": refitted})[""]):
+            reasons.append(f"the {LAW_REFITTED} alone foretells left-out poses as well")
     instruments = dict[str, str]()
     if not reasons:  # what is refused anyway needs no vote
-        believed = INSTRUMENT if fit.candidates[j].effect.is_instrument else MACHINE
-        rivals = others.of_instrument if believed == MACHINE else others.of_machine
-        instruments = as_well(others.problem, alone, {family.name: family.best for family in rivals if family.best})
+        if believed == MACHINE and not as_free:
+            rivals = rivals_of_law(task.problem, before.fit)
+        else:
+            families = others.of_instrument if believed == MACHINE else others.of_machine
+            likely = {family.name: family.best.candidates for family in families if family.best}
+            law_free = others.none.law_free
+            rivals = {name: add_effect(task.problem, before.fit, c, law_free) for name, c in likely.items()}
+            fit = fit if as_free else refine(task.problem, fit)
+        instruments = as_well(task.problem, fit, rivals)
         reasons += mistakable(task, instruments, believed)
     return Support(
         fit.names[j], not reasons, tuple(reasons), percent_of(after.error), percent_of(after.held.mean_error),
@@ -287,7 +315,8 @@ def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Suppo
     """Judge the refitted strut law of a step; the same effects beside the file's law."""
     task.progress("judging the strut law")
     fit, problem = after.fit, task.problem
-    given = LadderStep.of(LAW_GIVEN, with_given_law(problem, fit), task.data)
+    groups = [[candidate] for candidate in fit.candidates]  # anew: beside a refitted law some may be absent
+    given = LadderStep.of(LAW_GIVEN, fitted_with(task, base_fit(problem, law_free=False), groups), task.data)
     differences = votes(problem, fit, {LAW_GIVEN: given.fit})[LAW_GIVEN]
     reasons, instruments = [], dict[str, str]()
     if outvoted(differences):

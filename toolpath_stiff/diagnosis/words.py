@@ -125,17 +125,16 @@ def _capital(text: str) -> str:
 
 def _rivals(diagnosis: Diagnosis) -> str:
     """Explanations that stand beside each other."""
-    causes = [
-        f"{_cause(diagnosis, first)}{f' - or, alike at these poses, {joined(same)}' if same else ''}"
-        for first, *same in diagnosis.entries
-    ]
+    causes = [f"{_cause(diagnosis, entry[0])}{_alike(entry)}" for entry in diagnosis.entries]
     if len(diagnosis.explanations) < 2:
         return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
     if diagnosis.explanations[0] not in (NONE, diagnosis.best):
         return f"What is likeliest lowers no error at points that are left out: {'; '.join(causes)}."
     if diagnosis.explanations[0] == NONE and diagnosis.main.votes:
         moved = float(np.mean(np.abs(diagnosis.base.jacobian @ diagnosis.base.law)))
-        causes[0] = f"the strut law is off and moves the stiffness by {100.0 * moved:.2g} %"
+        causes[0] = (
+            f"the strut law is off and moves the stiffness by {100.0 * moved:.2g} %{_alike(diagnosis.entries[0])}"
+        )
         return f"Readings of the tip do not tell which of these it is: either {', or '.join(causes)}."
     if diagnosis.explanations[0] == NONE and diagnosis.main.base_gate.probability > FALSE_ALARM:
         left = f"with what struts, joints and links leave that may be more than {100 * LEFT:g} %"
@@ -145,6 +144,10 @@ def _rivals(diagnosis: Diagnosis) -> str:
     if first < POSITIVE * second or len(causes) < 2:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
     return f"Most likely {causes[0]}; not ruled out: {'; '.join(causes[1:])}."
+
+
+def _alike(entry: Sequence[str]) -> str:
+    return f" - or, alike at these poses, {joined(entry[1:])}" if entry[1:] else ""
 
 
 def _most_left(diagnosis: Diagnosis) -> str:
@@ -244,7 +247,7 @@ def next_steps(diagnosis: Diagnosis, request: Asked | None = None) -> list[str]:
         return [hint("add it" if len(names) == 1 else "add them", update)]
     if verdict == "ambiguous":
         depends = [f"{repeat}: the verdict depends on the scatter"] if len(diagnosis.judgements) > 1 else []
-        return [*depends, unplanned or hint("measure what tells them apart", plan)]
+        return [*depends, unplanned or hint("measure what tells them apart", plan), *_until_then(diagnosis, request)]
     if diagnosis.main.question:
         return [
             "check that machine file, poses and units are those of the readings: stiffness in N/mm, lengths in mm",
@@ -260,6 +263,19 @@ def next_steps(diagnosis: Diagnosis, request: Asked | None = None) -> list[str]:
         return [look, write, hint("and try it", request.command("diagnose", effects=[file]))]
     use = "use the model; `bounds` lists what could still be there unseen"
     return [repeat, use] if diagnosis.noise.guess else [use]
+
+
+def _until_then(diagnosis: Diagnosis, request: Asked) -> list[str]:
+    """How the error falls before the explanations are told apart, where one of the machine lowers it."""
+    of_instrument = {f.name for f in diagnosis.main.families if f.effect.is_instrument} & {*diagnosis.plausible}
+    if {*diagnosis.plausible} <= of_instrument or np.mean(
+        diagnosis.as_given.errors - diagnosis.likeliest.errors
+    ) < LEFT:
+        return []
+    words = options(auto=True, believe="machine" if of_instrument else None)
+    trusted = f" if {joined(sorted(of_instrument))} {'is' if len(of_instrument) == 1 else 'are'} ruled out"
+    update = request.command("update", *words, "-o", request.updated_machine)
+    return [hint(f"until then, lower the error with what they share{trusted if of_instrument else ''}", update)]
 
 
 def assumptions(diagnosis: Diagnosis) -> list[str]:
