@@ -263,7 +263,7 @@ def _levels(around: tuple[FloatArray, FloatArray], corner: FloatArray, longest: 
     top, bottom = around
     base = np.maximum(np.clip(bottom, 0.0, None).min(axis=1, keepdims=True), corner)
     heights = np.concatenate([base, np.maximum(np.minimum(top, longest), base)], axis=1)
-    below = np.where(top > bottom, np.clip(bottom, base, longest), base)
+    below = np.where((top > bottom) & (bottom > base + TOUCH), np.clip(bottom, base, longest), base)
     if (below > base).any():
         heights = np.concatenate([heights, below], axis=1)
     heights = np.sort(heights, axis=1)

@@ -17,6 +17,7 @@ import numpy as np
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
 
 CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
+ROUNDED = 1e-12  # m: what a cutter touches to this it does not take, in whatever frame
 NEWTON = 8  # steps: heights to 1e-9 m
 FLATTEST = 1e-6  # slope; the heights of less differ by less than a nanometre
 Index = tuple[IntArray, IntArray, IntArray, FloatArray]
@@ -171,7 +172,7 @@ def lower(
             least += smaller - z
             along, beside, spoke = foot(part, x, y, arc)
             near = distance(beside, within(along, part["extent"]) - along, spoke, arc)
-            if near > part["reach"] - smaller or least + rise(part["reach"], part["flat"], near) >= best:
+            if near > part["reach"] - smaller - ROUNDED or least + rise(part["reach"], part["flat"], near) >= best:
                 continue
             sloped, bull = part["slope"] != 0.0, 0.0 < part["flat"] < part["reach"]
             height = float(height_above(part, along, beside, spoke, arc, sloped, bull)) + smaller - z

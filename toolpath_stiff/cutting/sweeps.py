@@ -18,6 +18,7 @@ from toolpath_stiff.path.sampling import Orient
 
 SAGITTA = 5e-7  # m, of chords in place of an arc that is not level in the plane
 STRAIGHT, ARC_TURN, NARROW_TURN = 4.0, 0.5 * np.pi, np.pi / 60.0  # longest pieces: radii of the cutter; rad
+ROUNDED = 1e-9  # share of a radius: arcs turned in space differ by less
 PIECE_TURN = np.radians(0.5)  # that a tool makes along a piece: a quarter of a degree is 4.4 um a mm above its corner
 
 
@@ -129,7 +130,7 @@ def _counts(
     arcs = np.flatnonzero(cuts & (moves.arc_sweep != 0.0))
     if len(arcs):
         frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
-        turn = np.where(frame.radius_start < radius[arcs], NARROW_TURN, ARC_TURN)
+        turn = np.where(frame.radius_start < (1.0 - ROUNDED) * radius[arcs], NARROW_TURN, ARC_TURN)
         turn = np.where(bent[arcs], np.sqrt(8.0 * SAGITTA / frame.radius_start), turn)
         counts[arcs] = np.ceil(sweep / turn - 1e-9)
     return np.where(cuts, np.maximum(counts, np.ceil(angle / PIECE_TURN - 1e-9)), 0.0)

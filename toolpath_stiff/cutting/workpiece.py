@@ -22,6 +22,7 @@ from toolpath_stiff.cutting.cells import PORTION, cells_of_boxes
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import (
     CLEAR,
+    ROUNDED,
     Grid,
     Index,
     bounds,
@@ -306,7 +307,8 @@ def _heights(part: AnyArray, x: FloatArray, y: FloatArray, smaller: FloatArray) 
         if len(rows):
             some = part[rows]
             along, beside, spoke = foot(some, x[rows], y[rows], arc)
-            near = distance(beside, within(along, some["extent"]) - along, spoke, arc) <= some["reach"] - smaller[rows]
+            near = distance(beside, within(along, some["extent"]) - along, spoke, arc)
+            near = near <= some["reach"] - smaller[rows] - ROUNDED
             rows, some = rows[near], some[near]
             heights[rows] = height_above(some, along[near], beside[near], spoke[near], arc, sloped) + smaller[rows]
     return heights
