@@ -52,7 +52,7 @@ def named(record: Record) -> bool:
     if record["verdict"] != "identified":
         return False
     first = record["explanations"][0]
-    return holds(first, record) and len(first) == len(record["truths"])
+    return holds(first, record) and all(any(name in truth["names"] for truth in record["truths"]) for name in first)
 
 
 def listed(record: Record) -> bool:

@@ -154,10 +154,8 @@ def _refused_line(text: str, ours: str, theirs: str) -> int | None:
     if found:
         return int(found[1])
     repeated = theirs.strip().splitlines()[-1].strip() if theirs and not ours else None
-    for number, line in enumerate(text.splitlines(), 1):
-        if repeated and line.strip() == repeated:
-            return number
-    return None
+    lines = enumerate(text.splitlines(), 1)
+    return next((number for number, line in lines if repeated and line.strip() == repeated), None)
 
 
 def main() -> int:

@@ -49,9 +49,8 @@ MODEL, LOAD = build_model(load_machine("nist")), parse_load("tangential")
 def shipped(name: str) -> ReadProgram:
     """A program of `programs/`."""
     controller = PROGRAMS / f"{Path(name).stem}.toml"
-    reading = {"controller": read_controller(controller, None)} if controller.exists() else {}
-    if not reading:
-        reading = {"tool_table": PROGRAMS / "tools.tbl"}
+    told = {"controller": read_controller(controller, None)} if controller.exists() else {}
+    reading = told or {"tool_table": PROGRAMS / "tools.tbl"}
     return read_program(PROGRAMS / name, default_origin=MODEL.machine.default_origin, **reading)
 
 

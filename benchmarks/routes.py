@@ -95,9 +95,9 @@ def measure_routes(rounds: int) -> tuple[list[str], bool]:
             call()  # fill caches
         for _ in range(rounds):
             for times, (_, n, call) in zip(seconds, timed, strict=True):
-                start = time.perf_counter()
+                start = time.process_time()
                 call()
-                times.append((time.perf_counter() - start) / n)
+                times.append((time.process_time() - start) / n)
         for times, (name, _, _) in zip(seconds, timed, strict=True):
             ratio = statistics.median(a / b for a, b in zip(seconds[0], times, strict=True))
             least = next((most for start, most in AT_LEAST.items() if name.startswith(start)), 0.0)

@@ -21,7 +21,6 @@ ROWS = (
     (("diagnose", "readings.csv"), f"`tps diagnose`, {READINGS} readings, all files", 3.0),
     (("update", "readings.csv", "--add", "weak_strut"), f"`tps update`, {READINGS} readings, all files", 2.0),
 )
-PROGRAMS, WITH_PICTURES = 2000, 200
 MANY_BAR = 1.2  # times the CPU of the analyses
 PICTURES_BAR = 0.15  # s of CPU a program for two pictures and a page
 THEMSELVES = """
@@ -63,7 +62,7 @@ def write_programs(folder: Path, count: int) -> None:
         (folder / f"part{i:04}.nc").write_text(text)
 
 
-def measure_many(rounds: int, programs: int = PROGRAMS) -> tuple[list[str], bool]:
+def measure_many(rounds: int, programs: int) -> tuple[list[str], bool]:
     """Lines of the table, and whether the bar is cleared."""
     alone = [sys.executable, "-c", THEMSELVES]
     command = [sys.executable, "-m", "toolpath_stiff", "analyze", "programs", "--jobs", "1", "--no-plots"]
@@ -79,7 +78,7 @@ def measure_many(rounds: int, programs: int = PROGRAMS) -> tuple[list[str], bool
     return table("command | CPU seconds of the analyses and their reports, median: | times these: | bar", [row]), clears
 
 
-def measure_pictures(programs: int = WITH_PICTURES) -> tuple[list[str], bool]:
+def measure_pictures(programs: int) -> tuple[list[str], bool]:
     """What two pictures and a page cost a program: lines of the table, and whether the bar is cleared."""
     command = [sys.executable, "-m", "toolpath_stiff", "analyze", "programs", "--jobs", "1"]
     seconds = []

@@ -39,6 +39,7 @@ def said(verdict, explanations, truths, *, left=1.0, portrait=()):
         (said("identified", [["spindle_compliance"]], [TABLE]), {"wrong_link"}),
         (said("identified", [["weak_strut", "gauge_scale"]], [STRUT]), {"wrong_link"}),
         (said("identified", [["weak_strut"]], [STRUT, TABLE]), set()),  # half of a pair
+        (said("identified", [["weak_strut"]], [STRUT, STRUT]), {"named"}),  # one name that is right of both
         (said("ambiguous", [["gauge_scale"], ["weak_strut"]], [STRUT]), {"listed"}),
         (said("ambiguous", [["a"], ["b"], ["c"], ["weak_strut"]], [STRUT]), set()),
         (said("adequate", [["none"]], [STRUT], left=2.9), {"negligible"}),

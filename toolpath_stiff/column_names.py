@@ -20,10 +20,10 @@ Mapped = Annotated[
 ]
 
 # Units of one quantity and their sizes (BIPM: The International System of Units, 9th ed.; inch, pound-force and
-# kilogram-force: NIST Special Publication 811:2008, B.8, exact).
+# kilogram-force, by which kg on a cable pull: NIST Special Publication 811:2008, B.8, exact).
 SIZES: tuple[Mapping[str, str], ...] = (
     {"nm": "1e-9", "um": "1e-6", "mm": "1e-3", "cm": "0.01", "m": "1", "in": "0.0254", "mil": "2.54e-5"},
-    {"N": "1", "kN": "1000", "daN": "10", "kgf": "9.80665", "lbf": "4.4482216152605"},
+    {"N": "1", "kN": "1000", "daN": "10", "kgf": "9.80665", "kg": "9.80665", "lbf": "4.4482216152605"},
     {"s": "1", "min": "60", "h": "3600"},
     {"deg": "1", "rad": "57.29577951308232087679815", "mrad": "0.05729577951308232087679815"},
     {

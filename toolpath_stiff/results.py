@@ -16,11 +16,13 @@ from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.results_folder import Rules, write_folder
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure  # noqa: PLC0414  (for all results)
+    from pandas import DataFrame as DataFrame  # noqa: PLC0414
+else:  # both libraries are loaded when the first table or picture is asked for
+    DataFrame = Figure = Any
 
 
-def frame_of(rows: Any, columns: list[str] | None = None) -> pd.DataFrame:
+def frame_of(rows: Any, columns: list[str] | None = None) -> DataFrame:
     """Rows or columns as a DataFrame: pandas is loaded when the first one is asked for."""
     import pandas as pd
 
@@ -96,7 +98,7 @@ class Result(ABC):
         """
         return json_text(self.to_dict())
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The result as a pandas DataFrame, the unit in each column's name.
 
         Examples
@@ -128,8 +130,7 @@ class Result(ABC):
 
     def _picture(self, **look: Any) -> bytes:
         """The same as a PNG."""
-        picture: bytes = _door().picture(self, **look)
-        return picture
+        return bytes(_door().picture(self, **look))
 
     def _cannot(self, what: str, hint: str) -> InputError:
         return InputError(f"{type(self).__name__} {what}", hint=hint)
@@ -155,8 +156,7 @@ class FolderResult(Result):
         self, plots: bool, omit: Collection[str] = (), **look: Any
     ) -> Mapping[str, Content | Callable[[], Content]]:
         """The files of the result but for `omit`."""
-        contents: Mapping[str, Content | Callable[[], Content]] = _door().files(self, plots=plots, omit=omit, **look)
-        return contents
+        return dict(_door().files(self, plots=plots, omit=omit, **look))
 
     def save(
         self,

@@ -212,7 +212,7 @@ REFUSALS = {
     "L X+10\nRND R2 X+3\nL Y+10": ("X.3 is no word of RND", 4),
     "CYCL DEF 9.1 V.ZEIT": ("needs its time", 3),
     "Q1 = 3 / 0": ("cannot be worked out", 3),
-    "Q1 = ((3": ("cannot be worked out", 3),
+    "Q1 = ((3": ("3:7: a bracket that is not closed", 3),
     "L X+1 L Y+2": ("no word|is no word", 3),
 }  # fmt: skip
 

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.text import Text
 
 import toolpath_stiff as tps
-from tests.browser import needs_browser, painted, viridis
+from tests.browser import needs_browser, opened, painted, viridis
 from tests.report.factory import short
 from tests.stiffness.cases import nist
 from tests.updating.cases import VERDICTS, diagnosed
@@ -189,3 +189,15 @@ def test_a_picture_stands_in_a_page_as_wide_as_it_was_drawn():
     found = diagnosed(*VERDICTS["ambiguous"])
     text = diagnose_html(found, {"ladder.png": files.picture_file("ladder.png", ladder, found, files.SHARP)})
     assert text.count('class="picture"') == 1 and '<img alt="" style="--natural:1400px" src="data:image/png' in text
+
+
+@needs_browser
+def test_a_picture_is_saved_from_its_page_under_its_name(tmp_path):
+    # Under the page's own policy, which lets no other script run.
+    found, file = diagnosed(*VERDICTS["ambiguous"]), tmp_path / "report.html"
+    drawn = {"ladder.png": files.picture_file("ladder.png", ladder, found, files.SHARP)}
+    file.write_text(diagnose_html(found, drawn), encoding="utf-8")
+    done = opened(file.as_uri(), tmp_path)
+    ((picture,), (link,)) = (re.findall(tag, done.stdout) for tag in ('<img [^>]*src="([^"]*)"', "<a [^>]*>PNG</a>"))
+    assert f'href="{picture}"' in link and 'download="ladder.png"' in link
+    assert "CONSOLE" not in done.stderr

@@ -17,6 +17,8 @@ from tests.updating.cases import campaign, diagnosed, examined, readings_by_hand
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.judgement import TAKEN_UP
 from toolpath_stiff.inference.prediction import scaled_law
+from toolpath_stiff.rig.kinematics import commanded_lengths, rotations
+from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.stiffness.catalogue import find_effect
 
 # One of each verdict, of the paper's layout.
@@ -147,6 +149,16 @@ def test_where_nothing_is_missing_it_is_said_how_far_each_effect_may_go():
     assert f"Up to {most:g} % are not excluded" in back["text"] and {one["effect"] for one in back["not_excluded"]} <= {
         one["effect"] for one in back["bounds"]
     }
+
+
+def test_where_nothing_is_missing_the_widest_stretch_without_a_reading_is_said():
+    """By the rig's own kinematics."""
+    data = diagnosed(*CASES["adequate"]).data
+    lengths = commanded_lengths(load_nominal(), data.position, rotations(data.angles), np.zeros(len(data)))
+    lengths = np.sort(np.round(1e3 * lengths, 3), axis=0)
+    row, strut = divmod(int(np.diff(lengths, axis=0).argmax()), 6)
+    ends = f"{lengths[row, strut]:.0f} and {lengths[row + 1, strut]:.0f} mm"
+    assert f"No reading has strut {strut + 1} between {ends}" in found("adequate")["text"]
 
 
 @pytest.mark.parametrize("verdict", CASES)

@@ -23,6 +23,7 @@ from toolpath_stiff.planning.plan import plan_measurements
 from toolpath_stiff.planning.result import plan_csv, plan_rows
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import exercise as rig
+from toolpath_stiff.rig.case import draw_case
 from toolpath_stiff.rig.kinematics import reachable as rig_reachable
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.stiffness.catalogue import known_effects
@@ -73,7 +74,7 @@ def test_points_bear_new_names_unless_the_pose_is_old(planned):
 
 def test_the_rig_measures_a_plan_and_both_files_are_read_together(planned, tmp_path):
     _, file = planned
-    rig.new_exercise(tmp_path / "blind", rig.blind_case(3, "paper", "none"))
+    rig.new_exercise(tmp_path / "blind", draw_case(3, "paper", "none"))
     text, count = rig.measured_again(tmp_path / "blind", str(file), 1)
     (tmp_path / "more.csv").write_text(text)
     assert count == len(read_csv(file))

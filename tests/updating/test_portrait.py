@@ -173,7 +173,19 @@ def test_the_dictionary_speaks_the_agreed_words(folder):
     assert {t.shape for t in terms} <= set(SHAPES)
     assert len({t.key for t in terms}) == len(terms)
     assert np.exp(dictionary.log_prior).sum() <= 1.0 + 1e-9
-    np.testing.assert_allclose(np.sqrt((dictionary.columns**2).mean(axis=1)), 1.0)
+
+
+def test_columns_of_many_readings_are_made_again_and_are_the_same(folder, monkeypatch):
+    ground = Ground(sound(1, folder), np.exp(-sound(1, folder).log_stiffness()), np.zeros(2))
+    kept = dictionary_of(ground)
+    columns, some = np.concatenate([*kept.columns()]), slice(None, None, 97)
+    one_by_one = [ground.column(term) / ground.compliance for term in kept.terms[some]]
+    np.testing.assert_allclose(columns[some], one_by_one, rtol=1e-12, atol=1e-12)
+    for module in ("columns", "dictionary"):
+        monkeypatch.setattr(f"toolpath_stiff.portrait.{module}.MOST_HELD", 0)
+    made_again = dictionary_of(Ground(ground.predictor, ground.compliance, np.zeros(2)))
+    assert made_again.terms == kept.terms
+    np.testing.assert_allclose(np.concatenate([*made_again.columns()]), columns, rtol=1e-5, atol=1e-6)
 
 
 def test_what_can_only_give_has_no_negative_size_and_factors_leave_a_stiffness():

@@ -196,7 +196,9 @@ def test_a_cable_off_the_tip_is_the_wrench_that_it_makes(tmp_path: Path) -> None
             "1800,0,900,5,12,45,-30,-60,-165,1,2,3,5",
             "pose and joints are .* mm apart",
         ),
-        ("x_mm,y_mm,z_mm,tension_N,ux_um", "1800,0,900,100,5", "no force"),
+        ("x_mm,y_mm,z_mm,tension_N,ux_um", "1800,0,900,100,5", "column cable_x_mm is missing"),
+        ("x_mm,y_mm,z_mm,load_kg,fz_N", "1800,0,900,100,5", "column ux_um is missing"),
+        ("x_mm,y_mm,z_mm,fz_N,ux_um,force_axes", "1800,0,900,100,5,tcp", "axes tcp; expected base or tip"),
         ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um", "1800,0,900,0,0,0,5", "no force"),
         ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um,uy_um", "1800,0,900,1,2,3,0,nan", "nothing read"),
     ],
@@ -305,3 +307,72 @@ def test_bands_hold_what_refitted_joints_leave_open(tmp_path: Path) -> None:
 def _along_y(model: StiffnessModel, stance: Stance) -> float:
     """Compliance of the tip along Y, m/N."""
     return float(tip_compliance(model, path_of_stance(model, stance))[0, 1, 1])
+
+
+def test_auto_refits_the_joints_where_all_of_them_are_wrong(tmp_path: Path) -> None:
+    """Else it would explain six wrong torsions by four effects; what is named by hand is refused with the way out."""
+    off = tmp_path / "off.toml"
+    true = "[620.0, 340.0, 460.0, 1900.0, 2300.0, 4800.0]"
+    off.write_text(ROBOT.read_text("utf-8").replace(true, "[1000.0, 1000.0, 1000.0, 1000.0, 1000.0, 1000.0]"), "utf-8")
+    data = campaign(tmp_path / "a.csv", 78, "none", 0, 40)
+    update = tps.update(data, off, auto=True)
+    assert update.added == ["joints refitted"]
+    assert list(update.fitted_joints.values()) == pytest.approx(json.loads(true), rel=0.05)
+    assert "(--joints)" in tps.update(data, off, add="spindle_compliance").text
+
+
+def test_repeats_tell_the_scatter(tmp_path: Path) -> None:
+    """Of pulls read four times each, against the scatter that was drawn; too small a stated one is overruled."""
+    head, rows = rows_of(campaign(tmp_path / "a.csv", 9, "none", 0, 20))
+    again = rows.repeat(4, axis=0)
+    again[:, 9:12] += 40.0 * np.random.default_rng(1).normal(size=(80, 3))
+    found = tps.diagnose(written(tmp_path / "r.csv", head[:-1], again[:, :-1]), ROBOT)
+    size = np.linalg.norm(again[:, 9:12], axis=1)
+    drawn = float(np.sqrt(np.mean((40.0 / size) ** 2)))
+    assert found.problem.noise.typical == pytest.approx(drawn, rel=0.2)
+    assert "180 differences between repeats" in found.problem.noise.origin and found.verdict == "adequate"
+    stated = tps.diagnose(written(tmp_path / "s.csv", head, again), ROBOT)
+    assert "sd_um of each row is too little" in stated.problem.noise.origin
+    copies = tps.diagnose(written(tmp_path / "c.csv", head[:-1], rows[:, :-1].repeat(2, axis=0)), ROBOT)
+    assert "repeats" not in copies.problem.noise.origin
+
+
+def test_components_in_the_tip_axes(tmp_path: Path) -> None:
+    """Forces written in the tip's axes are asked about, and read so where it is said."""
+    head, rows = rows_of(campaign(tmp_path / "a.csv", 9, "none", 0, 20))
+    turned = rows.copy()
+    turned[:, 6:9] = np.einsum("nji,nj->ni", MACHINE.forward(np.radians(rows[:, :6]))[1], rows[:, 6:9])
+    data = written(tmp_path / "t.csv", head, turned)
+    assert '"force_axes==tip"' in tps.diagnose(data, ROBOT).to_dict()["question"]
+    assert tps.diagnose(data, ROBOT, columns="force_axes==tip").verdict == "adequate"
+
+
+def test_a_pull_far_off_is_named_and_not_counted(tmp_path: Path) -> None:
+    """A slip of a decimal point among pulls that no single effect explains; and rows of no load are passed over."""
+    off = tmp_path / "off.toml"
+    off.write_text(ROBOT.read_text("utf-8").replace("[620.0, 340.0, 460.0,", "[900.0, 500.0, 300.0,"), "utf-8")
+    head, rows = rows_of(campaign(tmp_path / "a.csv", 9, "bending", 2, 30))
+    rows[4, 9:12] *= 10.0
+    none = np.zeros((1, rows.shape[1]))
+    none[0, :6], none[0, 12] = rows[0, :6], SD_UM
+    found = tps.diagnose(written(tmp_path / "w.csv", head, np.vstack([rows, none])), off)
+    assert found.verdict == "unexplained" and f"{tmp_path / 'w.csv'}:6 x" in found.wild and len(found.wild) == 3
+    assert found.error_as_given < 40.0 and "1 rows of no force" in str(found)
+
+
+def test_tables_of_pulls_are_refused_where_stiffnesses_are_read(tmp_path: Path) -> None:
+    """`reduce` and the studio say what to do instead; angles of another order are told by pose and joints."""
+    data = campaign(tmp_path / "a.csv", 9, "none", 0, 20)
+    for read in (tps.reduce, lambda file: tps.Case.open(tmp_path / "case").add_data(file)):
+        with pytest.raises(tps.TpsError, match=r"pulls on a machine of elements.*diagnose"):
+            read(data)
+    head, rows = rows_of(data)
+    position, rotation = MACHINE.forward(np.radians(rows[:, :6]))
+    yaw, pitch, roll = np.degrees([np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]), -np.arcsin(rotation[:, 2, 0]),
+                                   np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])])  # fmt: skip
+    pose = np.column_stack([1e3 * position, yaw, pitch, roll])
+    both = written(tmp_path / "b.csv", ["x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", *head],
+                   np.hstack([pose, rows]))  # fmt: skip
+    with pytest.raises(tps.TpsError, match=r"degrees apart.*a=c_deg"):
+        tps.diagnose(both, ROBOT)
+    assert tps.diagnose(both, ROBOT, columns="a=c_deg, c=a_deg").verdict == "adequate"

@@ -84,6 +84,29 @@ def test_sizes_within_bounds_are_those_of_least_squares() -> None:
         assert found == pytest.approx(wanted, abs=1e-6)
 
 
+def test_of_two_effects_that_read_alike_the_evidence_is_that_of_their_sum() -> None:
+    """Score of two columns that are all but equal, against two that have nothing in common.
+
+    Both by quadrature over sizes from 1 to 30 standard deviations, flat in their logarithms.
+    """
+    problem = problem_with(WEAK)
+    search = LinearSearch(
+        problem, families_of(problem, ("table_compliance", "spindle_compliance")), problem.score_base()
+    )
+    search.low, search.high = np.zeros_like(search.low), np.full_like(search.high, 30.0)
+    p, logs = search.columns.shape[1], np.linspace(0.0, np.log(30.0), 1500)
+    sizes, found, exact = np.exp(logs), [], []
+    for alike in (1.0 - 1e-7, 0.0):
+        product = np.array([[1.0, alike], [alike, 1.0]])
+        information, pull = np.zeros((2 * p, 2 * p)), np.zeros(2 * p)
+        information[np.ix_((0, p), (0, p))], pull[[0, p]] = product, product @ [20.0, 20.0]
+        found.append(float(search._bounded(np.arange(2 * p)[None], information, pull)[1][0]))
+        x, y = sizes[:, None], sizes
+        fit = pull[0] * (x + y) - 0.5 * (x**2 + y**2) - alike * x * y
+        exact.append(float(np.log(np.exp(fit - fit.max()).mean()) + fit.max()))
+    assert found[0] - found[1] == pytest.approx(exact[0] - exact[1], abs=1.0)
+
+
 # -- what the readings neither show nor exclude ------------------------------------------------------------------------
 
 BESIDE = ("joint_compliance", "setup_compliance", "thermal_drift", "weak_strut")

@@ -106,6 +106,19 @@ def test_an_instrument_for_which_the_law_may_stand_is_not_corrected(soft):
     assert not found.accepted
 
 
+def test_what_the_form_of_an_instruments_error_leaves_is_none_of_the_machines():
+    """A gauge that reads along Y too little by 4 to 16 %, pose after pose in turn: no scale says it."""
+    data = readings(active("weak_strut", {"strut": 3}, factor=0.85))
+    along_y = data.direction[:, 1] > 0.9
+    uneven = replace(
+        data, stiffness=data.stiffness * (1.0 - along_y * np.array([0.04, 0.16])[np.arange(len(along_y)) // 3 % 2])
+    )
+    found = updated(uneven, "weak_strut", "gauge_scale:direction=Y")
+    assert not found.accepted and any("together leave" in clause for clause in found.rises)
+    even = replace(data, stiffness=data.stiffness * (1.0 - 0.1 * along_y))
+    assert not updated(even, "weak_strut", "gauge_scale:direction=Y").rises
+
+
 def test_auto_finds_the_hidden_sizes(two):
     found, truth = two
     for name, key, unit in (("contact_nonlinearity", "compliance", 1e-9), ("gauge_scale", "scale", 1e-2)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,12 +13,9 @@ from toolpath_stiff.analysis.loads import Load
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, UnreachableError
-from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.results import DataFrame, FolderResult, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOST_POINTS = 5_000_000
 COLUMNS = ("x_mm", "y_mm", "z_mm", "stiffness_N_per_mm", "reachable")
@@ -95,7 +92,7 @@ class StiffnessMap(FolderResult):
         values = (xs, ys, zs, n_per_mm_from_n_per_m(self.stiffness), self.reachable)
         return {name: column.ravel() for name, column in zip(COLUMNS, values, strict=True)}
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a point of the grid: x_mm, y_mm, z_mm, stiffness_N_per_mm (nan out of reach), reachable."""
         return frame_of(self.columns())
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,12 +12,9 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK
-from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 # N/um of a strut: screws, bearings and joints in series. Below, it is no machine's; above, no screw's.
 STRUT_SOFTEST, STRUT_STIFFEST = 1.0, 1000.0
@@ -87,7 +84,7 @@ class MachineCheck(Result):
             "warnings": self.warnings,
         }
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a finding: severity (wrong, doubtful, warning), text."""
         kinds = (("wrong", self.wrong), ("doubtful", self.doubtful), ("warning", self.warnings))
         rows = [(severity, text) for severity, texts in kinds for text in texts]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,14 +15,11 @@ from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
 from toolpath_stiff.documents import Document, without_nan
 from toolpath_stiff.machine.limits import Reach
-from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import n_per_mm_from_n_per_m, nm_from_m
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 AS_IT_IS = ("extrapolated", "margin_limit")  # a whole number, a word
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
@@ -125,7 +122,7 @@ class PoseStiffness(Result):
             "margin_limit": limits[self.reach.limit],
         }
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a pose, the columns of `tps pose --csv`."""
         return frame_of(self.columns)
 

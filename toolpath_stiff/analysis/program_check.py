@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,12 +19,9 @@ from toolpath_stiff.nc.courses import Extents
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.path.sampling import move_figures, sample_moves
-from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_per_min_from_m_per_s
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOST_NAMED = 20  # lines named for one kind of finding
 
@@ -118,7 +115,7 @@ class ProgramCheck(Result):
         """The findings that keep the program from running as it stands."""
         return [finding for finding in self.findings if finding.severity == ERROR]
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The findings, one a row."""
         return frame_of(to_dict(self.findings), columns=["line", "column", "code", "text", "severity"])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.poses import Pose, pose_in_mm
-from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.results import DataFrame, Figure, FolderResult, frame_of
 from toolpath_stiff.stiffness.model import (
     StiffnessModel,
     build_model,
@@ -45,11 +45,6 @@ from toolpath_stiff.stiffness.model import (
     effects_stated,
 )
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
 
 STANDING = ("weakest", "out_of_reach_samples", "extrapolated_share")  # of a machine compared with
 
@@ -150,7 +145,7 @@ class Analysis(EvaluatedPath, FolderResult):
         """(n,) standard deviation of each sample's stiffness from the fitted parameters; None where none is stated."""
         return None if self.parameter_band is None else n_per_mm_from_n_per_m(self.parameter_band.deviation)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """All samples as a pandas DataFrame, columns as in `samples.csv` and `cut.csv` (mm, degrees, N/mm, um)."""
         return frame_of(sample_columns(self) | ({} if self.cut is None else cut_columns(self, self.cut)))
 

@@ -20,6 +20,7 @@ from toolpath_stiff.machine.error_model import FEW, GEOMETRY, alike, coordinates
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness import core
+from toolpath_stiff.stiffness.geometry_slopes import geometry_slopes
 from toolpath_stiff.stiffness.model import StiffnessModel, parameter_slopes
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
@@ -92,7 +93,8 @@ def parameter_band(
         turn, tools = rotation_matrices(samples.abc[rows]), np.broadcast_to(samples.tool_length, len(place))[rows]
         compliance = core.tip_compliance(model, samples.position[rows], turn, tools, force)
         direction[rows] = load_directions(load, compliance, samples.position[rows], turn, samples.tangent[rows])[0]
-        by_geometry = core.geometry_slopes_along(model, direction[rows], samples.position[rows], turn, tools, force)
+        paths = core.load_paths(model, samples.position[rows], turn, tools, force)
+        by_geometry = np.concatenate([geometry_slopes(model, path, direction[rows][some]) for some, path in paths])
         factors[rows, -GEOMETRY:] -= stiffness[rows, None] * by_geometry * errors.geometry
     near = errors.nearness(place)
     return ParameterBand(names, factors, stiffness * errors.form(near), near < FEW, place, direction)

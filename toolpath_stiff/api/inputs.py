@@ -45,11 +45,10 @@ def pose_si(name: str, pose: Sequence[float]) -> Pose:
     values = [finite(name, value) for value in pose]
     if len(values) not in (3, 6):
         raise InputError(f"{name} of {len(values)} numbers", expected="X, Y, Z or X, Y, Z, A, B, C in mm and degrees")
-    x, y, z, a, b, c = (*values, 0.0, 0.0, 0.0)[:6]
-    if max(abs(x), abs(y), abs(z)) > FARTHEST_MM or max(abs(a), abs(b), abs(c)) > FARTHEST_DEG:
+    if max(map(abs, values[:3])) > FARTHEST_MM or max(map(abs, values[3:]), default=0.0) > FARTHEST_DEG:
         within = f"positions within +-{FARTHEST_MM:g} mm and angles within +-{FARTHEST_DEG:g} degrees"
         raise InputError(f"{name} {values}", expected=within)
-    return pose_in_si((x, y, z, a, b, c))
+    return pose_in_si(values)
 
 
 def origin_si(origin_mm_deg: Sequence[float] | None) -> Pose | None:

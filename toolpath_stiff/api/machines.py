@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -27,16 +27,12 @@ from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_te
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import Option, checked, names
 from toolpath_stiff.poses import pose_in_mm, pose_in_si
-from toolpath_stiff.results import Result, TextFile, frame_of
+from toolpath_stiff.results import DataFrame, Figure, Result, TextFile, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import NO_SETUP, StiffnessModel, build_model, check_setup
 from toolpath_stiff.stiffness.trial import failures, own_effects, refuse_failing
 from toolpath_stiff.units import mm_from_m
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the paper's Figure 2
 
@@ -277,7 +273,7 @@ class Machine(Result):
         columns = joint_columns(self.model.machine, self.standing(pose_mm_deg)[1].joints)
         return {name: float(values[0]) for name, values in columns.items()}
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """Its figures: quantity, value, unit, origin (published, recovered, assumed, fitted), remark.
 
         Examples

@@ -10,7 +10,7 @@ from concurrent.futures import Executor, Future, as_completed
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from pebble import ProcessExpired
 
@@ -31,11 +31,8 @@ from toolpath_stiff.report.batch.index import files
 from toolpath_stiff.report.batch.outcomes import ProgramOutcome, columns_of, figures_of, terminal_summary
 from toolpath_stiff.report.batch.programs import RESERVED, Found, Listed, find_programs, report_folders
 from toolpath_stiff.report.words import counted
-from toolpath_stiff.results import Progress, Result, frame_of
+from toolpath_stiff.results import DataFrame, Progress, Result, frame_of
 from toolpath_stiff.results_folder import Rules, check_folder, write_folder
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _ALONE = threading.Lock()  # a process analyzes one program at a time, however many threads an executor has
 
@@ -84,7 +81,7 @@ class ManyAnalyses(Result):
         summary = json.loads((report.parent / "summary.json").read_text(encoding="utf-8"))
         return {**summary, "file": outcome.file, "report": str(report)}
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a program, the columns of `summary.csv`."""
         return frame_of(columns_of(self.outcomes))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.column_names import Mapped
@@ -12,9 +11,7 @@ from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.documents import Document, without_nan
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.readings.measurements import Readings, read_measurements, reading_columns
-
-if TYPE_CHECKING:
-    import pandas as pd
+from toolpath_stiff.results import DataFrame, frame_of
 
 
 class Measurements:
@@ -87,7 +84,7 @@ class Measurements:
             self._last = (machine.stated, read_measurements(self.files, machine.stated, columns=self.columns))
         return self._last[1]
 
-    def to_frame(self, machine: Machine | str | Path = MACHINE) -> pd.DataFrame:
+    def to_frame(self, machine: Machine | str | Path = MACHINE) -> DataFrame:
         """One row a reading: file, line, point, pose, direction, measured stiffness, force.
 
         Examples
@@ -96,9 +93,7 @@ class Measurements:
         >>> tps.Measurements.read("nist-table1").to_frame()[["point", "dx", "stiffness_N_per_mm"]].values.tolist()[0]
         ['P1', 1.0, 56813.0]
         """
-        import pandas as pd
-
-        return pd.DataFrame(reading_columns(self.on(machine_from(machine))))
+        return frame_of(reading_columns(self.on(machine_from(machine))))
 
     def to_dict(self, machine: Machine | str | Path = MACHINE) -> Document:
         """The files, and the readings as `to_frame` has them: the unit in each key, None where one does not say.

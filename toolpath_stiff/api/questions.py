@@ -463,7 +463,7 @@ def plan(
     of_struts, pulled = isinstance(question.model, Hexapod), dict[str, Any]()
     if question.data is not None and not of_struts:
         found = diagnosis if isinstance(diagnosis, ElementDiagnosis) else question.of_elements()
-        fits = [found.problem.none, *found.ranked]
+        fits = sorted([found.problem.none, *found.ranked], key=lambda fit: -fit.log_posterior)
         pulled = {"rivals": rivals_on_elements(fits, found.plausible, between), "noise": found.problem.noise.typical}
     readings = question.readings if question.data is not None and of_struts else None
     menu = Menu.of(readings).with_options(

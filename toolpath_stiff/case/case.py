@@ -36,6 +36,7 @@ from toolpath_stiff.options import arguments_of, words_of
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, json_text
 from toolpath_stiff.rig import exercise as rig
+from toolpath_stiff.rig.case import draw_case
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 
 Found = tuple[Any, str]  # a result, and the command line that gives it
@@ -484,7 +485,7 @@ class Case:
         `hidden` and `layout` as of `tps rig new`.
         """
         name = free_name(self.folder, "exercise")
-        rig.new_exercise(self.folder / name, rig.blind_case(seed, layout, hidden))
+        rig.new_exercise(self.folder / name, draw_case(seed, layout, hidden))
         python = call("start_exercise", seed, hidden=hidden, layout=layout)
         line = command_line("rig", "new", *options(seed=seed, out=name, hidden=hidden, layout=layout))
         new: Document = {"data": (f"{name}/{rig.MEASUREMENTS}",), "aside": (), "used": {}, "on": {}, "exercise": name}

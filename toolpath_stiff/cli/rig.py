@@ -19,9 +19,11 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, hint
 from toolpath_stiff.options import Option
-from toolpath_stiff.rig.exercise import FILES, blind_case, measured_again, new_exercise, new_robot, reveal
+from toolpath_stiff.rig.campaigns import LAYOUTS
+from toolpath_stiff.rig.case import draw_case
+from toolpath_stiff.rig.exercise import FILES, measured_again, new_exercise, new_robot, read_plan, reveal
+from toolpath_stiff.rig.nominal import load_nominal
 
-LAYOUTS = ("paper", "tilted", "campaign")
 Exercise = Annotated[str, Option("DIR", help="folder that `tps rig new` wrote")]
 
 
@@ -65,7 +67,9 @@ def new(
             raise InputError("--built serial with a layout, a plan or a machine", expected="--seed, --hidden, --noise")
         written = f"{new_robot(out, seed, hidden, noise / 100.0, run.rules_of(args, fresh=True))} pulls"
     else:
-        case = blind_case(seed, layout, hidden, noise / 100.0, machine, at, built)
+        nominal = load_nominal(machine)
+        plan = None if at is None else read_plan(at, nominal)
+        case = draw_case(seed, layout, hidden, noise / 100.0, nominal, plan, built=built)
         written = f"{new_exercise(out, case, run.rules_of(args, fresh=True))} measurements"
     print(f"{out}: {written}, the nominal machine and the sealed truth", _diagnose(out), sep="\n")
     return 0

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -31,10 +31,7 @@ from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.inference.repeats import repeat_groups
 from toolpath_stiff.machine.model import MachineTool, as_hexapod
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.results import FolderResult
-
-if TYPE_CHECKING:
-    import pandas as pd
+from toolpath_stiff.results import DataFrame, FolderResult
 
 DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 
@@ -105,7 +102,7 @@ class Comparison(FolderResult):
         """The content of compare.json."""
         return dict(self.document)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a reading, as in `residuals.csv`: measured, modelled, deviation, and what it may vary with."""
         import pandas as pd
 

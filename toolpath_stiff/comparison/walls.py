@@ -8,7 +8,7 @@ residual is beyond twice what scatter and the band of the model explain.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,12 +23,9 @@ from toolpath_stiff.documents import certain, records, without_nan
 from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.readings.mapping import check_needed, mapped_table, number_columns
-from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.results import DataFrame, FolderResult, frame_of
 from toolpath_stiff.tables import Columns
 from toolpath_stiff.units import m_from_mm, m_from_um, mm_from_m, um_from_m
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 POINT, NORMAL = ("x_mm", "y_mm", "z_mm"), ("nx", "ny", "nz")
 COLUMNS = Columns((*POINT, *NORMAL, "deviation_um"))
@@ -126,7 +123,7 @@ class WallComparison(FolderResult):
         further = {"factor_sd": spread, "lines": self.lines, "notes": list(self.notes)}
         return dict(certain(without_nan(document | further)))
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """A row a point: line, side, height on the wall (mm), measured and foretold error, its deviation (um)."""
         columns = {f"{name}_um": um_from_m(getattr(self, name)) for name in ("measured", "foretold", "deviation")}
         place = {"line": self.line, "side": np.array(["left", "right"])[self.side], "height_mm": mm_from_m(self.height)}

@@ -20,6 +20,7 @@ from toolpath_stiff.inference.left_out import HeldOut, held_out
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.error_model import GEOMETRY
 from toolpath_stiff.machine.model import Hexapod
+from toolpath_stiff.portrait.portrait import LACKING
 
 AS_BUILT = "struts and joints as read"
 FURTHEST = 3.0  # standard deviations from which on an offset is no tolerance: the model lacks something else
@@ -29,6 +30,8 @@ DIGITS = 9  # of ln and m, on which all processors agree
 def as_built(task: UpdateTask, before: LadderStep) -> tuple[Hexapod, LadderStep] | None:
     """The machine with the likeliest offsets, and the step that this is; None where left-out points ask for none."""
     fit, noise = before.fit, task.noise_model
+    if before.instruments and 100 * before.held.mean_error > LACKING * noise.floor_percent:
+        return None  # what the form of an instrument's error leaves is none of the machine's
     known = fit.scatter.covariance.shared[:GEOMETRY]
     pull = fit.scatter.precision.times(known)
     likely = pull @ fit.residual

@@ -30,7 +30,7 @@ from toolpath_stiff.diagnosis.examination import percent_of
 from toolpath_stiff.diagnosis.on_elements import NRAD, fitted_torsions, residual_columns
 from toolpath_stiff.documents import Document, json_number, to_dict
 from toolpath_stiff.errors import EffectError, InputError
-from toolpath_stiff.inference.element_fits import GAIN, JOINTS, PullProblem, explanations, question
+from toolpath_stiff.inference.element_fits import GAIN, JOINTS, PullProblem, explanations, joints_say_more, question
 from toolpath_stiff.inference.errors import AS_GIVEN
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.foretold import votes
@@ -44,6 +44,7 @@ from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.sizes import joined
 
 FEWEST_POSES = 3
+JOINTS_FIRST = "all joints refitted foretell pose after pose better (--joints)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +107,8 @@ def build_pull_ladder(task: PullTask) -> ElementUpdate:
         if candidate.name not in known:
             raise EffectError(f"--add {text}: it holds on hexapods only", expected=f"one of {', '.join(known)}")
     steps = [LadderStep.of(AS_GIVEN, problem.none, task.data)]
+    if task.auto and joints_say_more(problem, next(iter(explanations(problem, problem.none)), problem.none)):
+        task = replace(task, strut_law=True)
     if task.strut_law:
         if not problem.torsions:
             raise InputError(f"machine {task.machine.name} has no joints that turn: nothing to refit")
@@ -118,6 +121,8 @@ def build_pull_ladder(task: PullTask) -> ElementUpdate:
         others = [[other] for k, other in enumerate(full.candidates) if k >= count and k != j]
         before = LadderStep.of("", fitted_with(task, start.fit, others), task.data)
         supports.append(support_of(task, PullField(task, before.fit), before, full, j, [candidate]))
+    if supports and not task.strut_law and joints_say_more(problem, full):
+        supports = [replace(each, supported=False, reasons=(*each.reasons, JOINTS_FIRST)) for each in supports]
     while task.auto and len(steps[-1].fit.candidates) < count + MOST_EFFECTS:
         better, tried = next_effect(task, steps[-1], PullField)
         if better is None:

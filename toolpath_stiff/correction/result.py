@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,12 +29,9 @@ from toolpath_stiff.machine.error_model import ErrorModel
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.portrait.portrait import LACKING
-from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.results import DataFrame, FolderResult, frame_of
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
 NEEDED = 1.0  # standard errors by which the error at left-out points must fall
@@ -186,10 +183,13 @@ class Update(FolderResult):
                     change = f"{100 * before.mean_error:.2f} to {100 * after.mean_error:.2f} %"
                     clauses.append(f"{words.format(value)} the error at left-out points rises, {change}")
         left, floor = 100 * last.mean_error, self.noise.floor_percent
-        if self.described and left > LACKING * floor:  # it stands for something else, which elsewhere does otherwise
-            clauses.append(
-                f"what was read off these readings leaves {left:.2f} % at left-out points, scatter {floor:.2f} %"
-            )
+        # A form that leaves more than scatter stands for something else, which elsewhere does otherwise; what it leaves
+        # of an instrument's error is taken for the machine's.
+        names, of_instrument = self.model.fit.names, self.model.instruments
+        beside = f"{joined(names)} together leave" if of_instrument and len(of_instrument) < len(names) else ""
+        of = "what was read off these readings leaves" if self.described else beside
+        if of and left > LACKING * floor:
+            clauses.append(f"{of} {left:.2f} % at left-out points, scatter {floor:.2f} %")
         return clauses
 
     @property
@@ -273,7 +273,7 @@ class Update(FolderResult):
         first, last = (100.0 * step.error for step in (self.steps[0], self.steps[-1]))
         return f"{self.verdict}, mean error {first:.2f} to {last:.2f} %"
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The steps, one a row: as given, strut law refitted, each effect; errors in per cent."""
         return frame_of(self.document["steps"])
 

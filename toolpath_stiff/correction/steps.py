@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +61,11 @@ class LadderStep:
     def title(self) -> str:
         """Its effects, "with a + b"; its name where it has none."""
         return f"with {' + '.join(self.fit.names)}" if self.fit.names else self.name
+
+    @property
+    def instruments(self) -> Sequence[str]:
+        """Its errors of the instrument."""
+        return [candidate.name for candidate in self.fit.candidates if candidate.effect.is_instrument]
 
     @property
     def by_direction(self) -> dict[str, Document]:

@@ -22,14 +22,12 @@ from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.courses import move_lengths, points_along
 from toolpath_stiff.nc.moves import Moves, ReadProgram
 from toolpath_stiff.poses import Pose
-from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.rewriting.program import RewrittenProgram, shift_program
 from toolpath_stiff.rewriting.side_shift import Shifts, SideShift, movable_rows
 from toolpath_stiff.units import m_from_mm, mm_from_m, um_from_m
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from toolpath_stiff.cutting.cut import Cut
 
 LARGEST = 1e-4  # m, and half of the width of cut: a line that would be shifted by more is left alone
@@ -242,7 +240,7 @@ class Compensation(Result):
         document["lines"] = records(self.lines)
         return dict(certain(without_nan(to_dict(document | {name: getattr(self, name) for name in names}))))
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """A row a line and side, as `lines`."""
         return frame_of(dict(self.lines))
 

@@ -16,8 +16,8 @@ from toolpath_stiff.cutting.chips import flute_gaps, flute_laws
 from toolpath_stiff.cutting.patches import TURN, Contact, Patches
 
 WIDEST = 0.4  # rad of kappa in a layer: three nodes give the sines in it to eight digits
-# Nodes and weights, shares of a layer.
-NODES = [(0.5 + 0.5 * node, 0.5 * weight) for node, weight in zip(*np.polynomial.legendre.leggauss(3), strict=True)]
+# Gauss and Legendre's nodes and weights, shares of a layer (Abramowitz and Stegun 1964, 25.4.30).
+NODES = [(0.5 - 0.15**0.5, 5 / 18), (0.5, 4 / 9), (0.5 + 0.15**0.5, 5 / 18)]
 ANGLES = 8  # nodes of an arc: up to a half turn to nine digits
 
 

@@ -19,6 +19,7 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, TpsError
 from toolpath_stiff.inference import slips
 from toolpath_stiff.inference.candidates import testable_effects
+from toolpath_stiff.inference.discrepancies import FORMS
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.fits import baseline, refine
 from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, judge, unexcluded
@@ -100,6 +101,7 @@ def diagnose(
         for model in noise_models(data, noise, strut_spread):
             progress(f"searching {len(effects)} effects, noise {model.name}")
             judgements[model.name] = judge(Problem.of(predictor, model), model, effects, seed)
+        predictor.tables.pop(FORMS, None)  # of 5,000 readings 0.4 GB, of no use after the judgement
         # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
         return judgements, max(judgements.values(), key=lambda judgement: judgement.noise.typical)
 

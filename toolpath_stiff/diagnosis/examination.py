@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -33,11 +33,8 @@ from toolpath_stiff.planning.result import PlanRow
 from toolpath_stiff.portrait.alike import Alike
 from toolpath_stiff.portrait.portrait import Portrait
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.results import DataFrame, FolderResult, frame_of
 from toolpath_stiff.stiffness.sizes import joined
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
@@ -185,7 +182,7 @@ class Diagnosis(FolderResult):
         """The content of diagnose.json."""
         return dict(self.view.document(self))
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The candidates, one a row: probability, errors, why not."""
         return frame_of(self.to_dict()["candidates"])
 

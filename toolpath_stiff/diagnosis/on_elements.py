@@ -18,6 +18,7 @@ from toolpath_stiff.inference.element_fits import (
     LEAST,
     PullProblem,
     chi_square,
+    contradicted,
     estimate_noise,
     explanations,
     label_of,
@@ -40,6 +41,7 @@ NRAD = 1e9  # nrad/(N m) of rad/(N m)
 FEWEST = 6  # readings below which nothing is fitted
 SHOWN = 12  # explanations in the document
 NAMED = 4  # causes in a sentence
+FAR_OFF, SD_OF_MEDIAN = 8.0, 1.4826  # standard deviations, each of the median of what is off
 WORTHWHILE = 0.8  # of the error as given: what refitted joints have to leave to be spoken of
 NO_NAME = {
     "adequate": "nothing is missing that shows",
@@ -83,7 +85,7 @@ class ElementDiagnosis(FolderResult):
     @property
     def error_as_given(self) -> float:
         """Root mean square of measured less modelled, in per cent of that of what was measured."""
-        return self.problem.error_percent(self.problem.observed)
+        return self.counted(self.problem.observed)
 
     @cached_property
     def joints(self) -> Fit | None:
@@ -103,7 +105,7 @@ class ElementDiagnosis(FolderResult):
     def to_dict(self) -> Document:
         """The content of diagnose.json: keys as of a hexapod's, and the joints fitted alone."""
         problem, fits = self.problem, self.ranked[:SHOWN]
-        error = json_number(problem.error_percent(self.left_out)) if self.joints else None
+        error = json_number(self.counted(self.left_out)) if self.joints else None
         return {
             "machine": problem.machine.name,
             **effects_stated(problem.model),
@@ -153,9 +155,11 @@ class ElementDiagnosis(FolderResult):
         told = NO_NAME.get(self.verdict) or joined([*causes[:NAMED], *more])
         text = f"{self.verdict.capitalize()}: {told}. Error as given {self.error_as_given:.1f} %"
         text += " of the displacements (rms)"
-        if self.verdict == "adequate" and problem.typical > GUESSES["low"] and problem.freedom < np.inf:
+        if self.verdict == "adequate" and problem.typical > GUESSES["low"] and problem.together:
             return f"{text}, all of which counts as scatter, since nobody says how pulls scatter (--noise, sd_um)."
-        left = problem.error_percent(self.left_out)
+        if self.verdict == "ambiguous" and len(self.plausible) == 1 and problem.together:
+            text += ". Nobody says how pulls scatter (--noise, sd_um), without which it stands for no certain name"
+        left = self.counted(self.left_out)
         if self.verdict == "identified" or question(problem) or not left < WORTHWHILE * self.error_as_given:
             return f"{text}."
         return (
@@ -191,12 +195,25 @@ class ElementDiagnosis(FolderResult):
         columns["error_percent"] = 100.0 * np.linalg.norm(error, axis=1) / lengths[0]
         return columns | {"angle_deg": deg_from_rad(np.arccos(np.clip(cosine, -1.0, 1.0)))}
 
+    @cached_property
+    def wild_rows(self) -> list[int]:
+        """Readings that the likeliest explanation takes for wild; else of pulls far off what refitted joints leave."""
+        if self.verdict != "unexplained":
+            return sorted((self.plausible or [self.problem.none])[0].scatter.wild)
+        pulls, error = self.pulls, (self.joints or self.problem.none).residual * self.pulls.size
+        left, moved = (np.bincount(pulls.pull, part**2)[pulls.pull] for part in (error, pulls.value - error))
+        off = np.sqrt(left / np.maximum(moved, 1e-300))
+        return np.flatnonzero(off > FAR_OFF * SD_OF_MEDIAN * np.median(off)).tolist()
+
     @property
     def wild(self) -> list[str]:
-        """Readings that the likeliest explanation takes for wild: "FILE:LINE x"."""
-        fit = (self.plausible or [self.problem.none])[0]
+        """Of these "FILE:LINE x"."""
         pulls = self.pulls
-        return [f"{pulls.file[i]}:{pulls.line[i]} {pulls.component[i]}" for i in sorted(fit.scatter.wild)]
+        return [f"{pulls.file[i]}:{pulls.line[i]} {pulls.component[i]}" for i in self.wild_rows]
+
+    def counted(self, residual: FloatArray) -> float:
+        """Error of (m,) residuals over all readings that are not wild, per cent."""
+        return self.problem.error_percent(residual, self.wild_rows)
 
     def to_frame(self) -> pd.DataFrame:
         """One row a reading, as in `residuals.csv`."""
@@ -241,10 +258,11 @@ def pull_problem(
     spread: float = 0.0,
     effect_files: Sequence[str] = (),
 ) -> tuple[PullProblem, bool]:
-    """Pulls with their scatter, and whether somebody states it: the rows, else a share of each pull's size.
+    """Pulls with their scatter, and whether it is known: stated by rows or as a share of each pull's size, or repeats.
 
     `noise` is the standard deviation of a displacement relative to the size of its pull's, `spread` that of the
-    elements' compliances, relative. Where nobody states it, it is what all candidates together leave.
+    elements' compliances, relative. Repeats that scatter by more than is stated overrule it. Where neither tells, it is
+    what all candidates together leave.
 
     Raises
     ------
@@ -264,8 +282,10 @@ def pull_problem(
         problem.noise_of(np.where(stated, pulls.sd / pulls.size, noise), spread, words)
     else:
         problem.noise_of(np.full(len(pulls), LEAST), spread)
+    said = noise is not None or bool(stated.all())
+    if not said or contradicted(problem):
         estimate_noise(problem)
-    return problem, noise is not None or bool(stated.all())
+    return problem, said or not problem.together
 
 
 def diagnose_elements(problem: PullProblem, known: bool) -> ElementDiagnosis:

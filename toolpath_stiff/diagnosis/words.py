@@ -9,6 +9,7 @@ from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Diagnosis
 from toolpath_stiff.hints import Asked, command_line, hint, options
 from toolpath_stiff.inference.candidates import choice_text
+from toolpath_stiff.inference.discrepancies import RANGE_LENGTH
 from toolpath_stiff.inference.drawn import seen_readings
 from toolpath_stiff.inference.errors import errors_text, raised_text, scatter_text
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit
@@ -137,9 +138,8 @@ def _rivals(diagnosis: Diagnosis) -> str:
         )
         return f"Readings of the tip do not tell which of these it is: either {', or '.join(causes)}."
     if diagnosis.explanations[0] == NONE and diagnosis.main.base_gate.probability > FALSE_ALARM:
-        left = f"with what struts, joints and links leave that may be more than {100 * LEFT:g} %"
-        looks = f"What the model leaves looks like scatter.{_most_left(diagnosis)} {_capital(left)}"
-        return f"{looks}: either {', or '.join(causes)}."
+        looks = f"What the model leaves looks like scatter.{_most_left(diagnosis)} With what struts, joints and links"
+        return f"{looks} leave that may be more than {100 * LEFT:g} %: either {', or '.join(causes)}."
     first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
     if first < POSITIVE * second or len(causes) < 2:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
@@ -158,8 +158,8 @@ def _most_left(diagnosis: Diagnosis) -> str:
 
 
 def _hidden(diagnosis: Diagnosis) -> str:
-    """What an adequate model may still hide; under a guessed noise the law."""
-    text = _most_left(diagnosis)
+    """What an adequate model may still hide: beside the readings, between them; under a guessed noise the law."""
+    text = _most_left(diagnosis) + _unread(diagnosis)
     if not diagnosis.noise.guess:
         return text
     law = NORMAL_95 * np.sqrt(np.diag(diagnosis.base.covariance)[: len(diagnosis.machine.strut_law.parameters)].max())
@@ -167,6 +167,19 @@ def _hidden(diagnosis: Diagnosis) -> str:
         f"{text} But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading "
         f"would hide struts that are off by up to {100.0 * law:.2g} %, too."
     )
+
+
+def _unread(diagnosis: Diagnosis) -> str:
+    """The widest stretch of a strut's travel that lies between two readings, if it is wide enough to hide a fault.
+
+    A sentence with the space before it, else "".
+    """
+    lengths = np.sort(np.round(mm_from_m(diagnosis.predictor.strut_lengths()), 3), axis=0)
+    row, strut = np.unravel_index(np.diff(lengths, axis=0).argmax(), (len(lengths) - 1, lengths.shape[1]))
+    first, last = lengths[row : row + 2, strut].tolist()
+    if last - first < mm_from_m(RANGE_LENGTH):
+        return ""
+    return f" No reading has strut {strut + 1} between {first:.0f} and {last:.0f} mm: a fault there does not show."
 
 
 def _errors(diagnosis: Diagnosis, name: str = "") -> str:

@@ -15,21 +15,21 @@ from toolpath_stiff.machine.error_model import RANGE_ANGLE, RANGE_POSITION, coor
 RANGE_LENGTH, RANGE_ORDER = 0.05, 0.3
 # Features of a form, and of the one that has one for each point and direction: what varies faster is left out.
 MOST_FEATURES, MOST_POINTS = 300, 2000
+FORMS = ("forms of discrepancy",)
 
 
 def discrepancy_forms(predictor: Predictor) -> dict[str, FloatArray]:
     """What a discrepancy may look like, in words -> features (n, r) of its covariance; only forms that vary.
 
-    Worked out once for a set of readings.
+    Worked out once for a set of readings, and kept in `predictor.tables` under `FORMS`.
     """
-    key = ("forms of discrepancy",)
-    if key not in predictor.tables:
-        predictor.tables[key] = {
+    if FORMS not in predictor.tables:
+        predictor.tables[FORMS] = {
             words: kernel.features(MOST_POINTS if words == POINT_TO_POINT else MOST_FEATURES)
             for words, kernel in _kernels(predictor).items()
             if kernel.varies
         }
-    forms: dict[str, FloatArray] = predictor.tables[key]
+    forms: dict[str, FloatArray] = predictor.tables[FORMS]
     return forms
 
 

@@ -18,11 +18,11 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect, base_fit, fit_effects, settled
 from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.least_squares import bounded_step
-from toolpath_stiff.inference.noise import GUESSES, STATED_FREEDOM, Noise, Scatter
+from toolpath_stiff.inference.noise import CONTRADICTED, GUESSES, STATED_FREEDOM, Noise, Scatter
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS
 from toolpath_stiff.inference.votes import outvoted
 from toolpath_stiff.machine.elements import turns
-from toolpath_stiff.readings.pulls import MOVED_AXES, Pulls
+from toolpath_stiff.readings.pulls import FRAMES, MOVED_AXES, Pulls
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 from toolpath_stiff.stiffness.contract import ELEMENT, Effect, LoadPath
@@ -40,11 +40,13 @@ WRONG = 1e-3  # probability of so large a misfit, below which something else is 
 REWEIGHTED = 8  # times that scatter is estimated
 OFF = 3.0  # standard deviations that one reading counts for at most in it
 LEAST = 1e-4  # relative sd of a reading: nobody measures better
+CLOSELY = 0.9  # the same from which nobody is asked
 FOLLOWS = 0.5  # correlation of measured with modelled components, joints refitted, below which it is another machine's
 OTHER_UNIT = 100.0  # measured over modelled, or the inverse, from which the unit is asked for
 INVISIBLE = 1e-6  # of the readings' size, rms: what a candidate of its largest usual size must change at least
 VISIBLE = 5e-3  # the same of the geometry, which pulls hardly show
 ALIKE_FREEDOM = 20  # degrees of freedom within pulls that are alike, from which these tell scatter from a misfit
+SAME_PULL = 0.02  # by which components of a direction, and a force, relative, may differ between repeats
 NO_LAW = np.zeros(2)
 
 
@@ -164,9 +166,10 @@ class PullProblem(Problem):
         """Scatter of the readings over their size, root mean squares."""
         return float(np.linalg.norm(self.noise.repeat * self.pulls.size) / np.linalg.norm(self.pulls.size))
 
-    def error_percent(self, residual: FloatArray) -> float:
-        """Root mean square of (m,) residuals in m, of that of the readings, all components together."""
-        return float(100.0 * np.sqrt(((residual * self.pulls.size) ** 2).sum() / (self.pulls.value**2).sum()))
+    def error_percent(self, residual: FloatArray, wild: Sequence[int] = ()) -> float:
+        """Root mean square of (m,) residuals, of that of the readings, all components together, without the wild."""
+        error, value = (np.delete(part, wild) for part in (residual * self.pulls.size, self.pulls.value))
+        return float(100.0 * np.linalg.norm(error) / np.linalg.norm(value))
 
 
 def _says_more(fit: Fit, other: Fit, behind: Mapping[str, float]) -> bool:
@@ -184,6 +187,8 @@ def question(problem: PullProblem) -> str:
     pulls, best = problem.pulls, problem.joints_fitted if problem.torsions else problem.none
     modelled = pulls.value - best.residual * pulls.size
     alike = float((pulls.value @ modelled) / np.maximum(np.linalg.norm(pulls.value) * np.linalg.norm(modelled), 1e-300))
+    if alike < CLOSELY and (told := _in_tip_axes(pulls)):
+        return told
     if alike >= FOLLOWS:
         share = float(np.linalg.norm(pulls.value)) / max(float(np.linalg.norm(problem.predicted)), 1e-300)
         if 1.0 / OTHER_UNIT < share < OTHER_UNIT:
@@ -206,6 +211,26 @@ def question(problem: PullProblem) -> str:
     )
 
 
+def _in_tip_axes(pulls: Pulls) -> str:
+    """That components stand in the tip's axes at each pose, where those would leave half the error; else ""."""
+    turn, length = pulls.stance.rotation, np.linalg.norm(pulls.value)
+    if turn is None:
+        return ""
+    force, read = (
+        np.stack([part, np.einsum("nij,nj->ni", turn, part)]) for part in (pulls.wrench[:, :3], pulls.direction)
+    )
+    modelled = np.einsum("ani,nij,bnj->abn", read, pulls.stance.tip_compliance()[:, :3, :3], force)
+    alike = modelled @ pulls.value / np.maximum(length * np.linalg.norm(modelled, axis=-1), 1e-300)
+    sensor, pull = np.unravel_index(int(alike.argmax()), alike.shape)
+    if 4.0 * (1.0 - alike.max() ** 2) > 1.0 - alike[0, 0] ** 2 or alike.max() < FOLLOWS:
+        return ""
+    said = ", ".join(f"{name}==tip" for name, turned in zip(FRAMES, (pull, sensor), strict=True) if turned)
+    return (
+        f"Are components in the tool's axes? In those measured and modelled ones correlate by {alike.max():.2f}, in "
+        f'the base\'s by {alike[0, 0]:.2f}: --columns "{said}".'
+    )
+
+
 def label_of(fit: Fit) -> str:
     """Effects and elements: "joint_torsion, joint 3"; "none"."""
     labels = [", ".join(map(str, (c.name, *(v for _, v in c.choice if v not in ("", 0))))) for c in fit.candidates]
@@ -218,15 +243,18 @@ def chi_square(fit: Fit) -> float:
 
 
 def chance(problem: PullProblem, fit: Fit) -> float:
-    """Probability of so large a misfit by scatter: stated, or estimated by what all candidates together leave.
+    """Probability of so large a misfit by scatter: stated, of repeats, or of what all candidates together leave.
 
-    Then what these take away more is held against what they leave (Fisher's F of nested models).
+    What these take away more is held against what they leave (Fisher's F of nested models), a misfit against repeats
+    (F, too).
     """
     from scipy.special import chdtrc, fdtrc
 
-    squares = chi_square(fit)
+    squares, left = chi_square(fit), max(len(fit.residual) - len(fit.free), 1)
     if np.isinf(problem.freedom):
-        return float(chdtrc(max(len(fit.residual) - len(fit.free), 1), squares))
+        return float(chdtrc(left, squares))
+    if not problem.together:
+        return float(fdtrc(left, problem.freedom, squares / left))
     more = max(problem.together - len(fit.free), 1)
     return float(fdtrc(more, problem.freedom, max(squares - problem.freedom, 0.0) / more))
 
@@ -239,18 +267,21 @@ def lack_of_fit(problem: PullProblem, fit: Fit) -> float:
     """
     from scipy.special import fdtrc
 
-    pulls, covariance = problem.pulls, fit.scatter.covariance
-    along = np.round(pulls.wrench / np.linalg.norm(pulls.wrench[:, :3], axis=1, keepdims=True), 2)
-    labels = np.column_stack([pulls.pose, np.unique(pulls.component, return_inverse=True)[1], along])
-    groups = Groups(np.unique(labels, axis=0, return_inverse=True)[1].reshape(-1))
+    covariance, groups = fit.scatter.covariance, _alike(problem.pulls)
     own = np.clip(np.sqrt(covariance.own_variance) * fit.scatter.precision.times(fit.residual), -OFF, OFF)
     counts = np.bincount(groups.of)
     mean, several = groups.sums(own) / counts, counts > 1
     freedom, within = int(several.sum()) - len(fit.free), len(own) - len(counts)
     if within < ALIKE_FREEDOM or freedom < 1:
         return np.nan
-    ratio = (counts * mean**2)[several].sum() / freedom * within / ((own - groups.spread(mean)) ** 2).sum()
+    apart = float(((own - groups.spread(mean)) ** 2).sum())
+    ratio = (counts * mean**2)[several].sum() / freedom * within / max(apart, 1e-300)
     return float(fdtrc(freedom, within, ratio))
+
+
+def joints_say_more(problem: PullProblem, fit: Fit) -> bool:
+    """Whether the joints refitted all together foretell pose after pose better than an explanation, beyond chance."""
+    return bool(problem.torsions) and outvoted(-votes(problem, fit, {JOINTS: problem.joints_fitted})[JOINTS])
 
 
 def explanations(problem: PullProblem, before: Fit) -> list[Fit]:
@@ -259,36 +290,77 @@ def explanations(problem: PullProblem, before: Fit) -> list[Fit]:
     return sorted((fit for fit in fits if fit.sizes[-1].any()), key=lambda fit: -fit.log_posterior)
 
 
-def estimate_noise(problem: PullProblem) -> None:
-    """Take for scatter what all candidates together leave, each of at least its neutral size.
+def _alike(pulls: Pulls, *further: FloatArray) -> Groups:
+    """Readings of one pose and component under forces along one direction, and alike in what (m, ...) is given."""
+    along = pulls.wrench / np.linalg.norm(pulls.wrench[:, :3], axis=1, keepdims=True)
+    labels = [pulls.pose, *(np.round(part / SAME_PULL) for part in (pulls.along, along, *further))]
+    return Groups(np.unique(np.column_stack(labels), axis=0, return_inverse=True)[1].reshape(-1))
 
-    A reading's variance is that of its component (an indicator's own) and a share of the squared size of its pull:
-    both by weighted squares of what is left (iterated, Davidian and Carroll 1987, J. Am. Stat. Assoc. 82, 1079).
+
+def between_repeats(problem: PullProblem) -> tuple[FloatArray, int]:
+    """(m,) squared deviation, relative, of each reading from the mean of its repeats, and how many differences.
+
+    Repeats are alike, their forces too. The squares of n count n / (n - 1) times; nan without repeats, or of copies.
+    """
+    groups = _alike(problem.pulls, np.log(np.linalg.norm(problem.pulls.wrench[:, :3], axis=1)))
+    count = groups.spread(np.bincount(groups.of).astype(float))
+    off = problem.observed - groups.spread(groups.sums(problem.observed)) / count
+    several = (count > 1) & bool(np.abs(off).max() > LEAST)
+    return np.where(several, off**2 * count / np.maximum(count - 1, 1), np.nan), round((1 - 1 / count)[several].sum())
+
+
+def contradicted(problem: PullProblem) -> bool:
+    """Whether repeats scatter by more than is stated, beyond chance; by less they may: poses differ besides."""
+    squares, differences = between_repeats(problem)
+    ratio = np.nanmean(np.minimum(squares / problem.noise.repeat**2, OFF**2)) if differences else 0.0
+    chance = CONTRADICTED * np.sqrt(0.5 / STATED_FREEDOM + 0.5 / max(differences, 1))
+    return bool(differences >= ALIKE_FREEDOM and ratio > np.exp(2.0 * chance))
+
+
+def estimate_noise(problem: PullProblem) -> None:
+    """Take for scatter what repeats differ by; without enough of them what all candidates together leave.
+
+    Each of these has at least its neutral size. A reading's variance is that of its component (an indicator's own) and
+    a share of the squared size of its pull: both by weighted squares of what is left (iterated, Davidian and Carroll
+    1987, J. Am. Stat. Assoc. 82, 1079).
     """
     from scipy.optimize import nnls
 
+    repeated, differences = between_repeats(problem)
+    by_repeats = differences >= ALIKE_FREEDOM
+    rows = np.isfinite(repeated) | (not by_repeats)
+    changes, least = (np.empty(0), np.empty(0)) if by_repeats else _changes(problem)
+    size, names = problem.pulls.size, np.unique(problem.pulls.component)
+    variances = np.stack([*(problem.pulls.component == name for name in names), size**2]).astype(float)
+    variance, problem.freedom = (GUESSES["high"] * size) ** 2, float(differences)
+    for _ in range(REWEIGHTED):
+        weight, squares, more = size / np.sqrt(variance), repeated, 1.0
+        if not by_repeats:
+            columns, observed = changes * weight[:, None], problem.observed * weight
+            columns = columns / np.linalg.norm(columns, axis=0).clip(min=1e-300)
+            rank = int(np.linalg.matrix_rank(columns))
+            if len(observed) - rank < FEWEST:
+                break
+            sizes = bounded_step(columns.T @ columns, columns.T @ observed, least, np.full(len(least), np.inf))
+            squares, more = (problem.observed - columns @ sizes / weight) ** 2, len(observed) / (len(observed) - rank)
+            problem.freedom, problem.together = float(len(observed) - rank), rank
+        squares = np.minimum(squares * weight**2, OFF**2)[rows]  # in units of the variance so far
+        shares = nnls((variances / variance)[:, rows].T, squares)[0] * more
+        variance = np.maximum(shares @ variances, (LEAST * size) ** 2)
+    share = float(np.sqrt(variance.sum() / (size**2).sum()))
+    words = f"{100 * share:.2g} % of the size of the displacements"
+    told = f"; {problem.noise.origin} is too little" if problem.noise.origin else ""
+    of_repeats = f"estimated from {differences} differences between repeats, {words}{told}"
+    words = of_repeats if by_repeats else f"estimated or guessed, {words} (say --noise)"
+    problem.noise_of(np.sqrt(variance) / size, problem.noise.strut_spread, words)
+
+
+def _changes(problem: PullProblem) -> tuple[FloatArray, FloatArray]:
+    """(m, k) what each parameter of each candidate changes, of its usual size; (k,) the least that it may be."""
     parts = [(c, j, part) for c in problem.candidates() for j, part in enumerate(c.components)]
     units = [c.active(np.eye(len(c.components))[j] * part.signs[-1] * part.typical()[1]) for c, j, part in parts]
-    least = np.array([-np.inf if len(part.signs) > 1 else 0.0 for *_, part in parts])
-    size, names = problem.pulls.size, np.unique(problem.pulls.component)
-    changes = np.stack([problem.observed - problem.residual(NO_LAW, [active]) for active in units], axis=1)
-    variances = np.stack([*(problem.pulls.component == name for name in names), size**2]).astype(float)
-    variance = (GUESSES["high"] * size) ** 2
-    for _ in range(REWEIGHTED):
-        weight = size / np.sqrt(variance)
-        columns, observed = changes * weight[:, None], problem.observed * weight
-        columns = columns / np.linalg.norm(columns, axis=0).clip(min=1e-300)
-        rank = int(np.linalg.matrix_rank(columns))
-        if len(observed) - rank < FEWEST:
-            break
-        sizes = bounded_step(columns.T @ columns, columns.T @ observed, least, np.full(len(least), np.inf))
-        squares = np.minimum((observed - columns @ sizes) ** 2, OFF**2)  # in units of the variance so far
-        shares = nnls((variances / variance).T, squares)[0] * len(observed) / (len(observed) - rank)
-        variance = np.maximum(shares @ variances, (LEAST * size) ** 2)
-        problem.freedom, problem.together = float(len(observed) - rank), rank
-    share = float(np.sqrt(variance.sum() / (size**2).sum()))
-    words = f"estimated or guessed, {100 * share:.2g} % of the size of the displacements (say --noise)"
-    problem.noise_of(np.sqrt(variance) / size, problem.noise.strut_spread, words)
+    changes = [problem.observed - problem.residual(NO_LAW, [active]) for active in units]
+    return np.stack(changes, axis=1), np.array([-np.inf if len(part.signs) > 1 else 0.0 for *_, part in parts])
 
 
 def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool) -> tuple[str, list[Fit]]:
@@ -308,9 +380,7 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
     if gain < GAIN and chance(problem, base) > WRONG and fits_alike:
         return "adequate", []
     explained = chance(problem, best) >= WRONG and gain >= GAIN and fits_alike
-    if explained and problem.torsions:  # no name where all joints together say far more
-        explained = not outvoted(-votes(problem, best, {JOINTS: problem.joints_fitted})[JOINTS])
-    if not explained:
+    if not explained or joints_say_more(problem, best):
         return "unexplained", []
     behind = {label_of(fit): 2.0 * (best.log_posterior - fit.log_posterior) for fit in fits}
     ballots = votes(problem, best, {label_of(fit): fit for fit in (base, *fits[1:])})

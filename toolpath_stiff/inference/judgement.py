@@ -161,8 +161,8 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
     gates = apply_gates(problem, noise, candidates, seed)
     probability, form = weigh(problem, noise, candidates, gates)
     doubtful = question(problem.predictor)
-    verdict, explanations = ("unexplained", ()) if doubtful else decide(gates, probability)
-    verdict, explanations, ballots = put_to_vote(problem, noise, candidates, gates, (verdict, explanations))
+    voted = ("unexplained", (), {}) if doubtful else put_to_vote(problem, noise, candidates, gates, probability)
+    verdict, explanations, ballots = voted
     doubt, factor = ("", 1.0) if doubtful else noise_doubt(problem, noise, gates.base, verdict, seed)
     described = None
     if verdict == "identified":
@@ -249,8 +249,7 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: in
     signs = signatures(problem, (table for family in families for table in family.tables))
     # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
     gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
-    alone = absolute_gate(problem, base.residual, base.jacobian, draws, forms, signs, gain)
-    gates = Gates(alone)
+    gates = Gates(absolute_gate(problem, base.residual, base.jacobian, draws, forms, signs, gain))
     if gates.enough:
         return gates
 
@@ -278,7 +277,7 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: in
         tried.append(pair)
     gates.tried = tuple(sorted(tried, key=lambda fit: (-fit.log_evidence, fit.name)))
     # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
-    gates.none_stands = min(alone.squares_probability, alone.structure_probability) > ADEQUATE
+    gates.none_stands = min(gates.base.squares_probability, gates.base.structure_probability) > ADEQUATE
     return gates
 
 
@@ -288,16 +287,15 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
     Where no single effect passes, something outside the catalogue is weighed, too: then with the form of discrepancy
     that stands out, in words, else "".
     """
-    families = candidates.families
     if gates.enough:
-        return _posterior(problem, noise, candidates, True, [f.name for f in families]), ""
+        return _posterior(problem, noise, candidates, True, [f.name for f in candidates.families]), ""
     outside, form = (-np.inf, "") if gates.singles else _outside(problem, candidates)
 
     def posterior(standing: Sequence[Fit]) -> dict[str, float]:
         if gates.singles:
             return _posterior(problem, noise, candidates, gates.none_stands, gates.singles, standing)
         evidences = {OUTSIDE: outside} | {several.name: several.log_evidence for several in standing}
-        prior = {several.name: _prior(families, len(several.names)) for several in standing}
+        prior = {several.name: _prior(candidates.families, len(several.names)) for several in standing}
         return probabilities(evidences, {OUTSIDE: PRIOR_OUTSIDE} | prior)
 
     posteriors = _sparing(gates, posterior)
@@ -338,13 +336,12 @@ def _posterior(
     pairs: Sequence[Fit] = (),
 ) -> dict[str, float]:
     """Probabilities of the base model (if it stands), of single effects and of pairs; 0 for all others."""
-    families = candidates.families
     hypotheses = {NONE: (candidates.base.log_evidence, candidates.base)}
-    hypotheses |= {family.name: (family.log_evidence, family.best or candidates.base) for family in families}
+    hypotheses |= {family.name: (family.log_evidence, family.best or candidates.base) for family in candidates.families}
     hypotheses |= {pair.name: (pair.log_evidence, pair) for pair in pairs}
     prior = {NONE: PRIOR_NONE} if none else {}
-    prior |= {name: _prior(families, 1) for name in names}
-    prior |= {pair.name: _prior(families, len(pair.names)) for pair in pairs}
+    prior |= {name: _prior(candidates.families, 1) for name in names}
+    prior |= {pair.name: _prior(candidates.families, len(pair.names)) for pair in pairs}
     return probabilities({name: _with_unknown_noise(problem, noise, *of) for name, of in hypotheses.items()}, prior)
 
 
@@ -383,20 +380,21 @@ def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str
 
 
 def put_to_vote(
-    problem: Problem, noise: Noise, candidates: Candidates, gates: Gates, decided: tuple[str, tuple[str, ...]]
+    problem: Problem, noise: Noise, candidates: Candidates, gates: Gates, probability: Mapping[str, float]
 ) -> tuple[str, tuple[str, ...], Votes]:
-    """Verdict and explanations (as `decided`) after the votes of the readings, and the votes for the first explanation.
+    """Verdict and explanations (`decide`) after the votes of the readings, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer. A name that has not outvoted every rival of another part is
-    one of several; the closest of these stand beside it, and what a strut law that had to move may stand for. A model
-    that passes is not the only explanation where its nuisances have taken up more than they may, or where more may be
-    left than an adequate one leaves; what a guessed noise would hide is told instead.
+    one of several: beside it stand those that are likely, then the closest of the others and of what a strut law that
+    had to move may stand for. A model that passes is not the only explanation where its nuisances have taken up more
+    than they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would
+    hide is told instead.
     """
-    verdict, explanations = decided
+    verdict, explanations = decide(gates, probability)
     base, data, ballots = candidates.base, problem.predictor.data, dict[str, FloatArray]()
     fits = {NONE: base} | {family.name: best for family, best in candidates.offered} | gates.fits
     if verdict == "adequate":
-        open_ones = explanations if not noise.guess and _may_leave(problem, candidates) > LEFT else ()
+        open_ones = explanations if noise.guess != "high" and _may_leave(problem, noise, candidates) > LEFT else ()
         likely = standing = [*dict.fromkeys([NONE, *(name for name in TAKEN_UP if name in fits), *open_ones])]
     elif verdict in ("identified", "ambiguous"):
         left_out = {name: held_out(fits[name], data.point).of_readings(data.tip) for name in {NONE, *explanations}}
@@ -412,23 +410,23 @@ def put_to_vote(
             ballots = votes(problem, fits[top], rivals_of(fits[top], rivals))
             ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
             open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
-            ranked = [top, *(name for name in standing if name not in ballots), *ballots]  # the closest first
-            likely = [name for name in dict.fromkeys(ranked) if name in standing]
+            # Likeliest first, but for those that are outvoted: differences of votes below that are chance.
+            likely = sorted(standing, key=lambda name: (name != top, name in ballots and name not in open_rivals))
             verdict, standing = "ambiguous" if open_rivals else verdict, [*likely, *open_rivals]
-            small = gates.none_stands and _is_small(problem, base, [fits[name] for name in likely])
-            if verdict == "ambiguous" and small:
+            if verdict == "ambiguous" and gates.none_stands and _is_small(problem, base, [fits[n] for n in likely]):
                 standing.append(NONE)
     else:
         return verdict, explanations, {}
-    # Of the likely ones: a name that is open only in a fair form does not fit as it stands.
-    instead, of_law = _instead_of_law(problem, fits, likely)
+    instead, of_law = _instead_of_law(problem, fits[likely[0]])
     gates.fits |= instead
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
+    ballots = closest(ballots, of_law)
+    sure = [name for name in standing if name == standing[0] or probability.get(name, 0.0) >= STANDS]
     return (
         "ambiguous" if instead or verdict == "adequate" else verdict,
-        shortened(problem, fits | instead, (*standing, *instead)),
-        closest(ballots, of_law),
+        shortened(problem, fits | instead, (*sure, *(n for n in ballots if n in {*standing, *instead}), *standing)),
+        ballots,
     )
 
 
@@ -440,15 +438,19 @@ def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -
     return tuple(name for group in kept for name in group)
 
 
-def _may_leave(problem: Problem, candidates: Candidates) -> float:
+def _may_leave(problem: Problem, noise: Noise, candidates: Candidates) -> float:
     """Mean error (relative) at the readings' poses up to which a model that passes may still be off.
 
     What an effect may hide there beside the refitted law (95 %), of all the one that hides most, and what struts,
-    joints and links that are not quite those of the model leave on average.
+    joints and links that are not quite those of the model leave on average. Where the scatter is only guessed, at least
+    what it does not account for of the error of the model as given: whether that is scatter, too, nobody knows.
     """
     families = [family for family in candidates.families if family.name not in candidates.within]
     hidden = max((room.left for room, _ in rooms(problem, families, candidates.base)), default=0.0)
-    return hidden + mean_left_by_nuisances(candidates.base, problem.predictor.data.tip)
+    tip = problem.predictor.data.tip
+    error = float(np.abs(np.expm1(-problem.residual(np.zeros(2), ())[tip])).mean()) if noise.guess else 0.0
+    beyond = float(max(error**2 - (noise.floor_percent / 100.0) ** 2, 0.0) ** 0.5)
+    return max(beyond, hidden + mean_left_by_nuisances(candidates.base, tip))
 
 
 def _moved_by_law(problem: Problem, fit: Fit) -> float:
@@ -468,22 +470,20 @@ def _is_small(problem: Problem, base: Fit, explanations: Sequence[Fit]) -> bool:
     return most <= LEFT
 
 
-def _instead_of_law(problem: Problem, fits: Mapping[str, Fit], standing: Sequence[str]) -> tuple[dict[str, Fit], Votes]:
-    """Explanations beside the file's strut law that hold as well as these with a law that had to move; their votes.
+def _instead_of_law(problem: Problem, fit: Fit) -> tuple[dict[str, Fit], Votes]:
+    """Explanations beside the file's strut law that hold as well as one with a law that had to move; all their votes.
 
-    None where the law has moved the stiffness by less than an adequate model may leave along a path, beyond chance.
+    The closest first. None where the law has moved the stiffness by less than an adequate model may leave along a path,
+    beyond chance.
     """
-    instead, ballots = dict[str, Fit](), dict[str, FloatArray]()
-    leaders = [first for first, *_ in entries(problem, fits, standing)[:MOST_OPEN]]
-    for fit in (fits[name] for name in leaders if name in fits):
-        if _moved_by_law(problem, fit) <= LEFT:
-            continue
-        given = with_given_law(problem, fit)
-        if outvoted(votes(problem, fit, {NONE: given})[NONE]):
-            rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (SERIES, *ONE_BODY)).values()}
-            ballots |= votes(problem, fit, rivals)
-            instead |= {rival: rivals[rival] for rival in rivals if not outvoted(ballots[rival])}
-    return instead, ballots
+    if _moved_by_law(problem, fit) <= LEFT:
+        return {}, {}
+    given = with_given_law(problem, fit)
+    if not outvoted(votes(problem, fit, {NONE: given})[NONE]):
+        return {}, {}
+    rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (SERIES, *ONE_BODY)).values()}
+    ballots = votes(problem, fit, rivals)
+    return {name: rivals[name] for name in ballots if not outvoted(ballots[name])}, ballots
 
 
 def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
@@ -496,10 +496,9 @@ def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
     name = next((name for name in judgement.explanations if name == NONE or name in judgement.fits), "")
     if not name:
         return ()
-    families = judgement.families
-    one, two = (_prior(families, count) for count in (1, 2))
+    one, two = (_prior(judgement.families, count) for count in (1, 2))
     odds = one / PRIOR_NONE if name == NONE else two / one
-    return tuple(not_excluded(judgement.problem, families, judgement.fits.get(name, judgement.base), odds))
+    return tuple(not_excluded(judgement.problem, judgement.families, judgement.fits.get(name, judgement.base), odds))
 
 
 def _smallest_set(posterior: Mapping[str, float], named: float = NAMED) -> tuple[str, ...]:

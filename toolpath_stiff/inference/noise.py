@@ -33,7 +33,6 @@ from toolpath_stiff.readings.measurements import Readings
 # Sd of what the links that the model takes for rigid change ln stiffness by along each axis, rms; assumed. Twice as
 # much hides a spindle that gives way by 4 % of the tip; without any, sound machines of beams and mounts are called ill.
 REST = 0.003
-REST_COLUMNS = 7
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
 # Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.

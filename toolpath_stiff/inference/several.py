@@ -156,8 +156,10 @@ class LinearSearch:
                 rest -= matrix[:, :, j] * move[:, None]
         present = np.abs(sizes) > NEGLIGIBLE
         gains = (sizes * (wanted + rest)).sum(axis=1)
-        volume = np.linalg.slogdet(np.where(present[:, :, None] & present[:, None, :], matrix, eye) + 1e-9 * eye)[1]
-        price = np.where(present, np.log(np.maximum(np.abs(sizes), 1.0)) + PER_SIZE, 0.0).sum(axis=1)
+        # Of two columns that are alike the readings tell the sum alone: each is then known no better than its own size.
+        known, extent = np.where(present[:, :, None] & present[:, None, :], matrix, eye), np.maximum(np.abs(sizes), 1.0)
+        volume = np.linalg.slogdet(known + eye * (present / extent**2)[:, None])[1]
+        price = np.where(present, np.log(extent) + PER_SIZE, 0.0).sum(axis=1)
         p = self.columns.shape[1]
         price += np.log(2.0) * (high > low).sum(axis=1)  # of subsets of components, then of choices
         price += np.log([self.choices[name] for name in self.owner])[rows[:, ::p] // p].sum(axis=1)

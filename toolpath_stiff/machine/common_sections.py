@@ -10,7 +10,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.machine.schema import MachineToml, Sections
 from toolpath_stiff.machine.uncertainty import read_uncertainty
-from toolpath_stiff.poses import Pose, pose_in_si
+from toolpath_stiff.poses import pose_in_si
 from toolpath_stiff.toml_reader import shortened
 from toolpath_stiff.units import m_per_s_from_mm_per_min
 
@@ -21,7 +21,7 @@ def common_fields(toml: MachineToml, values: Sections, parameters: Sequence[str]
     effects, instruments = (_entries(toml, kind) for kind in ("effect", "instrument"))
     return {
         **{key: top[key] for key in ("name", "title", "source")},
-        "default_origin": pose_of(setup.get("default_origin_mm", np.zeros(3))),
+        "default_origin": pose_in_si(setup.get("default_origin_mm", np.zeros(3))),
         "rapid_feed": m_per_s_from_mm_per_min(setup["rapid_mm_per_min"]) if setup else defaults.RAPID_FEED,
         "setup": setup.get("name"),
         "temperature": setup.get("temperature_C"),
@@ -39,11 +39,8 @@ def _entries(toml: MachineToml, kind: str) -> tuple[EffectEntry, ...]:
 
     What the parameters mean, and their bounds, is known to the effects themselves (the room above).
     """
-    rows = toml.data.get(kind, [])
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise toml.fault("", kind, f" is not a list of tables; write [[{kind}]]")
     entries = []
-    for nth, row in enumerate(rows):
+    for nth, row in enumerate(toml.rows(kind)):
         places = {key: toml.line_of(kind, key, nth) for key in ("", *row)}
         lines = {key: line for key, line in places.items() if line is not None}
         name, provenance = row.get("name"), row.get("provenance", {})
@@ -57,11 +54,5 @@ def _entries(toml: MachineToml, kind: str) -> tuple[EffectEntry, ...]:
             text, line = f"[[{kind}]] {key}{mistake}", lines.get(key, lines.get(""))
             raise InputError(text, expected=expected, file=toml.file, line=line)
         parameters = {key: value for key, value in row.items() if key not in ("name", "provenance")}
-        entries.append(EffectEntry(name, parameters, provenance, toml.file, lines))
+        entries.append(EffectEntry(str(name), parameters, provenance, toml.file, lines))
     return tuple(entries)
-
-
-def pose_of(values: Any) -> Pose:
-    """A pose in SI of x, y, z in mm and, if there, three angles in degrees."""
-    x, y, z, a, b, c = [*map(float, values), 0.0, 0.0, 0.0][:6]
-    return pose_in_si((x, y, z, a, b, c))

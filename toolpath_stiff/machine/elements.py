@@ -179,7 +179,7 @@ def beam_axes(along: FloatArray, near_z: FloatArray) -> FloatArray:
     return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
-def rod_forces(directions: FloatArray, arms: FloatArray, last: FloatArray | None = None) -> FloatArray:
+def rod_forces(directions: FloatArray, arms: FloatArray) -> FloatArray:
     """(n, 6, 6) forces in six rods per unit wrench at the tip, W^-1, W = [u_i; r_i x u_i]; nan where it is singular.
 
     Of rods along unit vectors u_i (n, 6, 3) that meet the platform at r_i (n, 6, 3) from the tip.

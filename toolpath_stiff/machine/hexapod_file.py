@@ -10,10 +10,11 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.common_sections import common_fields, pose_of
+from toolpath_stiff.machine.common_sections import common_fields
 from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Hexapod, Limits, StrutLaw
 from toolpath_stiff.machine.schema import OPTIONAL_SECTIONS, SECTIONS, MachineToml, Sections, read_sections
+from toolpath_stiff.poses import pose_in_si
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
 
 CLOSEST_LENGTHS = 1e-6  # m, of a strut law: nobody measures closer, and the slope between them stays a number
@@ -115,7 +116,7 @@ def _limits(toml: MachineToml, values: Sections) -> Limits:
     if not low < high:
         raise toml.fault("limits.strut_length", "max_mm", f" = {high:g}", expected=f"more than min_mm = {low:g}")
     # Joints without limits: the neutral pose only serves the singularity index.
-    neutral = pose_of(values.get("setup", {}).get("default_origin_mm", np.zeros(3)))
+    neutral = pose_in_si(values.get("setup", {}).get("default_origin_mm", np.zeros(3)))
     limits = Limits(strut_length=(m_from_mm(low), m_from_mm(high)), neutral_pose=neutral)
     if box := values.get("limits.workspace"):
         if not (box["min_mm"] < box["max_mm"]).all():
@@ -124,7 +125,7 @@ def _limits(toml: MachineToml, values: Sections) -> Limits:
         limits = replace(limits, workspace=m_from_mm(np.array([box["min_mm"], box["max_mm"]])))
     if angles := values.get("limits.joint_angle"):
         frame, platform = (rad_from_deg(angles[key]) for key in ("frame_max_deg", "platform_max_deg"))
-        neutral = pose_of(angles["neutral_pose_mm_deg"])
+        neutral = pose_in_si(angles["neutral_pose_mm_deg"])
         limits = replace(limits, frame_joint_angle=frame, platform_joint_angle=platform, neutral_pose=neutral)
     singularity = values.get("limits.singularity", {}).get("min_index", limits.singularity)
     return replace(limits, singularity=singularity)

@@ -7,11 +7,12 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
-from toolpath_stiff.machine.common_sections import common_fields, pose_of
+from toolpath_stiff.machine.common_sections import common_fields
 from toolpath_stiff.machine.elements import Element
 from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections
-from toolpath_stiff.machine.serial_elements import ELEMENT, read_bodies
+from toolpath_stiff.machine.serial_elements import ELEMENT, read_elements
+from toolpath_stiff.poses import pose_in_si
 from toolpath_stiff.units import m_from_mm, m_from_nm
 
 STILL: tuple[tuple[()], tuple[()]] = ((), ())  # no joints on either side: base and tip alone
@@ -40,13 +41,13 @@ def shared_fields(toml: MachineToml, values: Sections) -> dict[str, Any]:
         raise toml.fault("workspace", "max_mm", ": not above min_mm", expected="max_mm > min_mm in x, y and z")
     neutral = singularity.get("neutral_pose_mm_deg")
     limits = Limits(
-        workspace=m_from_mm(corners), neutral_pose=common["default_origin"] if neutral is None else pose_of(neutral)
+        workspace=m_from_mm(corners), neutral_pose=common["default_origin"] if neutral is None else pose_in_si(neutral)
     )
     return {
         **common,
         "limits": limits,
         "reference_tool_length": m_from_mm(values.get("reference_tool", {}).get("length_mm", np.nan)),
-        "bodies": read_bodies(toml, STILL)[0],
+        "bodies": tuple(read_elements(toml, STILL).bodies[0]),
         "least_index": singularity.get("min_index", 0.0),
     }
 

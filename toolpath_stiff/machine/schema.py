@@ -26,6 +26,13 @@ class MachineToml(TomlReader):
             label, line = f"[[{name}]] {number} {key}".strip(), line or self.line_at(section)
         return InputError(f"{label}{mistake}", expected=expected, hint=hint, file=self.file, line=line)
 
+    def rows(self, name: str) -> list[Document]:
+        """The tables `[[name]]`. Raises `InputError` where it is something else."""
+        rows = self.data.get(name, [])
+        if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+            raise self.fault("", name, f" is not a list of tables; write [[{name}]]")
+        return rows
+
 
 @dataclass(frozen=True)
 class Key:
@@ -167,10 +174,7 @@ def _section(toml: MachineToml, name: str, content: Document, keys: Mapping[str,
 
 def read_rows(toml: MachineToml, name: str, keys: Mapping[str, Key]) -> list[Document]:
     """The tables `[[name]]` of a file, each key checked as of a section; errors name the row."""
-    rows = toml.data.get(name, [])
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise toml.fault("", name, f" is not a list of tables; write [[{name}]]")
-    return [_section(toml, f"{name}[{nth}]", row, keys, stated=False) for nth, row in enumerate(rows, 1)]
+    return [_section(toml, f"{name}[{nth}]", row, keys, stated=False) for nth, row in enumerate(toml.rows(name), 1)]
 
 
 def _value(toml: MachineToml, section: str, key: str, raw: Any, rule: Key) -> Any:

@@ -50,10 +50,15 @@ Mass = tuple[float, int, FloatArray]  # kg, number of the frame that it moves wi
 
 
 class ElementReader:
-    """Reads one element after the other; frames of each side are numbered from the base, the last one tip or work."""
+    """Reads one row after the other to `bodies` and `masses`, those of the tool's side and those of the work's.
+
+    Frames of each side are numbered from the base, the last one tip or work.
+    """
 
     def __init__(self, toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[FixedFrame]) -> None:
         self.toml, self.chains, self.section = toml, chains, ""
+        self.bodies: tuple[list[Part], list[Part]] = ([], [])
+        self.masses: tuple[list[Mass], list[Mass]] = ([], [])
         self.row: Document = {}
         self.homes = []
         for joints, end in zip(chains, ends, strict=True):
@@ -66,8 +71,8 @@ class ElementReader:
         """An error at a key of the row."""
         return self.toml.fault(self.section, key, mistake, expected)
 
-    def read(self, nth: int, row: Document) -> tuple[list[Part], list[Part]]:
-        """Parts of the tool's and of the work's side of one row."""
+    def element(self, nth: int, row: Document) -> None:
+        """Adds what gives way by one row."""
         self.section, self.row = f"element[{nth}]", row
         kind, side = row["type"], row.get("side", "tool")
         if kind not in USED:
@@ -79,10 +84,11 @@ class ElementReader:
             raise self.fault("side", f" = {side!r}", "tool or work")
         if row.get("link", LINKS[0]) not in LINKS:
             raise self.fault("link", f" = {row['link']!r}", f"one of {', '.join(LINKS)}")
+        work = side == "work"
         if kind == "joint":
-            return self._joints()
-        part = self._beam(side == "work") if kind == "beam" else self._spring(side == "work")
-        return ([], [part]) if side == "work" else ([part], [])
+            self._joints()
+        else:
+            self.bodies[work].append(self._beam(work) if kind == "beam" else self._spring(work))
 
     def needed(self, key: str) -> FloatArray:
         """The value of a key that must be there."""
@@ -90,14 +96,13 @@ class ElementReader:
             raise self.fault(key, " is missing", ELEMENT[key].expected)
         return np.asarray(self.row[key])
 
-    def element(self, link: str) -> Element:
+    def _element(self, link: str) -> Element:
         """Its name as results show it, and its link unless the file names one."""
         return Element(self.row["name"].replace("_", " "), self.row.get("link", link))
 
-    def _joints(self) -> tuple[list[Part], list[Part]]:
+    def _joints(self) -> None:
         """Torsion about the axis of each rotary joint, and the same bending about both others."""
         rotary = [(work, i) for work in (False, True) for i, j in enumerate(self.chains[work]) if not j.linear]
-        parts: tuple[list[Part], list[Part]] = ([], [])
         given = {}
         for key in USED["joint"]:
             values = self.needed(key) if key.startswith("torsion") else np.asarray(self.row.get(key, 0.0))
@@ -107,8 +112,7 @@ class ElementReader:
         for (work, i), torsion, bending in zip(rotary, *given.values(), strict=True):
             element = Element(joint_element(self.chains[work][i].name), self.row.get("link", "joints"))
             compliance = np.array([0.0, 0.0, 0.0, bending, bending, torsion])
-            parts[work].append(Body(element, i + 1, STILL, compliance))
-        return parts
+            self.bodies[work].append(Body(element, i + 1, STILL, compliance))
 
     def _spring(self, work: bool) -> Part:
         ways = [key for key in ("at", "centre", "centre_mm") if key in self.row]
@@ -130,7 +134,7 @@ class ElementReader:
         if "x_axis" in self.row or "z_axis" in self.row:
             place = FixedFrame(beam_axes(self.needed("x_axis"), self.needed("z_axis")), place.origin)
         tip = frame == len(homes) - 1 and not work
-        return Body(self.element("tool" if tip else "table" if work else "frame"), frame, place, compliance)
+        return Body(self._element("tool" if tip else "table" if work else "frame"), frame, place, compliance)
 
     def _centre(self, work: bool) -> tuple[int, FixedFrame]:
         """On the axis of a rotary joint, in the frame that carries it: machine axes with all joints at 0."""
@@ -167,7 +171,7 @@ class ElementReader:
         (first, start), (second, end) = (
             self._placed(f"{key}_mm", f"{prefix}moves_with", work) for key, prefix in (("from", ""), ("to", "to_"))
         )
-        element = self.element("table" if work else "frame")
+        element = self._element("table" if work else "frame")
         z_axis = start.axes @ self.needed("z_axis")
         if first != second:
             return SpanningBeam(element, (first, second), start.origin, end.origin, z_axis, stiffness)
@@ -177,30 +181,19 @@ class ElementReader:
         place = FixedFrame(beam_axes(along, z_axis), 0.5 * (start.origin + end.origin))
         return Body(element, first, place, beam_compliance(float(np.linalg.norm(along)), stiffness))
 
-    def mass(self, nth: int, row: Document) -> tuple[bool, Mass]:
-        """Whether a mass is on the work's side; kg, the frame that it moves with, (3,) m in that frame."""
+    def mass(self, nth: int, row: Document) -> None:
+        """Adds the mass of one row."""
         self.section, self.row, work = f"mass[{nth}]", row, row.get("side") == "work"
         frame, place = self._placed("centre_mm", "moves_with", work)
-        return work, (float(row["kg"]), frame, place.origin)
+        self.masses[work].append((float(row["kg"]), frame, place.origin))
 
 
-def read_masses(
-    toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[FixedFrame]
-) -> tuple[tuple[Mass, ...], tuple[Mass, ...]]:
-    """Masses on the tool's and on the work's side."""
-    reader = ElementReader(toml, chains, ends)
-    masses = [reader.mass(nth, row) for nth, row in enumerate(read_rows(toml, "mass", MASS), 1)]
-    return tuple(mass for work, mass in masses if not work), tuple(mass for work, mass in masses if work)
-
-
-def read_bodies(
+def read_elements(
     toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[FixedFrame] = (STILL, STILL)
-) -> tuple[tuple[Part, ...], tuple[Part, ...]]:
-    """What gives way on the tool's and on the work's side."""
+) -> ElementReader:
+    """What gives way, and the masses, each on the tool's and on the work's side."""
     reader = ElementReader(toml, chains, ends)
-    sides: tuple[list[Part], list[Part]] = ([], [])
-    for nth, row in enumerate(read_rows(toml, "element", ELEMENT), 1):
-        of_tool, of_work = reader.read(nth, row)
-        sides[0].extend(of_tool)
-        sides[1].extend(of_work)
-    return tuple(sides[0]), tuple(sides[1])
+    for name, keys, read in (("element", ELEMENT, reader.element), ("mass", MASS, reader.mass)):
+        for nth, row in enumerate(read_rows(toml, name, keys), 1):
+            read(nth, row)
+    return reader

@@ -20,7 +20,7 @@ from toolpath_stiff.machine.elements import TORSION, beam_axes, turns
 from toolpath_stiff.machine.model import Limits
 from toolpath_stiff.machine.schema import NAMES, SETUP, Key, MachineToml, Sections, read_rows, read_sections
 from toolpath_stiff.machine.serial import Serial
-from toolpath_stiff.machine.serial_elements import ELEMENT, MASS, read_bodies, read_masses
+from toolpath_stiff.machine.serial_elements import ELEMENT, MASS, read_elements
 from toolpath_stiff.machine.words import LETTERS
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
@@ -85,11 +85,10 @@ def read(toml: MachineToml) -> Serial:
     else:
         rows, names, convention = _rows_of_mill(toml, values), ["X", "Y", "Z", "A", "B", "C"], MODIFIED
     tool, work, tip, table = _of_rows(toml, rows, values, convention)
-    bodies = read_bodies(toml, (tool, work), (tip, table))
-    masses = read_masses(toml, (tool, work), (tip, table))
-    if not any(bodies):
+    parts = read_elements(toml, (tool, work), (tip, table))
+    if not any(parts.bodies):
         raise InputError("no [[element]]: nothing gives way", expected="springs, joints or beams", file=toml.file)
-    known = [body.element.name + TORSION for side in bodies for body in side if turns(body.element)]
+    known = [body.element.name + TORSION for side in parts.bodies for body in side if turns(body.element)]
     common = common_fields(toml, values, known)
     machine = Serial(
         **{"limits": Limits(neutral_pose=common["default_origin"]), **common},
@@ -99,10 +98,10 @@ def read(toml: MachineToml) -> Serial:
         order=tuple(int(i) for i in np.argsort([names.index(joint.name) for joint in (*tool, *work)])),
         tip=tip,
         work=table,
-        tool_bodies=bodies[0],
-        work_bodies=bodies[1],
-        tool_masses=masses[0],
-        work_masses=masses[1],
+        tool_bodies=tuple(parts.bodies[0]),
+        work_bodies=tuple(parts.bodies[1]),
+        tool_masses=tuple(parts.masses[0]),
+        work_masses=tuple(parts.masses[1]),
         least={name: v for name, v in values.get("singularity", {}).items() if isinstance(v, float)},
     )
     _check_solvable(toml, machine)

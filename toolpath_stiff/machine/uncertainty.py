@@ -68,11 +68,7 @@ def _read_errors(toml: MachineToml, table: object, parameters: int) -> ErrorMode
     values: dict[str, FloatArray] = {}
     for key, (dimensions, expected) in ERROR_KEYS.items():
         value = as_array(table[key])
-        if (
-            value is None
-            or value.ndim != dimensions
-            or not (np.isfinite(value).all() and _fits(key, value, parameters))
-        ):
+        if value is None or value.ndim != dimensions or not _fits(key, value, parameters):
             raise toml.fault(section, key, "", expected.format(columns=GEOMETRY))
         values[key] = value
     near, away = (0.01 * values["form_percent"]).tolist()
@@ -93,6 +89,8 @@ def _is_correlation(matrix: FloatArray) -> bool:
 
 def _fits(key: str, value: FloatArray, parameters: int) -> bool:
     """True where an array of `ERROR_KEYS` has the size that it needs and no number that cannot be."""
+    if not np.isfinite(value).all():
+        return False
     if key == "loadings":
         return len(value) == parameters and value.shape[1] >= GEOMETRY
     if key == "places_mm_deg":

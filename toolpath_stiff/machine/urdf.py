@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 
@@ -54,7 +55,7 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
         inertia = inertias.get(link, ET.Element("none"))
         mass = _number(inertia.find("mass"), "value", f"link {link}", "kg", fault)
         if frame and mass:
-            centre = mm_from_m(rest.then(placement(_numbers(inertia.find("origin"), "xyz", [0.0] * 3, fault))).origin)
+            centre = mm_from_m(rest.then(placement(_numbers(inertia.find("origin"), "xyz", "0 0 0", fault))).origin)
             masses.append(section("[[mass]]", {"name": link, "kg": mass, "frame": frame, "centre_mm": centre}))
     if not rows:
         raise fault("no joint moves on the way to the tip", expected="a chain of joints")
@@ -91,7 +92,7 @@ def _chain(robot: ET.Element, tip: str, fault: Fault) -> list[ET.Element]:
 
 def _row(joint: ET.Element, name: str, kind: str, rest: FixedFrame, fault: Fault) -> str:
     """The `[[axis]]` of a joint that moves."""
-    axis, linear = _numbers(joint.find("axis"), "xyz", [1.0, 0.0, 0.0], fault), MOVING[kind]
+    axis, linear = _numbers(joint.find("axis"), "xyz", "1 0 0", fault), MOVING[kind]
     if not np.linalg.norm(axis) > 0.0:
         raise fault(f"joint {name}: axis 0 0 0", expected="a direction")
     speed = _number(joint.find("limit"), "velocity", f"joint {name}", "m/s or rad/s", fault)
@@ -102,29 +103,31 @@ def _row(joint: ET.Element, name: str, kind: str, rest: FixedFrame, fault: Fault
 
 def _number(element: ET.Element | None, key: str, where: str, unit: str, fault: Fault) -> float:
     """A number of 0 or more; 0 where there is none."""
-    word = "0" if element is None else element.get(key, "0")
-    try:
-        number = float(word)
-    except ValueError:
-        number = np.nan
+    word, (number, *_) = _words(element, key, "0", 1)
     if not 0.0 <= number < np.inf:
         raise fault(f'{where}: {key}="{word}"', expected=f"a number, {unit}")
     return number
 
 
-def _numbers(element: ET.Element | None, key: str, default: list[float], fault: Fault) -> FloatArray:
-    text = None if element is None else element.get(key)
-    try:
-        values = np.array(default if text is None else [float(word) for word in text.split()])
-    except ValueError:
-        values = np.empty(0)
-    if values.shape != (3,) or not np.isfinite(values).all():
+def _numbers(element: ET.Element | None, key: str, default: str, fault: Fault) -> FloatArray:
+    text, values = _words(element, key, default, 3)
+    if not np.isfinite(values).all():
         raise fault(f'{key}="{text}"', expected="three numbers")
-    return values
+    return np.array(values)
+
+
+def _words(element: ET.Element | None, key: str, default: str, count: int) -> tuple[str, list[float]]:
+    """An attribute, and so many numbers of it; nan where it has others."""
+    text = default if element is None else element.get(key, default)
+    with suppress(ValueError):
+        values = [float(word) for word in text.split()]
+        if len(values) == count:
+            return text, values
+    return text, [np.nan] * count
 
 
 def _origin(joint: ET.Element, fault: Fault) -> FixedFrame:
-    place = [_numbers(joint.find("origin"), key, [0.0] * 3, fault) for key in ("xyz", "rpy")]
+    place = [_numbers(joint.find("origin"), key, "0 0 0", fault) for key in ("xyz", "rpy")]
     if np.abs(place[0]).max() > FARTHEST or np.abs(place[1]).max() > MOST_TURNS:
         mistake = f"joint {joint.get('name')}: origin {place[0].tolist()}, rpy {place[1].tolist()}"
         raise fault(mistake, expected="metres and radians", hint="these look like mm or degrees")
@@ -134,11 +137,7 @@ def _origin(joint: ET.Element, fault: Fault) -> FixedFrame:
 def _limits(joint: ET.Element, name: str, kind: str, fault: Fault) -> FloatArray:
     if kind == "continuous":
         return np.array([-np.inf, np.inf])
-    limit = joint.find("limit")
-    try:
-        ends = np.array([float(limit.get(key, "nan")) for key in ("lower", "upper")])  # type: ignore[union-attr]
-    except (AttributeError, ValueError):
-        ends = np.full(2, np.nan)
+    ends = np.array([_words(joint.find("limit"), key, "nan", 1)[1][0] for key in ("lower", "upper")])
     if not ends[0] < ends[1]:
         raise fault(f"joint {name} has no limits", expected='<limit lower="..." upper="..."/>, lower below upper')
     if np.abs(ends).max() > (FARTHEST if kind == "prismatic" else MOST_TURNS):

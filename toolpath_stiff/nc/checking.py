@@ -27,7 +27,7 @@ from toolpath_stiff.nc.reader import (
 )
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Tally
-from toolpath_stiff.nc.state import START
+from toolpath_stiff.nc.state import START, Record
 
 CODE = re.compile(r"([GM])(\d+\.?\d*)")
 ERROR, WARNING, NOTE = "error", "warning", "note"
@@ -224,14 +224,9 @@ def _check_by_linuxcnc(request: Request, may_lack: bool = False) -> Checked:
         if error.file is None and not may_lack:
             raise
         errors = [error]
-        program = ReadProgram(
-            request.name,
-            request.path,
-            request.lines,
-            Recorder().moves(),
-            request.default_origin if request.origin is None else request.origin,
-            interpreter="linuxcnc",
-            dialect=request.controller.label,
+        origin = request.default_origin if request.origin is None else request.origin
+        program = request.program(
+            Record(request.name), origin=origin, interpreter="linuxcnc", dialect=request.controller.label
         )
     return Checked(
         program=program,

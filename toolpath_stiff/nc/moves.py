@@ -29,6 +29,8 @@ CUTTER_LOCATION = "cutter-location file"
 Blank = tuple[tuple[float, float, float], tuple[float, float, float]]
 MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
 NARROW = {"line": np.int32, "motion": np.int8}  # whole numbers that a long program has many of
+KINDS = {**dict.fromkeys(("line", "motion", "tool"), np.int64), "from_machine": np.bool_}  # other columns: float
+WIDE = {"start": (6,), "end": (6,), "arc_center": (3,), "arc_normal": (3,), "from_machine": (2,)}
 HELD = ("tool", "tool_length", "spindle")  # columns that most programs have one value of
 
 
@@ -329,26 +331,16 @@ class Recorder:
         return Moves(**columns | {name: held_once(columns[name]) for name in HELD})
 
     def _recent_in_si(self) -> Moves:
-        def column(name: str, kind: type = float, *wide: int) -> NDArray[Any]:
-            return np.array([getattr(move, name) for move in self.recent], kind).reshape(-1, *wide)
-
         arcs = [move.arc or NO_ARC for move in self.recent]
-        moves = Moves(
-            line=column("line", np.int64),
-            motion=column("motion", np.int64),
-            start=column("start", float, 6),
-            end=column("end", float, 6),
-            arc_sweep=np.array([arc.sweep for arc in arcs], dtype=float),
-            arc_center=np.array([arc.center for arc in arcs], dtype=float).reshape(-1, 3),
-            arc_normal=np.array([arc.normal for arc in arcs], dtype=float).reshape(-1, 3),
-            feed=column("feed"),
-            dwell=column("dwell"),
-            tool=column("tool", np.int64),
-            tool_length=column("tool_length"),
-            spindle=column("spindle"),
-            from_machine=column("from_machine", np.bool_, 2),
-        )
-        return in_si(moves)
+        values: dict[str, list[Any]] = {
+            "arc_sweep": [arc.sweep for arc in arcs], "arc_center": [arc.center for arc in arcs],
+            "arc_normal": [arc.normal for arc in arcs],
+        }  # fmt: skip
+        columns: dict[str, NDArray[Any]] = {}
+        for name in (column.name for column in fields(Moves)):
+            rows = values[name] if name in values else [getattr(move, name) for move in self.recent]
+            columns[name] = np.array(rows, KINDS.get(name, float)).reshape(-1, *WIDE.get(name, ()))
+        return in_si(Moves(**columns))
 
 
 def in_si(moves: Moves) -> Moves:

@@ -19,7 +19,6 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.feeds import SLOWEST, bare_feed_is_open, rotary_feed
 from toolpath_stiff.nc.codes.increments import ANGLES, assume_increments, increment
-from toolpath_stiff.nc.codes.motion import note_tool
 from toolpath_stiff.nc.codes.points import LINEAR
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.frames import STILL
@@ -161,7 +160,7 @@ class Lines:
             )
         )
         if n:
-            note_tool(state)
+            state.note_tool()
 
     def _spindle(self) -> FloatArray:
         """1/min of the spindle on each line, as `State.spindle` has it."""

@@ -144,11 +144,8 @@ def _known_points(
     cuts = fixed & (moves.motion != RAPID)
     if cuts.any():
         problem = "a cut that begins or ends at a point of the machine that the program was posted for (G53, G28, G30)"
-        place, expected = (
-            Place(name, int(moves.line[np.argmax(cuts)])),
-            "rapids alone there, and X Y Z in the move after",
-        )
-        raise place.fail(f"{problem}: {reason}", expected, hint)
+        expected = "rapids alone there, and X Y Z in the move after"
+        raise Place(name, int(moves.line[np.argmax(cuts)])).fail(f"{problem}: {reason}", expected, hint)
     lines = np.unique(moves.line[fixed])
     more = f", in {len(lines)} lines," if len(lines) > 1 else ""
     text = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypedDict, Unpack
+from typing import Annotated, TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
@@ -17,9 +17,7 @@ from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.tables import read_offsets, read_tool_table
 from toolpath_stiff.options import Option, arguments_of, checked, switches
 from toolpath_stiff.poses import Pose
-
-if TYPE_CHECKING:
-    import pandas as pd
+from toolpath_stiff.results import DataFrame, frame_of
 
 File = str | Path
 
@@ -232,7 +230,7 @@ class Program:
         request = replace(self.request, lines=self.lines, name=self.name, path=self.file or "")
         return replace(request, origin=origin, default_origin=default_origin)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         r"""The moves, one a row: line, motion, tool, start and end in program coordinates of G54, feed.
 
         Examples
@@ -242,9 +240,7 @@ class Program:
         >>> slot.to_frame()[["line", "motion"]].values.tolist()
         [[2, 'rapid'], [3, 'feed'], [4, 'feed']]
         """
-        import pandas as pd
-
-        return pd.DataFrame(move_columns(self.moves().moves))
+        return frame_of(move_columns(self.moves().moves))
 
 
 def program_from(program: Program | str | Path) -> Program:

@@ -24,7 +24,7 @@ from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.run_result import program_of
-from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, Then
+from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, Then
 from toolpath_stiff.nc.words import Block, Word, read_block
 
 DEEPEST = 10  # calls within calls (LinuxCNC, and Fanuc's series 30i; older controls have 4)
@@ -71,6 +71,7 @@ class ProgramRun:
         self._passes: dict[int, str] = {}  # by the line that jumps back: what changes often, as it was there
         self._moved = (0, 0)  # moves at the last step back after a move, and the blocks that had run by then
 
+    _at, _main_lines = 0, 1  # the line that runs, and how many lines the file itself has
     meaning = staticmethod(code_meaning)  # what a code, or a word of the language, is taken for
     cuts_by = "a feed move (G1, G2, G3 or a cycle)"
 
@@ -82,6 +83,7 @@ class ProgramRun:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
         row, begun, numbered = 0, False, False  # from the first word on, a tape mark is the last one
         while row < len(self.lines):
+            self._at = row
             words = self._plain.execute(row) if self._plain is not None and not self._levels else None
             if words is not None:
                 self._tally_plain(row, words)
@@ -122,8 +124,10 @@ class ProgramRun:
         try:
             return act(argument)
         except InputError as error:
+            if self._at >= self._main_lines and error.file == self.name:  # its block stands on the line of the call
+                error = self._fail(self._at, error.found, error.expected, error.hint, error.column)
             if self.tally is None:
-                raise
+                raise error from None
             self.tally.keep(error)
             return instead
 
@@ -275,11 +279,11 @@ class ProgramRun:
             raise self._fail(row, f"{what} N{number:g}, {other}", "one block with that number", column=column)
         return rows[0]
 
-    def _return(self, row: int, flow: Flow | GoTo) -> int | None:
+    def _return(self, row: int, flow: Flow | Word) -> int | None:
         """The line at which M99 goes on; None where that is the beginning of the program, or before this line."""
-        if not isinstance(flow, GoTo):
+        if not isinstance(flow, Word):
             return self._leave(row) if self._levels else None
-        to = self._block_numbered(row, "M99 P goes to", flow.number, flow.column)
+        to = self._block_numbered(row, "M99 P goes to", flow.value, flow.column)
         if not self._levels:
             return to if to > row else None
         level = self._pop_level(row)

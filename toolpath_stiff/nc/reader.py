@@ -1,6 +1,7 @@
 """An NC program or a cutter-location file, from file or text, to `ReadProgram`."""
 
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
@@ -28,25 +29,17 @@ PARAMETRIC = "variables and jumps"
 READ_ELSEWHERE = (*READ, CUTTER_LOCATION_FILE)  # languages with a reader of their own
 
 
+RUNS = {
+    CUTTER_LOCATION_FILE: "cutter_location.reader:CutterLocationRun", LANGUAGES["siemens"]: "siemens.run:SiemensRun",
+    LANGUAGES["heidenhain"]: "heidenhain.run:HeidenhainRun", PARAMETRIC: "parametric.run:ParametricRun",
+}  # fmt: skip
+
+
 def run_of(language: str) -> type[ProgramRun]:
     """What runs programs of a language, or `PARAMETRIC` ones, loaded for these alone: most are plain G code."""
-    if language == CUTTER_LOCATION_FILE:
-        from toolpath_stiff.nc.cutter_location.reader import CutterLocationRun
-
-        return CutterLocationRun
-    if language == LANGUAGES["heidenhain"]:
-        from toolpath_stiff.nc.heidenhain.run import HeidenhainRun
-
-        return HeidenhainRun
-    if language == LANGUAGES["siemens"]:
-        from toolpath_stiff.nc.siemens.run import SiemensRun
-
-        return SiemensRun
-    if language == PARAMETRIC:
-        from toolpath_stiff.nc.parametric.run import ParametricRun
-
-        return ParametricRun
-    return ProgramRun
+    module, name = RUNS[language].split(":")
+    run: type[ProgramRun] = getattr(import_module(f"toolpath_stiff.nc.{module}"), name)
+    return run
 
 
 def read_program(

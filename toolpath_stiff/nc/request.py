@@ -3,11 +3,12 @@
 import copy
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.state import State
+from toolpath_stiff.nc.moves import ReadProgram, Remark
+from toolpath_stiff.nc.state import Record, State
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
 
@@ -69,4 +70,11 @@ class Request:
         """The control as the program finds it."""
         frames = Frames(copy.deepcopy(self.work_offsets), *self.zero, posted=self.controller.kinematics)
         control = self.controller
-        return State(self.name, frames, copy.deepcopy(control.tools), control.dialect, feed=control.feed)
+        return State(self.name, frames, control.dialect, tools=copy.deepcopy(control.tools), feed=control.feed)
+
+    def program(self, record: Record, **more: Any) -> ReadProgram:
+        """What a reading has made of the program; `more`: other attributes of `ReadProgram`."""
+        return ReadProgram(
+            self.name, self.path, self.lines, record.recorder.moves(), unsupported=tuple(record.unsupported),
+            tools=tuple(record.used_tools.values()), **more,
+        )  # fmt: skip

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from toolpath_stiff.nc.codes.increments import point_warning
 from toolpath_stiff.nc.languages import lathe_warning
@@ -19,27 +20,17 @@ def program_of(
     frames, warnings = state.frames, [*ending]
     if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
         warnings.append(ORIGIN_WINS)
-    moves = state.recorder.moves()
-    return ReadProgram(
-        name=request.name,
-        path=request.path,
-        source=request.lines,
-        moves=moves,
+    program = request.program(
+        state,
         origin=pose_in_si(frames.origin),
         origin_source=frames.source,
-        unsupported=tuple(state.unsupported),
-        warnings=(
-            *warnings,
-            *state.warnings,
-            *lathe_warning(state.turning, moves),
-            *point_warning(state, lines),
-        ),
         assumptions=(START, *state.assumptions),
-        tools=tuple(state.used_tools.values()),
         dialect=request.controller.label,
         jumps=tuple(jumps),
         stock=blank_of(state.plain.stock),
     )
+    lathe, points = lathe_warning(state.turning, program.moves), point_warning(state, lines)
+    return replace(program, warnings=(*warnings, *state.warnings, *lathe, *points))
 
 
 def blank_of(stock: Mapping[str, Sequence[float]]) -> Blank | None:

@@ -6,7 +6,7 @@ mm, degrees, mm/min.
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from enum import Enum
 from typing import Literal, get_args
 
@@ -17,7 +17,7 @@ from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
-from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD, ToolEntry
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD, ToolEntry, tool_of
 from toolpath_stiff.nc.words import AXES, Block, Word
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY
 
@@ -63,15 +63,7 @@ class Call:
     modal: bool = False
 
 
-@dataclass(frozen=True)
-class GoTo:
-    """M99 P: go on at the block with that N number, of the caller or of the main program; the column of its P."""
-
-    number: int
-    column: int
-
-
-Then = Flow | Call | GoTo  # what runs after a block
+Then = Flow | Call | Word  # what runs after a block; the P of M99: the block of the caller with that N number
 
 
 @dataclass
@@ -199,6 +191,8 @@ class Conversational:
         Axes of the plane whose position is not known until they are named.
     tool_feed, radius, held_tip, shorter
         F of TOOL CALL (mm/min), the tool's radius with its DR, M128 and M126 in force.
+    led_to
+        Angles to which vectors (LN) led the tool last: under M128 it keeps them while X, Y, Z move; None: none have.
     preset, names, stock, parameters
         The datum of cycle 247; numbers given to tools of a name; the corners of the blank; Q parameters.
     inner
@@ -233,6 +227,7 @@ class Conversational:
     tool_feed: float | None = None
     radius: float = math.nan
     held_tip: bool = False
+    led_to: list[float] | None = None
     shorter: bool = False
     preset: float | None = None
     names: dict[str, int] = field(default_factory=dict)
@@ -249,15 +244,59 @@ class Conversational:
 
 
 @dataclass
-class State:
-    """The state of a control, at its start as LinuxCNC's is unless the dialect says otherwise.
+class Record:
+    """What a program of any language sets, and what is made of it; mm.
 
     Attributes
     ----------
     name
         Of the program, for errors.
-    frames, tools, dialect
-        Its coordinates (with the present point), its tool table (None: there is none), what its words mean.
+    tools
+        The tool table; None: there is none.
+    feed
+        F in force: mm/min, mm per revolution or, in G93, one over minutes; None before there is one.
+    speed
+        S in force, 1/min.
+    tool, tool_length
+        The tool in the spindle, and its length in force; nan: none, the machine's reference tool.
+    recorder, used_tools
+        The moves found so far; the tools that moved, by number.
+    unsupported, warnings, assumptions
+        As in `ReadProgram`.
+    """
+
+    name: str
+    _: KW_ONLY
+    tools: dict[int, ToolEntry] | None = None
+    feed: float | None = None
+    speed: float = 0.0
+    tool: int = 0
+    tool_length: float = math.nan
+    recorder: Recorder = field(default_factory=Recorder)
+    used_tools: dict[int, ToolEntry] = field(default_factory=dict)
+    unsupported: list[Unsupported] = field(default_factory=list)
+    warnings: list[Remark] = field(default_factory=list)
+    assumptions: list[str] = field(default_factory=list)
+
+    def note_tool(self) -> None:
+        """Keep the tool in the spindle among those that moved."""
+        if self.tool not in self.used_tools:
+            self.used_tools[self.tool] = replace(tool_of(self.tools, self.tool))
+
+    def assume(self, sentence: str) -> None:
+        """Note an assumption, once."""
+        if sentence not in self.assumptions:
+            self.assumptions.append(sentence)
+
+
+@dataclass
+class State(Record):
+    """The state of a control, at its start as LinuxCNC's is unless the dialect says otherwise.
+
+    Attributes
+    ----------
+    frames, dialect
+        Its coordinates (with the present point), what its words mean.
     motion
         The motion mode: "G0", "G1", "G2", "G3" or a drilling cycle; None after G80, and at the start.
     group_01
@@ -268,20 +307,16 @@ class State:
         G90, G90.1, G20 in force.
     feed_mode
         "G93", "G94" or "G95".
-    feed
-        F in force: mm/min, mm per revolution or, in G93, one over minutes; None before there is one.
-    speed, turn, surface_speed
-        S in force, 1/min; 1 after M3, -1 after M4, 0 while the spindle stands; whether S is of the surface (G96).
+    turn, surface_speed
+        1 after M3, -1 after M4, 0 while the spindle stands; whether S is of the surface (G96).
     retract
         "G98" or "G99", once the program or the dialect says; LinuxCNC starts as in G99.
     polar
         G16: the last programmed radius (mm) and angle (degrees), nan before there is one; None: G15.
-    tool, selected
-        The tool in the spindle, and the one that T names for the next M6.
+    selected
+        The tool that T names for the next M6.
     renamed
         Whether the tool in the spindle is M61's.
-    tool_length
-        In force through G43, mm; nan: none, the machine's reference tool.
     sticky
         What a run of drilling cycles keeps: R, Z, Q, P, the unit, the level from which it began.
     heights
@@ -291,14 +326,8 @@ class State:
     length_changed, rotation_changed, height_lost
         LinuxCNC's rs274 forgets at M6 that tool length or rotation changed since the last move: the next begins
         elsewhere. `height_lost`: it did, and no Z was named since.
-    recorder
-        The moves found so far.
-    used_tools
-        The tools that moved, by number.
     tip_held
         Tool centre point control, by the number of moves before it is switched (G43.4) on or off.
-    unsupported, warnings, assumptions
-        As in `Program`.
     trace
         Each move of the current block, those of no length too, with its ends in control coordinates, for whoever starts
         the list.
@@ -318,9 +347,7 @@ class State:
         What a check does with an error after which the run can go on; None: it is raised.
     """
 
-    name: str
     frames: Frames
-    tools: dict[int, ToolEntry] | None = None
     dialect: Dialect = GENERIC
     motion: str | None = None
     group_01: str | None = None
@@ -329,28 +356,19 @@ class State:
     arc_absolute: bool = field(init=False)
     inch: bool = False
     feed_mode: str = "G94"
-    feed: float | None = None
-    speed: float = 0.0
     turn: int = 0
     surface_speed: bool = False
     retract: str | None = field(init=False)
     polar: list[float] | None = None
-    tool: int = 0
     selected: int = 0
     renamed: bool = False
-    tool_length: float = math.nan
     sticky: dict[str, float] = field(default_factory=dict)
     heights: tuple[bool, float, float] = (True, 0.0, 0.0)
     unsettled: str | None = None
     length_changed: bool = False
     rotation_changed: bool = False
     height_lost: bool = False
-    recorder: Recorder = field(default_factory=Recorder)
-    used_tools: dict[int, ToolEntry] = field(default_factory=dict)
     tip_held: list[tuple[int, bool]] = field(default_factory=list)
-    unsupported: list[Unsupported] = field(default_factory=list)
-    warnings: list[Remark] = field(default_factory=list)
-    assumptions: list[str] = field(default_factory=list)
     trace: list[Move] | None = None
     corner: CurrentBlock | None = None
     cutter: RadiusCompensation | None = None
@@ -399,8 +417,3 @@ class State:
     def note(self, line: int, word: Word, reason: str) -> None:
         """List a word that is not acted upon."""
         self.unsupported.append(Unsupported(line, word.column, word.text, reason))
-
-    def assume(self, sentence: str) -> None:
-        """Note an assumption, once."""
-        if sentence not in self.assumptions:
-            self.assumptions.append(sentence)

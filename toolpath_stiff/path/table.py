@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,8 @@ from toolpath_stiff.documents import to_dict, without_nan
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.path.sampling import Samples
-from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, per_min_from_rad_per_s
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def decimals_of(column: str) -> int:
@@ -103,7 +100,7 @@ class SampledPath(Result):
         columns = without_nan(to_dict(self._columns()))
         return {"program": self.name, "warnings": self.warnings, "unsupported": self.unsupported, **columns}
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The samples, one a row."""
         return frame_of(self._columns())
 

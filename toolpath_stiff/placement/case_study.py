@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,12 +25,9 @@ from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.poses import Pose, pose_in_si
-from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.results import DataFrame, FolderResult, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import mm_from_m
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PROGRAM = "case_study.nc"
 LOW_MM, HIGH_MM = 400.0, 1200.0
@@ -91,7 +88,7 @@ class CaseStudy(FolderResult):
         """The JSON document of the command."""
         return self.summary
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The regions, one a row."""
         return frame_of(self.summary["regions"])
 

@@ -148,12 +148,13 @@ class Evaluator:
             some = None if rotation is None else rotation[:, :, loaded[0]].reshape(9, -1)
             tip, towards = (
                 position[:, :, loaded[0]].reshape(3, -1),
-                [motion[:, :, rows].reshape(3, -1) for rows in loaded],
+                [motion[:, :, rows].reshape(3, -1) for rows in loaded[: None if self.direct else 1]],
             )
             compliances, margins, laws = self._kernel_rows(tool, tip, towards, some)
-            for rows, compliance in zip(loaded, compliances, strict=True):
-                for column, values in ((along, compliance), (margin, margins), (law, laws)):
-                    column[:, rows] = values.reshape(k, -1)
+            for rows, compliance in zip(loaded, compliances, strict=False):  # effects have compliances of their own
+                along[:, rows] = compliance.reshape(k, -1)
+            for rows in loaded:
+                margin[:, rows], law[:, rows] = margins.reshape(k, -1), laws.reshape(k, -1)
         if self.direct:
             with np.errstate(divide="ignore"):
                 stiffness = np.divide(1.0, along)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,13 +19,10 @@ from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.placement.goals import Bounds, SearchRules
 from toolpath_stiff.placement.surface_error import Errors
 from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm, pose_in_si
-from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.results import DataFrame, FolderResult, frame_of
 from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
 from toolpath_stiff.stiffness.model import StiffnessModel, effects_stated
 from toolpath_stiff.units import mm_from_m
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 # The three objectives and where their values stand.
 FIGURES = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "weakest": "min_N_per_mm"}
@@ -338,7 +335,7 @@ class Placement(FolderResult):
         )
         return document
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """The front, one placement a row, as in `placements.csv`."""
         return frame_of([row.cells for row in self.front])
 

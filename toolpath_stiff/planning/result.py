@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,12 +29,9 @@ from toolpath_stiff.planning.plan import MOST_RIVALS, RivalPlan, plan_measuremen
 from toolpath_stiff.planning.rivals import errors_so_far, fitted_rivals, rivals_of, unfitted_rivals
 from toolpath_stiff.planning.visits import AXES, Visits
 from toolpath_stiff.readings.measurements import Readings, point_names
-from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.results import DataFrame, FolderResult, frame_of
 from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PLAN_POSES, CAMPAIGN_POSES = 6, 24
 CAMPAIGN_NOISE = 0.02  # relative sd of a reading where nothing is known, of a plan without data; assumed
@@ -110,7 +107,7 @@ class Plan(FolderResult):
         )
         return dict(certain(document))
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a reading, as in `plan.csv`: a measurement file with the stiffness left empty."""
         return frame_of(self.rows)
 

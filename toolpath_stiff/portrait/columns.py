@@ -45,6 +45,7 @@ BUMPS, MOST_EDGES = 5, 5
 SHORTEST_PITCH = 8e-3  # m, period in a strut's length: screws of mills have leads of 5 to 40 mm
 MOST_TURNS = 5  # of a wave over a place: clamps and grooves of a table
 TURNED = 0.1  # rms change of stiffness at which a resistance to turning is looked for: it is not linear in its size
+MOST_HELD = 1000  # readings of which the dictionary keeps columns; of more shapes alone, with seven digits
 PHASES = 3  # of half a turn; the other half is the other sign's
 
 
@@ -248,7 +249,8 @@ class Ground:
             springs = spring_stiffness(term, self.path, size * shape)
         else:
             weights = size * strut_share(_plain(term), self.path) * shape.reshape(len(shape), -1)
-            springs = np.einsum("nk,nkai,nkaj->nij", weights, self._rotations, self._rotations)
+            rows = self._rotations.reshape(len(shape), -1, 6)
+            springs = np.swapaxes(rows, 1, 2) @ (weights[:, :, None, None] * self._rotations).reshape(rows.shape)
         wrench = self.forces[:, 6:, None]
         moved = np.linalg.solve(np.eye(6) + self._flexibility @ springs, self._flexibility @ wrench)
         change = ((moved - self._flexibility @ wrench) * wrench).sum(axis=(1, 2))
@@ -281,7 +283,8 @@ class Ground:
         if key not in self._shapes:
             values = values if strut is None else values[:, strut - 1]
             named = tuple(shapes_of(variable, values, signed, column if variable == "tilt" else ""))
-            rows = [shape_values(shape, values, dict(constants), signed) for shape, constants in named]
+            kind = float if len(values) <= MOST_HELD else np.float32
+            rows = [shape_values(shape, values, dict(at), signed).astype(kind) for shape, at in named]
             self._shapes[key] = named, np.stack(rows) if rows else np.zeros((0, *values.shape))
         return self._shapes[key]
 

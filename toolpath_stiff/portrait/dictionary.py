@@ -9,16 +9,17 @@ over the constants of a shape, so that no link is preferred for having many term
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.portrait.columns import Ground
-from toolpath_stiff.stiffness.terms import PINS, PLACE, SWINGS, Action, Constants, Term
+from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.portrait.columns import MOST_HELD, Ground
+from toolpath_stiff.stiffness.terms import PARALLEL, PINS, PLACE, SWINGS, Action, Constants, Term
 
 WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
 ONCE = ("constant", "direction")  # variables whose every place stands in the dictionary as it is
@@ -138,8 +139,9 @@ class Dictionary:
     ----------
     terms
         Without sizes.
-    columns
-        (N, n) change of compliance over the compliance, scaled to an rms of 1.
+    blocks
+        Changes of compliance over the compliance, (m, n) of some terms at a time in their order, or what makes them: of
+        5,000 readings they would take half a gigabyte.
     log_prior
         (N,) weights.
     signed
@@ -147,37 +149,45 @@ class Dictionary:
     """
 
     terms: tuple[Term, ...]
-    columns: FloatArray
+    blocks: tuple[FloatArray | Callable[[], FloatArray], ...]
     log_prior: FloatArray
     signed: NDArray[np.bool_]
+
+    def columns(self) -> Iterator[FloatArray]:
+        """The blocks, one at a time."""
+        return (block() if callable(block) else block for block in self.blocks)
 
 
 def dictionary_of(ground: Ground) -> Dictionary:
     """Every term that does something to these readings."""
-    terms, logs, columns = list[Term](), list[float](), np.zeros((0, len(ground.data)))
+    terms, logs, blocks = list[Term](), list[float](), list[FloatArray | Callable[[], FloatArray]]()
     for local, priors in place_priors(ground):
         plain = local.term("constant", "offset", ())
         for variable in local.variables:
             names = columns_of(variable, ground, local.link == "joints")
             for column in names:
-                named, values = ground.shapes(variable, column, plain.signed, local.where)
+                named = ground.shapes(variable, column, plain.signed, local.where)[0]
                 if not named:
                     continue
-                relative = ground.columns(plain, ground.share(plain), values) / ground.compliance
+                relative = _relative(ground, plain, variable, column, slice(None))
                 scale = np.sqrt((relative**2).mean(axis=1))
-                shaped = [local.term(variable, shape, constants, column) for shape, constants in named]
-                limits = np.array([max(map(abs, term.bounds)) * term.si for term in shaped])
+                limit = max(map(abs, plain.bounds)) * plain.si
                 # A term that changes every reading alike is the strut law's affair.
-                kept = np.flatnonzero((scale * limits > NOTHING) & (relative.std(axis=1) > 1e-6 * scale))
-                # In place: of thousands of readings they take most of all memory, which is not to be held twice.
-                columns.resize((len(terms) + len(kept), columns.shape[1]), refcheck=False)
-                columns[len(terms) :] = relative[kept] / scale[kept, None]
+                kept = np.flatnonzero((scale * limit > NOTHING) & (relative.std(axis=1) > 1e-6 * scale))
+                held = len(ground.data) <= MOST_HELD or plain.action in PARALLEL  # dear ones are kept
+                blocks.append(relative[kept] if held else partial(_relative, ground, plain, variable, column, kept))
                 kinds = Counter(shape for shape, _ in named)
                 log = priors[variable] - float(np.log(len(kinds) * len(names)))
-                terms += [shaped[i] for i in kept]
+                terms += [local.term(variable, *named[i], column) for i in kept]
                 logs += [log - float(np.log(kinds[named[i][0]])) for i in kept]
     signed = np.array([term.signed for term in terms], dtype=bool)
-    return Dictionary(tuple(terms), columns, np.array(logs), signed)
+    return Dictionary(tuple(terms), tuple(blocks), np.array(logs), signed)
+
+
+def _relative(ground: Ground, plain: Term, variable: str, column: str, kept: IntArray | slice) -> FloatArray:
+    """(m, n) change of compliance over the compliance, of the shapes that are kept."""
+    shapes = ground.shapes(variable, column, plain.signed, plain.where)[1]
+    return ground.columns(plain, ground.share(plain), shapes)[kept] / ground.compliance
 
 
 def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:

@@ -194,7 +194,7 @@ class Selection:
     @cached_property
     def _squares(self) -> FloatArray:
         """(N,) information of each term by itself under the base fit's scatter."""
-        return self.base.scatter.precision.squares(self.dictionary.columns)
+        return np.concatenate([self.base.scatter.precision.squares(block) for block in self.dictionary.columns()])
 
     def _gains(self, residuals: FloatArray, before: Description) -> FloatArray:
         """(s, N) twice the gain in log likelihood for residuals (s, n), where the size goes to an allowed side.
@@ -204,9 +204,10 @@ class Selection:
         projected = before.fit.projected
         weights = set_wild_aside(projected.times(residuals), projected)[0]
         weighted = self.base.scatter.precision.times(before.fit.jacobian.T)
-        root = inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
-        columns, alone = self.dictionary.columns, self._squares
-        slope, information = -weights @ columns.T, alone - ((columns @ weighted.T @ root) ** 2).sum(axis=1)
+        across = weighted.T @ inverse_root(weighted @ before.fit.jacobian + law_prior(len(weighted)))
+        parts = [(-weights @ block.T, ((block @ across) ** 2).sum(axis=1)) for block in self.dictionary.columns()]
+        slope, taken = (np.concatenate(column, axis=-1) for column in zip(*parts, strict=True))
+        alone, information = self._squares, self._squares - taken
         allowed = self.dictionary.signed | (slope > 0.0)
         seen = information > 1e-6 * alone
         return np.asarray(np.where(allowed & seen, slope**2 / np.where(seen, information, 1.0), 0.0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,11 +18,8 @@ from toolpath_stiff.cutting.patches import TURN
 from toolpath_stiff.documents import Document, json_number, records, without_nan
 from toolpath_stiff.errors import InputError, MeasurementError
 from toolpath_stiff.readings.force_records import ComplexArray, harmonics, mean_force, read_records
-from toolpath_stiff.results import FolderResult, frame_of
+from toolpath_stiff.results import DataFrame, FolderResult, frame_of
 from toolpath_stiff.units import mm_from_m, um_from_m
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 AXES = ("x", "y", "z")
 FEW = 5  # feeds below which a straight line is hardly tested
@@ -118,7 +115,7 @@ class CoefficientFit(FolderResult):
         }
         return dict(without_nan(document))
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a record, as `columns`."""
         return frame_of(self.columns())
 

@@ -6,7 +6,7 @@ is one text for all rows. `FILE.columns.toml` beside a file holds the same, as `
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -128,6 +128,11 @@ def number_columns(table: Table, names: Sequence[str]) -> FloatArray:
                 fault = f"{name} = {record[name]!r}"
                 raise MeasurementError(fault, expected="a finite number", file=table.file, line=line)
     return values
+
+
+def unused(table: Table, known: Collection[str]) -> list[str]:
+    """A note for each column that is not known."""
+    return [f"{table.file}: column {name} is not used" for name in table.heading if name and name not in known]
 
 
 def check_needed(table: Table, needed: Sequence[str], layouts: str) -> None:

@@ -7,7 +7,7 @@ acts and what is read may lie off the tip, in tip axes.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import ClassVar
 
@@ -19,7 +19,7 @@ from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.joint_values import joint_margin
 from toolpath_stiff.machine.model import MachineTool
-from toolpath_stiff.readings.mapping import check_needed, mapped_table
+from toolpath_stiff.readings.mapping import check_needed, mapped_table, unused
 from toolpath_stiff.readings.measurements import lacking_columns, read_measurements
 from toolpath_stiff.readings.rows import (
     ANGLES,
@@ -41,11 +41,16 @@ MOMENT = ("mx_Nm", "my_Nm", "mz_Nm")  # about the tip, beside the force
 TENSION, CABLE = "tension_N", ("cable_x_mm", "cable_y_mm", "cable_z_mm")
 PULL, TARGET = (tuple(f"{what}_d{axis}_mm" for axis in "xyz") for what in ("pull", "target"))
 FORCE_AXES, MOVED_AXES = (tuple(f"{what}_axes_{axis}_deg" for axis in "abc") for what in ("force", "sensor"))
+USED = "direction", "force_N", "displacement_um", "sd_um", "repeat"  # beside vectors
+FRAMES = "force_axes", "sensor_axes"  # of the components: "base", or "tip", the tip's own at each row
 NOT_READ = ("nan", "n/a", "na", "-")  # cells that say so, as empty ones do
 FARTHEST = -1e6, 1e6  # um, of a dial
 SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
+ROLL_FIRST = 'angles turn about X, then Y, then Z of the base; where a, b, c begin with Z: --columns "a=c_deg, c=a_deg"'
 SMALL_TURNS, SEVERAL = rad_from_deg(6.29), 3  # poses of which no joint turns by more are hardly in degrees
-SAME_PLACE = m_from_mm(1.0)  # by which a pose and the joints beside it may differ: both are rounded
+# By which a pose and the joints beside it may differ: rounded; or of a robot that sags and is not calibrated (some mm:
+# ISO 9283 counts its accuracy apart from its repeatability). Then the joints count, with a note.
+SAME_PLACE, NEAR_PLACE, NEAR_TURN = m_from_mm(1.0), m_from_mm(10.0), rad_from_deg(3.0)
 
 
 @dataclass(frozen=True)
@@ -134,21 +139,24 @@ class Pulls(ArrayColumns):
 def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> Pulls:
     """Pulls on a machine of elements, or its stiffnesses as pulls. Raises `InputError`, `InputErrors`."""
     joints, rows, notes = _joint_columns(machine), list[_Pull](), list[str]()
-    used = {*_further(machine), *POSITION, *ANGLES, *VECTOR, "direction", "force_N", "displacement_um", "sd_um"}
+    used = {*_further(machine), *FRAMES, *POSITION, *ANGLES, *VECTOR, *USED}
     tables = pull_tables(files, machine, mapping)
     if not tables:
         return _of_stiffnesses(files, machine, mapping)
     if len(tables) < len(files):
         raise MeasurementError("pulls beside stiffnesses", hint="give one kind of files at a time")
     for table in tables:
-        _check_places(table, machine)
-        of_file, errors = parsed_rows(table, partial(_Pull.of, table.file, joints))
+        _check_columns(table, machine)
+        loaded = replace(table, rows=tuple(row for row in table.rows if not _unloaded(table.record(row[1]))))
+        of_file, errors = parsed_rows(loaded, partial(_Pull.of, table.file, joints))
         if errors:
             raise InputErrors(errors)
         rows += of_file
+        unloaded = len(table.rows) - len(loaded.rows)
         notes += [
             *table.notes,
-            *(f"{table.file}: column {name} is not used" for name in table.heading if name not in used),
+            *([f"{table.file}: {unloaded} rows of no force and no displacement are passed over"] if unloaded else []),
+            *unused(table, used),
         ]
     if not rows:
         raise MeasurementError("no rows below the heading", file=tables[0].file)
@@ -157,17 +165,23 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
 
 def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> list[Table]:
     """The files that give forces as vectors or by cables, as tables; the others give stiffnesses along directions."""
-    known = Columns((*COLUMNS.numbers, *_further(machine)), COLUMNS.texts)
+    known = Columns((*COLUMNS.numbers, *_further(machine)), (*COLUMNS.texts, *FRAMES))
     tables = [mapped_table(name, "measurements", known, mapping) for name in files]
     further = {*FORCE, TENSION, *_joint_columns(machine)}
     return [table for table in tables if not further.isdisjoint(table.heading)]
 
 
-def _check_places(table: Table, machine: MachineTool) -> None:
-    """Refuse a table that says neither poses nor all joints."""
+def _check_columns(table: Table, machine: MachineTool) -> None:
+    """Refuse a table that lacks poses or all joints, forces, or what moved."""
     if not {*POSITION} <= {*table.heading}:
         missing = [named for named in _names_of_joints(machine) if {*named}.isdisjoint(table.heading)]
         check_needed(table, [by_number for _, by_number in missing], f"all joints, or {', '.join(POSITION)}")
+    pulley = [TENSION, *CABLE]
+    if {*FORCE, "force_N"}.isdisjoint(table.heading):
+        needed = pulley if TENSION in table.heading else FORCE
+        check_needed(table, needed, f"{', '.join(FORCE)}; or {', '.join(pulley)}")
+    if {*MOVED, "displacement_um"}.isdisjoint(table.heading):
+        check_needed(table, MOVED, f"{', '.join(MOVED)}; or displacement_um along {', '.join(DIAL)}")
 
 
 @dataclass(frozen=True)
@@ -183,6 +197,7 @@ class _Pull:
     moved: tuple[tuple[str, tuple[float, ...], float], ...]
     pull: tuple[float, ...]
     target: tuple[float, ...]
+    in_tip: tuple[bool, ...]  # of `FRAMES`
     sd: float
     file: str
     line: int
@@ -203,7 +218,8 @@ class _Pull:
         if not placed and np.isnan(values).any():
             expected = f"{', '.join(POSITION)}; or {', '.join(joints)}"
             raise MeasurementError("neither a pose nor all joints", expected=expected)
-        angles = tuple(rad_from_deg(number(record, name)) if record.get(name) else 0.0 for name in ANGLES)
+        blank = 0.0 if any(record.get(name) for name in ANGLES) else np.nan
+        angles = tuple(rad_from_deg(number(record, name)) if record.get(name) else blank for name in ANGLES)
         tension, vector = optional_number(record, TENSION), any(record.get(name) for name in FORCE)
         components = np.array([_component(record, name) if vector else np.nan for name in FORCE])
         along = direction_of(record) if record.get("force_N") and not vector and np.isnan(tension) else None
@@ -224,10 +240,19 @@ class _Pull:
             expected = f"{', '.join(MOVED)}; or displacement_um along {', '.join(DIAL)}"
             raise MeasurementError("nothing read", expected=expected)
         pose = (*mm(POSITION), *angles) if placed else (np.nan,) * 6
-        pulley, sd = mm(CABLE), m_from_um(optional_number(record, "sd_um"))
+        pulley, sd, frames = mm(CABLE), m_from_um(optional_number(record, "sd_um")), [record.get(f) for f in FRAMES]
+        if not {*frames} <= {None, "", "base", "tip"}:
+            raise MeasurementError(f"axes {' and '.join(filter(None, frames))}", expected="base or tip")
         return cls(
-            pose, tuple(values), force, moment, tension, pulley, tuple(moved), mm(PULL), mm(TARGET), sd, file, line
-        )
+            pose, tuple(values), force, moment, tension, pulley, tuple(moved), mm(PULL), mm(TARGET),
+            tuple(frame == "tip" for frame in frames), sd, file, line,
+        )  # fmt: skip
+
+
+def _unloaded(record: Mapping[str, str]) -> bool:
+    """Whether a row says that nothing moved under no force: where the readings are counted from."""
+    cells = [record.get(name, "").strip() for name in (*FORCE, TENSION, "force_N", *MOVED, "displacement_um")]
+    return any(cells) and set("".join(cells)) <= set("+-.0")
 
 
 def _component(record: Mapping[str, str], name: str) -> float:
@@ -267,15 +292,19 @@ def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) 
     pull, target = (np.einsum("nij,nj->ni", turn, [getattr(row, name) for row in rows]) for name in ("pull", "target"))
     cable = np.array([row.pulley for row in rows]) - stance.position - pull
     by_cable = np.array([[row.tension] for row in rows]) * cable / np.linalg.norm(cable, axis=1, keepdims=True)
-    given = np.array([row.force for row in rows])
+    in_tip = np.array([row.in_tip for row in rows])[..., None, None]
+    of_force, of_sensor = (np.where(in_tip[:, i], turn, np.eye(3)) for i in range(len(FRAMES)))
+    given, moment = (
+        np.einsum("nij,nj->ni", of_force, [getattr(r, name) for r in rows]) for name in ("force", "moment")
+    )
     force = np.where(np.isnan(given), by_cable, given)
     which = np.repeat(np.arange(len(rows)), [len(row.moved) for row in rows])
-    direction = np.array([axis for row in rows for _, axis, _ in row.moved])
+    direction = np.einsum("nij,nj->ni", of_sensor[which], [axis for row in rows for _, axis, _ in row.moved])
     distinct = np.unique(np.round(np.nan_to_num(np.hstack([stance.joints, stance.position]), nan=-1.0), 6), axis=0,
                          return_inverse=True)[1].reshape(-1)  # fmt: skip
     return Pulls(
         stance=stance.take(which),
-        wrench=np.hstack([force, np.cross(pull, force) + [row.moment for row in rows]])[which],
+        wrench=np.hstack([force, np.cross(pull, force) + moment])[which],
         along=np.hstack([direction, np.cross(target[which], direction)]),
         value=np.array([value for row in rows for *_, value in row.moved]),
         sd=np.array([row.sd for row in rows])[which],
@@ -295,13 +324,23 @@ def _stances(
     Raises `InputErrors` for rows that cannot be.
     """
     by_joints, errors, notes = ~np.isnan(joints).any(axis=1), list[MeasurementError](), list[str]()
-    position, rotation, joints = pose[:, :3], rotation_matrices(pose[:, 3:]), joints.copy()
-    apart = np.full(len(rows), np.nan)
+    position, rotation, joints = pose[:, :3], rotation_matrices(np.nan_to_num(pose[:, 3:])), joints.copy()
+    apart, turned = np.full((2, len(rows)), np.nan)
     if by_joints.any():
-        apart[by_joints] = np.linalg.norm(machine.forward(joints[by_joints])[0] - position[by_joints], axis=1)
-    for row in np.flatnonzero(apart > SAME_PLACE).tolist():
-        text = f"pose and joints are {mm_from_m(float(apart[row])):.1f} mm apart"
-        errors.append(MeasurementError(text, file=rows[row].file, line=rows[row].line))
+        at, turn = machine.forward(joints[by_joints])
+        apart[by_joints] = np.linalg.norm(at - position[by_joints], axis=1)
+        cosine = (np.einsum("nij,nij->n", turn, rotation[by_joints]) - 1.0) / 2.0
+        turned[by_joints] = np.arccos(np.clip(cosine, -1.0, 1.0)) + 0.0 * pose[by_joints, 3]
+
+    def refuse(row: int, text: str) -> None:
+        hint = "" if np.isnan(pose[row, 3]) else ROLL_FIRST
+        errors.append(MeasurementError(text, hint=hint, file=rows[row].file, line=rows[row].line))
+
+    for row in np.flatnonzero((apart > NEAR_PLACE) | (turned > NEAR_TURN)).tolist():
+        by = [f"{mm_from_m(float(apart[row])):.1f} mm", f"{deg_from_rad(float(turned[row])):.1f} degrees"]
+        refuse(row, f"pose and joints are {by[not apart[row] > NEAR_PLACE]} apart")
+    if (apart > SAME_PLACE).any():
+        notes.append(f"poses and joints are up to {mm_from_m(float(np.nanmax(apart))):.1f} mm apart: the joints count")
     if not by_joints.all():  # one configuration for all poses: of those that reach most, that farthest from limits
         alone = position[~by_joints], rotation[~by_joints]
         tried = [machine.solve(*alone, configuration=i).joints for i in range(len(machine.configurations))]
@@ -312,12 +351,12 @@ def _stances(
         if machine.configurations[kept]:
             notes.append(f"poses without joint values: taken in the configuration {machine.configurations[kept]}")
     for row in np.flatnonzero(np.isnan(joints).any(axis=1)).tolist():
-        errors.append(MeasurementError("no joint values lead to the pose", file=rows[row].file, line=rows[row].line))
+        refuse(row, "no joint values lead to the pose")
     turning = joints[by_joints][:, [kind != "linear" for kind in machine.joint_kinds]]
     if len(np.unique(turning, axis=0)) >= SEVERAL and turning.any() and np.abs(turning).max() < SMALL_TURNS:
-        turned = f"no joint turns by more than {deg_from_rad(float(np.abs(turning).max())):.3g} deg"
+        small = f"no joint turns by more than {deg_from_rad(float(np.abs(turning).max())):.3g} deg"
         hint = 'columns in radians are named by --columns "joint_1=joint_1_deg:rad, ..." (columns=)'
-        errors.append(MeasurementError(turned, expected="degrees", hint=hint, file=rows[0].file))
+        errors.append(MeasurementError(small, expected="degrees", hint=hint, file=rows[0].file))
     if errors:
         raise InputErrors(errors)
     return machine.standing(joints), notes

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,16 +20,13 @@ from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.files import Content, write_atomically
 from toolpath_stiff.readings.history import StrutHistory
 from toolpath_stiff.readings.loop_figures import LoopFigures, in_tension, reduce_loop
-from toolpath_stiff.readings.mapping import DATE, check_needed, mapped_table
-from toolpath_stiff.readings.raw_records import COLUMNS, PLACE, STIFFNESS, Loop, read_raw, strut_or_loop, unused
+from toolpath_stiff.readings.mapping import DATE, check_needed, mapped_table, unused
+from toolpath_stiff.readings.raw_records import COLUMNS, PLACE, STIFFNESS, Loop, read_raw, strut_or_loop
 from toolpath_stiff.readings.raw_rows import loop_entry, measurement_csv, remarks, struts_over_dates
 from toolpath_stiff.readings.rows import LABELS, SOFTEST, STIFFEST, number, optional_number, parsed_rows
-from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.tables import Table
 from toolpath_stiff.units import n_per_m_from_n_per_mm
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 READ = (".csv", ".txt", ".dat", ".asc", ".tsv", ".xlsx", ".xlsm")  # of a folder
 OWN_OUTPUT = "_measurements.csv"
@@ -98,7 +95,7 @@ class Reduction(Result):
         """One entry a loop, under "loops"; struts measured alone over their dates, under "history"."""
         return {"loops": [loop_entry(figures) for figures in self.figures], "history": to_dict(self.history)}
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a loop."""
         return frame_of(self.to_dict()["loops"])
 

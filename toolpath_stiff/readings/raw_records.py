@@ -12,7 +12,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import loop_of
-from toolpath_stiff.readings.mapping import DATE, check_needed
+from toolpath_stiff.readings.mapping import DATE, check_needed, unused
 from toolpath_stiff.readings.rows import (
     ANGLES,
     LABELS,
@@ -22,6 +22,7 @@ from toolpath_stiff.readings.rows import (
     number,
     optional_number,
     parsed_rows,
+    refuse_pulls,
 )
 from toolpath_stiff.stiffness.measuring_loop import TIP, MeasuringLoop, measuring_loop
 from toolpath_stiff.tables import Columns, Table
@@ -129,6 +130,7 @@ def read_raw(table: Table) -> tuple[list[Loop], list[str]]:
     InputErrors
         Bad records, all of them.
     """
+    refuse_pulls(table)
     check_needed(table, _needed(table.heading), LAYOUTS)
     parsed, errors = parsed_rows(table, _record)
     if errors:
@@ -150,11 +152,6 @@ def read_raw(table: Table) -> tuple[list[Loop], list[str]]:
         notes.append(f"{table.file}: {fault}")
     loops = [_loop(group, table.file) for group in groups.values()]
     return sorted(loops, key=lambda loop: loop.line), notes
-
-
-def unused(table: Table, known: Sequence[str]) -> list[str]:
-    """A note for each column that is not known."""
-    return [f"{table.file}: column {name} is not used" for name in table.heading if name and name not in known]
 
 
 def _needed(heading: Sequence[str]) -> tuple[str, ...]:

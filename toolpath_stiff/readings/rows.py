@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+from toolpath_stiff.column_names import heading_key
 from toolpath_stiff.errors import InputError, InputErrors, MeasurementError
 from toolpath_stiff.readings.dates import day_of
 from toolpath_stiff.readings.loops import loop_of
@@ -93,6 +94,18 @@ class Row:
     side: float = 1.0
 
 
+def refuse_pulls(table: Table) -> None:
+    """Raise `InputError` for a table of forces as vectors, which is no table of stiffnesses or of raw records."""
+    if not {"fx_n", "fy_n", "fz_n", "tension_n"}.isdisjoint(map(heading_key, table.heading)):
+        raise MeasurementError(
+            "forces as vectors, or by a cable: pulls on a machine of elements",
+            hint="compare, diagnose, update and plan read pulls as they are (--machine ROBOT.toml); reduce and the "
+            "studio take none",
+            file=table.file,
+            line=table.heading_line,
+        )
+
+
 def read_rows(table: Table, planned: bool = False, softest: float = SOFTEST) -> tuple[list[Row], list[str]]:
     """Rows of a measurement file; and what was not used, in words.
 
@@ -113,6 +126,7 @@ def read_rows(table: Table, planned: bool = False, softest: float = SOFTEST) -> 
         Bad rows, all of them.
     """
     file, heading, line = table.file, table.heading, table.heading_line
+    refuse_pulls(table)
     check_needed(table, _needed(heading, planned), "one row a reading: x_mm,y_mm,z_mm,direction,stiffness_N_per_mm")
     fault = "a column without a name" if "" in heading else "" if table.rows else "no rows below the heading"
     if "direction" in heading and "dx" in heading:

@@ -22,7 +22,7 @@ def text(result: ElementDiagnosis) -> str:
         f"{problem.machine.title}: {count} readings at {poses} poses; noise: {problem.noise.origin}",
         result.sentence,
         *filter(None, [question(problem)]),
-        *([f"taken for wild: {', '.join(result.wild)}"] if result.wild else []),
+        *([f"taken for wild, and not counted: {', '.join(result.wild)}"] if result.wild else []),
     ]
     parts = [(row["component"], *(f"{row[key]:.1f}" for key in COLUMNS)) for row in result.components]
     lines += ["", *ShownTable(("um, as given", *(f">{name}" for name in COLUMNS.values())), parts).lines()]
@@ -33,7 +33,7 @@ def text(result: ElementDiagnosis) -> str:
         values = ", ".join(f"{name} {NRAD * value:.0f}" for name, value in result.torsions.items())
         lines += ["", f"torsion of the joints fitted in place of the file's, nrad/(N m): {values}"]
         lines.append(
-            f"error of these at poses left out of the fit {problem.error_percent(result.left_out):.1f} %; they leave "
+            f"error of these at poses left out of the fit {result.counted(result.left_out):.1f} %; they leave "
             f"chi-square {chi_square(result.joints):.0f} of {count} readings"
         )
     return "\n".join([*lines, *(f"note: {note}" for note in result.pulls.notes)])

@@ -74,7 +74,8 @@ def page_of(
         _picture(part, drawn, questions) if isinstance(part, str) else _section(part[0], part[1:]) for part in sections
     )
     values = {**vars(head), "about": "   ·   ".join(filter(None, head.about))}
-    return "".join(render("sections.html", styles=["sections.css"], sections=[*filter(None, shown)], **values))
+    values |= {"styles": ["sections.css"], "scripts": ["pictures.js"] if drawn else []}
+    return "".join(render("sections.html", sections=[*filter(None, shown)], **values))
 
 
 def readings_head(
@@ -121,7 +122,7 @@ def _picture(name: str, drawn: Mapping[str, bytes], questions: Mapping[str, tupl
     if not (picture := drawn.get(name)):
         return Markup()
     (width,) = struct.unpack(">I", picture[16:20])  # of the header, in pixels of the PNG
-    return _macro("picture", *questions[name], base64.b64encode(picture).decode("ascii"), round(width / FINER))
+    return _macro("picture", name, *questions[name], base64.b64encode(picture).decode("ascii"), round(width / FINER))
 
 
 def render(

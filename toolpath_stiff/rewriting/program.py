@@ -6,7 +6,6 @@ marks, line ends, upper and lower case. The rapid with which the tool comes from
 the one move that cannot match.
 """
 
-import copy
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -16,14 +15,12 @@ from typing import Any, ClassVar
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc.controller import LANGUAGES, UNKNOWN_CONTROL, Controller
-from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.lines import read_text, split_lines
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
 from toolpath_stiff.nc.place import Place
-from toolpath_stiff.nc.state import State
-from toolpath_stiff.nc.tables import Offsets
+from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.words import read_block
-from toolpath_stiff.poses import Pose, ShopPose, pose_in_mm
+from toolpath_stiff.poses import Pose, pose_in_mm
 from toolpath_stiff.results import Result
 from toolpath_stiff.rewriting.blocks import rewrite_block
 from toolpath_stiff.rewriting.controls import Controls
@@ -131,16 +128,16 @@ def rewrite_program(
     X100 Y40
     M30
     """
-    placement, original = pose_in_mm(placement_origin), pose_in_mm(original_origin)
+    placement, original = tuple(placement_origin), tuple(original_origin)
     if program.dialect in LANGUAGES and not program.kinematics:
         text, encoding = _text(program)
-        turn = Turn(placement, original)
-        written = text if placement == original else write_placed(program, text, turn, decimals, control)
+        turn, stays = _turn(placement_origin, original_origin), placement == original
+        written = text if stays else write_placed(program, text, turn, decimals, control)
         return RewrittenProgram(program.name, written, encoding, [])
     check_rewritable(program)
     if placement == original:
         return RewrittenProgram(program.name, *_text(program), [])
-    controls = _controls(program, control, placement, original, decimals)
+    controls = _controls(program, control, placement_origin, original_origin, decimals)
     controls.linearise = linearise and mm_from_m(linearise)
     return _rewritten(program, controls, control)
 
@@ -192,25 +189,20 @@ def shift_program(
     ([0, 1, 2], {})
     """
     check_rewritable(program)
-    place = pose_in_mm(origin)
-    controls = _controls(program, control, place, place, decimals)
+    controls = _controls(program, control, origin, origin, decimals)
     controls.courses = courses
     return _rewritten(program, controls, control), controls.row_of, controls.fixed
 
 
 def _controls(
-    program: ReadProgram, control: Controller, placement: ShopPose, original: ShopPose, decimals: int | None
+    program: ReadProgram, control: Controller, placement: Pose, original: Pose, decimals: int | None
 ) -> Controls:
-    source, out = (
-        State(
-            program.name,
-            Frames(copy.deepcopy(control.offsets or Offsets()), origin, origin),
-            copy.deepcopy(control.tools),
-            control.dialect,
-        )
-        for origin in (placement, original)
-    )
-    return Controls(source, out, Turn(placement, original), decimals, None)
+    source, out = (Request((), program.name, origin=at, controller=control).start() for at in (placement, original))
+    return Controls(source, out, _turn(placement, original), decimals, None)
+
+
+def _turn(placement: Pose, original: Pose) -> Turn:
+    return Turn(pose_in_mm(placement), pose_in_mm(original))
 
 
 def _text(program: ReadProgram) -> tuple[str, str]:

@@ -3,30 +3,29 @@
 from collections.abc import Callable
 from typing import Any
 
-from numpy.random import Generator
-
 Shape = dict[str, Any]  # by name
-Draw = Callable[[Generator], Shape]
+Draw = Callable[..., Shape]  # of a generator, how many vertices the frame has, which set-ups there are
 
 
 def uniform(name: str, low: float, high: float) -> Draw:
     """One number, drawn from a range."""
-    return lambda rng: {name: float(rng.uniform(low, high))}
+    return lambda rng, *_: {name: float(rng.uniform(low, high))}
 
 
 def whole(name: str, low: int, beyond_high: int) -> Draw:
     """One whole number, from the lowest to below the last."""
-    return lambda rng: {name: int(rng.integers(low, beyond_high))}
+    return lambda rng, *_: {name: int(rng.integers(low, beyond_high))}
 
 
 def either(name: str) -> Draw:
     """1 or -1."""
-    return lambda rng: {name: float(rng.choice([-1.0, 1.0]))}
+    return lambda rng, *_: {name: float(rng.choice([-1.0, 1.0]))}
 
 
 def drawn(*draws: Draw) -> Draw:
     """Several, one after the other."""
-    return lambda rng: {name: value for draw in draws for name, value in draw(rng).items()}
+    return lambda rng, *there: {name: value for draw in draws for name, value in draw(rng, *there).items()}
 
 
+nothing = drawn()
 one_strut, side, signed = whole("strut", 0, 6), either("side"), either("sign")  # a strut from 0

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from toolpath_stiff.rig.draws import Shape
+from toolpath_stiff.rig.draws import Draw, Shape, drawn, nothing, signed, whole
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.hidden import HiddenMachine
 from toolpath_stiff.rig.unknown import Unknown
@@ -22,15 +22,7 @@ NM_PER_N = 1e-9  # m/N in nm/N
 
 # Largest compliances that are tried, nm/N: far beyond 30 % of a tip that gives 8 to 31 nm/N.
 SOFT = 60.0
-Draw = Callable[[Generator, int, list[str]], Shape]  # of how many vertices the frame has, which set-ups there are
-
-
-def _no_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
-    return {}
-
-
-def _sign(rng: Generator, vertices: int, setups: list[str]) -> Shape:
-    return {"sign": float(rng.choice([-1.0, 1.0]))}
+Grow = Callable[[float, Shape], Shape]
 
 
 def _shares(*names: str) -> Draw:
@@ -44,15 +36,9 @@ def _shares(*names: str) -> Draw:
     return draw
 
 
-def _frame_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
-    shares = _shares("radial", "vertical")(rng, vertices, setups)
-    # All vertices alike in half of the cases, else a single one.
-    return {"vertex": 0 if rng.random() < 0.5 else int(rng.integers(1, vertices + 1)), **shares}
-
-
-def _setup_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
-    shares = _shares(*"xyz")(rng, vertices, setups)
-    return {"setup": str(rng.choice(setups)), **shares}
+def _vertex(rng: Generator, vertices: int, setups: list[str]) -> Shape:
+    """All vertices alike in half of the cases, else a single one."""
+    return {"vertex": 0 if rng.random() < 0.5 else int(rng.integers(1, vertices + 1))}
 
 
 def _gauge_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
@@ -60,24 +46,18 @@ def _gauge_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
     target = str(rng.choice(["X", "Y", "Z", *(setups if len(setups) > 1 else [])]))
     axis = target in ("X", "Y", "Z")
     direction = {"direction": "XYZ".index(target) + 1 if axis else 0, "setup": "" if axis else target}
-    return direction | _sign(rng, vertices, setups)
+    return direction | signed(rng)
 
 
-Grow = Callable[[float, Shape], Shape]
+def _scaled(limit: float, *names: str) -> Grow:
+    """Parameters in proportion to the strength and to share or sign in the shape, beside what else that has."""
 
+    def grow(strength: float, shape: Shape) -> Shape:
+        shares = {**dict.fromkeys(names, shape.get("sign", 1.0)), **shape}
+        sizes = {name: limit * strength * float(shares[name]) for name in names}
+        return {key: value for key, value in shape.items() if key != "sign"} | sizes
 
-def _scaled(name: str, limit: float, *kept: str) -> Grow:
-    """One parameter in proportion to the strength, with the sign of its shape, beside what is kept of that."""
-    return lambda strength, shape: {
-        **{key: shape[key] for key in kept}, name: limit * strength * float(shape.get("sign", 1.0))
-    }  # fmt: skip
-
-
-def _soft(*names: str, kept: tuple[str, ...] = ()) -> Grow:
-    """Compliances in proportion to the strength and to their shares."""
-    return lambda strength, shape: {
-        **{key: shape[key] for key in kept}, **{name: SOFT * strength * shape[name] for name in names}
-    }  # fmt: skip
+    return grow
 
 
 @dataclass(frozen=True)
@@ -90,7 +70,7 @@ class Hideable:
         What its parameters, by the catalogue's names and in shop units, change of a machine.
     grow
         The parameters at a strength in (0, 1].
-    draw
+    shape
         What is drawn beside the strength: which strut, which axis, which sign, which proportions.
     columns
         Columns that a measurement file needs to show it.
@@ -98,59 +78,59 @@ class Hideable:
 
     change: Callable[[HiddenMachine, Shape], Shape]
     grow: Grow
-    draw: Draw = _no_shape
+    shape: Draw = nothing
     columns: tuple[str, ...] = ()
 
 
 CATALOGUE: dict[str, Hideable] = {
     "spindle_compliance": Hideable(
         lambda h, p: {"spindle": (p["radial"] * NM_PER_N, p["axial"] * NM_PER_N)},
-        _soft("radial", "axial"), _shares("radial", "axial"),
+        _scaled(SOFT, "radial", "axial"), _shares("radial", "axial"),
     ),
     "platform_flexibility": Hideable(
         lambda h, p: {"bars": p["bar_stiffness"]}, lambda strength, _: {"bar_stiffness": 1e8 / strength}
     ),
-    "joint_compliance": Hideable(lambda h, p: {"joint": p["compliance"] * NM_PER_N}, _scaled("compliance", SOFT)),
-    "joint_moment_stiffness": Hideable(lambda h, p: {"moment": p["stiffness"]}, _scaled("stiffness", 2e6)),
+    "joint_compliance": Hideable(lambda h, p: {"joint": p["compliance"] * NM_PER_N}, _scaled(SOFT, "compliance")),
+    "joint_moment_stiffness": Hideable(lambda h, p: {"moment": p["stiffness"]}, _scaled(2e6, "stiffness")),
     "joint_clearance": Hideable(
-        lambda h, p: {"clearance": m_from_um(p["lost_motion"])}, _scaled("lost_motion", 50.0), columns=("force_N",)
+        lambda h, p: {"clearance": m_from_um(p["lost_motion"])}, _scaled(50.0, "lost_motion"), columns=("force_N",)
     ),
     "contact_nonlinearity": Hideable(
-        lambda h, p: {"hertz": p["compliance"] * NM_PER_N}, _scaled("compliance", SOFT), columns=("force_N",)
+        lambda h, p: {"hertz": p["compliance"] * NM_PER_N}, _scaled(SOFT, "compliance"), columns=("force_N",)
     ),
-    "strut_law": Hideable(lambda h, p: {"curvature": p["curvature"] / 100.0}, _scaled("curvature", 40.0), _sign),
+    "strut_law": Hideable(lambda h, p: {"curvature": p["curvature"] / 100.0}, _scaled(40.0, "curvature"), signed),
     "weak_strut": Hideable(
         lambda h, p: {"strut_factors": np.where(np.arange(1, 7) == p["strut"], p["factor"], 1.0) * h.strut_factors},
         lambda strength, shape: {"strut": shape["strut"], "factor": 1.0 - 0.7 * strength},
-        lambda rng, *_: {"strut": int(rng.integers(1, 7))},
+        whole("strut", 1, 7),
     ),
     "frame_compliance": Hideable(
         lambda h, p: {"vertices": np.where(
             (np.arange(1, 7) == p["vertex"])[:, None] | (p["vertex"] == 0),
             np.array([p["radial"], p["vertical"]]) * NM_PER_N, 0.0,
         )},
-        _soft("radial", "vertical", kept=("vertex",)), _frame_shape,
+        _scaled(SOFT, "radial", "vertical"), drawn(_shares("radial", "vertical"), _vertex),
     ),
     "table_compliance": Hideable(
         lambda h, p: {"table": np.array([p[axis] for axis in "xyz"]) * NM_PER_N, "rocking": p["rocking"] * NM_PER_N},
-        _soft(*"xyz", "rocking"), _shares(*"xyz", "rocking"),
+        _scaled(SOFT, *"xyz", "rocking"), _shares(*"xyz", "rocking"),
     ),
     "setup_compliance": Hideable(
         lambda h, p: {"setup": p["setup"], "setup_compliance": np.array([p[axis] for axis in "xyz"]) * NM_PER_N},
-        _soft(*"xyz", kept=("setup",)), _setup_shape,
+        _scaled(SOFT, *"xyz"), drawn(_shares(*"xyz"), lambda rng, _, setups: {"setup": str(rng.choice(setups))}),
     ),
-    "tool_length_error": Hideable(lambda h, p: {"tip_error": m_from_mm(p["error"])}, _scaled("error", 60.0), _sign),
+    "tool_length_error": Hideable(lambda h, p: {"tip_error": m_from_mm(p["error"])}, _scaled(60.0, "error"), signed),
     "platform_radius_error": Hideable(
-        lambda h, p: {"radius_error": m_from_mm(p["error"])}, _scaled("error", 60.0), _sign
+        lambda h, p: {"radius_error": m_from_mm(p["error"])}, _scaled(60.0, "error"), signed
     ),
     "gauge_scale": Hideable(
         lambda h, p: {
             "gauge_target": p["setup"] or "XYZ"[p["direction"] - 1], "gauge_factor": 1.0 + p["scale"] / 100.0
         },
-        _scaled("scale", 20.0, "direction", "setup"), _gauge_shape,
+        _scaled(20.0, "scale"), _gauge_shape,
     ),
     "thermal_drift": Hideable(
-        lambda h, p: {"drift": per_s_from_per_min(m_from_um(p["rate"]))}, _scaled("rate", 20.0), _sign, ("time_min",)
+        lambda h, p: {"drift": per_s_from_per_min(m_from_um(p["rate"]))}, _scaled(20.0, "rate"), signed, ("time_min",)
     ),
 }  # fmt: skip
 
@@ -159,23 +139,18 @@ BEYOND = {*OUTSIDE, *(name for name, fault in FAULTS.items() if not fault.names)
 
 def draw_shape(name: str, rng: Generator, vertices: int, setups: list[str]) -> Shape:
     """What is drawn of anything that can be hidden, beside its strength."""
-    if name in CATALOGUE:
-        return CATALOGUE[name].draw(rng, vertices, setups)
-    return (FAULTS[name] if name in FAULTS else OUTSIDE[name]).shape(rng)
+    return (CATALOGUE.get(name) or FAULTS.get(name) or OUTSIDE[name]).shape(rng, vertices, setups)
 
 
 def at_strength(name: str, shape: Shape, strength: float) -> Shape:
     """Shape in shop units, by the catalogue's names, for a strength in (0, 1]."""
     if name in CATALOGUE:
         return CATALOGUE[name].grow(strength, shape)
-    limit = (FAULTS[name] if name in FAULTS else OUTSIDE[name]).limit
-    return _scaled("size", limit, *(key for key in shape if key != "sign"))(strength, shape)
+    return _scaled((FAULTS.get(name) or OUTSIDE[name]).limit, "size")(strength, shape)
 
 
 def with_effect(hidden: HiddenMachine, name: str, parameters: Shape) -> HiddenMachine:
     """The machine with one more effect; parameters in shop units by the catalogue's names."""
-    if name in CATALOGUE:
-        return dataclasses.replace(hidden, **CATALOGUE[name].change(hidden, parameters))
-    if name in FAULTS:
-        return dataclasses.replace(hidden, **FAULTS[name].change(hidden, parameters))
+    if known := CATALOGUE.get(name) or FAULTS.get(name):
+        return dataclasses.replace(hidden, **known.change(hidden, parameters))
     return dataclasses.replace(hidden, unknown=Unknown(name, parameters["size"], dict(parameters)))

@@ -24,14 +24,14 @@ from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.files import Content, read_bytes, read_text
 from toolpath_stiff.results_folder import Rules, write_folder
 from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, POSE, Table
-from toolpath_stiff.rig.case import BUILT, DrawnCase, clamp_of, draw_case, rows_of
+from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
 from toolpath_stiff.rig.effects import BEYOND, CATALOGUE
 from toolpath_stiff.rig.fem import FemMachine
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
 from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
-from toolpath_stiff.rig.nominal import Nominal, load_nominal, parse_nominal
+from toolpath_stiff.rig.nominal import Nominal, parse_nominal
 from toolpath_stiff.rig.robot import FAULTS as ROBOT_FAULTS
 from toolpath_stiff.rig.robot import robot_case
 from toolpath_stiff.rig.unknown import Unknown
@@ -205,38 +205,25 @@ def _value(name: str, cell: str) -> float | int | str:
     raise ValueError(f"a number from {low:g} to {high:g}")
 
 
-def blind_case(
-    seed: int,
-    layout: str = "tilted",
-    hidden: str | None = None,
-    noise: float = 0.02,
-    machine: str = defaults.MACHINE,
-    plan_file: str | None = None,
-    built: str = BUILT[0],
-) -> DrawnCase:
-    """A case as of `draw_case`, with the poses of a file. Raises `InputError`."""
-    nominal = load_nominal(machine)
-    plan = None if plan_file is None else read_plan(plan_file, nominal)
-    return draw_case(seed, layout, hidden, noise, nominal, plan, built=built)
-
-
 def new_exercise(folder: str | Path, case: DrawnCase, rules: Rules = NO_OTHER) -> int:
     """Write a blind exercise; returns the number of rows. Raises `InputError`; then nothing is written.
 
     `rules`: what must not be replaced. An exercise in the folder is not, by default: its sealed truth would be lost.
     """
-    contents: dict[str, Content] = {MACHINE: case.nominal.text, MEASUREMENTS: csv_text(case.rows), SEALED: seal(case)}
-    write_folder(folder, contents, command="rig new", rules=rules)
-    return len(case.rows["x_mm"])
+    return _written(folder, case.nominal.text, case.rows, seal(case), rules)
 
 
 def new_robot(folder: str | Path, seed: int, hidden: str | None, noise: float, rules: Rules = NO_OTHER) -> int:
     """Write an exercise on an invented robot (`robot`), as `new_exercise`."""
     text, table, truth = robot_case(seed, hidden, noise)
     sealed = sealed_bytes({"seed": seed, "layout": "robot", "truth": truth, "built": "serial"})
-    contents: dict[str, Content] = {MACHINE: text, MEASUREMENTS: csv_text(table), SEALED: sealed}
+    return _written(folder, text, table, sealed, rules)
+
+
+def _written(folder: str | Path, machine: str, table: Table, sealed: bytes, rules: Rules) -> int:
+    contents: dict[str, Content] = {MACHINE: machine, MEASUREMENTS: csv_text(table), SEALED: sealed}
     write_folder(folder, contents, command="rig new", rules=rules)
-    return len(table["sd_um"])
+    return len(next(iter(table.values())))
 
 
 def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[str, int]:

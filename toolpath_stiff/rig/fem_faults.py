@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.draws import Draw, Shape, drawn, one_strut, signed, uniform, whole
+from toolpath_stiff.rig.draws import Draw, Shape, drawn, nothing, one_strut, signed, uniform, whole
 
 Change = Callable[[Any, Shape], Shape]  # of a `FemMachine` and a shape with `size`
 SOFT = 80e-9  # m/N, largest compliance that is tried: several times the tip's
@@ -31,9 +31,7 @@ class Fault:
     columns: tuple[str, ...]
 
 
-def _fault(
-    links: str, names: str, limit: float, change: Change, shape: Draw = lambda rng: {}, needs: str = ""
-) -> Fault:
+def _fault(links: str, names: str, limit: float, change: Change, shape: Draw = nothing, needs: str = "") -> Fault:
     return Fault(frozenset(links.split(",")), frozenset(names.split()), limit, change, shape, tuple(needs.split()))
 
 

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.draws import Draw, Shape
+from toolpath_stiff.rig.draws import Draw, Shape, nothing
 from toolpath_stiff.rig.kinematics import neutral_directions
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
@@ -112,7 +112,7 @@ class Kind:
     limit: float
     act: Callable[[Links, CommandedRows, Unknown], Links] | None = None
     read: Callable[[Rows, Unknown], FloatArray] | None = None
-    shape: Draw = lambda rng: {}
+    shape: Draw = nothing
     columns: tuple[str, ...] = ()
 
 

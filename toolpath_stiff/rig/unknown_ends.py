@@ -27,7 +27,7 @@ HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
 # tangent of a circle about the axis is described by x and y as well as by the radius.
 BASE = "table,frame"
 AZIMUTH = uniform("azimuth", 0.0, 2.0 * np.pi)
-HOLDS = drawn(uniform("holds", 800.0, 2500.0), lambda rng: {"setup": "riser"})
+HOLDS = drawn(uniform("holds", 800.0, 2500.0), lambda *_: {"setup": "riser"})
 
 
 @act(BASE, "x", SOFT)

@@ -14,20 +14,17 @@ from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.stiffness import effects, element_effects
 from toolpath_stiff.stiffness.contract import LINKS, Effect
 from toolpath_stiff.stiffness.declarations import check_declarations
 from toolpath_stiff.stiffness.effect_source import line_in, line_of
 from toolpath_stiff.stiffness.term_file import effects_of_terms
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every save is one
 
@@ -35,18 +32,20 @@ MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every
 @cache
 def packaged_effects() -> dict[str, Effect]:
     """Name -> effect of the packaged files, one an effect."""
-    packaged: dict[str, Effect] = {}
-    for name in sorted(module.name for module in pkgutil.iter_modules(effects.__path__)):
-        packaged |= _effects_in(import_module(f"toolpath_stiff.stiffness.effects.{name}"), name)
-    return packaged
+    return _effects_below(effects)
 
 
 @cache
 def effects_of_elements() -> dict[str, Effect]:
     """Name -> packaged effect that holds for machines of elements."""
-    packaged = {name: effect for name, effect in packaged_effects().items() if effect.holds_for == "all"}
-    for module in sorted(module.name for module in pkgutil.iter_modules(element_effects.__path__)):
-        packaged |= _effects_in(import_module(f"toolpath_stiff.stiffness.element_effects.{module}"), module)
+    of_both = {name: effect for name, effect in packaged_effects().items() if effect.holds_for == "all"}
+    return of_both | _effects_below(element_effects)
+
+
+def _effects_below(package: ModuleType) -> dict[str, Effect]:
+    packaged: dict[str, Effect] = {}
+    for module in sorted(module.name for module in pkgutil.iter_modules(package.__path__)):
+        packaged |= _effects_in(import_module(f"{package.__name__}.{module}"), module)
     return packaged
 
 
@@ -59,10 +58,8 @@ def known_effects(files: Iterable[str | Path] = (), kind: str = Hexapod.kind) ->
         A file cannot be loaded, holds no effect, or names one that exists already.
     """
     of_struts = kind == Hexapod.kind
-    known, others = (
-        dict(packaged_effects() if of_struts else effects_of_elements()),
-        "elements" if of_struts else "hexapods",
-    )
+    known = dict(packaged_effects() if of_struts else effects_of_elements())
+    others = "elements" if of_struts else "hexapods"
     for file in files:
         for name, effect in effects_from_file(file).items():
             if name in known:
@@ -174,7 +171,7 @@ class EffectCatalogue(Result):
         """What each effect declares, in its own units."""
         return {"effects": [self.view.describe_effect(effect) for effect in self.effects]}
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row an effect: link of the load path, name, title, equation, source."""
         return frame_of(self.to_dict()["effects"])[["link", "name", "title", "equation", "source", "load_dependent"]]
 

@@ -125,6 +125,11 @@ def compliance(name: str, largest: float, typical: tuple[float, float], source: 
     return Parameter(name, "nm/N", 1e-9, (0.0, largest), typical, source=source, meaning=meaning)
 
 
+def rocking(name: str, source: str, meaning: str) -> Parameter:
+    """The parameter of a body that turns about horizontal axes under a moment, nrad/(N m)."""
+    return Parameter(name, "nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0), source, meaning=meaning)
+
+
 @dataclass(frozen=True)
 class LoadPath(ArrayColumns):
     """What an effect sees of n poses under load. SI, base axes.

@@ -7,16 +7,16 @@ route, which pivots.
 
 from collections.abc import Iterator
 from dataclasses import replace
+from types import ModuleType
 
 import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import FloatArray, IntArray, product
-from toolpath_stiff.machine.model import Hexapod, as_hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.stiffness import closed_form, element_sum, exact
 from toolpath_stiff.stiffness.contract import LoadPath
 from toolpath_stiff.stiffness.element_sum import stance_of
-from toolpath_stiff.stiffness.geometry_slopes import geometry_slopes
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
 
 BLOCK = 8192  # poses at a time on the exact route: bounds memory, keeps LAPACK's call overhead small
@@ -24,6 +24,11 @@ CLOSED_FORM_FROM = 150  # poses; below, the closed form's fixed cost of some 0.2
 LEAST_LOAD = 1.0  # N
 
 Tools = FloatArray | float  # m, length of the tool; N, size of the load: of all poses, or (n,)
+
+
+def solver_of(machine: MachineTool) -> ModuleType:
+    """What gives the compliance of a kind of machine."""
+    return exact if isinstance(machine, Hexapod) else element_sum
 
 
 def is_closed_form(model: StiffnessModel) -> bool:
@@ -73,7 +78,7 @@ def tip_compliance(
         size = np.maximum(np.linalg.norm(load, axis=1), LEAST_LOAD)
         towards = np.where((load == 0.0).all(axis=1)[:, None], (0.0, 0.0, 1.0), load)
         towards = towards / np.linalg.norm(towards, axis=1)[:, None]
-    for rows, path in _paths(model, position, rotation, tool_length, size):
+    for rows, path in load_paths(model, position, rotation, tool_length, size):
         if not isinstance(model.machine, Hexapod):
             axes, compliance[rows] = stance_of(path).work_axes, element_sum.tip_compliance(model, path)
             if in_work and axes is not None:
@@ -93,25 +98,9 @@ def compliance_along(
 ) -> FloatArray:
     """Compliance of the tip along unit vectors (n, 3), load-dependent effects included: (n,) m/N."""
     compliance = np.empty(len(position))
-    for rows, path in _paths(model, position, rotation, tool_length, force):
-        solver = exact if isinstance(model.machine, Hexapod) else element_sum
-        compliance[rows] = solver.compliance_along(model, path, direction[rows])
+    for rows, path in load_paths(model, position, rotation, tool_length, force):
+        compliance[rows] = solver_of(model.machine).compliance_along(model, path, direction[rows])
     return compliance
-
-
-def geometry_slopes_along(
-    model: StiffnessModel,
-    direction: FloatArray,
-    position: FloatArray,
-    rotation: FloatArray | None = None,
-    tool_length: Tools = np.nan,
-    force: float = defaults.FORCE,
-) -> FloatArray:
-    """(n, 42) as of `geometry_slopes`; arguments as of `compliance_along`."""
-    slopes = np.empty((len(position), 42))
-    for rows, path in _paths(model, position, rotation, tool_length, force):
-        slopes[rows] = geometry_slopes(model, path, direction[rows])
-    return slopes
 
 
 def rows_of_tools(tool_length: FloatArray) -> list[tuple[float, IntArray | slice]]:
@@ -142,15 +131,16 @@ def compliance_with_effects(
     kernel = closed_form.prepare(as_hexapod(model.machine, "the closed form"), tool_length)
     turns = None if rotation is None else rotation.T.reshape(-1, 3, 3)
     upright = rotation is None and model.control is None  # else the platform may stand elsewhere
-    for rows, path in _paths(model, position.T, turns, tool_length, force):
+    for rows, path in load_paths(model, position.T, turns, tool_length, force):
         turn = None if upright else path.rotation.reshape(-1, 9).T
         forces, along = np.empty((len(path), 6)), direction[:, rows]
         good = closed_form.compliance_along_columns(kernel, path.position.T, along, turn, forces)[3]
-        compliance[rows][good] = exact.compliance_along(model, path.take(good), along.T[good], forces[good])
+        some = path if good.all() else path.take(good)  # copies, which take as long as the effects
+        compliance[rows][good] = exact.compliance_along(model, some, along.T[good], forces[good])
     return compliance
 
 
-def _paths(
+def load_paths(
     model: StiffnessModel, position: FloatArray, rotation: FloatArray | None, tool_length: Tools, force: Tools
 ) -> Iterator[tuple[slice, LoadPath]]:
     """Rows of some poses of a program, and what the effects see there, the model's conditions included."""

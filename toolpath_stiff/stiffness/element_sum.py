@@ -95,13 +95,9 @@ def energies(stance: Stance, direction: FloatArray) -> list[FloatArray]:
 
 def _spring_energy(spring: Spring, tip: FloatArray, force: FloatArray) -> FloatArray:
     """(n,) of a spring under forces (3, n) at the tip (3, n)."""
-    axes = (
-        spring.axes
-        if spring.axes is None
-        else np.moveaxis(spring.axes, 0, -1)
-        if spring.axes.ndim == 3
-        else spring.axes
-    )
+    axes = spring.axes
+    if axes is not None and axes.ndim == 3:
+        axes = np.moveaxis(axes, 0, -1)
     compliance = spring.compliance.T  # (6,) or (6, n)
     energy = _quadratic(compliance[:3], axes, force)
     if compliance[3:].any():

@@ -203,7 +203,7 @@ def compliance_along(
         form, parallel = assemble_links(model, loaded)
         if parallel is None:
             both = np.concatenate([equilibrium, direction], axis=1)  # no moment
-            along = np.einsum("ni,nij,nj->n", both, form[:, :9, :9], both)
+            along = np.einsum("ni,ni->n", _times(form[:, :9, :9], both), both)
     if along is None:
         along = np.einsum("ni,ni->n", under_load(model, path, direction)[2][:, :3], direction)
     return possible(model, path, along[:, None, None])[:, 0, 0]

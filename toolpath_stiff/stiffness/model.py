@@ -20,7 +20,7 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.machine.elements import TORSION, Stance
-from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
+from toolpath_stiff.machine.kinematics import Struts, forward_kinematics, solve_struts
 from toolpath_stiff.machine.limits import solved
 from toolpath_stiff.machine.model import EffectEntry, Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
@@ -242,16 +242,7 @@ def load_path(
     stance = solved(model.machine, tip, rotation, length)
     if isinstance(stance, Stance):
         return path_of_stance(model, stance, length, force, **seen)
-    turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
-    return LoadPath(
-        machine_tool=model.machine,
-        position=tip,
-        rotation=np.broadcast_to(turn, (n, 3, 3)),
-        stance=stance,
-        tool_extension=np.where(np.isnan(length), 0.0, length - model.machine.reference_tool_length),
-        force=np.broadcast_to(np.asarray(force, dtype=float), (n,)),
-        **seen,
-    )
+    return _path(model, stance, tip, rotation, length, force, seen)
 
 
 def path_of_stance(
@@ -262,18 +253,30 @@ def path_of_stance(
     **seen: Any,
 ) -> LoadPath:
     """What the effects see of a machine of elements whose control believes this stance; arguments as of `load_path`."""
-    n, true, joints = len(stance), model.machine, stance.joints
+    true, joints = model.machine, stance.joints
     for active in model.effects:
         true, joints = active.stands(true, joints)
     if joints is not stance.joints or true is not model.machine:
         stance = true.standing(joints, tool_length)
-    extension = np.asarray(tool_length, dtype=float) - model.machine.reference_tool_length
+    return _path(model, stance, stance.position, stance.rotation, tool_length, force, seen)
+
+
+def _path(
+    model: StiffnessModel,
+    stance: Struts | Stance,
+    position: FloatArray,
+    rotation: FloatArray | None,
+    tool_length: ArrayLike,
+    force: ArrayLike,
+    seen: Document,
+) -> LoadPath:
+    n = len(position)
     return LoadPath(
         machine_tool=model.machine,
-        position=stance.position,
-        rotation=np.broadcast_to(np.eye(3) if stance.rotation is None else stance.rotation, (n, 3, 3)),
+        position=position,
+        rotation=np.broadcast_to(np.eye(3) if rotation is None else np.asarray(rotation, dtype=float), (n, 3, 3)),
         stance=stance,
-        tool_extension=np.broadcast_to(np.where(np.isnan(extension), 0.0, extension), (n,)),
+        tool_extension=np.broadcast_to(model.machine.extension(tool_length), (n,)),
         force=np.broadcast_to(np.asarray(force, dtype=float), (n,)),
         **seen,
     )

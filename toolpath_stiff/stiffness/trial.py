@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from types import ModuleType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,18 +20,15 @@ from toolpath_stiff.machine.elements import turns
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.limits import reach, solved
 from toolpath_stiff.machine.model import Hexapod, MachineTool
-from toolpath_stiff.results import Result, frame_of
+from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
-from toolpath_stiff.stiffness import element_sum, exact
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import effects_from_file
 from toolpath_stiff.stiffness.contract import ELEMENT, Effect, LoadPath, Parameter, Values
+from toolpath_stiff.stiffness.core import solver_of
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model, load_path
 from toolpath_stiff.units import RAD_PER_DEG, rad_from_deg
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 POSES, DRAWN = 24, 600
 AROUND = 0.3  # m around the default origin of a machine of elements
@@ -123,7 +119,7 @@ def _behaviour(effect: Effect, machine: MachineTool, seed: int) -> Iterator[Tria
     for words, values in _parameter_sets(effect, names):
         model = build_model(machine, extra=[ActiveEffect(effect, values)])
         path = _path(model, poses)
-        _solver(machine).tip_compliance(model, path)  # refused if there can be no such one
+        solver_of(machine).tip_compliance(model, path)  # refused if there can be no such one
         after[words] = _shown(model, path)
     alone = np.concatenate([_shown(model, path.take(slice(i, i + 1))) for i in range(len(path))])
     yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {len(poses)} poses")
@@ -189,15 +185,10 @@ def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
 def _shown(model: StiffnessModel, path: LoadPath) -> FloatArray:
     """(n,) N/m that a gauge shows, one direction a pose."""
     assert path.direction is not None
-    stiffness = 1.0 / _solver(model.machine).compliance_along(model, path, path.direction)
+    stiffness = 1.0 / solver_of(model.machine).compliance_along(model, path, path.direction)
     for active in model.instruments:
         stiffness = active.reading(stiffness, path)
     return np.asarray(stiffness)
-
-
-def _solver(machine: MachineTool) -> ModuleType:
-    """What gives the compliance of a kind of machine."""
-    return exact if isinstance(machine, Hexapod) else element_sum
 
 
 def _unit(parameter: Parameter) -> TrialOutcome:
@@ -256,7 +247,7 @@ class EffectCheck(Result):
         rows = [{"effect": name, "passed": all_passed(made), "checks": to_dict(made)} for name, made in trials]
         return {"file": self.file, "machine": self.machine, "passed": self.passed, "effects": rows}
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> DataFrame:
         """One row a check."""
         trials = self.trials.items()
         return frame_of([{"effect": name, **check} for name, made in trials for check in to_dict(made)])

@@ -1,7 +1,7 @@
 """Which block runs next: subprogram calls (M97, M98, G65), M99, stops and the end; `program_run` carries them out."""
 
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, holds_anyway, m_codes
-from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, GoTo, State
+from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, State
 
 
 def call(state: State, block: CurrentBlock, code: str) -> None:
@@ -26,7 +26,7 @@ def macro_call(state: State, block: CurrentBlock, code: str) -> None:
 def end_of_subprogram(state: State, block: CurrentBlock, code: str) -> None:
     """M99: back to the block after the call; with P, to the block of the caller with that N number."""
     number = block.whole("P", block.codes[code])
-    block.flow = Flow.RETURN if number is None else GoTo(number, block.values["P"].column)
+    block.flow = Flow.RETURN if number is None else block.values["P"]
 
 
 def end_of_program(state: State, block: CurrentBlock, code: str) -> None:

@@ -28,7 +28,6 @@ from toolpath_stiff.nc.codes.points import (
 from toolpath_stiff.nc.frames import standing
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Move
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.tables import tool_of
 from toolpath_stiff.nc.words import AXES, Word
 
 ARCS = ("G2", "G3")
@@ -70,13 +69,7 @@ def record(
         state.trace.append(replace(move, start=list(frames.position), end=list(control), arc=arc))
     frames.position = control
     if added:
-        note_tool(state)
-
-
-def note_tool(state: State) -> None:
-    """Keep the tool in the spindle among those that moved."""
-    if state.tool not in state.used_tools:
-        state.used_tools[state.tool] = replace(tool_of(state.tools, state.tool))
+        state.note_tool()
 
 
 def find_height(state: State, block: CurrentBlock, motion: int, named: bool) -> None:

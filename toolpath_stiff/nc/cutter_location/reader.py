@@ -58,22 +58,18 @@ class CutterLocationRun(ProgramRun):
 
     def __init__(self, request: Request, tally: Tally | None = None) -> None:
         self.request, self.lines, self.name, self.tally = request, request.lines, request.name, tally
-        self.state = CutterLocationState(request.name, copy.deepcopy(request.controller.tools), request.controller.feed)
+        controller = request.controller
+        self.state = CutterLocationState(request.name, tools=copy.deepcopy(controller.tools), feed=controller.feed)
 
     def program(self, ending: list[Remark]) -> ReadProgram:
         """What the run has made of the file."""
         request, state = self.request, self.state
-        return ReadProgram(
-            name=request.name,
-            path=request.path,
-            source=request.lines,
-            moves=state.recorder.moves(),
+        return request.program(
+            state,
             origin=request.default_origin if request.origin is None else request.origin,
             origin_source="default" if request.origin is None else "option",
-            unsupported=tuple(state.noted.values()),
             warnings=(*not_for(request), *state.warnings),
             assumptions=tuple(state.assumptions),
-            tools=tuple(state.used_tools.values()),
             dialect=CUTTER_LOCATION,
             marks=tuple(state.marks),
         )

@@ -14,10 +14,11 @@ from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, d
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle
 from toolpath_stiff.nc.geometry import Vector
-from toolpath_stiff.nc.moves import RAPID, Arc, Move, Recorder, Remark, Unsupported
+from toolpath_stiff.nc.moves import RAPID, Arc, Move, Remark, Unsupported
 from toolpath_stiff.nc.place import Place
+from toolpath_stiff.nc.state import Record
 from toolpath_stiff.nc.strokes import Drilling, strokes
-from toolpath_stiff.nc.tables import LARGEST_MM, ToolEntry, tool_of
+from toolpath_stiff.nc.tables import LARGEST_MM, tool_of
 
 FIRST_POINT = "the path begins at the file's first point; where the tool comes from is not given (no FROM)"
 FREE_YAW = "the turn of the tool about its own axis (yaw) is free in a cutter-location file; it is 0"
@@ -27,12 +28,9 @@ NOT_MOVED = (False, False)
 
 
 @dataclass
-class CutterLocationState:
+class CutterLocationState(Record):
     """The modes in force and all that was made so far; every word is a function of this and its statement."""
 
-    name: str  # of the file, for messages
-    tools: dict[int, ToolEntry] | None
-    feed: float | None = None  # mm/min, or mm per revolution
     statement: MajorStatement = field(default_factory=lambda: MajorStatement(1, 1, ""))  # being executed
     last_word: str = ""  # of the statement before
     ended: bool = False
@@ -41,15 +39,12 @@ class CutterLocationState:
     scale: float = 1.0  # mm of the length unit
     units_given: bool = False
     per_revolution: bool = False
-    speed: float = 0.0  # of the spindle, 1/min; 0: not known, or it stands
     turn: float = 1.0  # -1: counter-clockwise; nan: a speed of the surface
     revolutions: float = 0.0  # that SPINDL/ON goes back to
     on_contour: bool = False  # Creo's OUTPUT_ON_PROFILE: points of the contour beside CUTCOM
     frames: dict[str, tuple[float, ...]] = field(default_factory=dict)  # who names a coordinate system: its numbers
 
     # The tool.
-    tool: int = 0
-    tool_length: float = math.nan
     diameter: float = math.nan
     tool_name: str = ""
     moves_before_cutter: int = 0
@@ -74,13 +69,8 @@ class CutterLocationState:
     hole_from: Vector | None = None  # where the tool stood before the cycle, to whose height each hole goes back
 
     # What the file holds.
-    recorder: Recorder = field(default_factory=Recorder)
-    used_tools: dict[int, ToolEntry] = field(default_factory=dict)
     marks: list[tuple[int, str]] = field(default_factory=list)  # line and name of each operation
-    assumptions: list[str] = field(default_factory=list)
-    warnings: list[Remark] = field(default_factory=list)
-    noted: dict[str, Unsupported] = field(default_factory=dict)  # words that were not acted upon, each once
-    doubted: dict[str, Remark] = field(default_factory=dict)  # those of them that deserve a warning
+    doubted: dict[str, Remark] = field(default_factory=dict)  # words not acted upon that deserve a warning
     smooth: int = 0  # arcs that a straight move enters smoothly
     turning_back: list[int] = field(default_factory=list)  # lines of those into which it would turn back
 
@@ -96,14 +86,10 @@ class CutterLocationState:
     def note(self, reason: str, doubtful: bool = False) -> None:
         """Note that the word being executed is not acted upon; `doubtful`: which is a warning."""
         line, column, word = self.statement.line, self.statement.column, self.statement.word
-        self.noted.setdefault(word, Unsupported(line, column, word, reason))
+        if all(noted.word != word for noted in self.unsupported):
+            self.unsupported.append(Unsupported(line, column, word, reason))
         if doubtful:
             self.doubted.setdefault(word, Remark(f"{self.statement.shown}: {reason}", line))
-
-    def assume(self, text: str) -> None:
-        """Note an assumption, once."""
-        if text not in self.assumptions:
-            self.assumptions.append(text)
 
     def number(self, argument: str, expected: str = "a number") -> float:
         """The number of an argument. Raises `InputError`."""

@@ -18,6 +18,7 @@ from toolpath_stiff.nc.elements import direction as direction_of
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.points import (
     ON_CIRCLE_MM,
+    end_of,
     feed,
     in_plane,
     inch_tenths,
@@ -177,7 +178,8 @@ def check_known(state: State, block: CurrentBlock, there: dict[int, float], rapi
     plain.doubt = ""
     block.refuse_if(all(inner[:2]), None, "under cycle 8 and cycle 10: their order decides the path", "one of them")
     if plain.held_tip and state.frames.posted is None:
-        leans = any(state.frames.position[3:]) or any(there.get(axis) for axis in (3, 4, 5))
+        turned = any(state.frames.position[3:]) and state.frames.position[3:] != plain.led_to
+        leans = turned or any(there.get(axis) for axis in (3, 4, 5))
         block.refuse_if(leans, None, "turns rotary axes under tool centre point control (M128)", "", HOLDS_HINT)
 
 
@@ -265,8 +267,7 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
     turn, there, radius = direction(block), named(state, block), block.take("R")
     if not radius:
         raise block.fail(None, "without its radius", "R")
-    start = in_plane(state, present(state))
-    end = in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
+    start, end = in_plane(state, present(state)), end_of(state, there)
     places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
     center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
     _round(state, block, there, center, turn)
@@ -282,8 +283,7 @@ def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
     else:
         with plane_of_pole(state, block) as pole:
             there = polar(state, block, pole)
-    start = in_plane(state, present(state))
-    end = in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
+    start, end = in_plane(state, present(state)), end_of(state, there)
     ahead = heading / abs(heading)
     chord = (end - start) / ahead  # seen along the path
     block.refuse_if(abs(chord) < ON_CIRCLE_MM, None, "to its own start", "another point")

@@ -7,51 +7,55 @@ two squares, ANG the angle of two sides from 0 to 360 degrees; angles are in deg
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from operator import truediv
+from typing import ClassVar
 
 from toolpath_stiff.nc.heidenhain.statements import NUMBER
+from toolpath_stiff.nc.parametric.expressions import ARITHMETIC, Scanner
 from toolpath_stiff.nc.place import Place
 
-_TOKEN = re.compile(rf"\s*({NUMBER}|Q[LR]?\d+|DIV|LEN|ANG|[A-Z]+|[-+*/^()])")
-_RANKS = {"+": 1, "-": 1, "*": 2, "/": 2, "DIV": 2, "^": 3, "LEN": 1, "ANG": 1}
-_DEEPEST = 50
 PARAMETER = re.compile(r"Q[LR]?\d+")
 _ASSIGNED = re.compile(r"\s*(Q[LR]?\d+)?\s*=\s*(.+)$")
 _JUMP = re.compile(r'\s*IF\s*(.+?)\s*(EQU|NE|GT|LT)\s*(.+?)\s*GOTO\s*LBL\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*$')
 CONDITIONS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
 EQUAL = 1e-9
+KNOWN = "numbers, Q parameters, functions, + - * / ^ ( )"
+Value = float | str  # a truth value is a bool, which is a number
+Lookup = Callable[[str, int], Value]  # the value of a variable, and the column where it stands
+BLANK = re.compile(r"\s*")
+LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (SIEMENS, Fundamentals, "Blocks and block format")
 
 
-def _whole(value: float) -> float:
+def whole(value: float) -> float:
+    """Without what stands behind the point."""
     return float(math.trunc(value))
 
 
-def _trimmed(degrees: float) -> float:
+def trimmed(degrees: float) -> float:
     """Without the noise beyond the digits of a control: SIN 180 is 0."""
     return float(f"{degrees:.12g}") if abs(degrees) > 1e-14 else 0.0
 
 
-FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "SIN": lambda v: _trimmed(math.sin(math.radians(v))), "COS": lambda v: _trimmed(math.cos(math.radians(v))),
-    "TAN": lambda v: math.tan(math.radians(v)), "ASIN": lambda v: _trimmed(math.degrees(math.asin(v))),
-    "ACOS": lambda v: _trimmed(math.degrees(math.acos(v))), "ATAN": lambda v: _trimmed(math.degrees(math.atan(v))),
-    "SQRT": math.sqrt, "SQ": lambda v: v * v, "LN": math.log, "LOG": math.log10, "EXP": math.exp,
-    "NEG": lambda v: -v, "ABS": abs, "INT": _whole, "FRAC": lambda v: v - _whole(v),
-    "SGN": lambda v: float((v > 0) - (v < 0)),
+COMMON: dict[str, Callable[..., float]] = {
+    "SIN": lambda v: trimmed(math.sin(math.radians(v))), "COS": lambda v: trimmed(math.cos(math.radians(v))),
+    "TAN": lambda v: math.tan(math.radians(v)), "ASIN": lambda v: trimmed(math.degrees(math.asin(v))),
+    "ACOS": lambda v: trimmed(math.degrees(math.acos(v))), "SQRT": math.sqrt, "LN": math.log, "EXP": math.exp,
+    "ABS": abs,
 }  # fmt: skip
-OPERATORS: dict[str, Callable[[float, float], float]] = {
-    "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "/": lambda a, b: a / b,
-    "DIV": lambda a, b: a / b, "^": math.pow, "LEN": math.hypot,
-    "ANG": lambda a, b: _trimmed(math.degrees(math.atan2(a, b)) % 360.0),
+FUNCTIONS: dict[str, Callable[..., float]] = {
+    **COMMON, "ATAN": lambda v: trimmed(math.degrees(math.atan(v))), "SQ": lambda v: v * v, "LOG": math.log10,
+    "NEG": lambda v: -v, "INT": whole, "FRAC": lambda v: v - whole(v), "SGN": lambda v: float((v > 0) - (v < 0)),
 }  # fmt: skip
 
 
-def assigned(head: str, rest: str, place: Place) -> tuple[str, str]:
-    """Name and formula of an assignment: `Q5 = ...`, with the name as its head, or `FN 1: Q5 = ...`."""
+def assigned(head: str, rest: str, place: Place) -> tuple[str, str, Place]:
+    """Name, formula and its place, of an assignment: `Q5 = ...`, with the name as its head, or `FN 1: Q5 = ...`."""
     formula = _ASSIGNED.match(rest)
     if formula is None or not (formula[1] or head[0] == "Q"):
         raise place.fail(f"{head}{rest[:40]} is no assignment", "Q5 = +10")
-    return formula[1] or head, formula[2]
+    return formula[1] or head, formula[2], place._replace(column=(place.column or 1) + formula.start(2))
 
 
 def condition(
@@ -61,10 +65,106 @@ def condition(
     jump = _JUMP.match(rest)
     if jump is None or jump[2] != CONDITIONS[head]:
         raise place.fail(f"{head}:{rest[:40]} is no condition", f"IF +Q1 {CONDITIONS[head]} +5 GOTO LBL 2")
-    left, right = (work_out(jump[part], parameter, place) for part in (1, 3))
+    begin = place.column or 1
+    left, right = (work_out(jump[n], parameter, place._replace(column=begin + jump.start(n))) for n in (1, 3))
     same = abs(left - right) <= EQUAL
     holds = {"EQU": same, "NE": not same, "GT": left > right and not same, "LT": left < right and not same}
     return holds[jump[2]], jump[4], jump[5]
+
+
+@dataclass
+class Formula(Scanner):
+    """A block in upper case without its comment; blanks between its parts are passed over. `lookup`: variables."""
+
+    lookup: Lookup = field(kw_only=True)
+
+    literal: ClassVar = re.compile(NUMBER)
+    operator: ClassVar = re.compile(r"DIV|LEN|ANG|[-+*/^]")
+    name: ClassVar = re.compile(rf"{PARAMETER.pattern}|[A-Z]+")
+    ranks: ClassVar[Mapping[str, int]] = {
+        "+": 1,
+        "-": 1,
+        "*": 2,
+        "/": 2,
+        "DIV": 2,
+        "^": 3,
+        "LEN": 1,
+        "ANG": 1,
+    }  # how tightly an operator binds
+    operations: ClassVar[Mapping[str, Callable[[float, float], float]]] = {
+        **ARITHMETIC, "DIV": truediv, "^": math.pow, "LEN": math.hypot,
+        "ANG": lambda a, b: trimmed(math.degrees(math.atan2(a, b)) % 360.0),
+    }  # fmt: skip
+
+    def __post_init__(self) -> None:
+        problem = f"a block of {len(self.text)} characters, or with too many brackets"
+        long = len(self.text) > LONGEST_BLOCK or self.text.count("(") > MOST_BRACKETS
+        self.refuse_if(long, problem, f"at most {LONGEST_BLOCK}, {MOST_BRACKETS} of them")
+
+    def part(self, pattern: re.Pattern[str]) -> str:
+        """What matches next behind blanks, then read."""
+        self.take(BLANK)
+        return self.take(pattern)
+
+    def sign(self, text: str) -> bool:
+        """Whether that comes next behind blanks; it is then read."""
+        self.take(BLANK)
+        return self.next(text)
+
+    def result(self, tightest: int = 0) -> Value:
+        """Values and operators that bind tighter than `tightest`."""
+        left = self.operand()
+        while True:
+            begin, column = self.position, self.column
+            operator = self.part(self.operator)
+            if self.ranks.get(operator, 0) <= tightest:
+                self.position = begin
+                return left
+            left = self.operated(operator, left, self.result(self.ranks[operator]), column)
+
+    def real(self) -> float:
+        """A number. Raises `InputError` where it is none."""
+        column = self.column
+        return float(self.number(self.result(), column))
+
+    def operand(self) -> Value:
+        """A value with its sign: a number, an expression in brackets, what a name stands for."""
+        self.take(BLANK)
+        column = self.column
+        self.next("+")
+        if self.sign("("):
+            value = self.result()
+            self.refuse_if(not self.sign(")"), "a bracket that is not closed", ")", column=column)
+            return value
+        if self.next("-"):
+            self.refuse_if(self.begins("-"), "a sign after a sign", "brackets")
+            value = -self.number(self.operand(), column)
+            self.refuse_if(self.sign("^"), "a sign before ^, which may belong to either", "brackets", column=column)
+            return value
+        literal = self.take(self.literal)
+        if literal:
+            return float(literal.replace("EX", "E").replace(",", "."))
+        name = self.take(self.name)
+        self.refuse_if(not name, f"{self.rest()} is not a value", "a value", column=column)
+        return self.named(name, column)
+
+    def named(self, name: str, column: int) -> Value:
+        """The value of a name, with what belongs to it: of a function, of a Q parameter."""
+        if name in FUNCTIONS:
+            return self.finite(name, column, FUNCTIONS[name], self.operand())
+        self.refuse_if(name != "PI" and not PARAMETER.fullmatch(name), f"{name} in a formula", KNOWN, column=column)
+        return math.pi if name == "PI" else self.lookup(name, column)
+
+    def operated(self, operator: str, left: Value, right: Value, column: int) -> Value:
+        """The value of an operator."""
+        values = self.number(left, column), self.number(right, column)
+        return self.finite(operator, column, self.operations[operator], *values)
+
+    def number(self, value: Value, column: int) -> float:
+        """The number that a value is."""
+        if isinstance(value, str):
+            raise self.fail(f"{value!r} is no number", "a number", column=column)
+        return value
 
 
 def work_out(text: str, parameter: Callable[[str], float], place: Place) -> float:
@@ -77,51 +177,9 @@ def work_out(text: str, parameter: Callable[[str], float], place: Place) -> floa
     >>> work_out("2 * (Q1 + 3)", {"Q1": 2.0}.__getitem__, Place("part.h", 1))
     10.0
     """
-    tokens, position = list[str](), 0
-    while text[position:].strip():
-        token = _TOKEN.match(text, position)
-        if token is None:
-            raise place.fail(f"{text[position:].strip()[:12]!r} in a formula", "numbers, Q parameters, + - * / ^ ( )")
-        tokens.append(token[1])
-        position = token.end()
-    try:
-        value = _expression(tokens[::-1], parameter, 0, 0)
-    except (ArithmeticError, ValueError, IndexError) as error:
-        raise place.fail(f"{text.strip()[:40]!r} cannot be worked out: {error}") from None
-    if not math.isfinite(value):
-        raise place.fail(f"{text.strip()[:40]!r} is no finite number")
+    begin = place.column or 1
+    scanner = Formula(text, range(begin, begin + len(text) + 1), place, "", lookup=lambda name, _: parameter(name))
+    value = scanner.real()
+    scanner.take(BLANK)
+    scanner.refuse_if(not scanner.done, f"{scanner.rest()} in a formula", KNOWN)
     return value
-
-
-def _expression(rest: list[str], parameter: Callable[[str], float], tightest: int, depth: int) -> float:
-    """Values and operators that bind tighter than `tightest`; `rest` are the tokens left, in reverse order."""
-    negative = rest[-1] == "-"
-    left = _value(rest, parameter, depth)
-    if negative and rest and rest[-1] == "^":
-        raise ValueError("a sign before ^ may belong to either")
-    while rest and _RANKS.get(rest[-1], 0) > tightest:
-        operator = rest.pop()
-        left = OPERATORS[operator](left, _expression(rest, parameter, _RANKS[operator], depth + 1))
-    if not tightest and not depth and rest:
-        raise ValueError(f"{rest[-1]} there")
-    return left
-
-
-def _value(rest: list[str], parameter: Callable[[str], float], depth: int) -> float:
-    if depth > _DEEPEST:
-        raise ValueError("too deep")
-    token = rest.pop()
-    if token in "+-":
-        return _value(rest, parameter, depth + 1) * (-1.0 if token == "-" else 1.0)
-    if token == "(":
-        value = _expression(rest, parameter, 0, depth + 1)
-        if not rest or rest.pop() != ")":
-            raise ValueError("a bracket that is not closed")
-        return value
-    if token == "PI":
-        return math.pi
-    if token in FUNCTIONS:
-        return FUNCTIONS[token](_value(rest, parameter, depth + 1))
-    if token[0] == "Q":
-        return parameter(token)
-    return float(token.replace(",", "."))

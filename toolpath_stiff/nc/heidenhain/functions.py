@@ -113,7 +113,7 @@ def vectors(state: State, block: CurrentBlock, code: str) -> None:
         leaning = target if part == parts else on_great_circle(start, target, share)
         roll, pitch = angles_near(leaning, (state.frames.position[3], state.frames.position[4]))
         go(state, block, at_part | {3: roll, 4: pitch, 5: 0.0}, rapid=rapid)
-    state.plain.held_tip = held
+    state.plain.held_tip, state.plain.led_to = held, state.frames.position[3:]
 
 
 def _axis(state: State) -> Vector:

@@ -44,6 +44,11 @@ def in_plane(state: State, point: list[float]) -> complex:
     return complex(point[first], point[second])
 
 
+def end_of(state: State, there: dict[int, float]) -> complex:
+    """Where a move ends in the plane, whose words give some coordinates; the others are the present ones."""
+    return in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
+
+
 def named(state: State, block: CurrentBlock) -> dict[int, float]:
     """Axis -> coordinate of the axis words, steps added to the present point; they then count as used."""
     words = block.free & WORDS_OF_AXES.keys()

@@ -15,10 +15,11 @@ from toolpath_stiff.nc.heidenhain.cycles import call
 from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, PARAMETER, assigned, condition, work_out
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
 from toolpath_stiff.nc.heidenhain.plain_statements import EMPTY, as_g_code, corner_follows
-from toolpath_stiff.nc.heidenhain.statements import PlainStatement, labels, read_statement
+from toolpath_stiff.nc.heidenhain.statements import PlainStatement, code_text, labels, read_statement
 from toolpath_stiff.nc.heidenhain.system_data import SYSREAD, system_value
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up, meaning_of, refusal_of
 from toolpath_stiff.nc.moves import Remark
+from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.program_run import ProgramRun
@@ -49,7 +50,6 @@ class HeidenhainRun(ProgramRun):
         self._labels: dict[int, dict[str, list[int]]] = {}  # by the first line of their program
         self._repeats: dict[tuple[int, int], int] = {}
         self._locals: list[dict[str, float]] = [{}]  # QL, by the programs that run
-        self._row = 0
         self._to_machine = False  # the statement is a rapid in machine coordinates
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
@@ -70,16 +70,8 @@ class HeidenhainRun(ProgramRun):
 
     def _steered(self, row: int) -> int:
         """Carry out the statement in a line; where the run goes on."""
-        self._row = row
         self._count_block(row)
-        try:
-            return self._carried_out(row, self._statement(row))
-        except InputError as error:
-            if row >= self._main_lines:  # its block stands on the line that calls its file
-                error.file, error.line, _ = self._place(row)
-            raise
-
-    def _carried_out(self, row: int, statement: PlainStatement) -> int:
+        statement = self._statement(row)
         if not statement.head or (statement.optional and 1 in self.switches):
             return statement.after
         self._count(statement)
@@ -166,27 +158,28 @@ class HeidenhainRun(ProgramRun):
             return math.nan
         if known is None or math.isnan(known):
             reason = "a control keeps it from earlier programs, or works it out itself"
-            raise self._fail(self._row, f"{name} is read before it is set: {reason}", f"FN 0: {name} = ... before")
+            raise self._fail(self._at, f"{name} is read before it is set: {reason}", f"FN 0: {name} = ... before")
         return known
 
     def _scope(self, name: str) -> dict[str, float]:
         """Where a parameter is kept; nan: the control has given it a value that is not known."""
         return self._locals[-1] if name.startswith("QL") else self.state.plain.parameters
 
-    def _work_out(self, row: int, formula: str) -> float:
+    def _work_out(self, formula: str, place: Place) -> float:
         """The value of a formula; nan where one of its parameters has a value that is not known."""
         unknown = any(math.isnan(self._scope(name).get(name, 0.0)) for name in PARAMETER.findall(formula))
-        return math.nan if unknown else work_out(formula, self._parameter, self._place(row))
+        return math.nan if unknown else work_out(formula, self._parameter, place)
 
     def _flow(self, row: int, statement: PlainStatement, block: CurrentBlock) -> int | None:
         """Where the run goes on after a statement, whose parameters and jumps are carried out; None: nowhere."""
         head, rest, after = statement.head, statement.rest, statement.after
+        place = self._place(row)._replace(column=len(code_text(self.lines[row])) - len(rest) + 1)
         if head.startswith("CYCL DEF 2"):
             for word in block.values.values():
                 if word.letter[0] == "Q" and not word.text.endswith(("MAX", "AUTO")):
                     self._scope(word.letter)[word.letter] = word.value
         elif head in CONDITIONS:
-            holds, number, name = condition(head, rest, self._parameter, self._place(row))
+            holds, number, name = condition(head, rest, self._parameter, place)
             return self._jump_back(row, self._label(row, number, name)) if holds else after
         elif head == "FUNCTION MODE" and rest.split() != ["MILL"]:
             raise self._fail(row, f"{head}{rest}: turning is not supported", "FUNCTION MODE MILL")
@@ -197,11 +190,11 @@ class HeidenhainRun(ProgramRun):
             for name in PARAMETER.findall(rest) if reads is None else ():
                 self._scope(name)[name] = math.nan
             if reads is not None:
-                index = self._work_out(row, reads[4] or "0")
+                index = self._work_out(reads[4] or "0", place)
                 self._scope(reads[1])[reads[1]] = system_value(self.state, reads[2], reads[3], index)
         elif head[0] == "Q" or head in FORMULAS:
-            name, formula = assigned(head, rest, self._place(row))
-            self._scope(name)[name] = self._work_out(row, formula)
+            name, formula, place = assigned(head, rest, place)
+            self._scope(name)[name] = self._work_out(formula, place)
         elif head == "CALL LBL":
             return self._call(row, statement)
         elif head == "CALL PGM":
@@ -275,7 +268,7 @@ class HeidenhainRun(ProgramRun):
         """A warning about what follows END PGM; an error where a corner or an approach still waits."""
         plain = self.state.plain
         if plain.held is not None or plain.approach is not None:
-            raise self._fail(self._row, "the program ends before the element behind a corner or an APPR", "the element")
-        statement = self._statements.get(self._row)
-        rest = [line for line in self.lines[self._row + 1 : self._main_lines] if not EMPTY.fullmatch(line)]
-        return beyond_the_end("END PGM", self._row, len(rest)) if statement and statement.head == "END PGM" else []
+            raise self._fail(self._at, "the program ends before the element behind a corner or an APPR", "the element")
+        statement = self._statements.get(self._at)
+        rest = [line for line in self.lines[self._at + 1 : self._main_lines] if not EMPTY.fullmatch(line)]
+        return beyond_the_end("END PGM", self._at, len(rest)) if statement and statement.head == "END PGM" else []

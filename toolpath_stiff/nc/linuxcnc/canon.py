@@ -20,9 +20,10 @@ from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.linuxcnc import program_words
 from toolpath_stiff.nc.linuxcnc.inputs import UNKNOWN_LENGTH_MM, Line
-from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Jump, Move, Recorder
+from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Arc, Jump, Move
 from toolpath_stiff.nc.request import ZERO
-from toolpath_stiff.nc.tables import Offsets, ToolEntry, tool_table_hint
+from toolpath_stiff.nc.state import Record
+from toolpath_stiff.nc.tables import Offsets, tool_table_hint
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -38,36 +39,30 @@ Vector = list[float]
 
 
 @dataclass
-class Follower:
+class Follower(Record):
     """Follows the canonical commands; `recorder` holds the moves in control coordinates less the `reference`.
+
+    Here `feed` is mm/min or mm/rev, degrees/min where only rotary axes move.
 
     A command of LinuxCNC's canonical interface (src/emc/nml_intf/canon.hh), as `rs274` spells it, is a method, `_on_`
     before its name, which is given the text between its parentheses.
     """
 
-    name: str
     lines: Sequence[Line]
-    tools: dict[int, ToolEntry] | None
     posted: PostedKinematics | None
     numbers: Sequence[int]  # of the tools, in the order of their table
     reference: Sequence[float] = (0.0, 0.0, 0.0)
-    recorder: Recorder = field(default_factory=Recorder)
-    used_tools: list[int] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
     first_motion: int | None = None
 
     scale: float = 1.0
     plane: str = "G17"
-    feed: float = 0.0  # mm/min or mm/rev; degrees/min where only rotary axes move
     feed_scale: float = 1.0
     feed_line: int = 0
     per_revolution: bool = False
     synchronised: float = 0.0
-    speed: float = 0.0
     turn: int = 0  # of the spindle: 1 clockwise, -1 the other way
     surface_speed: bool = False
-    tool: int = 0
-    tool_length: float = math.nan
     line: int = 0  # that moves; 0: one before the program
     reading: int = 0
     cycle: bool = False
@@ -233,11 +228,12 @@ class Follower:
 
     def _feed_of(self, start: Vector, end: Vector, arc: bool) -> float:
         """mm/min, or deg/min of a move of the rotary axes alone."""
+        feed = self.feed or 0.0
         if self.synchronised or self.per_revolution:
             if self.speed == 0.0:
                 raise self.fail("a feed per revolution with the spindle at S0", "S above 0", line=self.line)
-            return (self.synchronised or self.feed * self.feed_scale) * self.speed
-        return self.feed * (1.0 if not arc and start[:3] == end[:3] else self.feed_scale)
+            return (self.synchronised or feed * self.feed_scale) * self.speed
+        return feed * (1.0 if not arc and start[:3] == end[:3] else self.feed_scale)
 
     def _on_dwell(self, inner: str) -> None:
         self.recorder.add_dwell(_numbers(inner)[0])
@@ -292,8 +288,8 @@ class Follower:
         flags = self._machine_flags(start, end)
         spindle = math.nan if self.turn and self.surface_speed else self.turn * self.speed
         move = Move(self.line, motion, start, end, feed, self.tool, self.tool_length, spindle, flags, centred)
-        if self.recorder.add(move) and self.tool not in self.used_tools:
-            self.used_tools.append(self.tool)
+        if self.recorder.add(move):
+            self.note_tool()
 
     def _arc(self, start: Vector, end: Vector, c1: float, c2: float, turns: float) -> Arc:
         frames, (first, second, _) = self.frames, geometry.PLANES[self.plane]

@@ -27,7 +27,6 @@ from toolpath_stiff.nc.moves import ReadProgram, Remark, Unsupported
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.request import ORIGIN_WINS, Request
 from toolpath_stiff.nc.state import START
-from toolpath_stiff.nc.tables import tool_of
 from toolpath_stiff.poses import ShopPose, pose_in_si
 
 MACHINE_CODES = re.compile(r"G0*(?:53|28|30)(?!\d)")
@@ -89,16 +88,12 @@ class _Session:
             place, source = origin, "option"
         if shift == NO_SHIFT and self._uses(MACHINE_CODES) and place != g54:
             raise self._machine_error()
-        moves, shown = follower.recorder.moves(), len(request.lines)
+        shown = len(request.lines)
         called = np.array([*range(shown + 1), *self.callers.values()])  # moves of a file are those of its call's line
-        return ReadProgram(
-            name=request.name,
-            path=request.path,
-            source=request.lines,
-            moves=replace(moves, line=called[moves.line]),
+        program = request.program(
+            follower,
             origin=pose_in_si(place),
             origin_source=source,
-            unsupported=tuple(self._unsupported()),
             warnings=(
                 *([ORIGIN_WINS] if source == "option" and given else ()),
                 *(
@@ -109,11 +104,11 @@ class _Session:
                 *(Remark(WAITING, line.number) for line in self.lines if WAITS.search(line.plain)),
             ),
             assumptions=(START, "LinuxCNC's interpreter (rs274) read the program"),
-            tools=tuple(tool_of(request.controller.tools, number) for number in follower.used_tools),
             interpreter="linuxcnc",
             dialect="linuxcnc",
             jumps=tuple(jump for jump in follower.jumps if max(jump.left, jump.after) <= shown),
         )
+        return replace(program, moves=replace(program.moves, line=called[program.moves.line]))
 
     def _uses(self, codes: re.Pattern[str]) -> bool:
         return any(codes.search(line.plain) for line in self.lines)
@@ -167,7 +162,8 @@ class _Session:
 
     def _follow(self, run: Run, reference: Sequence[float] = NO_SHIFT) -> Follower:
         request, control = self.request, self.request.controller
-        follower = Follower(request.name, self.lines, control.tools, control.kinematics, self.tool_numbers, reference)
+        known = request.name, self.lines, control.kinematics, self.tool_numbers, reference
+        follower = Follower(*known, tools=control.tools, unsupported=self._unsupported())
         follower.follow(run.canon)
         if run.refusal:
             raise ProgramError(run.refusal, file=request.name, line=self.callers.get(run.line or 0, run.line))

@@ -116,19 +116,18 @@ class Scanner:
     def _missing(self, what: str, expected: str) -> InputError:
         return self.fail("the block ends here" if self.done else f"{self.rest()} is not {what}", expected)
 
+    def finite(self, name: str, column: int, work: Callable[..., float], *values: object) -> float:
+        """What a function or an operator makes of values: a finite real number, or an error at `column`."""
+        try:
+            result = float(work(*values))
+            if not math.isfinite(result):
+                raise ValueError("the result is no finite number")
+        except (ArithmeticError, ValueError, TypeError) as error:
+            raise self.fail(f"{name} cannot be worked out: {error}", column=column) from None
+        return result
+
     def _worked_out(self, name: str, column: int, work: Callable[[Variables], float]) -> Value:
-        """A value whose result is a finite real number, or an error at `column`."""
-
-        def value(variables: Variables) -> float:
-            try:
-                result = work(variables)
-                if not math.isfinite(result):
-                    raise ValueError("the result is no finite number")
-            except (ArithmeticError, ValueError) as error:
-                raise self.fail(f"{name} cannot be worked out: {error}", column=column) from None
-            return result
-
-        return value
+        return lambda variables: self.finite(name, column, work, variables)
 
     def _open(self) -> int:
         """The column of the bracket that comes next, then read."""

@@ -25,7 +25,7 @@ from toolpath_stiff.nc.parametric.variables import Variables
 from toolpath_stiff.nc.program_run import HEAD, ProgramRun
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
-from toolpath_stiff.nc.state import Call, Flow, GoTo, Then
+from toolpath_stiff.nc.state import Call, Flow, Then
 from toolpath_stiff.nc.words import Block, Word
 
 Step = Callable[[Any, int, Steering], int | None]  # of a run: its line, what it steers; where the run goes on
@@ -46,7 +46,6 @@ class ParametricRun(ProgramRun):
         self._statements: dict[int, Statement] = {}
         self._structure_known: Structure | None = None
         self._modal: Call | None = None
-        self._at = 0  # the block that runs
         self._began = False  # a variable was set, or the flow steered
         self._repeats: dict[tuple[int, int], int] = {}  # left of a loop, by the calls that run and its line
         self._marks: dict[str, int] = {}  # lines of BREAK and CONTINUE that LinuxCNC's interpreter has not forgotten
@@ -79,13 +78,9 @@ class ParametricRun(ProgramRun):
     def _execute(self, block: Block) -> Then:
         codes = [code_name("G", word.value) if word.letter == "G" else "" for word in block.words]
         place = next((index for index, code in enumerate(codes) if code in MACRO_CALLS), None)
-        try:
-            if place is None or self.family == NGC:  # LinuxCNC has none: refused where the codes are sorted
-                return self._act(block)
-            return self._macro_call(block, codes[place], place)
-        except InputError as error:
-            error.file, error.line, _ = self._place(self._at)  # the block stands on the line that calls its file
-            raise
+        if place is None or self.family == NGC:  # LinuxCNC has none: refused where the codes are sorted
+            return self._act(block)
+        return self._macro_call(block, codes[place], place)
 
     def _act(self, block: Block) -> Then:
         """Carry out a block; after a move the call of G66 follows."""
@@ -138,7 +133,6 @@ class ParametricRun(ProgramRun):
 
     def _steered(self, row: int) -> int | None:
         """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
-        self._at = row
         if self._ends_before(row):
             return len(self.lines)
         self._count_block(row)
@@ -172,12 +166,12 @@ class ParametricRun(ProgramRun):
     def _jump(self, row: int, to: int) -> int:
         return super()._jump(row, to) if to != row + 1 and max(row, to) < self._main_lines else to
 
-    def _return(self, row: int, flow: Flow | GoTo) -> int | None:
+    def _return(self, row: int, flow: Flow | Word) -> int | None:
         """M99; with P it goes on at that block of the caller, wherever that is."""
-        if not isinstance(flow, GoTo) or not self._levels:
+        if not isinstance(flow, Word) or not self._levels:
             return super()._return(row, flow)
         self._levels[-1].again = 0
-        return self._go_on(self._leave(row) - 1, flow.number, flow.column)
+        return self._go_on(self._leave(row) - 1, flow.value, flow.column)
 
     def _value(self, steering: Steering, which: int = 0) -> float:
         return number(steering.values[which](self.variables))
@@ -215,9 +209,6 @@ class ParametricRun(ProgramRun):
             raise self._fail(row, f"repeat [{count:g}]", "a whole number", column=steering.column)
         self._repeats[len(self._levels), row] = round(count)
         return self._again(row)
-
-    def _end_repeat(self, row: int, steering: Steering) -> int | None:
-        return self._again(self._structure.start[row])
 
     def _again(self, start: int) -> int:
         """Where a repeat goes on, from its beginning and from its end."""
@@ -257,9 +248,6 @@ class ParametricRun(ProgramRun):
             line = self._place(self._marks[leave]).line
             problem = f"after the {leave.lower()} in line {line} LinuxCNC's interpreter {what}"
             raise self._fail(row, problem, "if and endif in place of it")
-
-    def _sub(self, row: int, steering: Steering) -> int | None:
-        return self._structure.end[row] + 1
 
     def _return_sub(self, row: int, steering: Steering) -> int | None:
         if not self._levels:
@@ -339,9 +327,10 @@ class ParametricRun(ProgramRun):
 STEPS: dict[str, Step] = {
     "IF": ParametricRun._if, "ELSEIF": ParametricRun._else, "ELSE": ParametricRun._else,
     "WHILE": ParametricRun._while, "ENDWHILE": ParametricRun._back,
-    "REPEAT": ParametricRun._repeat, "ENDREPEAT": ParametricRun._end_repeat,
+    "REPEAT": ParametricRun._repeat, "ENDREPEAT": lambda run, row, steering: run._again(run._structure.start[row]),
     "BREAK": ParametricRun._break, "CONTINUE": ParametricRun._continue,
-    "SUB": ParametricRun._sub, "ENDSUB": ParametricRun._return_sub, "RETURN": ParametricRun._return_sub,
+    "SUB": lambda run, row, steering: run._structure.end[row] + 1,
+    "ENDSUB": ParametricRun._return_sub, "RETURN": ParametricRun._return_sub,
     "CALL": ParametricRun._call_sub,
     "IF GOTO": ParametricRun._if_goto, "IF THEN": ParametricRun._if_then, "GOTO": ParametricRun._goto,
     "WHILE LOOP": ParametricRun._while, "END": ParametricRun._back,

@@ -15,7 +15,7 @@ from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain import contour, functions
-from toolpath_stiff.nc.heidenhain.points import in_plane, named, outside_contour, plane_of_pole, polar, present
+from toolpath_stiff.nc.heidenhain.points import end_of, in_plane, named, outside_contour, plane_of_pole, polar, present
 from toolpath_stiff.nc.moves import ARC, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Word
@@ -160,10 +160,7 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
         there = named(state, block)
     if opening is not None:
         block.refuse_if(not 0.0 < opening < 360.0, "AR", "is no opening angle", "0 to 360 degrees")
-        swept, end = (
-            cmath.exp(1j * turn * math.radians(opening)),
-            complex(there.get(first, begin.real), there.get(second, begin.imag)),
-        )
+        swept, end = cmath.exp(1j * turn * math.radians(opening)), end_of(state, there)
         middle = middle if given else (end - begin * swept) / (1.0 - swept)
         end = middle + (begin - middle) * swept
         there, given = there | {first: end.real, second: end.imag}, True

@@ -8,7 +8,7 @@ import math
 import re
 from itertools import zip_longest
 
-from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.heidenhain.expressions import Value
 from toolpath_stiff.nc.heidenhain.statements import code_text
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.expressions import Value as Number
@@ -20,11 +20,11 @@ from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.siemens.blocks import carry_out, sort_words
-from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner, Value
+from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
 from toolpath_stiff.nc.siemens.words import read_words, steering_of
-from toolpath_stiff.nc.state import LATHE_HINT, Flow, GoTo, Then
-from toolpath_stiff.nc.words import AXES, Block
+from toolpath_stiff.nc.state import LATHE_HINT, Flow, Then
+from toolpath_stiff.nc.words import AXES, Block, Word
 
 HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
 PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
@@ -38,7 +38,6 @@ TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
-LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (Fundamentals, "Blocks and block format")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
 RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
 
@@ -108,14 +107,11 @@ class SiemensRun(ParametricRun):
     def _scanner(self, row: int, begin: int) -> SiemensScanner:
         text = self._begins[row].string
         columns, place = range(1, len(text) + 2), self._place(row)
-        return SiemensScanner(text, columns, place, "Siemens' language", False, begin, self._variable)
+        return SiemensScanner(text, columns, place, "Siemens' language", False, begin, lookup=self._variable)
 
     def _statement(self, row: int) -> Statement:
         if row not in self._statements:
             begin = self._begins[row]
-            if len(begin.string) > LONGEST_BLOCK or begin.string.count("(") > MOST_BRACKETS:
-                problem = f"a block of {len(begin.string)} characters, or with too many brackets"
-                raise self._fail(row, problem, f"at most {LONGEST_BLOCK}, {MOST_BRACKETS} of them")
             slash = begin[1] or begin[4] or ""
             block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
             steering = None
@@ -194,13 +190,9 @@ class SiemensRun(ParametricRun):
 
     def _execute(self, block: Block) -> Then:
         state, plain = self.state, self.state.plain
-        try:
-            current = sort_words(state, block, self.tally)
-            with current.placing():
-                carry_out(state, current)
-        except InputError as error:
-            error.file, error.line, _ = self._place(self._at)
-            raise
+        current = sort_words(state, block, self.tally)
+        with current.placing():
+            carry_out(state, current)
         slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
         self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
         called = any(level.stop < 0 for level in self._levels)
@@ -221,7 +213,7 @@ class SiemensRun(ParametricRun):
             return self._leave(row)
         return super()._steered(row)
 
-    def _return(self, row: int, flow: Flow | GoTo) -> int:
+    def _return(self, row: int, flow: Flow | Word) -> int:
         """M17, RET, the end of a program: back to the call, or the end of all."""
         while self._levels and self._levels[-1].stop >= 0:
             self._levels.pop()

@@ -7,10 +7,11 @@ absolute and incremental dimensions"; Job Planning, "Definition of user variable
 import re
 from collections.abc import Callable
 
+from toolpath_stiff.nc.heidenhain.expressions import BLANK, Value
 from toolpath_stiff.nc.parametric.expressions import Value as Number
 from toolpath_stiff.nc.parametric.statements import Steering
 from toolpath_stiff.nc.siemens.cycles import SIGNATURES
-from toolpath_stiff.nc.siemens.expressions import BLANK, NAME, SiemensScanner, Value
+from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
 from toolpath_stiff.nc.siemens.motion import CORNERS, VECTOR
 from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS
 from toolpath_stiff.nc.words import AXES, Word

@@ -108,10 +108,8 @@ class Stage {
     [this.base, this.overlay] = element.querySelectorAll("canvas");
     this.tip = element.querySelector(".tip");
     this.waiting = false;
-    const save = document.createElement("button");
-    Object.assign(save, { type: "button", className: "save", textContent: "PNG", title: "Save this picture" });
-    save.addEventListener("click", () => this.save());
-    element.append(save);
+    const save = { className: "save", textContent: "PNG", title: "Save this picture", onclick: () => this.save() };
+    element.append(Object.assign(document.createElement("button"), save, { type: "button" }));
     new ResizeObserver(() => this.resize()).observe(element);
   }
   resize() {
@@ -143,14 +141,12 @@ class Stage {
   }
   // The picture as it stands, as a file.
   save() {
-    const picture = document.createElement("canvas"), link = document.createElement("a");
-    [picture.width, picture.height] = [this.base.width, this.base.height];
-    const g = picture.getContext("2d");
+    const picture = this.base.cloneNode(), g = picture.getContext("2d");
     g.fillStyle = ink.panel;
     g.fillRect(0, 0, picture.width, picture.height);
     for (const canvas of [this.base, this.overlay]) g.drawImage(canvas, 0, 0);
-    Object.assign(link, { href: picture.toDataURL(), download: `${document.title.split(":")[0]}.png` });
-    link.click();
+    const link = { href: picture.toDataURL(), download: `${document.title.split(":")[0]}.png` };
+    Object.assign(document.createElement("a"), link).click();
   }
   // A tip beside a place; without lines there is none.
   tell([x, y], lines) {

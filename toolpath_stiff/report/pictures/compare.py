@@ -93,11 +93,9 @@ def variables(comparison: Comparison) -> Figure:
         _panel(axes, comparison, variable, limits)
         axes.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
         axes.set_ylim(*limits)
-        axes.tick_params(labelsize=7.5, pad=2)
+        axes.tick_params(labelsize=7.5, pad=2, labelleft=not j)
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_label_coords(0.5, 0.0)  # without a name: none is to be kept clear of the figures
-        if j:
-            axes.set_yticklabels([])
         unit = str(getattr(variable, "unit", ""))
         name = plain(variable.name.removesuffix(f"_{unit}").replace("_", " ")) + (f", {unit}" if unit else "")
         axes.set_title(shortened(name, 30), fontsize=9, pad=3)

@@ -6,11 +6,11 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.stiffness.contract import (
     Effect,
     LoadPath,
-    Parameter,
     Values,
     at_the_tip,
     body_on_springs,
     compliance,
+    rocking,
 )
 from toolpath_stiff.stiffness.effects.frame_compliance import BUILT, frame_vertices
 
@@ -40,9 +40,7 @@ class FrameSway(Effect):
     parameters = (
         compliance("sideways", 200.0, (2.0, 10.0), BUILT, "compliance of the frame along X and Y"),
         compliance("vertical", 200.0, (2.0, 10.0), BUILT, "compliance of the frame along Z"),
-        Parameter(
-            "rocking", "nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0), LEVER, meaning="rotation about X and Y per moment"
-        ),
+        rocking("rocking", LEVER, "rotation about X and Y per moment"),
     )
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:

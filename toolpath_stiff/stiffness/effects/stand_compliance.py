@@ -3,7 +3,7 @@
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Parameter, Values, compliance
+from toolpath_stiff.stiffness.contract import EXPERIENCE, Effect, LoadPath, Values, compliance, rocking
 
 
 class StandCompliance(Effect):
@@ -29,15 +29,7 @@ class StandCompliance(Effect):
     parameters = (
         compliance("sideways", 200.0, (1.0, 10.0), EXPERIENCE, "compliance of the stand along X and Y"),
         compliance("vertical", 200.0, (1.0, 10.0), EXPERIENCE, "compliance of the stand along Z"),
-        Parameter(
-            "tilting",
-            "nrad/N/m",
-            1e-9,
-            (0.0, 500.0),
-            (0.5, 10.0),
-            EXPERIENCE,
-            meaning="rotation of its foot per moment",
-        ),
+        rocking("tilting", EXPERIENCE, "rotation of its foot per moment"),
     )
 
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:

@@ -5,11 +5,11 @@ from toolpath_stiff.stiffness.contract import (
     EXPERIENCE,
     Effect,
     LoadPath,
-    Parameter,
     Values,
     at_the_tip,
     body_on_springs,
     compliance,
+    rocking,
 )
 
 BUILT = f"{EXPERIENCE}: machine beds are built for 100 to 500 N/um"
@@ -36,9 +36,7 @@ class TableCompliance(Effect):
             compliance(axis, 200.0, (2.0, 10.0), BUILT, f"compliance of the table along {axis.upper()}")
             for axis in "xyz"
         ),
-        Parameter(
-            "rocking", "nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0), LEVER, meaning="rotation about X and Y per moment"
-        ),
+        rocking("rocking", LEVER, "rotation about X and Y per moment"),
     )
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
