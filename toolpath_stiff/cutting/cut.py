@@ -125,9 +125,22 @@ class Cut:
         return self.highest[:, :2]
 
     @property
+    def turning(self) -> BoolArray:
+        """(n,) whether a tool turns on its way and cuts: no error of what it makes is foretold."""
+        return np.asarray(self.samples.cutting & (self.work.tilts[self.samples.move] == TURNING))
+
+    @property
     def machine_only(self) -> bool:
         """Whether a tool's own compliance is not known, so that the errors are too small."""
         return any(np.isnan(cutter.lateral_compliance) for cutter in self.cutters.values())
+
+    def lines_warning(self, rows: BoolArray, words: str) -> list[str]:
+        """A sentence that names the lines of some samples (n,), and what of them; none of none."""
+        lines = np.unique(self.samples.line[rows]).tolist()
+        if not lines:
+            return []
+        more = f" and {len(lines) - MOST_NAMED} more" if len(lines) > MOST_NAMED else ""
+        return [f"lines {', '.join(map(str, lines[:MOST_NAMED]))}{more}: {words}"]
 
 
 def evaluate_cut(
@@ -348,31 +361,24 @@ def _warnings(cut: Cut, struck: BoolArray) -> tuple[str, ...]:
             f"machine only: the compliance of {', '.join(numbers)} is not known, and a slim tool gives way more than "
             "the machine (stick_out_mm in [[tool]] of cut.toml)"
         )
-    engaged, turning = cut.ap > 0.0, samples.cutting & (cut.work.tilts[samples.move] == TURNING)
+    engaged = cut.ap > 0.0
     if not cut.removed.any():
         warnings.append("no cut meets the stock: corner_mm in [stock] and the program's zero say where both are")
     along = np.abs(along_tool_axis(samples.tangent, samples.abc))
     plunges = (cut.removed > 0.0) & (along >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
-    on_the_spot = turning & ~samples.tangent.any(axis=1)
+    on_the_spot = cut.turning & ~samples.tangent.any(axis=1)
     large = (np.abs(np.nan_to_num(cut.wall_mean)).max(axis=1) > THIN * cut.ae) & (cut.ae > 0.0)
     for rows, words in (
         (large, f"walls off by over {THIN:g} of the width of cut, foretold too large: the chip is not thinner for it"),
         (struck, "rapids run into material, which counts as still there afterwards"),
         (plunges, "plunges: cutting with the end is not modelled, no force is known there"),
+        (cut.turning & ~on_the_spot, "the tool turns on its way: no error of the surface is foretold there"),
         (on_the_spot, "the tool turns on the spot: it takes off what it meets, no force is known there"),
     ):  # fmt: skip
-        warnings += _lines_warning(samples, rows, words)
+        warnings += cut.lines_warning(rows, words)
     chip = np.where(engaged, cut.feed_per_tooth, np.nan)
     thin, thick = cut.coefficients.thinnest, cut.coefficients.thickest
     for beyond, words in ((chip < thin, "thinner"), (chip > thick, "thicker")):
         named = f"feeds per tooth {words} than those of the coefficients: extrapolated"
-        warnings += _lines_warning(samples, beyond, named)
+        warnings += cut.lines_warning(beyond, named)
     return tuple(warnings)
-
-
-def _lines_warning(samples: Samples, rows: BoolArray, words: str) -> list[str]:
-    lines = np.unique(samples.line[rows]).tolist()
-    if not lines:
-        return []
-    more = f" and {len(lines) - MOST_NAMED} more" if len(lines) > MOST_NAMED else ""
-    return [f"lines {', '.join(map(str, lines[:MOST_NAMED]))}{more}: {words}"]

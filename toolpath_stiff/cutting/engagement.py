@@ -165,7 +165,7 @@ def _contact_along(work: Workpiece, stations: AnyArray, regime: IntArray) -> tup
     turn = np.diff(np.arctan2(stations["ahead_y"], stations["ahead_x"]), prepend=9.0)
     steady = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi) < SAME
     steady &= (np.abs(np.diff(stations["down"], prepend=9.0)) < SAME) & (np.diff(regime, prepend=-1) == 0)
-    steady &= ~stations["end_alone"]
+    steady &= ~stations["end_alone"] & (np.diff(work.tilts[stations["move"]], prepend=-9) == 0)
     node = np.cumsum(~(steady & (np.diff(stations["path"], prepend=-np.inf) < TOUCH))) - 1
     first = np.searchsorted(node, np.arange(node[-1] + 1))
     broken = np.append(0, np.cumsum(~steady))[first + 1]

@@ -15,11 +15,10 @@ from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.path.sampling import Samples
 
 BESIDE = 2e-6  # m, outside of a wall, where it must stand; and how far above the finished surface still is that surface
-FACETS = 5e-5  # m, the same beside a tool that turns on its way, whose pieces are facets
 COLUMNS, DEEP = 32, 1e9  # of cells at a time; m, below everything
 MADE = 5.0  # times that, along a tool, within which the piece lies that made a surface
 TOUCHED = 2e-7  # m, within which a later pass touches a surface, and makes it: less than any surface error
-LATER, LATER_TURNING = 0.1, 1.0  # radii of the cutter along the path from where on a pass is another one
+LATER = 0.1  # radii of the cutter along the path from where on a pass is another one
 ACROSS = 41  # points across the cutter's end
 # Radii of a ball, above the finished surface: where the nearest of these points may lie beside a narrow scallop,
 # (pi / 80)^2 / 2.
@@ -39,22 +38,17 @@ def walls_of_passes(
     made, own = np.full((2, len(samples), 2, 2), np.nan)
     for rows, stations in _blocks(work, tilt, samples, cutters, np.full(len(samples), True)):
         sides, reach = np.array([[0.0, np.pi]]), stations["reach"][:, None]
-        far = _beside(work, stations)
-        x, y = points_around(stations, reach + far[:, None], sides)
-        every, tip, own_tilt = (
-            np.full(len(x), len(work.pieces)),
-            np.repeat(stations["z"], 2),
-            np.repeat(stations["tilt"], 2),
-        )
-        other = stations["path"] + np.where(far > BESIDE, LATER_TURNING, LATER) * stations["reach"]
+        x, y = points_around(stations, reach + BESIDE, sides)
+        every, tip = np.full(len(x), len(work.pieces)), np.repeat(stations["z"], 2)
+        tilts, other = np.repeat(stations["tilt"], 2), stations["path"] + LATER * stations["reach"]
         later = np.repeat(np.searchsorted(work.pieces["before"], other, "right"), 2)
         limits = tip + np.repeat(stations["reach"] - stations["flat"], 2), tip + np.repeat(stations["longest"], 2)
-        low, high = work.span(x, y, own_tilt, limits, (np.zeros_like(every), every))
+        low, high = work.span(x, y, tilts, limits, (np.zeros_like(every), every))
         stands = np.flatnonzero((high - low > BESIDE) & ~np.repeat(stations["end_alone"], 2))
-        window, own_tilt = (later[stands], every[stands]), own_tilt[stands]
+        window, tilts = (later[stands], every[stands]), tilts[stands]
         for walls, offset in ((made, TOUCHED), (own, -TOUCHED)):
             x, y = (axis[stands] for axis in points_around(stations, reach + offset, sides))
-            foot, top = (z - tip[stands] for z in work.span(x, y, own_tilt, (low[stands], high[stands]), window))
+            foot, top = (z - tip[stands] for z in work.span(x, y, tilts, (low[stands], high[stands]), window))
             part = np.full((len(tip), 2), np.nan)
             stays = top - foot > BESIDE
             part[stands[stays]] = np.stack([foot, top], axis=1)[stays]
@@ -83,7 +77,7 @@ def final_strip(
         x, y = points_around(stations, away, np.arctan2(-back, offset))
         every, tilts = np.full(len(surface), len(work.pieces)), np.repeat(stations["tilt"], ACROSS)
         ball = stations["flat"] == 0.0
-        near = np.repeat(np.where(ball, BESIDE + SCALLOP * stations["reach"], _beside(work, stations)), ACROSS)
+        near = np.repeat(BESIDE + np.where(ball, SCALLOP * stations["reach"], 0.0), ACROSS)
         limits = surface - near, surface + 2.0 * near
         low, high = work.span(x, y, tilts, limits, (np.zeros_like(every), every))
         stays: BoolArray = (np.abs(high - surface) < near) & (low < surface)
@@ -135,14 +129,10 @@ def finished_surface(
     return x, y, np.where(top <= work.stock.bottom.min(), -np.inf, top), owner
 
 
-def _beside(work: Workpiece, stations: AnyArray) -> FloatArray:
-    """(n,) m beside what a station makes, where the finished part must stand."""
-    return np.where(work.tilts[stations["move"]] == TURNING, FACETS, BESIDE)
-
-
 def _blocks(
     work: Workpiece, tilt: IntArray, samples: Samples, cutters: Mapping[int, Cutter], chosen: BoolArray
 ) -> Iterator[tuple[IntArray, AnyArray]]:
-    """Of the samples chosen (n,) that cut and move some rows and their records."""
-    moving = np.flatnonzero(chosen & (samples.motion != RAPID) & (samples.tangent != 0.0).any(axis=1))
+    """Of the samples chosen (n,) that cut and move, with a tool that stands still, some rows and their records."""
+    chosen = chosen & (work.tilts[samples.move] != TURNING) & (samples.motion != RAPID)
+    moving = np.flatnonzero(chosen & (samples.tangent != 0.0).any(axis=1))
     yield from blocks_of_stations(work, samples, tilt, cutters, moving)

@@ -59,7 +59,7 @@ def stations_at(
     rapid = work.first[move + 1] == work.first[move]
     steep = np.cos(defaults.PLUNGE_ANGLE) * np.hypot(level, motion[:, 2])
     stations["end_alone"] = rapid | (np.abs(motion[:, 2]) >= steep - 1e-12)
-    turning = work.tilts[move] == TURNING
+    turning = (work.tilts[move] == TURNING) & (stations["flat"] > 0.0)  # balls go on as they were, however they turn
     radii = np.where(turning, RECENT_TURNING, RECENT)
     recent = np.searchsorted(work.pieces["after"], path - radii * stations["reach"], "right")
     stations["recent"] = np.where(rapid, len(work.pieces), recent)

@@ -56,15 +56,7 @@ def sweeps_of(
     """
     length, (tilts, turns, angle) = move_lengths(moves), tilts_of(moves, orient)
     cuts = (moves.motion != RAPID) & ((length > 0.0) | (tilts == TURNING))
-    unknown = np.flatnonzero(cuts & ~np.isin(moves.tool, list(cutters)))
-    if len(unknown):
-        mistake = f"tool {moves.tool[unknown[0]]} cuts and its geometry is not known"
-        hint = "give it a [[tool]] in the file of --cut"
-        raise ProgramError(mistake, hint=hint, line=int(moves.line[unknown[0]]))
-    radius, flat = np.zeros(len(moves)), np.zeros(len(moves))
-    for tool in np.unique(moves.tool[cuts]).tolist():
-        radius[cuts & (moves.tool == tool)] = cutters[tool].radius
-        flat[cuts & (moves.tool == tool)] = cutters[tool].radius - cutters[tool].corner_radius
+    radius, flat = _ends_of(moves, cutters, cuts)
     upward = moves.arc_normal[:, 2] if len(turns) == 1 else (moves.arc_normal * turns[tilts, :, 2]).sum(axis=1)
     plane = cuts & (moves.arc_sweep != 0.0) & (np.abs(upward) > 1.0 - 1e-9) & (tilts != TURNING)
     counts = _counts(moves, length, radius, angle, cuts, cuts & (moves.arc_sweep != 0.0) & ~plane)
@@ -106,6 +98,20 @@ def sweeps_of(
         _enter_arcs(pieces, rows, moves.take(of), turns[tilts[of]], upward[of] / counts[of])
     pieces["cos"], pieces["sin"] = np.cos(pieces["heading"]), np.sin(pieces["heading"])
     return pieces, first, tilts, turns
+
+
+def _ends_of(moves: Moves, cutters: Mapping[int, Cutter], cuts: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """(n,) and (n,) m, radius of the cutter, and of its flat end, of moves that cut (n,); raises `ProgramError`."""
+    unknown = np.flatnonzero(cuts & ~np.isin(moves.tool, list(cutters)))
+    if len(unknown):
+        mistake = f"tool {moves.tool[unknown[0]]} cuts and its geometry is not known"
+        hint = "give it a [[tool]] in the file of --cut"
+        raise ProgramError(mistake, hint=hint, line=int(moves.line[unknown[0]]))
+    radius, flat = np.zeros(len(moves)), np.zeros(len(moves))
+    for tool in np.unique(moves.tool[cuts]).tolist():
+        radius[cuts & (moves.tool == tool)] = cutters[tool].radius
+        flat[cuts & (moves.tool == tool)] = cutters[tool].radius - cutters[tool].corner_radius
+    return radius, flat
 
 
 def _enter_arcs(pieces: AnyArray, rows: IntArray, arcs: Moves, turns: FloatArray, upward: FloatArray) -> None:
