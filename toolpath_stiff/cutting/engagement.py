@@ -15,11 +15,11 @@ from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, num
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import rise
 from toolpath_stiff.cutting.patches import Patches
-from toolpath_stiff.cutting.rings import around, heights_around
 from toolpath_stiff.cutting.stations import (
     BLOCK,
     STATION,
     TOUCH,
+    around,
     blocks_of_stations,
     pieces_at,
     samples_seen,
@@ -198,7 +198,7 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
     corner = stations["reach"] - stations["flat"]
     rows = np.flatnonzero(~stations["end_alone"])
     wall, low = (stations["reach"][rows] - TOUCH)[:, None], corner[rows, None]
-    beside = heights_around(work, stations[rows], wall, np.pi * SIDES[None, :], np.inf, low)
+    beside = _heights_around(work, stations[rows], wall, np.pi * SIDES[None, :], np.inf, low)
     beyond = (beside[0] > low).any(axis=1)  # the corner
     rows, beside = rows[beyond], (beside[0][beyond], beside[1][beyond])
     borders = _levels(beside, corner[rows, None], stations["longest"][rows, None], 1 if work.has_levels else PARTS)
@@ -240,6 +240,26 @@ def _cuts(work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatA
     return work.standing(np.stack([x, y, np.broadcast_to(z, shape).ravel()]), tilt, window).reshape(shape)
 
 
+def _heights_around(
+    work: Workpiece,
+    stations: AnyArray,
+    radius: FloatArray,
+    angle: FloatArray,
+    ceiling: FloatArray | float,
+    enough: FloatArray | float,
+) -> tuple[FloatArray, FloatArray]:
+    """Top and underside of the material before each station, m above the tip; points as `points_around`.
+
+    `ceiling` and `enough`, m above the tip, are the ends of `Workpiece.span`.
+    """
+    x, y, tilt, window = around(stations, radius, angle)
+    whole = np.zeros(np.broadcast_shapes(radius.shape, angle.shape))
+    z = stations["z"].reshape((-1,) + (1,) * (whole.ndim - 1))
+    low, high = ((whole + (z + height)).ravel() for height in (enough, ceiling))
+    bottom, top = work.span(x, y, tilt, (low, high), window)
+    return top.reshape(whole.shape) - z, bottom.reshape(whole.shape) - z
+
+
 def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatArray:
     """(n,) rad between axis and normal, up to where a corner or a ball is in contact: narrowed down twice."""
     reached, span = np.full(len(stations), 0.5 * np.pi), corner[:, None, None]
@@ -248,7 +268,7 @@ def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatAr
         heights = span - span * np.cos(rings)
         radius = stations["flat"][:, None, None] + span * np.sin(rings) - TOUCH
         ceiling = np.concatenate([heights[:, 1:], heights[:, -1:]], axis=1)  # of the next ring, whose inner one this is
-        top = heights_around(work, stations, radius, np.pi * SIDES[None, None, ::4], ceiling, 0.0)[0]
+        top = _heights_around(work, stations, radius, np.pi * SIDES[None, None, ::4], ceiling, 0.0)[0]
         inner = np.concatenate([top[:, :1], top[:, :-1]], axis=1)
         highest = np.clip(np.minimum(np.maximum(top, inner), heights).max(axis=(1, 2)), 0.0, corner)
         reached = np.arccos(1.0 - highest / corner)

@@ -7,8 +7,7 @@ import numpy as np
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import down_slope, foot, rise, within
-from toolpath_stiff.cutting.rings import points_around
-from toolpath_stiff.cutting.stations import blocks_of_stations
+from toolpath_stiff.cutting.stations import blocks_of_stations, points_around
 from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.workpiece import Workpiece, in_frames
 from toolpath_stiff.nc.moves import RAPID

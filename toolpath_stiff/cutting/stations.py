@@ -9,7 +9,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.tilts import TURNING
-from toolpath_stiff.cutting.workpiece import Workpiece
+from toolpath_stiff.cutting.workpiece import Window, Workpiece
 from toolpath_stiff.nc.courses import points_along
 from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.path.sampling import Samples
@@ -138,3 +138,21 @@ def blocks_of_stations(
         tool, move, path = (getattr(samples, name)[some] for name in ("tool", "move", "s"))
         seen = tilt[some], samples.position[some], samples.tangent[some]
         yield some, stations_at(work, cutters, (tool, move, path), seen)
+
+
+def points_around(stations: AnyArray, radius: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """x, y, m, of points around the axis, end to end; radius and angle (from the left, clockwise) are (n, ...)."""
+    shape = (-1,) + (1,) * (np.broadcast(radius, angle).ndim - 1)
+    x, y, ahead_x, ahead_y = (stations[name].reshape(shape) for name in ("x", "y", "ahead_x", "ahead_y"))
+    across, ahead = radius * np.cos(angle), radius * np.sin(angle)
+    return (x + ahead * ahead_x - across * ahead_y).ravel(), (y + ahead * ahead_y + across * ahead_x).ravel()
+
+
+def around(
+    stations: AnyArray, radius: FloatArray, angle: FloatArray
+) -> tuple[FloatArray, FloatArray, IntArray, Window]:
+    """x, y of points as `points_around`; their tilts, and the window of what stands before each station."""
+    x, y = points_around(stations, radius, angle)
+    names = ("tilt", "until", "recent")
+    tilt, until, recent = (np.repeat(stations[name], len(x) // max(len(stations), 1)) for name in names)
+    return x, y, tilt, (np.zeros_like(until), until, recent)

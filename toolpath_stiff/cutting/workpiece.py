@@ -291,11 +291,11 @@ def _bounded(pieces: AnyArray, turns: FloatArray, piece: IntArray, cell: IntArra
         near &= below < z + half
         taken = np.where(all_over & (above < z - half), 2.0 * CLEAR * (piece - len(pieces)), np.inf)
         below, above = np.minimum(-CLEAR, taken), taken
-    near = np.flatnonzero(near)
-    entries = np.empty(len(near), dtype=ENTRY)
-    entries["cell"] = ((cell[:, 0] * wide + cell[:, 1]) * deep + cell[:, 2])[near]
-    entries["piece"] = piece[near]
-    entries["below"], entries["above"] = below[near], np.where(all_over, above, np.inf)[near]
+    passed = np.flatnonzero(near)
+    entries = np.empty(len(passed), dtype=ENTRY)
+    entries["cell"] = ((cell[:, 0] * wide + cell[:, 1]) * deep + cell[:, 2])[passed]
+    entries["piece"] = piece[passed]
+    entries["below"], entries["above"] = below[passed], np.where(all_over, above, np.inf)[passed]
     return entries
 
 
@@ -307,8 +307,8 @@ def _heights(part: AnyArray, x: FloatArray, y: FloatArray, smaller: FloatArray) 
         if len(rows):
             some = part[rows]
             along, beside, spoke = foot(some, x[rows], y[rows], arc)
-            near = distance(beside, within(along, some["extent"]) - along, spoke, arc)
-            near = near <= some["reach"] - smaller[rows] - ROUNDED
+            away = distance(beside, within(along, some["extent"]) - along, spoke, arc)
+            near = away <= some["reach"] - smaller[rows] - ROUNDED
             rows, some = rows[near], some[near]
             heights[rows] = height_above(some, along[near], beside[near], spoke[near], arc, sloped) + smaller[rows]
     return heights
