@@ -180,6 +180,34 @@ def test_a_mill_that_turns_the_work_gives_way_along_the_axes_of_the_work(tmp_pat
     np.testing.assert_allclose(found.cut.deflection[row], expected, rtol=1e-5)
 
 
+def test_lines_on_which_the_tool_turns_or_stands_aslant_are_left_alone_by_name(tmp_path):
+    (tmp_path / "cut.toml").write_text(SETUP)
+    lines = [
+        "G0 X-120 Y-100 Z110",
+        "G0 Z96",
+        "G1 X120",
+        "G0 Z110",
+        "G0 Y100",
+        "G0 Z97",
+        "G1 X110 A3",
+        "G0 Z160",
+        "G0 A30",
+    ]
+    lines += ["G0 X-120 Y0 Z96", "G1 X120", "G0 Z160", "M30"]
+    program = tps.Program.from_text(HEAD + "\n".join(lines), name="part.nc")
+    (tmp_path / "points.csv").write_text(
+        "x_mm,y_mm,z_mm,nx,ny,nz,deviation_um\n40,-95,98,0,-1,0,9\n60,-95,98,0,-1,0,9\n"
+    )
+    compared = tps.compare_walls(tmp_path / "points.csv", program=program, cut=tmp_path / "cut.toml")
+    assert [row["line"] for row in compared.lines] == [5]
+    assert any(note.startswith("lines 9: the tool turns on its way: no error") for note in compared.notes)
+    assert "lines 13: left alone: the tool stands aslant" in compared.notes
+    compensated = tps.compensate(program, cut=tmp_path / "cut.toml")
+    left = dict(zip(compensated.lines["line"], compensated.lines["left_alone"], strict=True))
+    assert left[5] == "" and left[13].endswith("a tool aslant") and 9 not in left
+    assert "lines 9: left alone: the tool turns on its way" in compensated.notes
+
+
 def posed(place, rotary):
     """Axes of the tool and its tip, (3, 4), mm."""
     return np.column_stack([rotation_matrices(np.radians(rotary)), place])
