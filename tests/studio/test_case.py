@@ -16,6 +16,7 @@ import toolpath_stiff as tps
 from toolpath_stiff.api.trust import agree
 from toolpath_stiff.case.state import CaseState
 from toolpath_stiff.cli.main import main
+from toolpath_stiff.studio import preloading
 
 SEED = 9006  # hides a weak strut
 TABLE = {"x_nm_per_N": 2.0, "y_nm_per_N": 2.0, "z_nm_per_N": 2.0, "rocking_nrad_per_N_per_m": 0.0}
@@ -454,3 +455,8 @@ def test_a_folder_that_no_system_can_have_is_refused_in_one_line(tmp_path, capsy
     told = capsys.readouterr().err
     assert told.startswith("tps: error: cannot open the case ") and told.endswith(": File name too long\n")
     assert not list(tmp_path.iterdir())
+
+
+def test_what_long_work_is_forked_with_is_there():
+    """A module of that list that is gone is passed over in silence, and the first work waits for its libraries."""
+    assert all(importlib.util.find_spec(f"toolpath_stiff.{name}") for name in preloading.MODULES)

@@ -4,7 +4,7 @@ import multiprocessing
 from multiprocessing import forkserver
 from multiprocessing.context import BaseContext
 
-MODULES = ("studio.work", "correction.strut_law", "diagnosis.diagnose", "analysis.results", "planning.result")
+MODULES = ("studio.work", "correction.update", "diagnosis.diagnose", "analysis.results", "planning.result")
 
 
 def prepared() -> BaseContext:
