@@ -40,7 +40,7 @@ def heading_key(name: str) -> str:
     return "_".join(re.findall(r"[^\W_]+", text))
 
 
-UNITS = {heading_key(unit): unit for sizes in SIZES for unit in sizes}  # key -> as it is written
+UNITS = {heading_key(unit): unit for sizes in SIZES for unit in sizes} | {"inch": "in"}  # key -> as it is written
 
 
 def parted(name: str) -> tuple[str, str]:

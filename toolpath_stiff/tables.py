@@ -78,12 +78,13 @@ class Table:
         """One line on what was read differently from how it is written; none where nothing was."""
         return (f"{self.file}: {'; '.join(self.remarks)}",) if self.remarks else ()
 
-    def record(self, cells: Sequence[str]) -> dict[str, str]:
-        """Column -> cell of one row. Raises `InputError` where a row has too few or too many."""
+    def record(self, cells: Sequence[str], line: int | None = None) -> dict[str, str]:
+        """Column -> cell of one row, on that line. Raises `InputError` where a row has too few or too many."""
         written = len(self.heading) - len(self.constants)
         if len(cells) != written:
             hint = "a decimal comma between commas? Write semicolons between the cells" if len(cells) > written else ""
-            raise InputError(f"row with {len(cells)} cells", expected=f"{written} as in the heading", hint=hint)
+            found, wanted = f"row with {len(cells)} cells", f"{written} as in the heading"
+            raise InputError(found, expected=wanted, hint=hint, file=self.file, line=line)
         return {**dict(zip(self.heading, cells, strict=False)), **self.constants}
 
 

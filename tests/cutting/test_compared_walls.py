@@ -88,11 +88,20 @@ def test_a_file_with_other_names_and_units(tmp_path):
     assert compared.factor[0] == pytest.approx(1.0, abs=1e-3)
 
 
+def test_a_row_of_units_in_inch(tmp_path):
+    rows = [[float(cell) for cell in row.split(",")] for row in measured(noise_um=0.0)]
+    inch = [",".join(f"{v:.9f}" for v in (*(c / 25.4 for c in r[:3]), *r[3:6], r[6] / 25400)) for r in rows]
+    names = "x=X, y=Y, z=Z, nx=I, ny=J, nz=K, deviation=Dev"
+    compared = compare(tmp_path, ["inch,inch,inch,,,,inch", *inch], "X,Y,Z,I,J,K,Dev", columns=names)
+    assert compared.factor[0] == pytest.approx(1.0, abs=1e-3) and len(compared.line) == len(rows)
+
+
 @pytest.mark.parametrize(
     ("rows", "heading", "what"),
     [
         (["0,0,0,0,0,0,1"], HEADING, "a normal of no length"),
         (["0,0,zero,0,0,1,1"], HEADING, "z_mm = 'zero'"),
+        (["0,0,0,0,0,1,1", "1,2"], HEADING, r"points.csv:3: row with 2 cells; expected 7"),
         (["0,0,0,1"], "x_mm,y_mm,z_mm,nx", "column ny is missing"),
         (["100,100,0,1,0,0,1"], HEADING, "no measured point lies on a final wall"),
         ([], HEADING, "no measured point"),

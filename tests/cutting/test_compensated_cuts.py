@@ -7,6 +7,7 @@ less how far that path lies from the untouched one, by distances of points from 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,12 +16,15 @@ import toolpath_stiff as tps
 from tests.cutting.simulator import Mill
 from tests.placement.test_side_shift import distance
 from toolpath_stiff.cutting.coefficients import material
+from toolpath_stiff.cutting.compensation import ELSEWHERE
 from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.cutting.setup import CutSetup
 from toolpath_stiff.cutting.tip import station_axes, tip_compliances, with_tools
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.nc.tables import ToolEntry
+from toolpath_stiff.rewriting.program import shift_program
 from toolpath_stiff.stiffness.model import build_model
 
 HEAD = "G21 G90 G17 G94\nT1 M6\nS8000 M3\n"
@@ -135,7 +139,9 @@ def test_a_fifth_is_left_and_no_wall_is_worse(kind, ae, ap, up, diameter, stick_
         then, now = of == number, wall_of == number
         size = np.average(np.abs(cut[now] - shift[now]), weights=weight[now])
         assert size <= np.average(np.abs(error[then]), weights=length[then]) + 0.05  # um: 4 decimals
-    assert not any(compensated.lines["left_alone"])
+    elsewhere = [bool(reason) for reason in compensated.lines["left_alone"]]  # ends of arcs that lead in or out
+    assert set(compensated.lines["left_alone"]) <= {"", ELSEWHERE}
+    assert max(np.array(compensated.lines["length_mm"])[elsewhere], default=0.0) <= STEP
 
 
 @pytest.mark.parametrize(("ae", "ap", "up"), [(0.3, 6, True), (0.5, 4, False)])
@@ -202,3 +208,34 @@ def test_the_wall_of_a_tilted_tool_is_left_alone_and_the_other_is_shifted():
     assert tilted in compensated.rewritten.text and compensated.changed
     reasons = dict(zip(compensated.lines["line"], compensated.lines["left_alone"], strict=True))
     assert reasons.pop(14).endswith("a tool aslant") and not any(reasons.values())
+
+
+BOSS = (
+    "G0 X-65 Y-55 Z5\nG1 Z-8 F500\nX-46.3 F1200\nY36.3\nX46.3\nY-36.3\nX-65\nG0 Z5\nX-65 Y-55\nG1 Z-8 F500\n"
+    "X-45 F900\nY30\nG2 X-40 Y35 I5 J0\nG1 X40\nG2 X45 Y30 I0 J-5\nG1 Y-30\nG2 X40 Y-35 I-5 J0\nG1 X-65\nG0 Z5\n"
+)
+
+
+def test_a_line_whose_wall_others_make_afterwards_says_so():
+    """Round a sharp corner of a boss the tool only turns: shifted neighbours make what that arc made."""
+    blank = replace(setup(10, 30), size=(0.1, 0.08, 0.03), corner=(-0.05, -0.04, -0.03))
+    compensated = tps.compensate(tps.Program.from_text(f"{HEAD}{BOSS}M2\n"), cut=blank, step_mm=STEP)
+    after = np.array(compensated.lines["size_after_um"])
+    said = [reason == ELSEWHERE for reason in compensated.lines["left_alone"]]
+    assert compensated.changed and np.isnan(after).tolist() == said and any(said)
+    longest = compensated.lines["length_mm"][np.flatnonzero(np.isnan(after))[0]]
+    assert longest < 0.02 * compensated.walls["length_mm"] and compensated.walls["left_percent"] < 20.0
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "where"),
+    [
+        ("part.ngc", "G21\n#<d> = 4\nG1 X#<d> F100\nM2\n", "part.ngc:2: a program with variables or O words"),
+        ("part.ngc", "o<a> sub\nG1 X4 F100\no<a> endsub\no<a> call\nM2\n", "part.ngc:1: a program with variables"),
+        ("part.h", "BEGIN PGM A MM\nL X+4 F100\nEND PGM A MM\n", "as 'heidenhain'"),
+    ],
+)
+def test_what_cannot_be_shifted_is_refused_without_talk_of_placements(name, text, where):
+    with pytest.raises(InputError) as error:
+        shift_program(parse_program(text, name), ORIGIN, {})
+    assert where in str(error.value) and "ost it as G code" in str(error.value) and "--write" not in str(error.value)

@@ -179,7 +179,12 @@ def test_a_broken_setup_is_one_error_with_its_line(tmp_path, name):
 
 
 MISSING = {
-    "stock": (SETUP[SETUP.index("[stock]") : SETUP.index("[coeff")], "", "M3", "--stock"),
+    "stock": (
+        SETUP[SETUP.index("[stock]") : SETUP.index("[coeff")],
+        "",
+        "M3",
+        "wall.nc: no stock is given, the program states none",
+    ),
     "diameter": ("diameter_mm = 10\n", "", "M3", "tool 1: diameter_mm not known"),
     "teeth and helix": ("flutes = 3\nhelix_deg = 30\n", "", "M3", "flutes, helix_deg not known"),
     "tool": ("number = 1", "number = 2", "M3", "[[tool]] with number = 1"),
@@ -288,7 +293,6 @@ def test_the_command_writes_the_cut_and_says_what_leaves_the_tolerance(tmp_path,
     [
         (["--tolerance", "5"], "--tolerance without a cut"),
         (["--stock", "1,2,3"], "--stock without --material"),
-        (["--material", "Al7075"], "--material without a stock"),
         (["--material", "Al7075", "--stock", "1,2"], "X,Y,Z of a box"),
         (["--material", "Al7075", "--cut", str(POCKET_CUT)], "one of the two"),
         ([str(POCKET_CUT.with_name("arcs_in_planes.nc")), "--cut", str(POCKET_CUT)], "--cut with several programs"),
@@ -328,3 +332,22 @@ def test_cut_template_is_read(tmp_path):
     setup = read_setup(file)
     assert setup.tools[1].cutter["flutes"] == 3 and setup.size == pytest.approx((0.12, 0.08, 0.02))
     assert dataclasses.replace(setup, file="").inputs == ()
+
+
+BLANKS = {
+    "wall.h": "BEGIN PGM WALL MM\nBLK FORM 0.1 Z X+0 Y+0 Z-10\nBLK FORM 0.2 X+100 Y+20 Z+0\nTOOL CALL 1 Z S6000\n"
+    "L X-10 Y+24 Z+20 R0 FMAX M3\nL Z-3 FMAX\nL X+110 F900\nM30\nEND PGM WALL MM\n",
+    "wall.mpf": 'G17 G90 G71\nWORKPIECE(,"",,"BOX",112,0,-10,-80,0,0,100,20)\nT1 D1\nM6\nS6000 M3\nG0 X-10 Y24 Z20\n'
+    "G0 Z-3\nG1 X110 F900\nM30\n",
+}
+
+
+@pytest.mark.parametrize("name", BLANKS)
+def test_without_a_stock_it_is_the_blank_that_the_program_states(tmp_path, name):
+    """BLK FORM, WORKPIECE: the cut is that of the same box in the setup; G code that states none is refused (above)."""
+    read = parse_program(BLANKS[name], name)
+    old, new, *_ = MISSING["stock"]
+    stated, given = cut_of(read, tmp_path, SETUP.replace(old, new)), cut_of(read, tmp_path)
+    assert stated.removed.sum() > 1e-9 and "BLK FORM, WORKPIECE" in stated.stock.origin
+    np.testing.assert_allclose(stated.wall_mean, given.wall_mean, rtol=1e-9)
+    np.testing.assert_allclose(stated.removed, given.removed, rtol=1e-9, atol=1e-18)

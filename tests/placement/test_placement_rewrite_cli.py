@@ -78,6 +78,14 @@ def test_a_turn_that_cannot_be_written_keeps_the_search(in_empty_folder, capsys)
     assert again["chosen"]["mean_N_per_mm"] == pytest.approx(summary["chosen"]["mean_N_per_mm"], rel=1e-5)
 
 
+def test_a_program_in_plain_language_is_written_by_a_frame(in_empty_folder):
+    lines = ("BEGIN PGM A MM", "L X+0 Y+0 Z+5 FMAX", "L Z-2 F300", "L X+30", "L Y+20", "END PGM A MM")
+    Path("part.h").write_text("\n".join([*lines, ""]))
+    assert main(["place", "part.h", "--points", "2", "--rotate", "0", "--out", "out", "--write", "placed.h"]) == 0
+    assert "CYCL DEF 7.0 SHIFT" in Path("placed.h").read_text()
+    assert json.loads(Path("out/placement.json").read_text())["written"]["relative_difference"]["mean"] < 1e-4
+
+
 def test_nothing_asked_nothing_written():
     assert place("case_study.nc") == 0
     assert json.loads(Path("out/placement.json").read_text())["written"] is None

@@ -5,7 +5,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
-from toolpath_stiff.cutting.setup import STOCK_HINT, CutSetup, read_setup, setup_of
+from toolpath_stiff.cutting.setup import CutSetup, read_setup, setup_of
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import Option
 from toolpath_stiff.results import TextFile
@@ -26,9 +26,9 @@ def cut_setup(cut: Cutting, material: Material, stock_mm: StockBox) -> CutSetup 
         return None
     if material is None:
         raise InputError("--stock without --material", hint="say --material NAME, or --cut FILE with both")
-    if stock_mm is None:
-        raise InputError("--material without a stock", hint=STOCK_HINT)
-    return setup_of(material, stock_mm if isinstance(stock_mm, str) else ",".join(map(str, stock_mm)))
+    if stock_mm is None or isinstance(stock_mm, str):
+        return setup_of(material, stock_mm)
+    return setup_of(material, ",".join(map(str, stock_mm)))
 
 
 def cut_template(file: str | Path = "cut.toml") -> TextFile:

@@ -37,6 +37,7 @@ CONTRACTION = 0.3  # of a turn's change to that of the turn before; a warning be
 SHORT = 3e-3  # m of a move, below which it is a part of a wall
 SAME = 1e-7  # m by which the error of a wall may grow: rounding of the numbers written, and of the stock's grid
 WORSE = "it would be worse"
+ELSEWHERE = "lines beside it make its wall afterwards"
 BETWEEN = "it lies between two walls: what a shift takes off one it adds to the other"
 
 
@@ -178,7 +179,7 @@ class Compensation(Result):
         A row a line of the program and side of its feed on which it makes a final wall, by columns: line, side,
         length_mm, shift_um (mean, + into the work); of the mean over the wall's height, mean and mean size along the
         line and the largest, before and after (error, size, peak; um, + material left); spread_um, the mean range over
-        the height, which no shift removes; left_alone, the reason or "".
+        the height, which no shift removes; left_alone, the reason or "". Nan after, where other lines make it then.
     before, after
         Surface errors of the untouched and of the written program.
     shift
@@ -215,7 +216,7 @@ class Compensation(Result):
         columns = {name: np.array(self.lines[name]) for name in self.lines if name.endswith(("_um", "_mm"))}
         length = columns["length_mm"]
         before, after, spread = (
-            float((columns[name] * length).sum() / length.sum())
+            float(np.nansum(columns[name] * length) / length[np.isfinite(columns[name])].sum())
             for name in ("size_before_um", "size_after_um", "spread_um")
         )
         return {
@@ -224,7 +225,7 @@ class Compensation(Result):
             "mean_after_um": after,
             "left_percent": 100.0 * after / before if before else 0.0,
             "worst_before_um": float(columns["peak_before_um"].max()),
-            "worst_after_um": float(columns["peak_after_um"].max()),
+            "worst_after_um": float(np.nanmax(columns["peak_after_um"])),
             "mean_range_um": spread,
         }
 
@@ -372,10 +373,11 @@ def _lines(
     for name in ("error", "size", "peak"):
         before, after = was[name][row, side], now[name][row, side]
         columns[f"{name}_before_um"] = um_from_m(before).tolist()
-        columns[f"{name}_after_um"] = um_from_m(np.where(np.isnan(after), before, after)).tolist()
-    columns["spread_um"] = um_from_m(np.nan_to_num(now["spread"][row, side])).tolist()
+        columns[f"{name}_after_um"] = um_from_m(after).tolist()
+    columns["spread_um"] = um_from_m(now["spread"][row, side]).tolist()
     between = (was["length"] > 0.0).all(axis=1) & (np.abs(now["shift"]).max(axis=1) < 0.05 * was["size"].max(axis=1))
-    columns["left_alone"] = [alone.get(r, BETWEEN if between[r] else "") for r in row.tolist()]
+    reasons = np.where(between[row], BETWEEN, np.where(np.isnan(now["size"][row, side]), ELSEWHERE, ""))
+    columns["left_alone"] = [alone.get(r, reason) for r, reason in zip(row.tolist(), reasons.tolist(), strict=True)]
     return columns
 
 

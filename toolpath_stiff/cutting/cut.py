@@ -180,7 +180,7 @@ def evaluate_cut(
     spindle = spindle_of(setup, program, samples)
     feed_per_tooth = _feed_per_tooth(samples, cutters, spindle)
     samples = _along_teeth(samples, program.moves, feed_per_tooth)
-    stock = stock_of(setup, program.moves, cutters)
+    stock = stock_of(setup, program, cutters)
     try:
         engaged = engage(stages_of(stock, program.moves, cutters, orient), program.moves, samples, cutters, progress)
     except ProgramError as error:  # which knows no file

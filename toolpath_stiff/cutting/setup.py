@@ -17,7 +17,7 @@ from toolpath_stiff.cutting.stock import Stock, box_stock, stock_from_stl, stock
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.courses import Extents, extents
-from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
+from toolpath_stiff.nc.moves import RAPID, ReadProgram
 from toolpath_stiff.nc.tables import ToolEntry, tool_of, tools_of
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.toml_reader import TomlReader, is_text
@@ -45,15 +45,15 @@ class CutSetup:
         Of the cutting force.
     size, corner
         m: X, Y, Z of a box and its lowest corner in program coordinates, None: not given. Without a size, or an STL,
-        the stock is the extents of the cuts.
+        the stock is the extents of the cuts, or `from_program` the blank that the program states.
     body
         An STL file in program coordinates, mm; "" for none.
     tools
         Number -> tool, which wins over the program's tool table.
     spindle
         rad/s where the program names no speed, less than 0 counter-clockwise; nan: not given.
-    file
-        Where it was read from, for messages.
+    file, from_program
+        Where it was read from, for messages; whether it leaves the stock to the program.
     """
 
     coefficients: Coefficients
@@ -63,6 +63,7 @@ class CutSetup:
     tools: Mapping[int, ToolEntry] = field(default_factory=dict)
     spindle: float = math.nan
     file: str = ""
+    from_program: bool = False
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -74,20 +75,19 @@ def read_setup(file: str | Path) -> CutSetup:
     """The setup of a file. Raises `InputError` with line and key."""
     toml = TomlReader.read(file, "the cut's setup")
     toml.only("", toml.data, SECTIONS)
-    for section, hint in (("stock", STOCK_HINT), ("coefficients", COEFFICIENTS_HINT)):
-        if section not in toml.data:
-            raise toml.error(f"[{section}] is missing", hint=hint)
-    size, corner, body = _stock_in(toml)
-    return CutSetup(
-        _coefficients_in(toml), size, corner, body, tools_of(toml, "tool") or {}, _spindle_in(toml), str(file)
-    )
+    if "coefficients" not in toml.data:
+        raise toml.error("[coefficients] is missing", hint=COEFFICIENTS_HINT)
+    missing = "stock" not in toml.data
+    size, corner, body = (None, None, "") if missing else _stock_in(toml)
+    tools = tools_of(toml, "tool") or {}
+    return CutSetup(_coefficients_in(toml), size, corner, body, tools, _spindle_in(toml), str(file), missing)
 
 
-def setup_of(material_name: str, stock: str) -> CutSetup:
-    """The setup of `--material` and `--stock` ("X,Y,Z" in mm, or "extents"). Raises `InputError`."""
+def setup_of(material_name: str, stock: str | None) -> CutSetup:
+    """The setup of `--material` and `--stock` ("X,Y,Z" in mm, "extents", None: the program's). Raises `InputError`."""
     coefficients = material(material_name)
-    if stock == "extents":
-        return CutSetup(coefficients)
+    if stock is None or stock == "extents":
+        return CutSetup(coefficients, from_program=stock is None)
     try:
         x, y, z = (m_from_mm(float(part)) for part in stock.split(","))
     except ValueError:
@@ -173,7 +173,7 @@ def cutters_of(setup: CutSetup, program: ReadProgram) -> dict[int, Cutter]:
     return {tool.number: cutter_of(tool) for tool in tools}
 
 
-def stock_of(setup: CutSetup, moves: Moves, cutters: Mapping[int, Cutter]) -> Stock:
+def stock_of(setup: CutSetup, program: ReadProgram, cutters: Mapping[int, Cutter]) -> Stock:
     """The stock in program coordinates. Raises `InputError`.
 
     A box without a corner stands where a shop would put its zero: at the middle or an edge of the top face (the
@@ -182,11 +182,15 @@ def stock_of(setup: CutSetup, moves: Moves, cutters: Mapping[int, Cutter]) -> St
     if setup.body:
         smallest = min(cutter.diameter for cutter in cutters.values())
         return stock_from_stl(setup.body, smallest / CELLS)
+    if setup.from_program:
+        if program.stock is None:
+            raise ProgramError("no stock is given, the program states none", hint=STOCK_HINT, file=program.name)
+        return box_stock(*program.stock, "as the program states it (BLK FORM, WORKPIECE)")
     if setup.size is None:
-        return stock_of_extents(moves, cutters)
+        return stock_of_extents(program.moves, cutters)
     low, origin = setup.corner, "given"
     if low is None:
-        low = _usual_corner(setup.size, extents(moves.take(moves.motion != RAPID)))
+        low = _usual_corner(setup.size, extents(program.moves.take(program.moves.motion != RAPID)))
         corner = ", ".join(f"{mm_from_m(value) + 0.0:g}" for value in low)
         origin = f"its place is assumed: lowest corner at {corner} mm (corner_mm in [stock] of cut.toml says otherwise)"
     (x, y, z), (width, depth, height) = low, setup.size

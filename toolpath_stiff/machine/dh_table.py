@@ -21,7 +21,7 @@ def machine_from_dh(file: str, name: str, convention: str) -> tuple[str, list[st
     table = read_table(file, "DH rows", COLUMNS)
     rows = []
     for number, (line, cells) in enumerate(table.rows, 1):
-        cell = {key: value for key, value in table.record(cells).items() if value}
+        cell = {key: value for key, value in table.record(cells, line).items() if value}
         linear = cell.get("type", "R").upper() in ("P", "LINEAR")
         unit = "mm" if linear else "deg"
         try:

@@ -13,7 +13,7 @@ from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.languages import foreign_program, refused_program
 from toolpath_stiff.nc.linuxcnc.inputs import split
 from toolpath_stiff.nc.moves import ReadProgram, Recorder, Remark
-from toolpath_stiff.nc.parametric.families import uses_variables
+from toolpath_stiff.nc.parametric.families import line_with_variables
 from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.reader import (
     PARAMETRIC,
@@ -169,7 +169,7 @@ def _checked(request: Request, language: str) -> Checked:
 def _check_built_in(request: Request, run: ProgramRun) -> Checked:
     g_code = type(run) is ProgramRun
     errors, ending = _run_to_the_end(run, g_code)
-    if errors and g_code and uses_variables(request.lines):  # once more with their values, from the start
+    if errors and g_code and line_with_variables(request.lines):  # once more with their values, from the start
         run = run_of(PARAMETRIC)(request, Tally())
         errors, ending = _run_to_the_end(run, g_code)
     state, tally = run.state, run.tally

@@ -15,7 +15,7 @@ from toolpath_stiff.nc.languages import (
 )
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, ReadProgram
-from toolpath_stiff.nc.parametric.families import uses_variables
+from toolpath_stiff.nc.parametric.families import line_with_variables
 from toolpath_stiff.nc.posted import check_rotary_offsets, recovered
 from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import ZERO, Request
@@ -168,7 +168,7 @@ def _read_built_in(request: Request) -> ReadProgram:
     try:
         return _finished(request, ProgramRun(request))
     except InputError:
-        if not uses_variables(request.lines):
+        if not line_with_variables(request.lines):
             raise
     return replace(_finished(request, run_of(PARAMETRIC)(request)), parametric=True)
 

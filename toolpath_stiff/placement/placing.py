@@ -117,14 +117,8 @@ def _check(task: PlacementTask) -> None:
     if not isinstance(machine, Hexapod) and task.program.native and task.program.moves.end[:, 3:].any() and turns.any():
         mistake = f"the program turns axes of machine {machine.name}, whose words another turn of the work would change"
         raise InputError(mistake, hint="place it with --rotate 0, untilted")
-    if not task.write:
-        return
-    check_rewritable(task.program)
-    if task.program.interpreter != "builtin":
-        raise InputError(
-            f"--write: {task.program.name} was read by LinuxCNC's interpreter; its blocks cannot be rewritten",
-            hint="leave --write out and set the work offset",
-        )
+    if task.write:
+        check_rewritable(task.program)
 
 
 def numbered_rows(task: PlacementTask, path: WorkPath, found: PlacementResult) -> list[PlacementRow]:

@@ -120,7 +120,7 @@ def number_columns(table: Table, names: Sequence[str]) -> FloatArray:
     places = [(place, name) for place, name in enumerate(names) if name in table.heading]
     values = np.full((len(table.rows), len(names)), np.nan)
     for row, (line, cells) in enumerate(table.rows):
-        record = table.record(cells)
+        record = table.record(cells, line)
         for place, name in places:
             with suppress(ValueError):
                 values[row, place] = float(record[name])

@@ -114,7 +114,7 @@ def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
         data=data,
         title=f"Placements of {placed.best.program.name}",
         about=f"machine {machine_text(placed.machine_stated)} · load {best.load}, {best.force:g} N",
-        objective=placed.task.rules.objective,
+        objective=placed.task.rules.objective + (f" · {_error_words(e)}" if (e := placed.surface_error_um) else ""),
         load=str(best.load),
         note=note,
         warnings=placed.warnings,

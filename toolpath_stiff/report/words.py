@@ -32,8 +32,8 @@ def significant(value: float | None, digits: int = 3) -> str:
 
 
 def figure(value: object) -> str:
-    """A cell of a table of micrometres: a float with two decimals."""
-    return f"{value:.2f}" if isinstance(value, float) else str(value)
+    """A cell of a table of micrometres: a float with two decimals, "-" for nan."""
+    return f"{value:.2f}".replace("nan", "-") if isinstance(value, float) else str(value)
 
 
 def percent(value: float | None, digits: int = 1) -> str:

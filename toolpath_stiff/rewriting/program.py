@@ -17,6 +17,7 @@ from toolpath_stiff.files import write_atomically
 from toolpath_stiff.nc.controller import LANGUAGES, UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.lines import read_text, split_lines
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram
+from toolpath_stiff.nc.parametric.families import line_with_variables
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.words import read_block
@@ -128,15 +129,13 @@ def rewrite_program(
     X100 Y40
     M30
     """
-    placement, original = tuple(placement_origin), tuple(original_origin)
-    if program.dialect in LANGUAGES and not program.kinematics:
-        text, encoding = _text(program)
-        turn, stays = _turn(placement_origin, original_origin), placement == original
-        written = text if stays else write_placed(program, text, turn, decimals, control)
-        return RewrittenProgram(program.name, written, encoding, [])
     check_rewritable(program)
-    if placement == original:
-        return RewrittenProgram(program.name, *_text(program), [])
+    stays = tuple(placement_origin) == tuple(original_origin)
+    if stays or program.dialect in LANGUAGES:
+        text, encoding = _text(program)
+        if not stays:
+            text = write_placed(program, text, _turn(placement_origin, original_origin), decimals, control)
+        return RewrittenProgram(program.name, text, encoding, [])
     controls = _controls(program, control, placement_origin, original_origin, decimals)
     controls.linearise = linearise and mm_from_m(linearise)
     return _rewritten(program, controls, control)
@@ -188,7 +187,7 @@ def shift_program(
     >>> rows, fixed
     ([0, 1, 2], {})
     """
-    check_rewritable(program)
+    check_rewritable(program, shifted=True)
     controls = _controls(program, control, origin, origin, decimals)
     controls.courses = courses
     return _rewritten(program, controls, control), controls.row_of, controls.fixed
@@ -216,27 +215,30 @@ def _rewritten(program: ReadProgram, controls: Controls, control: Controller) ->
     return RewrittenProgram(program.name, "".join(lines), encoding, sorted(controls.notes))
 
 
-def check_rewritable(program: ReadProgram) -> None:
-    """Raise `InputError` for a program whose blocks are not what a control of this machine executes."""
+def check_rewritable(program: ReadProgram, shifted: bool = False) -> None:
+    """Raise `InputError` for a program whose blocks are not what a control of this machine executes.
+
+    A frame places programs of Heidenhain's and Siemens' languages; `shifted` to one side they cannot be written.
+    """
+    if program.dialect in LANGUAGES and not (program.kinematics or shifted):
+        return
     control = f"read by {program.interpreter!r} as {program.dialect!r}, not as one of {', '.join(PLAIN_DIALECTS)},"
+    location = program.dialect == CUTTER_LOCATION
     refused = (
         (
             bool(program.kinematics),
             f"posted for another kinematics ({program.kinematics})",
             ", set the work so in the CAM system, and post it for this machine",
         ),
-        (program.parametric, "with variables", ", and set the work offset that is printed (G10)"),
-        (
-            program.dialect == CUTTER_LOCATION,
-            "for a post processor (a cutter-location file)",
-            ", or place the posted program",
-        ),
+        (program.parametric, "with variables or O words", ", and set the work offset that is printed (G10)"),
+        (location, "for a post processor (a cutter-location file)", ", or place the posted program"),
         (program.interpreter != "builtin" or program.dialect not in PLAIN_DIALECTS, control, ""),
     )
     for holds, what, instead in refused:
         if holds:
-            hint = f"place it without --write{instead}"
-            raise ProgramError(f"a program {what} cannot be rewritten", hint=hint, file=program.name)
+            hint = "post it as G code of the tool centre" if shifted else f"place it without --write{instead}"
+            line = line_with_variables(program.source) if program.parametric else None
+            raise ProgramError(f"a program {what} cannot be rewritten", hint=hint, file=program.name, line=line)
 
 
 def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:

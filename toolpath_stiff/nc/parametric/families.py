@@ -17,20 +17,20 @@ _NGC_SIGN = re.compile(
     rf"{_BEGIN}O(?:<|\[|#|\d+(?:{'|'.join(NGC_WORDS)}))|#<|\*\*|EXISTS\["  # o<x> sub, #<name>
 )
 _MACRO_SIGN = re.compile(rf"{_BEGIN}(?:IF\[|WHILE\[|GOTO[\d#\[]|DO\d|END\d)|G6[5-7](?!\d)|POW\[")
-_ANY_SIGN = re.compile(r"[#\[]")
+_SIGNS = (re.compile(r"[#\[]"), _NGC_SIGN, _MACRO_SIGN)
 _COMMENT = re.compile(r"\([^)]*\)|;.*")
 _SUSPECT = re.compile(r"[#\[oOiIwWdD]|[gG]\s*0*6")
 
 
-def uses_variables(lines: tuple[str, ...]) -> bool:
-    """Whether any line holds a variable, an expression, or control of the flow.
+def line_with_variables(lines: tuple[str, ...]) -> int:
+    """The first line, from 1, that holds a variable, an expression, or control of the flow; 0: none does.
 
     Examples
     --------
-    >>> uses_variables(("G1 X10 (#1)",)), uses_variables(("#1 = 5", "G1 X#1"))
-    (False, True)
+    >>> line_with_variables(("G1 X10 (#1)",)), line_with_variables(("#1 = 5", "G1 X#1"))
+    (0, 1)
     """
-    return any(sign.search(text) for _, text in _bare(lines) for sign in (_ANY_SIGN, _NGC_SIGN, _MACRO_SIGN))
+    return next((number for number, text in _bare(lines) if any(sign.search(text) for sign in _SIGNS)), 0)
 
 
 def _bare(lines: tuple[str, ...]) -> Iterator[tuple[int, str]]:
