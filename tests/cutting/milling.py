@@ -23,10 +23,9 @@ class Milling:
         self.samples = sample_moves(self.moves, step * 1e-3)
         self.cutters = {0: self.cutter}
         stock = box_stock(tuple(np.multiply(low, 1e-3)), tuple(np.multiply(high, 1e-3)), "given")
-        every = np.full(len(self.moves), True)
-        self.stages = list(stages_of(stock, self.moves, self.cutters, every))
+        self.stages = list(stages_of(stock, self.moves, self.cutters))
         self.work = self.stages[-1]
-        self.context = [self.work], np.zeros(len(self.samples), int), self.samples, self.cutters
+        self.context = self.work, np.zeros(len(self.samples), int), self.samples, self.cutters
 
     def engaged(self):
         """All patches, and the removed volume of each sample."""

@@ -17,6 +17,7 @@ from toolpath_stiff.nc.reader import parse_program
 from toolpath_stiff.path.sampling import sample_moves
 
 HERE = (0.0,) * 6
+STILL = {"turning": None, "lines_warning": lambda rows, words: []}  # no tool turns on its way
 WIDTH, HEIGHT = 25.0, 15.0  # mm, of the centre path's rectangle
 POCKET = """G21 G90 G17
 S9000 M3
@@ -60,7 +61,14 @@ def cut_by(error, side=1, width=2.0):
         walls[made, side] = error(x, y, off)[made] * 1e-3
         wide = np.where(made, width * 1e-3, 0.0)
         return SimpleNamespace(
-            samples=samples, wall_mean=walls, wall_low=walls * 0.8, wall_high=walls * 1.1, ae=wide, made=made, off=off
+            samples=samples,
+            wall_mean=walls,
+            wall_low=walls * 0.8,
+            wall_high=walls * 1.1,
+            ae=wide,
+            made=made,
+            off=off,
+            **STILL,
         )
 
     return evaluate
@@ -143,7 +151,8 @@ def test_two_walls_of_a_slot_share_what_a_shift_can_do():
             samples = sample_moves(program.moves, 1e-3)
             made = (samples.motion == 1) & (np.abs(samples.tangent[:, 0]) > 0.9)
             walls = np.where(made[:, None], np.array([[left, right]]) * 1e-6, np.nan)
-            return SimpleNamespace(samples=samples, wall_mean=walls, wall_low=walls, wall_high=walls, ae=made * 0.01)
+            sides = dict.fromkeys(("wall_mean", "wall_low", "wall_high"), walls)
+            return SimpleNamespace(samples=samples, ae=made * 0.01, **sides, **STILL)
 
         return cut
 

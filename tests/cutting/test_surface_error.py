@@ -121,12 +121,12 @@ def test_an_inner_corner_of_a_program():
     cutter = Cutter(1, 0.010, 0.0, 3, np.radians(30.0))
     stock = box_stock((-0.040, -0.010, -0.010), (0.010, 0.040, 0.0), "")
     engaged = engage(
-        stages_of(stock, program.moves, {1: cutter}, np.full(len(program.moves), True)),
+        stages_of(stock, program.moves, {1: cutter}),
         program.moves,
         samples,
         {1: cutter},
     )
-    walls = walls_of_passes([engaged.work], np.zeros(len(samples), int), samples, {1: cutter})[1]
+    walls = walls_of_passes(engaged.work, np.zeros(len(samples), int), samples, {1: cutter})[1]
     values = np.array(ALUMINIUM) * [1e6, 1e6, 1e6, 1e3, 1e3, 1e3]
     known = Coefficients(values[:3], values[3:], np.zeros((6, 6)))
     turned, count = axes_at(samples), len(samples)

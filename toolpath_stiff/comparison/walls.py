@@ -142,6 +142,8 @@ def compare_walls(
     """
     upright = (cut.samples.abc[:, :2] == 0.0).all(axis=1)
     station, side = np.nonzero(np.isfinite(cut.wall_mean) & upright[:, None])
+    aslant = np.isfinite(cut.wall_mean).any(axis=1) & ~upright
+    notes = (*notes, *cut.lines_warning(aslant, "left alone: the tool stands aslant"))
     samples, radius = cut.samples.take(station), radii_of(cut.cutters, cut.samples.tool[station])
     surface, into = walls_beside(cut.samples, cut.cutters, station, side)
     height = samples.position[:, 2, None] + cut.wall_heights[station, side] + np.array([-FARTHEST, FARTHEST])

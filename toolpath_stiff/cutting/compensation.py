@@ -323,7 +323,7 @@ def compensate_program(
     contraction = max(ratios, default=float("nan"))
     return Compensation(
         rewritten, _lines(moves, was, now, alone), before_cut, cut, shift, turn, contraction,
-        um_from_m(m_from_mm(side.error)), _notes(changes[-1], contraction, rewritten),
+        um_from_m(m_from_mm(side.error)), _notes(changes[-1], contraction, before_cut, rewritten),
     )  # fmt: skip
 
 
@@ -381,8 +381,8 @@ def _lines(
     return columns
 
 
-def _notes(change: float, contraction: float, rewritten: RewrittenProgram) -> tuple[str, ...]:
-    notes = list(rewritten.notes)
+def _notes(change: float, contraction: float, cut: Cut, rewritten: RewrittenProgram) -> tuple[str, ...]:
+    notes = [*rewritten.notes, *cut.lines_warning(cut.turning, "left alone: the tool turns on its way")]
     if contraction > CONTRACTION:
         notes.append(
             f"the force depends on the shift: a turn of the iteration leaves {contraction:.2f} of the change before "

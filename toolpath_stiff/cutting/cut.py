@@ -10,16 +10,18 @@ from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter, radii_of
+from toolpath_stiff.cutting.engagement import engage
 from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
 from toolpath_stiff.cutting.passes import walls_of_all_passes
 from toolpath_stiff.cutting.patches import Contact, Patches, of_stations
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
+from toolpath_stiff.cutting.stations import samples_seen
 from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
-from toolpath_stiff.cutting.tilts import TURNING, engage_tilts, samples_seen, tilts_of
+from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
-from toolpath_stiff.cutting.workpiece import Workpiece
+from toolpath_stiff.cutting.workpiece import Workpiece, stages_of
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import Moves, ReadProgram
@@ -123,9 +125,22 @@ class Cut:
         return self.highest[:, :2]
 
     @property
+    def turning(self) -> BoolArray:
+        """(n,) whether a tool turns on its way and cuts: no error of what it makes is foretold."""
+        return np.asarray(self.samples.cutting & (self.work.tilts[self.samples.move] == TURNING))
+
+    @property
     def machine_only(self) -> bool:
         """Whether a tool's own compliance is not known, so that the errors are too small."""
         return any(np.isnan(cutter.lateral_compliance) for cutter in self.cutters.values())
+
+    def lines_warning(self, rows: BoolArray, words: str) -> list[str]:
+        """A sentence that names the lines of some samples (n,), and what of them; none of none."""
+        lines = np.unique(self.samples.line[rows]).tolist()
+        if not lines:
+            return []
+        more = f" and {len(lines) - MOST_NAMED} more" if len(lines) > MOST_NAMED else ""
+        return [f"lines {', '.join(map(str, lines[:MOST_NAMED]))}{more}: {words}"]
 
 
 def evaluate_cut(
@@ -162,27 +177,26 @@ def evaluate_cut(
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step, angles_of=orient)
     if sampled is not None:
         samples = replace(sampled, **{name: getattr(samples, name) for name in ("position", "abc", "tangent")})
-    tilts, turns = tilts_of(program.moves, orient)
-    tilt = tilts[samples.move]
     spindle = spindle_of(setup, program, samples)
     feed_per_tooth = _feed_per_tooth(samples, cutters, spindle)
     samples = _along_teeth(samples, program.moves, feed_per_tooth)
     stock = stock_of(setup, program, cutters)
-    seen = samples_seen(samples, tilt, turns)
     try:
-        engaged, works = engage_tilts(stock, program.moves, seen, cutters, tilts, turns, progress)
+        engaged = engage(stages_of(stock, program.moves, cutters, orient), program.moves, samples, cutters, progress)
     except ProgramError as error:  # which knows no file
         raise error.in_line(program.name, error.line or 0) from None
-    walls, own = walls_of_passes(works, tilt, seen, cutters)
+    work = engaged.work
+    tilt, seen = samples_seen(work, samples)
+    walls, own = walls_of_passes(work, tilt, seen, cutters)
     # Samples that share a contact are computed once, but where their walls differ.
     source = engaged.source.copy()
     apart = ~np.isclose(walls, walls[source], rtol=0.0, atol=SAME_WALL, equal_nan=True).all(axis=(1, 2))
     source[apart] = np.flatnonzero(apart)
     rows = np.unique(source)
-    strips = final_strip(works, tilt, seen, cutters, np.isin(np.arange(len(samples)), rows))
+    strips = final_strip(work, tilt, seen, cutters, np.isin(np.arange(len(samples)), rows))
     patches = of_stations(engaged.patches, engaged.source[rows])
     patches = replace(patches, station=rows[patches.station])
-    cut = _nothing_cut(samples, cutters, engaged.work, setup.coefficients, feed_per_tooth)
+    cut = _nothing_cut(samples, cutters, work, setup.coefficients, feed_per_tooth)
     cut, struck = replace(cut, removed=engaged.removed, wall_heights=walls), engaged.struck
     del engaged
     made = np.isfinite(np.concatenate([walls[..., 0], strips[:, :1]], axis=1))
@@ -204,7 +218,7 @@ def evaluate_cut(
             values = getattr(cut, name)
             values[some] = values[source[some]]
     cut = _with_walls_of_all_passes(cut, seen, tilt, own, step)
-    warnings = _warnings(cut, struck, samples.cutting & (tilt == TURNING))
+    warnings = _warnings(cut, struck)
     return replace(cut, assumptions=_assumptions(cut, model, setup), warnings=warnings)
 
 
@@ -338,7 +352,7 @@ def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str,
     return tuple(sentences)
 
 
-def _warnings(cut: Cut, struck: BoolArray, turning: BoolArray) -> tuple[str, ...]:
+def _warnings(cut: Cut, struck: BoolArray) -> tuple[str, ...]:
     """What deserves a look, a sentence each."""
     samples, warnings = cut.samples, []
     if cut.machine_only:
@@ -352,26 +366,19 @@ def _warnings(cut: Cut, struck: BoolArray, turning: BoolArray) -> tuple[str, ...
         warnings.append("no cut meets the stock: corner_mm in [stock] and the program's zero say where both are")
     along = np.abs(along_tool_axis(samples.tangent, samples.abc))
     plunges = (cut.removed > 0.0) & (along >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
+    on_the_spot = cut.turning & ~samples.tangent.any(axis=1)
     large = (np.abs(np.nan_to_num(cut.wall_mean)).max(axis=1) > THIN * cut.ae) & (cut.ae > 0.0)
     for rows, words in (
         (large, f"walls off by over {THIN:g} of the width of cut, foretold too large: the chip is not thinner for it"),
         (struck, "rapids run into material, which counts as still there afterwards"),
         (plunges, "plunges: cutting with the end is not modelled, no force is known there"),
-        (turning, "the tool turns on the way: no force is known there, and what these cuts take off counts as still "
-         "there, so that later cuts are foretold too heavy, never too light"),
+        (cut.turning & ~on_the_spot, "the tool turns on its way: no error of the surface is foretold there"),
+        (on_the_spot, "the tool turns on the spot: it takes off what it meets, no force is known there"),
     ):  # fmt: skip
-        warnings += _lines_warning(samples, rows, words)
+        warnings += cut.lines_warning(rows, words)
     chip = np.where(engaged, cut.feed_per_tooth, np.nan)
     thin, thick = cut.coefficients.thinnest, cut.coefficients.thickest
     for beyond, words in ((chip < thin, "thinner"), (chip > thick, "thicker")):
         named = f"feeds per tooth {words} than those of the coefficients: extrapolated"
-        warnings += _lines_warning(samples, beyond, named)
+        warnings += cut.lines_warning(beyond, named)
     return tuple(warnings)
-
-
-def _lines_warning(samples: Samples, rows: BoolArray, words: str) -> list[str]:
-    lines = np.unique(samples.line[rows]).tolist()
-    if not lines:
-        return []
-    more = f" and {len(lines) - MOST_NAMED} more" if len(lines) > MOST_NAMED else ""
-    return [f"lines {', '.join(map(str, lines[:MOST_NAMED]))}{more}: {words}"]

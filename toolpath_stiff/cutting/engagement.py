@@ -19,11 +19,13 @@ from toolpath_stiff.cutting.stations import (
     BLOCK,
     STATION,
     TOUCH,
+    around,
     blocks_of_stations,
-    heights_around,
     pieces_at,
+    samples_seen,
     stations_between,
 )
+from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.workpiece import Workpiece
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.path.sampling import Samples
@@ -80,15 +82,13 @@ def engage(
     samples: Samples,
     cutters: Mapping[int, Cutter],
     progress: Progress | None = None,
-    seen: BoolArray | None = None,
 ) -> Engagement:
-    """The engagement of samples, or those `seen` (n,) upright, in the frame that `moves` are in.
+    """The engagement of samples; `stages` as of `workpiece.stages_of` the moves, `cutters` by number of the tool.
 
-    `stages` are those of `workpiece.stages_of` the moves, `cutters` by number of the tool.
+    A rapid whose tool turns on the way is not looked at.
     """
     count, parts, tell = len(samples), [NO_PATCHES], counter(progress, "engagement")
     source, removed, struck = np.arange(count), np.zeros(count), np.zeros(count, dtype=bool)
-    moving = np.flatnonzero((samples.tangent != 0.0).any(axis=1) & (True if seen is None else seen))
     regime = np.zeros(count, dtype=np.int64)  # changes of what forces hang on besides the path
     for column in (samples.tool, samples.feed, samples.spindle):
         regime[1:] += np.nan_to_num(column[1:]) != np.nan_to_num(column[:-1])
@@ -97,9 +97,12 @@ def engage(
     last["move"] = -1
     piece: IntArray | None = None
     for work in stages:
-        piece = pieces_at(work, samples.move[moving], samples.s[moving]) if piece is None else piece
+        if piece is None:
+            tilt, seen = samples_seen(work, samples)
+            moving = np.flatnonzero((samples.tangent != 0.0).any(axis=1) & (tilt != TURNING))
+            piece = pieces_at(work, samples.move[moving], samples.s[moving])
         end = int(np.searchsorted(piece, work.until)) if work.until < len(work.pieces) else len(moving)
-        for rows, stations in blocks_of_stations(work, samples, cutters, moving[begin:end]):
+        for rows, stations in blocks_of_stations(work, seen, tilt, cutters, moving[begin:end]):
             patches, own, rate = _contact_along(work, stations, regime[rows])
             rapid = stations["recent"] == len(work.pieces)
             struck[rows], rate[rapid] = rapid & (rate > 0.0), 0.0
@@ -162,7 +165,7 @@ def _contact_along(work: Workpiece, stations: AnyArray, regime: IntArray) -> tup
     turn = np.diff(np.arctan2(stations["ahead_y"], stations["ahead_x"]), prepend=9.0)
     steady = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi) < SAME
     steady &= (np.abs(np.diff(stations["down"], prepend=9.0)) < SAME) & (np.diff(regime, prepend=-1) == 0)
-    steady &= ~stations["end_alone"]
+    steady &= ~stations["end_alone"] & (np.diff(work.tilts[stations["move"]], prepend=-9) == 0)
     node = np.cumsum(~(steady & (np.diff(stations["path"], prepend=-np.inf) < TOUCH))) - 1
     first = np.searchsorted(node, np.arange(node[-1] + 1))
     broken = np.append(0, np.cumsum(~steady))[first + 1]
@@ -195,10 +198,10 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
     corner = stations["reach"] - stations["flat"]
     rows = np.flatnonzero(~stations["end_alone"])
     wall, low = (stations["reach"][rows] - TOUCH)[:, None], corner[rows, None]
-    around = heights_around(work, stations[rows], wall, np.pi * SIDES[None, :], enough=low)
-    beyond = (around[0] > low).any(axis=1)  # the corner
-    rows, around = rows[beyond], (around[0][beyond], around[1][beyond])
-    borders = _levels(around, corner[rows, None], stations["longest"][rows, None], 1 if work.has_levels else PARTS)
+    beside = _heights_around(work, stations[rows], wall, np.pi * SIDES[None, :], np.inf, low)
+    beyond = (beside[0] > low).any(axis=1)  # the corner
+    rows, beside = rows[beyond], (beside[0][beyond], beside[1][beyond])
+    borders = _levels(beside, corner[rows, None], stations["longest"][rows, None], 1 if work.has_levels else PARTS)
     reached = np.full(len(stations), 0.5 * np.pi)
     below = np.setdiff1d(np.flatnonzero((corner > 0.0) & ~stations["end_alone"]), rows)
     reached[below] = _reached(work, stations[below], corner[below])
@@ -219,8 +222,8 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
             inside = _cuts(work, own, radius[:, None], ring, height[:, None])
         else:
             ring = np.broadcast_to(np.pi * SIDES, (len(row), AROUND))
-            inside = (around[0][row] > height[:, None]) & (around[1][row] < height[:, None])
-            if work.others:  # which may leave gaps between
+            inside = (beside[0][row] > height[:, None]) & (beside[1][row] < height[:, None])
+            if work.tilted:  # there may be gaps between
                 inside = _cuts(work, own, radius[:, None], ring, height[:, None])
         which, entry, exit_ = _arcs(work, own, radius, height, ring, inside, HALVINGS[round_part])
         parts.append(Patches(some[row][which], low[which], high[which], entry, exit_))
@@ -231,8 +234,30 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
 
 def _cuts(work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray, height: FloatArray) -> BoolArray:
     """Whether material stands above points of the envelope."""
-    top, bottom = heights_around(work, stations, radius, angle, height + TOUCH, height, at=True)
-    return np.asarray((top > height) & (bottom < height))
+    x, y, tilt, window = around(stations, radius, angle)
+    shape = np.broadcast_shapes(radius.shape, angle.shape)
+    z = height + stations["z"].reshape((-1,) + (1,) * (len(shape) - 1))
+    return work.standing(np.stack([x, y, np.broadcast_to(z, shape).ravel()]), tilt, window).reshape(shape)
+
+
+def _heights_around(
+    work: Workpiece,
+    stations: AnyArray,
+    radius: FloatArray,
+    angle: FloatArray,
+    ceiling: FloatArray | float,
+    enough: FloatArray | float,
+) -> tuple[FloatArray, FloatArray]:
+    """Top and underside of the material before each station, m above the tip; points as `points_around`.
+
+    `ceiling` and `enough`, m above the tip, are the ends of `Workpiece.span`.
+    """
+    x, y, tilt, window = around(stations, radius, angle)
+    whole = np.zeros(np.broadcast_shapes(radius.shape, angle.shape))
+    z = stations["z"].reshape((-1,) + (1,) * (whole.ndim - 1))
+    low, high = ((whole + (z + height)).ravel() for height in (enough, ceiling))
+    bottom, top = work.span(x, y, tilt, (low, high), window)
+    return top.reshape(whole.shape) - z, bottom.reshape(whole.shape) - z
 
 
 def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatArray:
@@ -243,7 +268,7 @@ def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatAr
         heights = span - span * np.cos(rings)
         radius = stations["flat"][:, None, None] + span * np.sin(rings) - TOUCH
         ceiling = np.concatenate([heights[:, 1:], heights[:, -1:]], axis=1)  # of the next ring, whose inner one this is
-        top = heights_around(work, stations, radius, np.pi * SIDES[None, None, ::4], ceiling, 0.0)[0]
+        top = _heights_around(work, stations, radius, np.pi * SIDES[None, None, ::4], ceiling, 0.0)[0]
         inner = np.concatenate([top[:, :1], top[:, :-1]], axis=1)
         highest = np.clip(np.minimum(np.maximum(top, inner), heights).max(axis=(1, 2)), 0.0, corner)
         reached = np.arccos(1.0 - highest / corner)
@@ -258,7 +283,7 @@ def _levels(around: tuple[FloatArray, FloatArray], corner: FloatArray, longest: 
     top, bottom = around
     base = np.maximum(np.clip(bottom, 0.0, None).min(axis=1, keepdims=True), corner)
     heights = np.concatenate([base, np.maximum(np.minimum(top, longest), base)], axis=1)
-    below = np.where(top > bottom, np.clip(bottom, base, longest), base)
+    below = np.where((top > bottom) & (bottom > base + TOUCH), np.clip(bottom, base, longest), base)
     if (below > base).any():
         heights = np.concatenate([heights, below], axis=1)
     heights = np.sort(heights, axis=1)
@@ -330,9 +355,13 @@ def _rates(stations: AnyArray, patches: Patches) -> FloatArray:
         rounded, stations["flat"], stations["reach"]
     )
     outer, inner = (stations["flat"] + corner * np.sin(angle) for angle in (second, first))
-    downward = np.where(rounded, 0.5 * (outer**2 - inner**2), 0.0) * (patches.exit - patches.entry)
-    turned = np.cos(patches.entry) - np.cos(patches.exit)
-    return np.asarray(stations["level"] * turned * sideways + stations["down"] * downward)
+    below = np.where(rounded, 0.5 * (outer**2 - inner**2), 0.0)
+    downward = below * (patches.exit - patches.entry)
+    turned, aside = np.cos(patches.entry) - np.cos(patches.exit), np.sin(patches.exit) - np.sin(patches.entry)
+    beside = 0.5 * stations["reach"] * ((patches.high - corner) ** 2 - (patches.low - corner) ** 2)
+    swing = stations["swing_ahead"] * turned + stations["swing_left"] * aside
+    swing *= np.where(rounded, stations["flat"] * below, beside)
+    return np.asarray(stations["level"] * turned * sideways + stations["down"] * downward + swing)
 
 
 def _end_area(work: Workpiece, stations: AnyArray) -> FloatArray:
@@ -341,12 +370,16 @@ def _end_area(work: Workpiece, stations: AnyArray) -> FloatArray:
     Counted over a spiral of even points (Vogel 1979), which turns along the path: its errors cancel.
     """
     area = np.zeros(len(stations))
-    rows = np.flatnonzero(stations["end_alone"] | ((stations["down"] > 0.0) & (stations["flat"] > 0.0)))
+    swings = (stations["swing_ahead"] != 0.0) | (stations["swing_left"] != 0.0)
+    rows = np.flatnonzero(stations["end_alone"] | (((stations["down"] > 0.0) | swings) & (stations["flat"] > 0.0)))
     some, number = stations[rows], np.arange(END_POINTS)
     widest = np.where(some["end_alone"], some["reach"], some["flat"])
     radius = widest[:, None] * np.sqrt((number + 0.5) / END_POINTS)[None, :]
     angle = np.pi * (3.0 - np.sqrt(5.0)) * number[None, :] + (some["path"] / np.maximum(some["reach"], TOUCH))[:, None]
     height = rise(some["reach"][:, None], some["flat"][:, None], radius) + TOUCH
-    area[rows] = np.pi * widest**2 * _cuts(work, some, radius, angle, height).mean(axis=1)
-    rapid = stations["recent"] == len(work.pieces)
-    return area * np.where(rapid, 1.0, np.maximum(stations["down"], 0.0))
+    cut = _cuts(work, some, radius, angle, height)
+    ahead, left = (some[name][:, None] for name in ("swing_ahead", "swing_left"))
+    fall = some["down"][:, None] + radius * (np.sin(angle) * ahead + np.cos(angle) * left)
+    fall = np.where((some["recent"] == len(work.pieces))[:, None], 1.0, np.maximum(fall, 0.0))
+    area[rows] = np.pi * widest**2 * (cut * fall).mean(axis=1)
+    return area

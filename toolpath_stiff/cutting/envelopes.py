@@ -17,10 +17,11 @@ import numpy as np
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
 
 CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
+ROUNDED = 1e-12  # m: what a cutter touches to this it does not take, in whatever frame
 NEWTON = 8  # steps: heights to 1e-9 m
 FLATTEST = 1e-6  # slope; the heights of less differ by less than a nanometre
 Index = tuple[IntArray, IntArray, IntArray, FloatArray]
-Grid = tuple[FloatArray, float, int]
+Grid = tuple[FloatArray, float, tuple[int, int]]  # corner (3,) and size of cells, m; cells along y and z
 
 
 def foot(part: AnyArray, x: FloatArray, y: FloatArray, arc: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -123,26 +124,28 @@ def first_from(piece: IntArray, low: int, high: int, value: int) -> int:
 
 
 def lower(
-    pieces: AnyArray,
-    grid: Grid,
+    sweeps: tuple[AnyArray, FloatArray],
+    grid: tuple[FloatArray, float, int, int],
     index: Index,
-    points: tuple[FloatArray, FloatArray],
+    points: tuple[FloatArray, FloatArray, FloatArray, IntArray],
     window: tuple[IntArray, IntArray],
     late: tuple[IntArray, float],
     result: tuple[FloatArray, IntArray],
     enough: FloatArray,
 ) -> None:
-    """Lower the tops and set the owners of points in `result`, as `Workpiece.tops` has them.
+    """Lower the tops and set the owners of points in `result`, as `Workpiece.lowest` has them.
 
     The tops come as those of the stock, or lower: what is above them is not looked at. A height below `enough` ends
     the search.
     """
-    (corner, size, columns), (starts, piece, counts_from, below) = grid, index
-    (x, y), (slack_from, slack), (top, owner) = points, late, result
-    for i in range(len(x)):
-        row, column = math.floor((x[i] - corner[0]) / size), math.floor((y[i] - corner[1]) / size)
-        cell = row * columns + column
-        if row < 0 or column < 0 or column >= columns or cell + 1 >= len(starts):
+    (corner, size, wide, deep), (starts, piece, counts_from, below) = grid, index
+    (pieces, turns), (px, py, pz, tilt), (slack_from, slack), (top, owner) = sweeps, points, late, result
+    tilted = len(turns) > 1
+    for i in range(len(px)):
+        row, column = math.floor((px[i] - corner[0]) / size), math.floor((py[i] - corner[1]) / size)
+        layer = math.floor((pz[i] - corner[2]) / size)
+        cell = (row * wide + column) * deep + layer
+        if row < 0 or not 0 <= column < wide or not 0 <= layer < deep or cell + 1 >= len(starts):
             continue
         low, high = starts[cell], first_from(piece, starts[cell], starts[cell + 1], window[1][i])
         if window[0][i] > 0:
@@ -155,13 +158,24 @@ def lower(
                 continue
             part = pieces[piece[entry]]
             arc, smaller = part["turn"] != 0.0, slack if piece[entry] >= slack_from[i] else 0.0
-            along, beside, spoke = foot(part, x[i], y[i], arc)
+            x, y, z = px[i], py[i], pz[i]
+            least: float = part["z"] + min(part["slope"] * part["extent"], 0.0)
+            if tilted:
+                turn = turns[part["tilt"]]
+                if smaller == 0.0 and part["tilt"] != tilt[i]:
+                    smaller = -slack
+                z = px[i] * turn[0, 2] + py[i] * turn[1, 2] + pz[i] * turn[2, 2]
+                if least + smaller - z >= best:
+                    continue
+                x = px[i] * turn[0, 0] + py[i] * turn[1, 0] + pz[i] * turn[2, 0]
+                y = px[i] * turn[0, 1] + py[i] * turn[1, 1] + pz[i] * turn[2, 1]
+            least += smaller - z
+            along, beside, spoke = foot(part, x, y, arc)
             near = distance(beside, within(along, part["extent"]) - along, spoke, arc)
-            least: float = part["z"] + min(part["slope"] * part["extent"], 0.0) + smaller
-            if near > part["reach"] - smaller or least + rise(part["reach"], part["flat"], near) >= best:
+            if near > part["reach"] - smaller - ROUNDED or least + rise(part["reach"], part["flat"], near) >= best:
                 continue
             sloped, bull = part["slope"] != 0.0, 0.0 < part["flat"] < part["reach"]
-            height = float(height_above(part, along, beside, spoke, arc, sloped, bull)) + smaller
+            height = float(height_above(part, along, beside, spoke, arc, sloped, bull)) + smaller - z
             if height < best:
                 last = piece[entry] if height < best - CLEAR else last
                 best = height

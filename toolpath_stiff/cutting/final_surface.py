@@ -1,19 +1,21 @@
 """What stays in the finished part: which stations make its walls, its floors and scallops; its heights, with owners."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, product
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.envelopes import down_slope, foot, rise, within
 from toolpath_stiff.cutting.stations import blocks_of_stations, points_around
-from toolpath_stiff.cutting.workpiece import Workpiece
+from toolpath_stiff.cutting.tilts import TURNING
+from toolpath_stiff.cutting.workpiece import Workpiece, in_frames
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.path.sampling import Samples
 
 BESIDE = 2e-6  # m, outside of a wall, where it must stand; and how far above the finished surface still is that surface
-ALWAYS = 1e9  # m of path, longer than any
+COLUMNS, DEEP = 32, 1e9  # of cells at a time; m, below everything
+MADE = 5.0  # times that, along a tool, within which the piece lies that made a surface
 TOUCHED = 2e-7  # m, within which a later pass touches a surface, and makes it: less than any surface error
 LATER = 0.1  # radii of the cutter along the path from where on a pass is another one
 ACROSS = 41  # points across the cutter's end
@@ -23,33 +25,29 @@ SCALLOP = 8e-4
 
 
 def walls_of_passes(
-    works: Sequence[Workpiece], tilt: IntArray, samples: Samples, cutters: Mapping[int, Cutter]
+    work: Workpiece, tilt: IntArray, samples: Samples, cutters: Mapping[int, Cutter]
 ) -> tuple[FloatArray, FloatArray]:
     """(n, 2, 2) m above the tip: lowest and highest point of the wall that a sample makes on its left and right.
 
-    Works by tilt, and samples in the frames of their tilts (n,).
+    Samples and their tilts (n,) as `stations.samples_seen`.
 
     First the walls that no later pass has cut deeper, then those of them that none has touched since (a spring pass
     makes a wall anew). nan where the finished part has no wall there. A corner's radius is below the wall.
     """
     made, own = np.full((2, len(samples), 2, 2), np.nan)
-    for work, rows, stations in _blocks(works, tilt, samples, cutters, np.full(len(samples), True)):
+    for rows, stations in _blocks(work, tilt, samples, cutters, np.full(len(samples), True)):
         sides, reach = np.array([[0.0, np.pi]]), stations["reach"][:, None]
-        wall = points_around(stations, reach + BESIDE, sides)
-        every, tip = np.full(len(wall[0]), len(work.pieces)), np.repeat(stations["z"], 2)
-        other = stations["path"] + LATER * stations["reach"]
+        x, y = points_around(stations, reach + BESIDE, sides)
+        every, tip = np.full(len(x), len(work.pieces)), np.repeat(stations["z"], 2)
+        tilts, other = np.repeat(stations["tilt"], 2), stations["path"] + LATER * stations["reach"]
         later = np.repeat(np.searchsorted(work.pieces["before"], other, "right"), 2)
-        longest = tip + np.repeat(stations["longest"], 2)
-        high = work.tops(*wall, (np.zeros_like(every), every), ceiling=longest)[0]
-        low = np.maximum(work.stock.bottoms(*wall), tip + np.repeat(stations["reach"] - stations["flat"], 2))
-        low, high = (z - tip for z in work.span(*wall, (low, high), -ALWAYS + tip, ALWAYS + tip))
+        limits = tip + np.repeat(stations["reach"] - stations["flat"], 2), tip + np.repeat(stations["longest"], 2)
+        low, high = work.span(x, y, tilts, limits, (np.zeros_like(every), every))
         stands = np.flatnonzero((high - low > BESIDE) & ~np.repeat(stations["end_alone"], 2))
+        window, tilts = (later[stands], every[stands]), tilts[stands]
         for walls, offset in ((made, TOUCHED), (own, -TOUCHED)):
             x, y = (axis[stands] for axis in points_around(stations, reach + offset, sides))
-            base = tip[stands]
-            top = work.tops(x, y, (later[stands], every[stands]), ceiling=base + high[stands])[0]
-            since = np.repeat(stations["path"], 2)[stands]
-            foot, top = (z - base for z in work.span(x, y, (base + low[stands], top), since, ALWAYS + base))
+            foot, top = (z - tip[stands] for z in work.span(x, y, tilts, (low[stands], high[stands]), window))
             part = np.full((len(tip), 2), np.nan)
             stays = top - foot > BESIDE
             part[stands[stays]] = np.stack([foot, top], axis=1)[stays]
@@ -58,7 +56,7 @@ def walls_of_passes(
 
 
 def final_strip(
-    works: Sequence[Workpiece], tilt: IntArray, samples: Samples, cutters: Mapping[int, Cutter], chosen: BoolArray
+    work: Workpiece, tilt: IntArray, samples: Samples, cutters: Mapping[int, Cutter], chosen: BoolArray
 ) -> FloatArray:
     """(n, 2) m across the feed, + to the left: lowest and highest offset at which a sample makes the finished surface.
 
@@ -66,7 +64,7 @@ def final_strip(
     of a ball the scallop around its point of contact kappa = asin(|offset| / R). nan: none.
     """
     strips = np.full((len(samples), 2), np.nan)
-    for work, rows, stations in _blocks(works, tilt, samples, cutters, chosen):
+    for rows, stations in _blocks(work, tilt, samples, cutters, chosen):
         offset = stations["reach"][:, None] * np.sin(np.linspace(-0.5, 0.5, ACROSS) * np.pi)[None, :]
         reach, flat = stations["reach"][:, None], stations["flat"][:, None]
         # On a slope the envelope leaves a point behind the tip, or before it, where its normal is square to the motion.
@@ -76,21 +74,20 @@ def final_strip(
         away = np.hypot(offset, back)
         surface = (stations["z"][:, None] + rise(reach, flat, away)).ravel()
         x, y = points_around(stations, away, np.arctan2(-back, offset))
-        every = np.full(len(surface), len(work.pieces))
-        ball = np.repeat(np.where(stations["flat"] == 0.0, SCALLOP * stations["reach"], 0.0), ACROSS)
-        near = BESIDE + ball
-        limits = surface + 2.0 * near, surface - near
-        top = work.tops(x, y, (np.zeros_like(every), every), None, 0.0, *limits)[0]
-        stays: BoolArray = np.abs(top - surface) < near
-        stays &= (work.stock.bottoms(x, y) < surface) & ~np.repeat(stations["end_alone"], ACROSS)
-        stays &= work.standing(np.stack([x, y, surface - BESIDE]), x - ALWAYS, x + ALWAYS)
+        every, tilts = np.full(len(surface), len(work.pieces)), np.repeat(stations["tilt"], ACROSS)
+        ball = stations["flat"] == 0.0
+        near = np.repeat(BESIDE + np.where(ball, SCALLOP * stations["reach"], 0.0), ACROSS)
+        limits = surface - near, surface + 2.0 * near
+        low, high = work.span(x, y, tilts, limits, (np.zeros_like(every), every))
+        stays: BoolArray = (np.abs(high - surface) < near) & (low < surface)
+        stays &= ~np.repeat(stations["end_alone"], ACROSS)
         # A flat end passes a point of the floor twice, with its front and with its back.
         other = stations["path"] + LATER * stations["reach"] + 2.0 * stations["flat"]
         some = np.flatnonzero(stays)
         later = np.searchsorted(work.pieces["before"], other, "right")[some // ACROSS]
-        ceiling = surface[some] + 2.0 * TOUCHED
-        above = work.tops(x[some], y[some], (later, every[some]), ceiling=ceiling)[0] - surface[some]
-        stays[some] = (above > TOUCHED) | ((above < -TOUCHED) & (ball[some] > 0.0))
+        limits = surface[some] - 2.0 * TOUCHED, surface[some] + 2.0 * TOUCHED
+        above = work.span(x[some], y[some], tilts[some], limits, (later, every[some]))[1] - surface[some]
+        stays[some] = (above > TOUCHED) | ((above < -TOUCHED) & ball[some // ACROSS])
         stays = stays.reshape(offset.shape)
         low, high = np.where(stays, offset, np.inf).min(axis=1), np.where(stays, offset, -np.inf).max(axis=1)
         strips[rows] = np.where(np.isfinite(low)[:, None], np.stack([low, high], axis=1), np.nan)
@@ -110,35 +107,31 @@ def finished_surface(
         for corner, edge, count in zip(work.stock.corner, size, np.ceil(size / cell).astype(np.int64), strict=True)
     )
     top, owner = np.empty((len(x), len(y))), np.empty((len(x), len(y)), dtype=np.int64)
-    for i in range(len(x)):
-        column, always = np.full(len(y), x[i]), np.full(len(y), ALWAYS)
-        own, path = _left(work, column, y)
-        top[i] = work.span(column, y, (work.stock.bottoms(column, y), own), -always, always)[1]
-        lower = top[i] < own
-        for turn, other in work.others:
-            across, beside, height = product(turn, np.stack([column, y, top[i]]))
-            left, made = _left(other, across, beside)
-            floor = lower & (np.abs(left - height) < BESIDE)
-            path[floor], lower[floor] = made[floor], False
-        top[i, lower] = -np.inf
-        owner[i] = np.where(path < 0.0, -1, np.searchsorted(0.5 * (samples.s[1:] + samples.s[:-1]), path))
+    for rows in (slice(start, start + COLUMNS) for start in range(0, len(x), COLUMNS)):
+        across, along = (places.ravel() for places in np.meshgrid(x[rows], y, indexing="ij"))
+        upright = np.zeros(len(across), dtype=np.int64)
+        whole = upright, np.full(len(across), len(work.pieces))
+        if work.tilted:
+            high = work.span(across, along, upright, (-np.inf, np.inf), whole)[1]
+            below = np.stack([across, along, np.maximum(high, -DEEP) - BESIDE])
+            piece = work.lowest(below, upright, whole, np.full(len(across), MADE * BESIDE))[1]
+            high[(piece < 0) & (high < work.stock.tops(across, along) - BESIDE)] = -np.inf
+        else:
+            high, piece = work.tops(across, along, whole)
+        part: AnyArray = work.pieces[piece]
+        u, v, _ = in_frames(np.stack([across, along, np.maximum(high, -DEEP)]), work.turns, part["tilt"])
+        place = np.where(part["turn"] != 0.0, foot(part, u, v, True)[0], foot(part, u, v, False)[0])
+        share = within(place, part["extent"]) / np.where(part["extent"] > 0.0, part["extent"], 1.0)
+        path = part["before"] + share * (part["after"] - part["before"])
+        made = np.where(piece < 0, -1, np.searchsorted(0.5 * (samples.s[1:] + samples.s[:-1]), path))
+        top[rows], owner[rows] = high.reshape(-1, len(y)), made.reshape(-1, len(y))
     return x, y, np.where(top <= work.stock.bottom.min(), -np.inf, top), owner
 
 
-def _left(work: Workpiece, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n,) m, the height that the pieces of a work leave at points, and (n,) m of the path where; -1: nowhere."""
-    top, piece = work.tops(x, y, (np.zeros(len(y), np.int64), np.full(len(y), len(work.pieces))))
-    part: AnyArray = work.pieces[piece]
-    along = np.where(part["turn"] != 0.0, foot(part, x, y, True)[0], foot(part, x, y, False)[0])
-    share = within(along, part["extent"]) / np.where(part["extent"] > 0.0, part["extent"], 1.0)
-    return top, np.where(piece < 0, -1.0, part["before"] + share * (part["after"] - part["before"]))
-
-
 def _blocks(
-    works: Sequence[Workpiece], tilt: IntArray, samples: Samples, cutters: Mapping[int, Cutter], chosen: BoolArray
-) -> Iterator[tuple[Workpiece, IntArray, AnyArray]]:
-    """Of the samples chosen (n,) that cut and move the work, some rows and their records."""
-    moving = np.flatnonzero(chosen & (samples.motion != RAPID) & (samples.tangent != 0.0).any(axis=1))
-    for number, work in enumerate(works):
-        for rows, stations in blocks_of_stations(work, samples, cutters, moving[tilt[moving] == number]):
-            yield work, rows, stations
+    work: Workpiece, tilt: IntArray, samples: Samples, cutters: Mapping[int, Cutter], chosen: BoolArray
+) -> Iterator[tuple[IntArray, AnyArray]]:
+    """Of the samples chosen (n,) that cut and move, with a tool that stands still, some rows and their records."""
+    chosen = chosen & (work.tilts[samples.move] != TURNING) & (samples.motion != RAPID)
+    moving = np.flatnonzero(chosen & (samples.tangent != 0.0).any(axis=1))
+    yield from blocks_of_stations(work, samples, tilt, cutters, moving)

@@ -2,7 +2,7 @@
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -31,9 +31,6 @@ class Stock:
         (nx, ny) m; top -inf: no material. Hollows below the top are taken as filled.
     origin
         Where this comes from, a sentence.
-    turn
-        (3, 3) axes of a frame as columns: there a box is looked at aslant, all else is of the frame that it is square
-        in. None: no other frame.
 
     Examples
     --------
@@ -46,12 +43,12 @@ class Stock:
     top: FloatArray
     bottom: FloatArray
     origin: str
-    turn: FloatArray | None = None
 
-    def seen(self, turn: FloatArray) -> "Stock":
-        """The box, or the one around it, in another frame, whose axes are the columns of `turn`."""
-        top, bottom = np.array([[self.top.max()]]), np.array([[self.bottom.min()]])
-        return replace(self, cell=self.cell * self.top.shape, top=top, bottom=bottom, turn=turn)
+    @property
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """(3,) m, lowest and highest corner of the box around it."""
+        high = np.append(self.corner + self.cell * self.top.shape, self.top.max())
+        return np.append(self.corner, self.bottom.min()), high
 
     def __repr__(self) -> str:
         x, y = mm_from_m(self.cell * self.top.shape)
@@ -60,9 +57,6 @@ class Stock:
 
     def tops(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """(n,) m of the top at points x, y; -inf beside the stock."""
-        if self.turn is not None:
-            bottom, top = self._through(x, y, self.turn)
-            return np.where(top > bottom, top, -np.inf)
         if self.top.size == 1:
             end = self.corner + self.cell
             inside = (x >= self.corner[0]) & (x < end[0]) & (y >= self.corner[1]) & (y < end[1])
@@ -72,21 +66,20 @@ class Stock:
 
     def bottoms(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """(n,) m of the underside at points x, y."""
-        if self.turn is not None:
-            bottom, _ = self._through(x, y, self.turn)
-            return bottom
         if self.top.size == 1:
             return np.full(len(x), self.bottom[0, 0])
         i, j, _ = self._cells(x, y)
         return np.asarray(self.bottom[i, j])
 
-    def _through(self, x: FloatArray, y: FloatArray, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n,) m, where lines along z enter a box that stands aslant, and (n,) leave it; less: they miss it."""
-        low = np.append(self.corner, self.bottom[0, 0])
-        ends = np.stack([low, np.append(self.corner + self.cell, self.top[0, 0])])
+    def through(self, x: FloatArray, y: FloatArray, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(n,) m, where lines along z of frames enter the box around it, and (n,) leave it; less: they miss it.
+
+        `turn` (n, 3, 3): axes of its own frame as columns in those.
+        """
         along = np.where(np.abs(turn[:, 2]) > 1e-12, turn[:, 2], 1e-12)
-        places = (ends[:, :, None] - turn[:, :1] * x - turn[:, 1:2] * y) / along[:, None]
-        return places.min(axis=0).max(axis=0), places.max(axis=0).min(axis=0)
+        beside = turn[:, 0] * x[:, None] + turn[:, 1] * y[:, None]
+        first, second = ((end - beside) / along for end in self.ends)
+        return np.minimum(first, second).max(axis=1), np.maximum(first, second).min(axis=1)
 
     def _cells(self, x: FloatArray, y: FloatArray) -> tuple[IntArray, IntArray, BoolArray]:
         i, j = np.floor((x - self.corner[0]) / self.cell[0]), np.floor((y - self.corner[1]) / self.cell[1])
