@@ -82,7 +82,15 @@ def test_what_the_data_leave_open_is_planned(here, capsys):
     rows, _ = case.make_case(11, layout="paper", hidden="spindle_compliance", size=0.1)
     (here / "a spindle.csv").write_text(exercise.csv_text(rows), encoding="utf-8")
     done = follow("tps diagnose 'a spindle.csv' --noise 2,1", capsys)
-    assert done[1:] == ["tps plan 'a spindle.csv' --noise 2,1"]
+    plan, update, *further = done[1:]
+    assert plan == "tps plan 'a spindle.csv' --noise 2,1"
+    # Until then: what the update takes away, and what it leaves.
+    assert update == "tps update 'a spindle.csv' --auto --believe machine -o nist-updated.toml --noise 2,1"
+    assert (here / "nist-updated.toml").is_file() and {shlex.split(line)[1] for line in further} == {
+        "compare",
+        "diagnose",
+        "map",
+    }
 
 
 def test_what_nothing_explains_is_written_and_tried(here, capsys):
