@@ -1,7 +1,5 @@
 """Stiffness at single poses: along the axes, in the softest and the stiffest direction."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
