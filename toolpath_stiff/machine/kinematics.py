@@ -17,13 +17,12 @@ from numpy.typing import ArrayLike
 from toolpath_stiff.arrays import ArrayColumns, FloatArray
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
+from toolpath_stiff.machine.newton import newton
+from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
-LENGTH_TOLERANCE = 1e-12  # m, a few units in the last place of a strut's length
-MOST_STEPS = 50
-# Farthest step of Newton's method: beyond some tenths of a radian its linear model of a rotation is worthless.
-LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.3  # m, rad
+# Farthest step of Newton's method, m and rad: beyond some tenths of a radian its linear model of a turn is worthless.
+LARGEST_STEPS = np.array([0.5, 0.5, 0.5, 0.3, 0.3, 0.3])
 
 
 @dataclass(frozen=True)
@@ -185,8 +184,7 @@ def forward_kinematics(
     Raises
     ------
     InputError
-        Not six finite lengths above 0 in each row, or lengths that no pose near the start has; the message names the
-        row.
+        Lengths that no pose near the start has; the message names the row.
 
     Examples
     --------
@@ -197,69 +195,24 @@ def forward_kinematics(
     array([ 0.1 , -0.05,  0.8 ])
     """
     wanted = np.atleast_2d(np.asarray(lengths, dtype=float))
-    _check_lengths(wanted)
+
+    def equations(poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+        struts = solve_struts(machine, poses[:, :3], rotation_matrices(poses[:, 3:]), tool_length)
+        slopes = struts.jacobian
+        return struts.lengths - wanted, np.concatenate([slopes[..., :3], slopes[..., 3:] @ _turning(poses)], axis=-1)
+
     first = np.asarray(machine.limits.neutral_pose if start is None else start, dtype=float)
-    poses = np.broadcast_to(first, (len(wanted), 6))
-    position, rotation = poses[:, :3].copy(), rotation_matrices(poses[:, 3:])
-    error = np.full(len(wanted), np.inf)
-    for _ in range(MOST_STEPS):
-        struts = solve_struts(machine, position, rotation, tool_length)
-        missing = wanted - struts.lengths
-        error = np.abs(missing).max(axis=1)
-        # The last digits differ from step to step; one more step after reaching them changes nothing.
-        if (error < LENGTH_TOLERANCE).all() or not np.isfinite(error).all():
-            break
-        twist = _newton_step(struts.jacobian, missing)
-        position = position + twist[:, :3]
-        rotation = _turn(twist[:, 3:]) @ rotation
-    failed = np.flatnonzero(~(error < 1e3 * LENGTH_TOLERANCE))
-    if len(failed):
-        row = int(failed[0])
-        mistake = f"row {row + 1}: no pose near the start has struts of {_in_words(wanted[row])} mm"
+    poses = newton(equations, np.broadcast_to(first, (len(wanted), 6)), LARGEST_STEPS)
+    if failed := np.flatnonzero(np.isnan(poses).any(axis=1)).tolist():
+        row = ", ".join(f"{mm_from_m(length):.3f}" for length in wanted[failed[0]])
+        mistake = f"row {failed[0] + 1}: no pose near the start has struts of {row} mm"
         raise InputError(mistake, hint="check the lengths, or give a start nearer to the pose")
-    return np.concatenate([position, roll_pitch_yaw(rotation)], axis=1)
+    return poses
 
 
-def _check_lengths(lengths: FloatArray) -> None:
-    """One bad row must not be blamed on another: rows are solved together."""
-    if lengths.ndim != 2 or lengths.shape[1] != 6:
-        raise InputError(f"strut lengths of shape {lengths.shape}", expected="(n, 6) or (6,)")
-    bad = np.flatnonzero(~(np.isfinite(lengths) & (lengths > 0.0)).all(axis=1))
-    if len(bad):
-        row = int(bad[0])
-        mistake = f"row {row + 1}: strut lengths {_in_words(lengths[row])} mm"
-        raise InputError(mistake, expected="six finite lengths above 0")
-
-
-def _in_words(lengths: FloatArray) -> str:
-    return ", ".join(f"{mm_from_m(v):.3f}" for v in lengths)
-
-
-def _newton_step(jacobian: FloatArray, missing: FloatArray) -> FloatArray:
-    """Twists (n, 6), shortened where they are too large to be trusted; near singular poses the smallest ones."""
-    try:
-        twist = np.asarray(np.linalg.solve(jacobian, missing[..., None])[..., 0])
-    except np.linalg.LinAlgError:
-        twist = np.full(missing.shape, np.inf)
-    rows = np.flatnonzero(~(_excess(twist) <= 1.0))
-    if len(rows):
-        twist[rows] = np.einsum("nij,nj->ni", np.linalg.pinv(jacobian[rows]), missing[rows])
-    return np.asarray(twist / np.maximum(1.0, _excess(twist))[:, None])
-
-
-def _excess(twist: FloatArray) -> FloatArray:
-    """(n,) size of twists (n, 6) over the largest one that is trusted."""
-    shift, turn = np.linalg.norm(twist[:, :3], axis=1), np.linalg.norm(twist[:, 3:], axis=1)
-    return np.asarray(np.maximum(shift / LARGEST_SHIFT, turn / LARGEST_TURN))
-
-
-def _turn(vector: FloatArray) -> FloatArray:
-    """Rotation matrices (n, 3, 3) of rotation vectors (n, 3), Rodrigues' formula."""
-    angle = np.linalg.norm(vector, axis=1)[:, None, None]
-    x, y, z = vector.T
-    zero = np.zeros_like(x)
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-    safe = np.where(angle > 1e-8, angle, 1.0)
-    first = np.where(angle > 1e-8, np.sin(safe) / safe, 1.0)
-    second = np.where(angle > 1e-8, (1.0 - np.cos(safe)) / safe**2, 0.5)
-    return np.asarray(np.eye(3) + first * skew + second * (skew @ skew))
+def _turning(poses: FloatArray) -> FloatArray:
+    """(n, 3, 3) axes about which roll, pitch and yaw turn the platform, in columns (R = Rz Ry Rx)."""
+    axes, yaw = rotation_matrices(poses[:, 3:]), poses[:, 5]
+    axes[..., 1] = np.column_stack([-np.sin(yaw), np.cos(yaw), np.zeros_like(yaw)])
+    axes[..., 2] = [0.0, 0.0, 1.0]
+    return axes
