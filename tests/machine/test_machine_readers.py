@@ -185,6 +185,9 @@ BAD_URDF = [
     (URDF[:300], "tip", "not XML"),
     (URDF.replace('axis xyz="0 0 1"', 'axis xyz="0 0 0"', 1), "tip", "axis 0 0 0"),
     (URDF.replace('axis xyz="0 0 1"', 'axis xyz="0 0"', 1), "tip", "three numbers"),
+    (URDF.replace('name="J3"', 'name="J2"'), "tip", "joint 'J2' is there twice"),
+    (URDF.replace('<link name="link3"', '<link name="link33"'), "tip", "joint J3: no link 'link3', its child"),
+    (re.sub(r'lower="-1.1344[^"]*"', 'lower="2"', URDF), "tip", "joint J2: limits [2.0, 1.48"),
 ]  # fmt: skip
 
 
@@ -195,6 +198,7 @@ def test_a_bad_urdf_is_one_line(tmp_path, text, tip, words):
     with pytest.raises(InputError) as error:
         tps.machine_from_urdf(file, tip)
     assert words in str(error.value) and "\n" not in str(error.value)
+    assert error.value.line is not None or "no link flange" in words
 
 
 @pytest.mark.parametrize(
@@ -220,3 +224,18 @@ def test_other_bad_descriptions_are_one_line(tmp_path, reader, name, text, words
         else:
             tps.machine_from_linuxcnc(tmp_path / name, "mm")
     assert words in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("machine", "old", "new", "words"),
+    [
+        ("robot200", 'name = "forearm"', 'name = "upper_arm"', "[[element]] 4 name = 'upper_arm' is there twice"),
+        ("mill3", "z_axis = [1.0, 0.0, 0.0]", "z_axis = [0.0, 0.0, 1.0]", "[[element]] 1 z_axis lies along the beam"),
+        ("mill3", "z_axis = [1.0, 0.0, 0.0]", "z_axis = [0.0, 0.0, 0.0]", "[[element]] 1 z_axis lies along the beam"),
+    ],
+)
+def test_bad_elements_are_one_line(machine, old, new, words):
+    text = (DATA / f"{machine}.toml").read_text()
+    with pytest.raises(InputError) as error:
+        parse_machine(text.replace(old, new, 1), "m.toml")
+    assert words in str(error.value) and error.value.line is not None and "\n" not in str(error.value)

@@ -60,6 +60,7 @@ class ElementReader:
         self.bodies: tuple[list[Part], list[Part]] = ([], [])
         self.masses: tuple[list[Mass], list[Mass]] = ([], [])
         self.row: Document = {}
+        self.names: set[str] = set()
         self.homes = []
         for joints, end in zip(chains, ends, strict=True):
             homes = [STILL]
@@ -75,6 +76,9 @@ class ElementReader:
         """Adds what gives way by one row."""
         self.section, self.row = f"element[{nth}]", row
         kind, side = row["type"], row.get("side", "tool")
+        if row["name"] in self.names:
+            raise self.fault("name", f" = {row['name']!r} is there twice")
+        self.names.add(row["name"])
         if kind not in USED:
             raise self.fault("type", f" = {kind!r}", f"one of {', '.join(USED)}")
         for key in row:
@@ -173,11 +177,13 @@ class ElementReader:
         )
         element = self._element("table" if work else "frame")
         z_axis = start.axes @ self.needed("z_axis")
-        if first != second:
+        spans, homes = first != second, self.homes[work]
+        far = homes[first].inverse().then(homes[second].then(end)) if spans else end  # all joints at 0
+        along = far.origin - start.origin
+        if not np.linalg.norm(np.cross(along, z_axis)) > 1e-6 * np.linalg.norm(along) * np.linalg.norm(z_axis):
+            raise self.fault("z_axis", " lies along the beam, or is 0", "a direction across it")
+        if spans:
             return SpanningBeam(element, (first, second), start.origin, end.origin, z_axis, stiffness)
-        along = end.origin - start.origin
-        if np.linalg.norm(np.cross(along, z_axis)) < 1e-6 * np.linalg.norm(along) or not along.any():
-            raise self.fault("z_axis", " lies along the beam", "a direction across it")
         place = FixedFrame(beam_axes(along, z_axis), 0.5 * (start.origin + end.origin))
         return Body(element, first, place, beam_compliance(float(np.linalg.norm(along)), stiffness))
 

@@ -3,6 +3,7 @@
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from contextlib import suppress
+from xml.parsers import expat
 
 import numpy as np
 
@@ -24,18 +25,20 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
     Raises `InputError` for what is no chain, limits that are missing, and units that cannot be.
     """
 
-    def fault(mistake: str, expected: str = "", hint: str = "") -> InputError:
-        return InputError(mistake, expected=expected, hint=hint, file=file)
+    def fault(mistake: str, expected: str = "", hint: str = "", at: ET.Element | None = None) -> InputError:
+        line = None if at is None else lines[at]
+        return InputError(mistake, expected=expected, hint=hint, file=file, line=line)
 
-    macros = fault("not a plain URDF", expected="XML without entities and macros", hint="run xacro over it first")
+    macros = ("not a plain URDF", "XML without entities and macros", "run xacro over it first")
     if "<!ENTITY" in text:
-        raise macros
+        raise fault(*macros)
     try:
-        robot = ET.fromstring(text)
-    except ET.ParseError as error:
-        raise InputError(f"not XML: {error.msg}", file=file, line=error.position[0]) from None
-    if any("}" in str(element.tag) for element in robot.iter()):  # of a namespace: xacro's
-        raise macros
+        robot, lines = _parsed(text)
+    except expat.ExpatError as error:
+        raise InputError(f"not XML: {expat.ErrorString(error.code)}", file=file, line=error.lineno) from None
+    for element in robot.iter():
+        if "}" in element.tag:  # of a namespace: xacro's
+            raise fault(*macros, at=element)
     chain = _chain(robot, tip, fault)
     rows, rest, notes, masses, frame = [], STILL, [], [], ""
     inertias = {link.get("name"): inertia for link in robot.iter("link") for inertia in link.findall("inertial")}
@@ -43,7 +46,7 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
         name, kind = joint.get("name", "?"), joint.get("type", "")
         rest = rest.then(_origin(joint, fault))
         if kind not in ("fixed", *MOVING):
-            raise fault(f"joint {name} is {kind}", expected=f"fixed, {', '.join(MOVING)}")
+            raise fault(f"joint {name} is {kind}", expected=f"fixed, {', '.join(MOVING)}", at=joint)
         if kind != "fixed":
             rows.append(_row(joint, name, kind, rest, fault))
             rest, frame = STILL, name
@@ -64,16 +67,35 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
     ), notes
 
 
+def _parsed(text: str) -> tuple[ET.Element, dict[ET.Element, int]]:
+    """The root of a tree, and the line of each of its elements."""
+    builder, lines, parser = ET.TreeBuilder(), {}, expat.ParserCreate(namespace_separator="}")
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        lines[builder.start(tag, attributes)] = parser.CurrentLineNumber
+
+    parser.StartElementHandler, parser.EndElementHandler = start, builder.end
+    parser.Parse(text, True)
+    return builder.close(), lines
+
+
 def _chain(robot: ET.Element, tip: str, fault: Fault) -> list[ET.Element]:
     """The joints from the root link to the tip."""
     above: dict[str, ET.Element] = {}
-    for joint in robot.iter("joint"):
-        if (child := joint.find("child")) is None or joint.find("parent") is None:
-            continue  # of a transmission or a plug-in
-        link = child.get("link", "")
+    named: dict[tuple[str, str], ET.Element] = {}
+    for element in (*robot.findall("link"), *robot.findall("joint")):  # those of transmissions and plug-ins lie deeper
+        if named.setdefault((element.tag, name := element.get("name", "")), element) is not element or not name:
+            raise fault(f"{element.tag} {name!r} is there twice", expected="a name of its own", at=element)
+    for joint in robot.findall("joint"):
+        name = joint.get("name", "")
+        for role in ("parent", "child"):
+            end = joint.find(role)
+            link = "" if end is None else end.get("link", "")
+            if ("link", link) not in named:
+                raise fault(f"joint {name}: no link {link!r}, its {role}", expected="<link> in the file", at=joint)
         if link in above:
-            mistake = f"link {link} hangs on the joints {above[link].get('name')} and {joint.get('name')}: a loop"
-            raise fault(mistake, expected="a tree: each link on one joint")
+            mistake = f"link {link} hangs on the joints {above[link].get('name')} and {name}: a loop"
+            raise fault(mistake, expected="a tree: each link on one joint", at=joint)
         above[link] = joint
     if tip not in above:
         parents = {joint.find("parent").get("link") for joint in above.values()}  # type: ignore[union-attr]
@@ -82,7 +104,8 @@ def _chain(robot: ET.Element, tip: str, fault: Fault) -> list[ET.Element]:
     chain: list[ET.Element] = []
     while tip in above:
         if above[tip] in chain:
-            raise fault(f"joint {above[tip].get('name')} leads back to itself: a loop", expected="a tree")
+            mistake = f"joint {above[tip].get('name')} leads back to itself: a loop"
+            raise fault(mistake, expected="a tree", at=above[tip])
         chain.insert(0, above[tip])
         tip = above[tip].find("parent").get("link", "")  # type: ignore[union-attr]
     return chain
@@ -92,7 +115,7 @@ def _row(joint: ET.Element, name: str, kind: str, rest: FixedFrame, fault: Fault
     """The `[[axis]]` of a joint that moves."""
     axis, linear = _numbers(joint.find("axis"), "xyz", "1 0 0", fault), MOVING[kind]
     if not np.linalg.norm(axis) > 0.0:
-        raise fault(f"joint {name}: axis 0 0 0", expected="a direction")
+        raise fault(f"joint {name}: axis 0 0 0", expected="a direction", at=joint.find("axis"))
     speed = _number(joint.find("limit"), "velocity", f"joint {name}", "m/s or rad/s", fault)
     key, value = ("speed_mm_per_s", mm_from_m(speed)) if linear else ("speed_deg_per_s", deg_from_rad(speed))
     place = place_keys(rest, axis / np.linalg.norm(axis))
@@ -103,14 +126,14 @@ def _number(element: ET.Element | None, key: str, where: str, unit: str, fault: 
     """A number of 0 or more; 0 where there is none."""
     word, (number, *_) = _words(element, key, "0", 1)
     if not 0.0 <= number < np.inf:
-        raise fault(f'{where}: {key}="{word}"', expected=f"a number, {unit}")
+        raise fault(f'{where}: {key}="{word}"', expected=f"a number, {unit}", at=element)
     return number
 
 
 def _numbers(element: ET.Element | None, key: str, default: str, fault: Fault) -> FloatArray:
     text, values = _words(element, key, default, 3)
     if not np.isfinite(values).all():
-        raise fault(f'{key}="{text}"', expected="three numbers")
+        raise fault(f'{key}="{text}"', expected="three numbers", at=element)
     return np.array(values)
 
 
@@ -128,16 +151,19 @@ def _origin(joint: ET.Element, fault: Fault) -> FixedFrame:
     place = [_numbers(joint.find("origin"), key, "0 0 0", fault) for key in ("xyz", "rpy")]
     if np.abs(place[0]).max() > FARTHEST or np.abs(place[1]).max() > MOST_TURNS:
         mistake = f"joint {joint.get('name')}: origin {place[0].tolist()}, rpy {place[1].tolist()}"
-        raise fault(mistake, expected="metres and radians", hint="these look like mm or degrees")
+        raise fault(mistake, "metres and radians", "these look like mm or degrees", at=joint.find("origin"))
     return placement(*place)
 
 
 def _limits(joint: ET.Element, name: str, kind: str, fault: Fault) -> FloatArray:
     if kind == "continuous":
         return np.array([-np.inf, np.inf])
-    ends = np.array([_words(joint.find("limit"), key, "nan", 1)[1][0] for key in ("lower", "upper")])
+    limit = joint.find("limit")
+    ends = np.array([_words(limit, key, "nan", 1)[1][0] for key in ("lower", "upper")])
     if not ends[0] < ends[1]:
-        raise fault(f"joint {name} has no limits", expected='<limit lower="..." upper="..."/>, lower below upper')
+        found = f"joint {name} has no limits" if np.isnan(ends).any() else f"joint {name}: limits {ends.tolist()}"
+        expected = '<limit lower="..." upper="..."/>, lower below upper'
+        raise fault(found, expected, at=joint if limit is None else limit)
     if np.abs(ends).max() > (FARTHEST if kind == "prismatic" else MOST_TURNS):
-        raise fault(f"joint {name}: limits {ends.tolist()}", expected="radians or metres, not degrees or mm")
+        raise fault(f"joint {name}: limits {ends.tolist()}", "radians or metres, not degrees or mm", at=limit)
     return ends
