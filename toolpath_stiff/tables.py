@@ -145,10 +145,11 @@ def _table(rows: Rows, file: str, columns: Columns, separator: str, remarks: lis
     while not written[-1]:
         written.pop()
     full = written  # with the units below
-    if body and _are_units(body[0][1]):
-        (below, cells), *body = body
+    # A row that is longer than the heading is refused as any other.
+    if body and len(stated := _fitted(body[0][1], len(written), pad=True)) == len(written) and _are_units(stated):
+        (below, _), *body = body
         remarks.append(f"line {below} is a row of units")
-        full = [f"{cell} [{unit}]" for cell, unit in zip(written, _fitted(cells, len(written), pad=True), strict=True)]
+        full = [f"{cell} [{unit}]" for cell, unit in zip(written, stated, strict=True)]
     heading = _named(written, full, columns, file, line)
     units = {i: pair for i, cell in enumerate(written) if (pair := _units(cell, full[i], heading[i], columns))}
     # Instruments leave a last column of remarks out where it is empty.

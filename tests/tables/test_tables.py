@@ -8,7 +8,7 @@ from datetime import datetime
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from openpyxl import Workbook
 
@@ -241,6 +241,7 @@ def test_raw_records_are_read_by_the_same_reader(tmp_path, monkeypatch, capsys):
 
 
 @settings(max_examples=150, deadline=None)
+@example(content=b"\x01\r,M")  # a row of units longer than the heading
 @given(content=st.binary(max_size=60) | st.text(alphabet="x_m0;,\t\n\r\"'.#N/A1 ", max_size=80).map(str.encode))
 def test_whatever_the_bytes_are_is_read_or_refused(tmp_path_factory, content):
     file = tmp_path_factory.mktemp("t") / "a.csv"
