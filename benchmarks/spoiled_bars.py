@@ -6,7 +6,7 @@ from typing import Any
 
 from benchmarks.bars import Figure, Record, holds_truth, named, share
 from benchmarks.spoiled_cases import FACTORS, MANY_OUTLIERS, WAYS
-from toolpath_stiff.rig.slips import VISIBLE
+from tests.rig.slips import VISIBLE
 
 COST_OF_OUTLIERS = 3.0  # percentage points
 Test = Callable[[Record], bool]

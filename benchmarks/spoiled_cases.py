@@ -9,10 +9,10 @@ from typing import Any
 
 from benchmarks.case_loop import record_of
 from benchmarks.diagnosis_cases import judged
+from tests.rig.slips import SLIPS, slipped_case, with_stated_noise
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.hidden import Nuisances
-from toolpath_stiff.rig.slips import SLIPS, slipped_case, with_stated_noise
 
 GROUPS = ("outliers", "stated", "slip")
 PAIR_SIZES = (0.10, 0.05)  # rms change of ln k of the two

@@ -1,7 +1,5 @@
 """What every result can do: print itself, show itself in a notebook, become a table, a document, a picture, files."""
 
-from __future__ import annotations
-
 import html
 import json
 from abc import ABC, abstractmethod

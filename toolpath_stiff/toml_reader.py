@@ -4,14 +4,12 @@ A reader of our own, because validators of types (msgspec, cattrs) know no lines
 means ("6 rows of 3 numbers in mm"), and stop at what a type can say: a bound, a unit, a key that excludes another.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, Self, TypeGuard
 
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
@@ -53,7 +51,7 @@ class TomlReader:
         self._places = _places(lines, self.data)
 
     @classmethod
-    def read(cls, path: str | Path, what: str, kind: type[InputError] = InputError) -> TomlReader:
+    def read(cls, path: str | Path, what: str, kind: type[InputError] = InputError) -> Self:
         """Read a file, as the constructor. Raises `InputError` if it cannot be read, `kind` if it is not TOML."""
         try:
             return cls(read_bytes(path, what, LARGEST_BYTES).decode("utf-8-sig"), str(path), what, kind)

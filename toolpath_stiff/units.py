@@ -5,8 +5,6 @@ The functions take and return scalars or numpy arrays alike; they only multiply,
 costs nothing at start-up.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.rig.slips import SLIPS, slipped_case, with_slip, with_stated_noise
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.case import draw_case, rows_of
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import Nuisances
 from toolpath_stiff.rig.kinematics import reachable
-from toolpath_stiff.rig.slips import SLIPS, slipped_case, with_slip, with_stated_noise
 
 CASE = draw_case(5, "tilted", "none")
 

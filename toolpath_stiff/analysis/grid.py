@@ -1,7 +1,5 @@
 """Stiffness on a grid: planes of the workspace under one load, as the paper's Figures 8 and 9."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

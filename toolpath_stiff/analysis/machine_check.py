@@ -1,7 +1,5 @@
 """Slips in a machine file: whether struts, neutral pose and joints are plausible."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

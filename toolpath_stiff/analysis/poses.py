@@ -1,7 +1,5 @@
 """Stiffness at single poses: along the axes, in the softest and the stiffest direction."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
@@ -13,7 +11,7 @@ from toolpath_stiff.analysis.evaluation import Poses, compliance_along, joint_co
 from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
-from toolpath_stiff.documents import Document, without_nan
+from toolpath_stiff.documents import Document, records, without_nan
 from toolpath_stiff.machine.limits import Reach
 from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
@@ -129,8 +127,7 @@ class PoseStiffness(Result):
     def to_dict(self) -> Document:
         """Of a single pose its figures; of several, a list of them under "poses", null where out of reach."""
         about = {"machine": self.model.machine.name, **effects_stated(self.model), "warnings": self.warnings}
-        cells = zip(*(column.tolist() for column in self.columns.values()), strict=True)
-        rows = [without_nan(dict(zip(self.columns, row, strict=True))) for row in cells]
+        rows = [without_nan(row) for row in records(self.columns)]
         tensors = (nm_from_m(self.tip_compliance).round(6) + 0.0).tolist()  # no digits of rounding
         rows = [
             {**row, "extrapolated": bool(row["extrapolated"]), **without_nan({"tip_compliance_nm_per_N": tensor})}

@@ -1,7 +1,5 @@
 """Checks of a program before any stiffness: extents, lengths, times, reach and strut speeds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar

@@ -4,8 +4,6 @@ Best are constant turns first: the one with the least mean compliance at which n
 changes along the path is taken where no constant one is feasible, or where it gains.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Many programs on one machine: each its report, one overview of all; in processes, or wherever an executor works."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import threading

@@ -11,12 +11,10 @@
 No file is written twice: a change is a new file and a step that names it, so to undo is to forget the last steps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Unpack, cast
+from typing import Any, Self, Unpack, cast
 
 import toolpath_stiff as tps
 from toolpath_stiff.api.by_hand import Preview, preview, with_effects
@@ -80,7 +78,7 @@ class Case:
         self.folder, self.history = folder, list(history)
 
     @classmethod
-    def open(cls, folder: str | Path, machine: str | Path = MACHINE, trust: Iterable[str] = ()) -> Case:
+    def open(cls, folder: str | Path, machine: str | Path = MACHINE, trust: Iterable[str] = ()) -> Self:
         """Open a case, or begin one in a folder that has none.
 
         Files of own effects that came with a case from elsewhere are code: it opens once you have agreed to run them.

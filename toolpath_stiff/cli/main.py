@@ -1,7 +1,5 @@
 """The entry point: commands are listed here and imported when they are asked for, as `tps --help` loads no numpy."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import signal

@@ -4,8 +4,6 @@ What a command writes may not be what it reads: one check for all of them, befor
 names a file is an input, but those that say where results go. With `--replace` the old file is kept beside the new one.
 """
 
-from __future__ import annotations
-
 import inspect
 import sys
 import time

@@ -4,8 +4,6 @@ What is tested are residuals r = ln(measured / modelled), on which noise and eff
 counted and which sign they have: `baseline`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -13,8 +13,6 @@ scatter, wild readings included (Westfall and Young 1993, Resampling-based multi
 strongest pattern is then taken out and the rest is asked again, until nothing stands out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache

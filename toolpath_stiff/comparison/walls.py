@@ -5,8 +5,6 @@ against the error that is foretold at its height. The lines of the program are t
 residual is beyond twice what scatter and the band of the model explain.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

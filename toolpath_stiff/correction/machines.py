@@ -101,7 +101,7 @@ def entries_of(
 
 
 def fitted_elements(
-    machine: MachineTool, fit: Fit, provenance: Document, widened: float, torsions: Sequence[float], heading: str = ""
+    machine: MachineTool, fit: Fit, provenance: Document, widened: float, torsions: Sequence[float]
 ) -> MachineTool:
     """A machine of elements with the torsions of its joints, nrad/(N m), and the other effects of a fit.
 
@@ -113,7 +113,7 @@ def fitted_elements(
     if len(set(names)) == len(names):  # else no name says which of two it is
         known = uncertainty_of(machine, fit, fit, widened, None, torsions=len(torsions))
         carrying = carrying.with_changes(uncertainty=known)
-    return parse_machine(elements_toml(carrying, torsions, heading), machine.name)
+    return parse_machine(elements_toml(carrying, torsions), machine.name)
 
 
 def _certain(value: float) -> float:

@@ -1,7 +1,5 @@
 """The result of an update: its steps, what the data support of them, in words, and the machine that came of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

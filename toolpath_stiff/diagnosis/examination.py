@@ -1,7 +1,5 @@
 """What a diagnosis has found: judgements under each noise model, fits, errors held out; a row for each hypothesis."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -8,13 +8,11 @@ refitted with the model itself afterwards.
 Sizes count from the neutral value: `value - neutral`, or `1 / value` where neutral is an infinite stiffness.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -56,7 +54,7 @@ class Component:
     bounds: tuple[float, float]
 
     @classmethod
-    def of(cls, parameter: Parameter) -> Component:
+    def of(cls, parameter: Parameter) -> Self:
         """The component of a real parameter."""
         low, high = (value * parameter.si for value in parameter.bounds)
         if np.isinf(parameter.neutral):

@@ -10,8 +10,6 @@ Some hundred pairs are on offer: each pays for that with its share of the prior
 (`inference.weigh`), and one of them has to leave no more than noise would, like every explanation.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ Kinematics of lineardeltakins(9): towers at 90, 210 and 330 degrees, z + sqrt(L^
 The rods keep the effector level; a tool does not turn.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

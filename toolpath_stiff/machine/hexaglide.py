@@ -4,8 +4,6 @@ s = e . d +- sqrt((e . d)^2 - d . d + L^2) with d from a foot's place at 0 to it
 strut's force moves its foot along the rail by the drive, across it by the guide.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -4,8 +4,6 @@ trivkins(9), 5axiskins(9), xyzac-trt-kins(9), xyzbc-trt-kins(9), genserkins(9), 
 lineardeltakins(9); their units are those of the machine, angles of genserkins' rows in rad, limits in degrees.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass

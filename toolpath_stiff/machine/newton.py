@@ -1,7 +1,5 @@
 """Newton's method with bounded steps, many poses at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

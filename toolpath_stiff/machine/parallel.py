@@ -3,8 +3,6 @@
 The platform's equilibrium gives the six forces, the rods' feet and carriages carry them on.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property

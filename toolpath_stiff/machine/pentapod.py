@@ -5,8 +5,6 @@ and a height above the tip. Struts carry no torque about the axis; the strut who
 force at its base joint, along its hinge (assumed: spherical base joint, hinge on the head).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -6,12 +6,10 @@ rotary ones (`rotary_axes`); else by bounded Newton steps (`newton`). Joints bey
 a table beside a robot, stay where they are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -304,7 +302,7 @@ class Serial(MachineTool):
         names = [joint_element(name) for name in self.joint_names]
         return names.index(element) if element in names else super().joint_of(element)
 
-    def with_longer_link(self, joint: int, by: float) -> Serial:
+    def with_longer_link(self, joint: int, by: float) -> Self:
         """With the joint's origin further from that of the joint before, in the frame of that."""
         sides = {"tool_joints": self.tool_joints, "work_joints": self.work_joints}
         chosen = self.joints[joint]

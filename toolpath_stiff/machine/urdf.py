@@ -1,7 +1,5 @@
 """Chains of URDF files (wiki.ros.org/urdf/XML): joints from the root link to a tip link; m and rad."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from contextlib import suppress

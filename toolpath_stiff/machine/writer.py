@@ -95,7 +95,7 @@ TORSION = re.compile(r"(?m)^([ \t]*torsion_nrad_per_Nm[ \t]*=[ \t]*)(\[[^\]]*\]|
 FITTED = "# Effects, and what was fitted to measurements, follow; they are written anew by `tps update`."
 
 
-def elements_toml(machine: MachineTool, torsions: Sequence[float], preamble: str = "") -> str:
+def elements_toml(machine: MachineTool, torsions: Sequence[float]) -> str:
     """The text of a machine of elements with the torsions of its joints (none: the file's), effects and uncertainty.
 
     Torsions in nrad/(N m), in the order of the joints. Raises `InputError` where the file does not hold them once.
@@ -108,10 +108,7 @@ def elements_toml(machine: MachineTool, torsions: Sequence[float], preamble: str
             raise InputError(mistake, expected="once, for all joints", hint="write one [[element]] of type joint")
     heads = re.split(r"(?m)^(?=\[)", text)
     kept = [part for part in heads if not re.match(r"\[\[?(effect|instrument|uncertainty)\b", part)]
-    head = [f"# {line}".rstrip() for line in preamble.splitlines()]
-    return "\n".join(
-        [*head, "".join(kept).rstrip().removesuffix(FITTED).rstrip(), "", FITTED, *fitted_lines(machine), ""]
-    )
+    return "\n".join(["".join(kept).rstrip().removesuffix(FITTED).rstrip(), "", FITTED, *fitted_lines(machine), ""])
 
 
 def fitted_lines(machine: MachineTool) -> list[str]:

@@ -1,11 +1,9 @@
 """An NC program or a cutter-location file, and how it is to be read."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, TypedDict, Unpack
+from typing import Annotated, Self, TypedDict, Unpack
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file
@@ -67,7 +65,7 @@ class Program:
 
     @classmethod
     @checked
-    def read(cls, file: File, **reading: Unpack[Reading]) -> Program:
+    def read(cls, file: File, **reading: Unpack[Reading]) -> Self:
         r"""A program in a file.
 
         Parameters
@@ -121,7 +119,7 @@ class Program:
         return cls._of(Path(file).name, str(file), None, reading)
 
     @classmethod
-    def from_text(cls, text: str, name: str = "program", **reading: Unpack[Reading]) -> Program:
+    def from_text(cls, text: str, name: str = "program", **reading: Unpack[Reading]) -> Self:
         r"""A program given as text; further arguments as of `read`.
 
         Examples
@@ -133,7 +131,7 @@ class Program:
         return cls._of(name, None, text, reading)
 
     @classmethod
-    def _of(cls, name: str, file: str | None, text: str | None, reading: Reading) -> Program:
+    def _of(cls, name: str, file: str | None, text: str | None, reading: Reading) -> Self:
         """A program whose options of reading are looked up, tables included."""
         arguments = arguments_of(cls.read)
         if unknown := reading.keys() - arguments.keys():

@@ -3,8 +3,6 @@
 Samples follow the true path: lines, arcs, helices, spirals; all moves at once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The sampled path of a program as a table in the shop's units."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial

@@ -5,8 +5,6 @@ regions are ours. What it concludes is checked one by one, and where it stops ho
 regions of one's own, but for the non-planar variants, which are those of the packaged square.
 """
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence

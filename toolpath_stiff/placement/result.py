@@ -1,7 +1,5 @@
 """A program placed: the result of a search, and the advice that terminal, placement.json, page and sheet give alike."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

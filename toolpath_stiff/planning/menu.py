@@ -1,10 +1,8 @@
 """The menu of a plan: what may vary, and what work costs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -86,7 +84,7 @@ class Menu:
         if not self.costs["pose"] + self.costs["reading"] > 0.0:
             raise InputError("costs of a plan", expected="a pose that costs something")
 
-    def with_options(self, **options: Any) -> Menu:
+    def with_options(self, **options: Any) -> Self:
         """The menu with those options that are given. Who names the heights knows how low a set-up may be used."""
         given: Any = {
             name: tuple(v) if isinstance(v, list) else v for name, v in options.items() if v not in (None, (), [])
@@ -94,7 +92,7 @@ class Menu:
         return replace(self, **given | ({"floors": {}} if "heights" in given else {}))
 
     @classmethod
-    def of(cls, data: Readings | None) -> Menu:
+    def of(cls, data: Readings | None) -> Self:
         """The menu after some measurements: also their poses, set-ups, tools and loads; before any, of a riser too."""
         if data is None:
             return cls(setups=(TABLE, RISER))

@@ -1,7 +1,5 @@
 """A plan: what to measure next, or first, and what that is expected to show; a measurement file to fill in."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

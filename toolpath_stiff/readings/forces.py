@@ -1,7 +1,5 @@
 """Coefficients of the cutting force from records of a dynamometer: how sure they are, what is not told by them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Measured stiffnesses as columns, SI, with what the model says to each of them."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -9,7 +7,7 @@ from functools import cached_property
 from importlib import resources
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -123,7 +121,7 @@ class Readings(ArrayColumns):
         return np.ones(len(self), dtype=bool) if self.beside is None else ~self.beside.beside
 
     @property
-    def of_tip(self) -> Readings:
+    def of_tip(self) -> Self:
         """The readings of the tip alone."""
         return self if self.beside is None else self.select(self.tip)
 
@@ -153,7 +151,7 @@ class Readings(ArrayColumns):
         _, first, which = np.unique(columns, axis=0, return_index=True, return_inverse=True)
         return first, which.reshape(-1)
 
-    def select(self, rows: AnyArray) -> Readings:
+    def select(self, rows: AnyArray) -> Self:
         """Some of the rows, by mask or index."""
         extra = {name: values[rows] for name, values in self.extra.items()}
         beside = self.beside.select(rows) if self.beside is not None and self.beside.beside[rows].any() else None

@@ -4,8 +4,6 @@ The machine is jogged from zero to one extreme, to the other, and back to zero (
 of 100 um), restrained by a force gauge; indicators read how far it really moved. A strut on a bench is measured alone.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,10 +1,8 @@
 """A table, said once: lines of a terminal, or a part of a page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Self, TypeVar
 
 from markupsafe import Markup
 
@@ -36,7 +34,7 @@ class ShownTable:
     @classmethod
     def of(
         cls, items: Iterable[Item], columns: Mapping[str, Callable[[Item], object]], kinds: Sequence[str] = ()
-    ) -> ShownTable:
+    ) -> Self:
         """A row for each item; `columns`: what each shows of it, under its title."""
         return cls([*columns], [[show(item) for show in columns.values()] for item in items], kinds)
 
@@ -50,7 +48,7 @@ class ShownTable:
         """Columns that stand to the right."""
         return [i for i, title in enumerate(self.head) if title.startswith(">")]
 
-    def columns(self, *titles: str) -> ShownTable:
+    def columns(self, *titles: str) -> Self:
         """Some of the columns."""
         places = [self.titles.index(title) for title in titles]
         return replace(self, head=[self.head[i] for i in places], rows=[[row[i] for i in places] for row in self.rows])

@@ -4,8 +4,6 @@ Displacements come from the stiffness of the whole arm (nodes on both sides of e
 joints; it stands where its Denavit-Hartenberg rows put it, computed here.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -74,9 +72,9 @@ class Robot:
     creep: float = 0.0
 
 
-def _soft(field: str, count: int) -> Callable[[Robot, int, float], Document]:
-    """Compliances grow by a factor of 1 + size, one of `count`."""
-    return lambda r, i, size: {field: getattr(r, field) * (1.0 + size * (np.arange(count) == i))}
+def _soft(field: str) -> Callable[[Robot, int, float], Document]:
+    """Compliances grow by a factor of 1 + size, that of one joint."""
+    return lambda r, i, size: {field: getattr(r, field) * (1.0 + size * (np.arange(6) == i))}
 
 
 @dataclass(frozen=True)
@@ -91,8 +89,8 @@ class RobotFault:
 
 JOINTS = tuple(range(6))
 FAULTS: dict[str, RobotFault] = {
-    "joint_torsion": RobotFault(("joint_torsion", "weak_element"), JOINTS, _soft("torsion", 6), 30.0),
-    "joint_bending": RobotFault(("joint_bending", "weak_element"), JOINTS[:3], _soft("bending", 6), 30.0),
+    "joint_torsion": RobotFault(("joint_torsion", "weak_element"), JOINTS, _soft("torsion"), 30.0),
+    "joint_bending": RobotFault(("joint_bending", "weak_element"), JOINTS[:3], _soft("bending"), 30.0),
     "soft_link": RobotFault(
         ("weak_element",), (0, 1), lambda r, i, s: {"arms": r.arms / (1.0 + s * (np.arange(2) == i))[:, None]}, 30.0
     ),

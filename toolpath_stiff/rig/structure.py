@@ -16,6 +16,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.rig.beams import arm
 
 HUB, TIP = 6, 7  # nodes of the platform truss (the paper's Figure 2b) after its six joints
 SECANT_STEPS = 60
@@ -269,12 +270,7 @@ def _truss(nodes: FloatArray) -> FloatArray:
 
 def _rigid_motions(arms: FloatArray) -> FloatArray:
     """(n, 3 k, 6) displacements of k points at `arms` (n, k, 3) from unit translations and unit rotations."""
-    n, k = arms.shape[:2]
-    motion = np.zeros((n, k, 3, 6))
-    motion[..., :3] = np.eye(3)
-    for axis in range(3):
-        motion[..., 3 + axis] = np.cross(np.eye(3)[axis], arms)
-    return motion.reshape(n, 3 * k, 6)
+    return arm(arms)[..., :3, :].reshape(len(arms), -1, 6)
 
 
 def radial(place: Geometry, vertex: int) -> FloatArray:

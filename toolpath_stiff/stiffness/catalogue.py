@@ -3,8 +3,6 @@
 Which effects there are: the packaged ones and those of a user's files.
 """
 
-from __future__ import annotations
-
 import difflib
 import pkgutil
 import sys

@@ -12,13 +12,11 @@ An effect sits on one link of the load path, declares its parameters, and implem
 Everything is SI and batched over n poses. A method that an effect does not implement adds nothing.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -176,7 +174,7 @@ class LoadPath(ArrayColumns):
     def __len__(self) -> int:
         return len(self.position)
 
-    def take(self, rows: IntArray | BoolArray | slice) -> LoadPath:
+    def take(self, rows: IntArray | BoolArray | slice) -> Self:
         """Some of the poses; repeated as an index says."""
         return replace(super().take(rows), stance=self.stance.take(rows))
 

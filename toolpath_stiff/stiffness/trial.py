@@ -1,7 +1,5 @@
 """An effect tried against the contract on a machine: what `tps effects check` says of it."""
 
-from __future__ import annotations
-
 import pickle
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -51,9 +51,8 @@ def open_frame(axes: Axes, *sides: str) -> None:
     axes.spines[["top", "right", *sides]].set_visible(False)
 
 
-def colour_scale(drawn: Any, bar: Axes, label: str, thousands: bool = True) -> None:
+def colour_scale(drawn: Any, bar: Axes, label: str) -> None:
     """Put the scale of what was drawn in colours into axes of its own."""
     bar.figure.colorbar(drawn, cax=bar, label=label)
-    if thousands:
-        in_thousands(bar.yaxis)
+    in_thousands(bar.yaxis)
     bar.grid(visible=False)
