@@ -384,8 +384,8 @@ def put_to_vote(
 ) -> tuple[str, tuple[str, ...], Votes]:
     """Verdict and explanations (`decide`) after the votes of the readings, and the votes for the first explanation.
 
-    What lowers no error at left-out points is no answer, nor is a second effect that the form of the first may stand
-    for. A name that has not outvoted every rival of another part is one of several: beside it stand those that outvote
+    What lowers no error at left-out points is no answer, nor is a second effect that lowers none, or that the form of
+    the first may stand for. A name that has not outvoted every rival of another part is one of several: beside it stand those that outvote
     it, then those that are likely, then the closest of the others and of what a strut law that had to move may stand
     for. A model that passes is not the only explanation where its nuisances have taken up more than they may, or where
     more may be left than an adequate one leaves; what the larger of two guessed noises would hide is told instead.
@@ -435,10 +435,13 @@ def put_to_vote(
 
 
 def _carried(problem: Problem, fits: Mapping[str, Fit], singles: Sequence[str], name: str) -> str:
-    """What the votes carry of an explanation: one of its effects where that suffices, else the whole."""
+    """What readings carry of an explanation: one of its effects where more foretells no better, else the whole."""
     fewer = {single: fits[single] for single in singles if {*fits[single].names} < {*fits[name].names}}
-    ballots = votes_for_more(problem, fits[name], fewer)
-    return next((single for single, differences in ballots.items() if not outvoted(differences)), name)
+    for single, differences in votes_for_more(problem, fits[name], fewer).items():
+        alone, both = (held_out(fits[which], problem.point) for which in (single, name))
+        if not (outvoted(differences) and lowers_error(alone, both)):
+            return single
+    return name
 
 
 def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
