@@ -385,10 +385,11 @@ def put_to_vote(
     """Verdict and explanations (`decide`) after the votes of the readings, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer, nor is a second effect that lowers none, or that the form of
-    the first may stand for. A name that has not outvoted every rival of another part is one of several: beside it stand those that outvote
-    it, then those that are likely, then the closest of the others and of what a strut law that had to move may stand
-    for. A model that passes is not the only explanation where its nuisances have taken up more than they may, or where
-    more may be left than an adequate one leaves; what the larger of two guessed noises would hide is told instead.
+    the first may stand for. A name that has not outvoted every rival of another part is one of several: beside it stand
+    those that outvote it, then those that are likely, then the closest of the others and of what a strut law that had
+    to move may stand for. A model that passes is not the only explanation where its nuisances have taken up more than
+    they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would hide is
+    told instead.
     """
     verdict, explanations = decide(gates, probability)
     base, data, ballots, ahead = candidates.base, problem.predictor.data, dict[str, FloatArray](), list[str]()
