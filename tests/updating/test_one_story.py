@@ -64,6 +64,17 @@ def update_of(data: Readings, *names: str, **options: Any) -> Update:
     return replace(build_ladder(UpdateTask(nist(), data, names, **options)), provenance=PROVENANCE)
 
 
+def test_a_plan_tells_apart_what_the_verdict_leaves_open():
+    """Also what votes left open that has no probability; nothing else, likely as it may be."""
+    judgement = diagnosed(*CASES["ambiguous"]).main
+    first, *others = [name for name in judgement.probability if name in judgement.fits]
+    only = {name: weight for name, weight in judgement.probability.items() if name != others[-1]}
+    left_open = replace(judgement, explanations=(first, others[-1]), probability=dict.fromkeys(only, 0.2))
+    assert {rival.name for rival in rivals_of(left_open)} == {first, others[-1]}
+    assert len(rivals_of(replace(left_open, explanations=(first,)))) > 2  # confirmed against all that are likely
+    assert len(rivals_of(replace(left_open, explanations=(), probability={}))) == 2
+
+
 # -- one baseline ------------------------------------------------------------------------------------------------------
 
 

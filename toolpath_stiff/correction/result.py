@@ -140,9 +140,13 @@ class Update(FolderResult):
 
     @property
     def known(self) -> Fit:
-        """The fit that says how well law and sizes are known: a law that stays as given is no better known for it."""
+        """The fit that says how well law and sizes are known: a law that stays as given is no better known for it.
+
+        Unless the refitted one leaves nothing of a size that is written.
+        """
         fit = self.model.fit if self.changed else self.steps[0].fit
-        return self.steps[self.steps.index(self.model) - 1].fit if self.changed and self.kept_law else fit
+        refitted = self.steps[self.steps.index(self.model) - 1].fit if self.changed and self.kept_law else fit
+        return refitted if {*fit.free} <= {*refitted.free} else fit
 
     @property
     def changed(self) -> bool:

@@ -10,30 +10,53 @@ all readings; their differences between two explanations are the votes, and inde
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Covariance, Groups
+from toolpath_stiff.inference.discrepancies import discrepancy_forms
+from toolpath_stiff.inference.error_model import SHARE
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.votes import CERTAIN, closest
 
+FORM, MOST_FEATURES = "smooth over the workspace, different by direction", 60  # the first of them hold nearly all
 
-def votes(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, FloatArray]:
+
+def votes(
+    problem: Problem, fit: Fit, rivals: Mapping[str, Fit], inexact: FloatArray | None = None
+) -> dict[str, FloatArray]:
     """Votes for an explanation against each rival, the closest rival first.
 
-    Readings that either of the two takes for wild scatter widely for both.
+    Readings that either of the two takes for wild scatter widely for both. `inexact` (q, n): what may be off in both.
     """
     scatter, points = problem.scatter, Groups.by(problem.point)
     against = {}
     for name, rival in rivals.items():
         rows = np.array(sorted({*fit.scatter.wild, *rival.scatter.wild}), dtype=np.int64)
         covariance = scatter.covariance.widened(rows, scatter.widening[rows])
+        if inexact is not None:
+            covariance = replace(covariance, shared=np.concatenate([covariance.shared, inexact]))
         squares = _squares_by_point(np.stack([fit.residual, rival.residual]), covariance, points)
         gain = 0.5 * (squares[1] - squares[0]) + (_price(rival) - _price(fit)) / points.count
         # Rounded: which of two rivals that do the same is the closer would be the processor's.
         against[name] = np.round(gain, CERTAIN) + 0.0
     return closest(against)
+
+
+def votes_for_more(problem: Problem, fit: Fit, fewer: Mapping[str, Fit]) -> dict[str, FloatArray]:
+    """Votes for an explanation against those with fewer of its effects, each as inexact in its form as effects are.
+
+    What a second effect adds may be no more than what constants along axes leave of the first, `SHARE` of its change.
+    """
+    ballots = []
+    for name, rival in fewer.items():
+        instruments = [active for active in rival.effects if active.effect.is_instrument]
+        change = problem.residual(rival.law, instruments) - rival.residual
+        form = discrepancy_forms(problem.predictor).get(FORM, np.zeros((len(change), 0)))[:, :MOST_FEATURES]
+        ballots.append(votes(problem, fit, {name: rival}, SHARE * change * form.T))
+    return closest(*ballots)
 
 
 def _price(fit: Fit) -> float:

@@ -38,7 +38,7 @@ from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fair_forms import fair_rivals
 from toolpath_stiff.inference.fits import refine, with_given_law
-from toolpath_stiff.inference.foretold import votes
+from toolpath_stiff.inference.foretold import votes, votes_for_more
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.left_out import held_out
@@ -384,21 +384,25 @@ def put_to_vote(
 ) -> tuple[str, tuple[str, ...], Votes]:
     """Verdict and explanations (`decide`) after the votes of the readings, and the votes for the first explanation.
 
-    What lowers no error at left-out points is no answer. A name that has not outvoted every rival of another part is
-    one of several: beside it stand those that are likely, then the closest of the others and of what a strut law that
-    had to move may stand for. A model that passes is not the only explanation where its nuisances have taken up more
-    than they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would
-    hide is told instead.
+    What lowers no error at left-out points is no answer, nor is a second effect that lowers none, or that the form of
+    the first may stand for. A name that has not outvoted every rival of another part is one of several: beside it stand
+    those that outvote it, then those that are likely, then the closest of the others and of what a strut law that had
+    to move may stand for. A model that passes is not the only explanation where its nuisances have taken up more than
+    they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would hide is
+    told instead.
     """
     verdict, explanations = decide(gates, probability)
-    base, data, ballots = candidates.base, problem.predictor.data, dict[str, FloatArray]()
+    base, data, ballots, ahead = candidates.base, problem.predictor.data, dict[str, FloatArray](), list[str]()
     fits = {NONE: base} | {family.name: best for family, best in candidates.offered} | gates.fits
     if verdict == "adequate":
         open_ones = explanations if noise.guess != "high" and _may_leave(problem, noise, candidates) > LEFT else ()
         likely = standing = [*dict.fromkeys([NONE, *(name for name in TAKEN_UP if name in fits), *open_ones])]
     elif verdict in ("identified", "ambiguous"):
-        left_out = {name: held_out(fits[name], data.point).of_readings(data.tip) for name in {NONE, *explanations}}
+        left_out = {name: held_out(fits[name], data.point) for name in {NONE, *explanations}}
         standing = [n for n in explanations if n == NONE or lowers_error(left_out[NONE], left_out[n])]
+        carried = dict.fromkeys(_carried(problem, fits, gates.singles, name) for name in standing)
+        verdict = "identified" if len(carried) == 1 < len(standing) else verdict
+        standing = [*carried]
         top = next((name for name in standing if name != NONE), NONE)
         if top == NONE and not gates.none_stands:
             return "unexplained", (), {}
@@ -412,7 +416,8 @@ def put_to_vote(
             open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
             # Likeliest first, but for those that are outvoted: differences of votes below that are chance.
             likely = sorted(standing, key=lambda name: (name != top, name in ballots and name not in open_rivals))
-            verdict, standing = "ambiguous" if open_rivals else verdict, [*likely, *open_rivals]
+            ahead = [name for name in open_rivals if outvoted(-ballots[name])]
+            verdict, standing = "ambiguous" if open_rivals else verdict, [top, *ahead, *likely, *open_rivals]
             if verdict == "ambiguous" and gates.none_stands and _is_small(problem, base, [fits[n] for n in likely]):
                 standing.append(NONE)
     else:
@@ -422,12 +427,22 @@ def put_to_vote(
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
     ballots = closest(ballots, of_law)
-    sure = [name for name in standing if name == standing[0] or probability.get(name, 0.0) >= STANDS]
+    sure = [name for name in standing if name in {standing[0], *ahead} or probability.get(name, 0.0) >= STANDS]
     return (
         "ambiguous" if instead or verdict == "adequate" else verdict,
         shortened(problem, fits | instead, (*sure, *(n for n in ballots if n in {*standing, *instead}), *standing)),
         ballots,
     )
+
+
+def _carried(problem: Problem, fits: Mapping[str, Fit], singles: Sequence[str], name: str) -> str:
+    """What readings carry of an explanation: one of its effects where more foretells no better, else the whole."""
+    fewer = {single: fits[single] for single in singles if {*fits[single].names} < {*fits[name].names}}
+    for single, differences in votes_for_more(problem, fits[name], fewer).items():
+        alone, both = (held_out(fits[which], problem.point) for which in (single, name))
+        if not (outvoted(differences) and lowers_error(alone, both)):
+            return single
+    return name
 
 
 def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:

@@ -26,23 +26,20 @@ def rival_of_fit(name: str, fit: Fit, weight: float = 1.0) -> Rival:
 
 
 def rivals_of(judgement: Judgement) -> list[Rival]:
-    """The explanations that a diagnosis leaves standing, with their probabilities.
+    """The explanations that a diagnosis leaves standing, with their probabilities, none below `LEAST_WEIGHT`.
 
-    Where it leaves one or none standing, the most likely others beside it, at `LEAST_WEIGHT`: what a plan would
-    confirm the answer against.
+    Those that votes leave open have none of their own or a small one. Where no two stand, the likely others beside it,
+    at least the likeliest: what a plan would confirm the answer against.
     """
-    rivals = []
-    for name, weight in sorted(judgement.probability.items(), key=lambda item: (-item[1], item[0])):
-        fit = _fit_of(judgement, name) if weight >= LEAST_WEIGHT or name in judgement.explanations else None
-        if fit is not None:
-            rivals.append(rival_of_fit(name, fit, max(weight, LEAST_WEIGHT)))
-    for name in (NONE, *(family.name for family in judgement.families)):
-        if len(rivals) >= 2:
+    likely = [name for name, weight in judgement.likely if weight >= LEAST_WEIGHT]
+    names = judgement.explanations if len(judgement.explanations) > 1 else (*judgement.explanations, *likely)
+    rivals = dict[str, Rival]()
+    for k, name in enumerate(dict.fromkeys([*names, NONE, *(family.name for family in judgement.families)])):
+        if k >= len(names) and len(rivals) >= 2:
             break
-        fit = _fit_of(judgement, name)
-        if fit is not None and name not in {rival.name for rival in rivals}:
-            rivals.append(rival_of_fit(name, fit, LEAST_WEIGHT))
-    return rivals
+        if fit := _fit_of(judgement, name):
+            rivals[name] = rival_of_fit(name, fit, max(judgement.probability.get(name, 0.0), LEAST_WEIGHT))
+    return sorted(rivals.values(), key=lambda rival: (-rival.weight, rival.name))
 
 
 def _fit_of(judgement: Judgement, name: str) -> Fit | None:
