@@ -90,11 +90,21 @@ def test_a_very_long_path_keeps_its_shape_and_what_is_red(monkeypatch):
 def test_what_lies_upon_another_segment_is_drawn_once_and_the_picture_stays(monkeypatch):
     there_and_back = [{"end": (0.2 * (i % 2), 0.0, 0.0), "start": (0.2 * (1 - i % 2), 0.0, 0.0)} for i in range(1, 41)]
     long = make_analysis(there_and_back)
-    whole = path_picture(long)
-    monkeypatch.setattr(path_module, "MOST_LINES", 100)
+    thinned = path_picture(long)
     curves = path(long).axes[0].collections[0].get_paths()
     assert sum(len(curve.vertices) for curve in curves) < len(long.samples) / 5
-    assert (np.abs(pixels(path_picture(long)) - pixels(whole)).max(axis=2) > 0.3).mean() < 2e-3
+    monkeypatch.setattr(path_module, "_thinned", lambda points, strokes, axes: strokes)
+    assert (np.abs(pixels(path_picture(long)) - pixels(thinned)).max(axis=2) > 0.3).mean() < 2e-3
+
+
+def test_a_command_leaves_lists_of_properties_out_of_docstrings_and_the_library_does_not():
+    lines = ("from toolpath_stiff.report.folder import pictures_of, skip_docstrings", "skip_docstrings()")
+    asked = ("pictures_of('map')", "from matplotlib.lines import Line2D", "print('markersize' in Line2D.set.__doc__)")
+    for told, kept in ((lines, "False"), (lines[:1], "True")):
+        done = subprocess.run(
+            [sys.executable, "-c", "\n".join((*told, *asked))], check=True, capture_output=True, text=True
+        )
+        assert done.stdout.strip() == kept
 
 
 def test_required_level_and_second_machine_change_the_profile(analysis):

@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 import toolpath_stiff as tps
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import PARAMETERS, SWITCHES, Argument, Option, arguments_of
+from toolpath_stiff.report.folder import skip_docstrings
 
 # argparse takes "-10,0,800" or "-300:300" for an option; this matches every value that begins like a negative number.
 NEGATIVE_VALUE = re.compile(r"^-(\d|\.\d|inf|nan)")
@@ -57,6 +58,8 @@ class Command:
             print(self.parser(title).format_help(), end="")
             return 0
         args = self.read(title, words)
+        if not getattr(args, NO_PLOTS.name, True):
+            skip_docstrings()
         return self.run(args, **{name: getattr(args, name) for name in arguments_of(self.run)})
 
     def parser(self, title: str) -> Parser:

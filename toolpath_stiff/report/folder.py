@@ -32,6 +32,15 @@ def pictures_of(shown_by: str) -> Mapping[str, Callable[..., Figure | None]]:
     return pictures
 
 
+def skip_docstrings() -> None:
+    """Leave the lists of properties out of matplotlib's docstrings, in a process where nobody reads them.
+
+    They are written while it is imported, and take more than half of that. To be called before the first picture.
+    """
+    artist: Any = import_module("matplotlib.artist")
+    artist.kwdoc = lambda _: ""
+
+
 def _writer() -> ModuleType:
     return import_module("toolpath_stiff.report.pictures.files")
 

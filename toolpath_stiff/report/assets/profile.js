@@ -15,7 +15,7 @@ class Profile extends Stage {
     this.model = model;
     this.on = on;
     this.strip = model.operations?.count > 1 ? 18 : 0;  // operations above the frame
-    this.pad = { left: 66, right: 12, top: 20 + this.strip, bottom: 34 };
+    this.pad = { left: 66, right: 24, top: 20 + this.strip, bottom: 34 };
     this.all();
     this.listen();
   }
@@ -122,9 +122,9 @@ class Profile extends Stage {
       g.fillStyle = chosen ? ink.accent : k % 2 ? ink.line : ink.soft;
       g.globalAlpha = chosen ? 0.35 : 1;
       g.fillRect(a, top - this.strip, b - a, this.strip - 1);
-      g.globalAlpha = 1;
-      g.fillStyle = ink.ink;  // what is longer than its place is painted over by the next
-      if (g.measureText(k + 1).width < b - a - 8) g.fillText(operations.name(k), a + 4, top - this.strip / 2);
+      Object.assign(g, { globalAlpha: 1, fillStyle: ink.ink });
+      const name = operations.name(k), letters = name.length * (b - a - 8) / g.measureText(name).width;
+      if (letters >= 2) g.fillText(name.slice(0, letters), a + 4, top - this.strip / 2);
     }
   }
   level(g, value, colour, dash) {

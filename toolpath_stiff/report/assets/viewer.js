@@ -89,7 +89,7 @@ class Viewer extends Stage {
     aligned(g, "left", "top");
     const text = this.box.map(([low, high], axis) => `${"XYZ"[axis]} ${low.toFixed(1)} to ${high.toFixed(1)}`)
       .join("    ");
-    g.fillText(`${text}  mm`, 4, 4);
+    g.fillText(`${text}  mm`, 4, 4, this.width - 8);
   }
   // The twelve edges of a box.
   edges(g, box, colour, width, dash = []) {

@@ -17,7 +17,7 @@ from toolpath_stiff.report.pictures.style import Look, new_figure, panel
 from toolpath_stiff.report.words import RESIDUAL_AXIS, plain, shortened
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
-SIDE = 2.6  # inches, of a map
+SIDE = 2.2  # inches, of a map
 SIDES = 2.0  # standard deviations of the bars and bands: 95 %
 ACROSS = 5  # panels in a row
 LEAST_SHOWN = ACROSS  # panels of `variables`: a row, or all that are significant

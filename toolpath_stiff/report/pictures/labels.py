@@ -26,20 +26,19 @@ def label_places(axes: Axes, places: Sequence[tuple[float, float]], texts: Seque
     spots, frame = np.reshape(places, (-1, 2)), axes.get_window_extent()
     ground = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
     written: list[tuple[float, float]] = []  # the left end of a label and its height, in pixels
+    in_data = axes.transData.inverted().transform
     for (x, y), text in sorted(
         zip(axes.transData.transform(spots).tolist(), texts, strict=True), key=lambda at: -at[0][1]
     ):
         wide = CHARACTER * len(text)
-        left = x + BESIDE if x + BESIDE + wide < frame.x1 else x - BESIDE - wide
-        level = y + (-LINE if below else LINE)
-        for other, height in written:
-            if abs(other - left) < wide and level > height - LINE:
-                level = height - LINE
-        written.append((left, level))
-        axes.annotate(
-            text, (x, y), (left, max(level, frame.y0 + LINE / 2)), xycoords="figure pixels", textcoords="figure pixels",
-            va="center", zorder=10, bbox=ground, arrowprops={"arrowstyle": "-", "color": INK, "linewidth": 0.8},
-        )  # fmt: skip
+        side, near = ("left", x + BESIDE) if x + BESIDE + wide < frame.x1 else ("right", x - BESIDE)
+        left = near if side == "left" else near - wide
+        above = [height - LINE for other, height in written if abs(other - left) < wide]
+        written.append((left, min([y + (-LINE if below else LINE), *above])))
+        # A line and a text: an annotation's arrow takes as long to clip at the text as a view takes to draw.
+        ends = in_data([(x, y), (near, max(written[-1][1], frame.y0 + LINE / 2))])
+        axes.plot(*ends.T, color=INK, linewidth=0.8, zorder=9.5, clip_on=False)
+        axes.text(*ends[1], text, ha=side, va="center", zorder=10, bbox=ground)
     for colour, width in (("white", 3.5), (INK, 1.6)):
         ring: Look = {"markeredgecolor": colour, "markeredgewidth": width, "markerfacecolor": "none"}
         axes.plot(*spots.T, marker="o", markersize=9.0, linestyle="none", zorder=10, **ring)
@@ -59,6 +58,5 @@ def add_heading(figure: Figure, analysis: Analysis) -> None:
 
 def add_legend(figure: Figure, keys: Sequence[tuple[Artist, str]], corner: tuple[float, float], **layout: Any) -> None:
     """What lines, markers and surfaces mean; `corner` in parts of the figure, the rest as of matplotlib's legend."""
-    if keys:
-        artists, texts = zip(*keys, strict=True)
-        figure.legend(artists, texts, bbox_to_anchor=corner, borderaxespad=0.0, frameon=False, **layout)
+    artists, texts = zip(*keys, strict=True)
+    figure.legend(artists, texts, bbox_to_anchor=corner, borderaxespad=0.0, frameon=False, **layout)

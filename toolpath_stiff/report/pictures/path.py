@@ -26,7 +26,6 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
 LEFT, RIGHT, TOP, BOTTOM, BETWEEN = 0.95, 0.45, 1.35, 0.75, 1.05  # inches around and between the views
 MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
-MOST_LINES = 100_000  # segments drawn in every view; beyond, those that lie upon others are left out
 UNREACHABLE, PLUNGE = -1, CLASSES  # without a colour of the scale; a lower class wins where segments are joined
 STROKE = 1.5  # points
 TITLE = 6.0  # points above a view
@@ -54,7 +53,7 @@ def path(analysis: Analysis) -> Figure:
         figure.text(box.x0, box.y1 + TITLE / POINTS / figure.get_figheight(), title, size=11.0, weight="bold")
         _set_up(axes, across, up, middle, span)
         seen = points[:, [across, up]]
-        shown = _thinned(seen, strokes, axes) if len(points) > MOST_LINES else strokes
+        shown = _thinned(seen, strokes, axes)
         curves, colours = [_polyline(seen, rows) for rows, _ in shown], [colour for _, colour in shown]
         axes.add_collection(
             LineCollection(curves, colors=colours, linewidths=STROKE, capstyle="round", zorder=3), autolim=False
@@ -125,7 +124,7 @@ def _thinned(points: FloatArray, strokes: Sequence[tuple[IntArray, Any]], axes: 
     halves -= halves.min(axis=0)
     spot = halves[:, 0] * (halves[:, 1].max() + 1) + halves[:, 1]
     between = np.minimum(spot[1:], spot[:-1]) * (spot.max() + 1) + np.maximum(spot[1:], spot[:-1])
-    drawn = np.concatenate([rows for rows, _ in strokes[::-1]])
+    drawn = np.concatenate([np.empty(0, dtype=np.int64), *(rows for rows, _ in strokes[::-1])])
     shown = np.zeros(len(between), dtype=bool)
     shown[drawn[np.unique(between[drawn], return_index=True)[1]]] = True
     return [(kept, colour) for rows, colour in strokes if len(kept := rows[shown[rows]])]
@@ -178,8 +177,8 @@ def _set_up(axes: Axes, across: int, up: int, middle: FloatArray, span: FloatArr
         ylim=(middle[up] - span[up] / 2, middle[up] + span[up] / 2),
     )
     box = axes.get_window_extent()
-    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(box.width // 75)), steps=[1, 2, 2.5, 5, 10]))
-    axes.yaxis.set_major_locator(MaxNLocator(max(2, int(box.height // 50)), steps=[1, 2, 2.5, 5, 10]))
+    axes.xaxis.set_major_locator(MaxNLocator(max(2, int(box.width // 85)), steps=[1, 2, 2.5, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(max(2, int(box.height // 60)), steps=[1, 2, 2.5, 5, 10]))
 
 
 def _legend(

@@ -86,8 +86,7 @@ def _draw_band(axes: Axes, s: FloatArray, band: tuple[FloatArray, FloatArray], c
     low, high = band
     # Rows that keep the extremes of both edges: a band drawn on either's rows alone would cut the other's.
     keep = np.union1d(extremes_by_column(s, low, columns), extremes_by_column(s, high, columns))
-    look: Look = {"color": CURVE_BLUE, "alpha": 0.18, "linewidth": 0}
-    axes.fill_between(s[keep], low[keep], high[keep], zorder=3, label="95 % band", **look)
+    axes.fill_between(s[keep], low[keep], high[keep], color=CURVE_BLUE, alpha=0.18, lw=0, zorder=3, label="95 % band")
 
 
 def _set_limits(axes: Axes, analysis: Analysis, curves: Sequence[FloatArray]) -> None:
@@ -101,8 +100,8 @@ def _set_limits(axes: Axes, analysis: Analysis, curves: Sequence[FloatArray]) ->
     axes.set(
         xlim=(0.0, end or 1.0), xlabel="path length, mm (rapids included)", ylabel="stiffness along the load, N/mm"
     )
-    axes.xaxis.set_major_locator(MaxNLocator(12, steps=STEPS))
-    axes.yaxis.set_major_locator(MaxNLocator(8, steps=STEPS))
+    axes.xaxis.set_major_locator(MaxNLocator(8, steps=STEPS))
+    axes.yaxis.set_major_locator(MaxNLocator(6, steps=STEPS))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if end > 20 else 2)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value, 0 if high - low > 5 else 2)))
     axes.grid(axis="x", visible=False)
@@ -129,7 +128,7 @@ def _levels(axes: Axes, analysis: Analysis) -> None:
 
 def _line_numbers(axes: Axes, analysis: Analysis) -> None:
     end = float(analysis.samples.s[-1])
-    where = np.linspace(0.0, end, 13)[:-1] + end / 24.0
+    where = np.linspace(0.0, end, 11)[:-1] + end / 20.0
     rows = np.minimum(np.searchsorted(analysis.samples.s, where), len(analysis.samples) - 1)
     across = axes.get_xaxis_transform()
     places = mm_from_m(where)
@@ -137,8 +136,7 @@ def _line_numbers(axes: Axes, analysis: Analysis) -> None:
         places, np.ones(len(places)), linestyle="none", marker=TICKUP, markersize=3.5, color=MUTED,
         markeredgewidth=0.8, transform=across, clip_on=False, zorder=2,
     )  # fmt: skip
-    words: Look = {"fontsize": 9.0, "color": MUTED, "ha": "center"}
-    words |= {"textcoords": "offset points", "annotation_clip": False}
+    words: Look = {"fontsize": 9.0, "color": MUTED, "ha": "center", "textcoords": "offset points"}
     for place, row in zip(places.tolist(), rows.tolist(), strict=True):
         axes.annotate(str(analysis.samples.line[row]), (place, 1.0), (0.0, 7.0), xycoords=across, **words)
     axes.annotate("program line", (0.5, 1.0), (0.0, 20.0), xycoords="axes fraction", **words)
@@ -146,5 +144,7 @@ def _line_numbers(axes: Axes, analysis: Analysis) -> None:
 
 def _legend(figure: Figure, axes: Axes) -> None:
     keys = list(zip(*axes.get_legend_handles_labels(), strict=True))
-    look = {"ncols": len(keys) or 1, "fontsize": 9.5, "columnspacing": 1.4, "handlelength": 1.8}
-    add_legend(figure, keys, (1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT), loc="upper right", **look)
+    add_legend(
+        figure, keys, (1.0 - RIGHT / WIDTH, 1.0 - 0.25 / HEIGHT), loc="upper right", ncols=len(keys), fontsize=9.5,
+        columnspacing=1.4, handlelength=1.8,
+    )  # fmt: skip

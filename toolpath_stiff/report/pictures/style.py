@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
@@ -19,7 +18,6 @@ Look = dict[str, Any]  # arguments of matplotlib by name
 def new_figure(width: float, height: float, title: str = "", note: str = "", left: float = 0.3) -> Figure:
     """An empty figure in inches, without pyplot and without a display; a heading and, below, how it is read."""
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
     figure.text(left / width, 1.0 - 0.4 / height, title, size=14, weight="bold")
     figure.text(left / width, 1.0 - 0.68 / height, note, size=9.5, color=colours.MUTED)
     return figure
