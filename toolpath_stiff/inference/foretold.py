@@ -9,7 +9,7 @@ pays for it. (Were each pose left out and foretold from all others, it would not
 all readings; their differences between two explanations are the votes, and independent but for the fits.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,9 @@ from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.error_model import SHARE
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
-from toolpath_stiff.inference.votes import CERTAIN, closest
+from toolpath_stiff.inference.left_out import held_out
+from toolpath_stiff.inference.rivals import lowers_error
+from toolpath_stiff.inference.votes import CERTAIN, closest, outvoted
 
 FORM, MOST_FEATURES = "smooth over the workspace, different by direction", 60  # the first of them hold nearly all
 
@@ -45,18 +47,22 @@ def votes(
     return closest(against)
 
 
-def votes_for_more(problem: Problem, fit: Fit, fewer: Mapping[str, Fit]) -> dict[str, FloatArray]:
-    """Votes for an explanation against those with fewer of its effects, each as inexact in its form as effects are.
+def carried(problem: Problem, fits: Mapping[str, Fit], singles: Sequence[str], name: str) -> str:
+    """What readings carry of an explanation: one of its effects where more foretells no better, else the whole.
 
     What a second effect adds may be no more than what constants along axes leave of the first, `SHARE` of its change.
     """
-    ballots = []
-    for name, rival in fewer.items():
-        instruments = [active for active in rival.effects if active.effect.is_instrument]
-        change = problem.residual(rival.law, instruments) - rival.residual
-        form = discrepancy_forms(problem.predictor).get(FORM, np.zeros((len(change), 0)))[:, :MOST_FEATURES]
-        ballots.append(votes(problem, fit, {name: rival}, SHARE * change * form.T))
-    return closest(*ballots)
+    whole, form = fits[name], discrepancy_forms(problem.predictor).get(FORM, np.zeros((len(problem.point), 0)))
+    for single in singles:
+        alone = fits[single]
+        if {*alone.names} < {*whole.names}:
+            instruments = [active for active in alone.effects if active.effect.is_instrument]
+            change = problem.residual(alone.law, instruments) - alone.residual
+            (differences,) = votes(problem, whole, {single: alone}, SHARE * change * form[:, :MOST_FEATURES].T).values()
+            before, after = (held_out(fit, problem.point) for fit in (alone, whole))
+            if not (outvoted(differences) and lowers_error(before, after)):
+                return single
+    return name
 
 
 def _price(fit: Fit) -> float:

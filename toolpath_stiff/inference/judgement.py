@@ -38,7 +38,7 @@ from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fair_forms import fair_rivals
 from toolpath_stiff.inference.fits import refine, with_given_law
-from toolpath_stiff.inference.foretold import votes, votes_for_more
+from toolpath_stiff.inference.foretold import carried, votes
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.left_out import held_out
@@ -392,17 +392,16 @@ def put_to_vote(
     told instead.
     """
     verdict, explanations = decide(gates, probability)
-    base, data, ballots, ahead = candidates.base, problem.predictor.data, dict[str, FloatArray](), list[str]()
+    base, ballots, ahead = candidates.base, dict[str, FloatArray](), list[str]()
     fits = {NONE: base} | {family.name: best for family, best in candidates.offered} | gates.fits
     if verdict == "adequate":
         open_ones = explanations if noise.guess != "high" and _may_leave(problem, noise, candidates) > LEFT else ()
         likely = standing = [*dict.fromkeys([NONE, *(name for name in TAKEN_UP if name in fits), *open_ones])]
     elif verdict in ("identified", "ambiguous"):
-        left_out = {name: held_out(fits[name], data.point) for name in {NONE, *explanations}}
-        standing = [n for n in explanations if n == NONE or lowers_error(left_out[NONE], left_out[n])]
-        carried = dict.fromkeys(_carried(problem, fits, gates.singles, name) for name in standing)
-        verdict = "identified" if len(carried) == 1 < len(standing) else verdict
-        standing = [*carried]
+        left_out = {name: held_out(fits[name], problem.point) for name in {NONE, *explanations}}
+        found = [n for n in explanations if n == NONE or lowers_error(left_out[NONE], left_out[n])]
+        standing = [*dict.fromkeys(carried(problem, fits, gates.singles, name) for name in found)]
+        verdict = "identified" if len(standing) == 1 < len(found) else verdict
         top = next((name for name in standing if name != NONE), NONE)
         if top == NONE and not gates.none_stands:
             return "unexplained", (), {}
@@ -433,16 +432,6 @@ def put_to_vote(
         shortened(problem, fits | instead, (*sure, *(n for n in ballots if n in {*standing, *instead}), *standing)),
         ballots,
     )
-
-
-def _carried(problem: Problem, fits: Mapping[str, Fit], singles: Sequence[str], name: str) -> str:
-    """What readings carry of an explanation: one of its effects where more foretells no better, else the whole."""
-    fewer = {single: fits[single] for single in singles if {*fits[single].names} < {*fits[name].names}}
-    for single, differences in votes_for_more(problem, fits[name], fewer).items():
-        alone, both = (held_out(fits[which], problem.point) for which in (single, name))
-        if not (outvoted(differences) and lowers_error(alone, both)):
-            return single
-    return name
 
 
 def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
