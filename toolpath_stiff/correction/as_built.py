@@ -16,7 +16,7 @@ from toolpath_stiff.correction.steps import LadderStep
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.left_out import HeldOut, held_out
+from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors, held_out
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.error_model import GEOMETRY
 from toolpath_stiff.machine.model import Hexapod
@@ -24,20 +24,22 @@ from toolpath_stiff.portrait.portrait import LACKING
 
 AS_BUILT = "struts and joints as read"
 FURTHEST = 3.0  # standard deviations from which on an offset is no tolerance: the model lacks something else
+CERTAIN = 2.0  # standard errors by which the error at left-out points must fall beside an instrument's error
 DIGITS = 9  # of ln and m, on which all processors agree
 
 
 def as_built(task: UpdateTask, before: LadderStep) -> tuple[Hexapod, LadderStep] | None:
     """The machine with the likeliest offsets, and the step that this is; None where left-out points ask for none."""
     fit, noise = before.fit, task.noise_model
-    if before.instruments and 100 * before.held.mean_error > LACKING * noise.floor_percent:
-        return None  # what the form of an instrument's error leaves is none of the machine's
     known = fit.scatter.covariance.shared[:GEOMETRY]
     pull = fit.scatter.precision.times(known)
     likely = pull @ fit.residual
     held = _held_out(fit, known, pull, held_out(fit, task.data.point))
-    if np.abs(likely).max() > FURTHEST or not held.of_readings(task.data.tip).mean_error < before.held.mean_error:
+    falls = gain_in_standard_errors(before.held, held.of_readings(task.data.tip))
+    if np.abs(likely).max() > FURTHEST or not falls > (CERTAIN if before.instruments else 0.0):
         return None
+    if before.instruments and 100 * before.held.mean_error > LACKING * noise.floor_percent:
+        return None  # what the form of an instrument's error leaves is none of the machine's
     sd = np.repeat([noise.strut_spread, noise.joint_error], [6, GEOMETRY - 6])
     earlier = np.zeros(GEOMETRY) if task.machine.as_built is None else task.machine.as_built
     machine = task.machine.with_changes(
