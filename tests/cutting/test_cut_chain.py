@@ -351,3 +351,10 @@ def test_without_a_stock_it_is_the_blank_that_the_program_states(tmp_path, name)
     assert stated.removed.sum() > 1e-9 and "BLK FORM, WORKPIECE" in stated.stock.origin
     np.testing.assert_allclose(stated.wall_mean, given.wall_mean, rtol=1e-9)
     np.testing.assert_allclose(stated.removed, given.removed, rtol=1e-9, atol=1e-18)
+
+
+def test_a_blank_turned_inside_out_names_its_program(tmp_path):
+    text = BLANKS["wall.h"].replace("X+100 Y+20 Z+0", "X+100 Y-20 Z+0")
+    old, new, *_ = MISSING["stock"]
+    with pytest.raises(InputError, match=r"wall\.h: a stock of 100 x -20 x 10 mm"):
+        cut_of(parse_program(text, "wall.h"), tmp_path, SETUP.replace(old, new))

@@ -138,6 +138,7 @@ BROKEN = {
     "an axis points the other way": ({}, {"axes": "x,-y,z"}, "Ktc = -"),
     "two axes are exchanged": ({}, {"axes": "-y,x,z"}, "Ktc = -"),
     "no such axes": ({}, {"axes": "x,x,z"}, "axes x,x,z"),
+    "one feed": ({"feeds": (0.03,)}, {}, r"slots at 1 feed\b"),
     "two feeds": ({"feeds": (0.03, 0.05)}, {}, "slots at 2 feeds"),
     "a tool that is not there": ({}, {"tool": 7}, "tool 7 is not told"),
     "no depth": ({"depth": ""}, {}, "column depth_mm is missing"),

@@ -185,7 +185,7 @@ def stock_of(setup: CutSetup, program: ReadProgram, cutters: Mapping[int, Cutter
     if setup.from_program:
         if program.stock is None:
             raise ProgramError("no stock is given, the program states none", hint=STOCK_HINT, file=program.name)
-        return box_stock(*program.stock, "as the program states it (BLK FORM, WORKPIECE)")
+        return box_stock(*program.stock, "as the program states it (BLK FORM, WORKPIECE)", program.name)
     if setup.size is None:
         return stock_of_extents(program.moves, cutters)
     low, origin = setup.corner, "given"

@@ -87,12 +87,12 @@ class Stock:
         return np.where(inside, i, 0).astype(np.int64), np.where(inside, j, 0).astype(np.int64), inside
 
 
-def box_stock(low: tuple[float, float, float], high: tuple[float, float, float], origin: str) -> Stock:
+def box_stock(low: tuple[float, float, float], high: tuple[float, float, float], origin: str, file: str = "") -> Stock:
     """A box between two corners, m."""
     first, size = np.array(low[:2]), np.subtract(high, low)
     if not (size > 0.0).all():
         raise InputError(
-            f"a stock of {' x '.join(f'{mm_from_m(float(edge)):g}' for edge in size)} mm", expected="sizes above 0"
+            f"a stock of {' x '.join(f'{e:g}' for e in mm_from_m(size))} mm", expected="sizes > 0", file=file or None
         )
     return Stock(first, size[:2], np.array([[high[2]]]), np.array([[low[2]]]), origin)
 

@@ -171,8 +171,8 @@ def fit_coefficients(
             for remark in (*remarks, *how):
                 noted.setdefault(remark, []).append(name)
     feed, depth, _ = np.array(settings).reshape(-1, 3).T
-    if len(np.unique(feed)) < 3:
-        fault = f"slots at {len(np.unique(feed))} feeds"
+    if (count := len(np.unique(feed))) < 3:
+        fault = f"slots at {count} feed{'s' * (count != 1)}"
         raise MeasurementError(fault, expected="3 or more, so that a straight line can be wrong; 5 are better")
     force = np.array(forces)
     run_out, angle = np.zeros(len(feed)), np.zeros(len(feed))
