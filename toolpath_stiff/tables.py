@@ -148,6 +148,11 @@ def _table(rows: Rows, file: str, columns: Columns, separator: str, remarks: lis
     # A row that is longer than the heading is refused as any other.
     if body and len(stated := _fitted(body[0][1], len(written), pad=True)) == len(written) and _are_units(stated):
         (below, _), *body = body
+        for cell, unit in zip(written, stated, strict=True):
+            wanted = parted(name := named.get(cell, ""))[1]
+            if wanted and heading_key(unit) not in {"", *UNITS} and not (columns.sources or {})[name].unit:
+                hint = f"say in the mapping what it is: {name}={cell}:{wanted}"
+                raise InputError(f"unit {unit!r} of {cell!r}", expected=wanted, hint=hint, file=file, line=below)
         remarks.append(f"line {below} is a row of units")
         full = [f"{cell} [{unit}]" for cell, unit in zip(written, stated, strict=True)]
     heading = _named(written, full, columns, file, line)

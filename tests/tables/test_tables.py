@@ -240,6 +240,15 @@ def test_raw_records_are_read_by_the_same_reader(tmp_path, monkeypatch, capsys):
     assert f"{1801 / 0.06:.0f}" in told.out and "decimal commas" in told.err
 
 
+def test_an_unknown_unit_below_a_heading_is_refused_unless_the_mapping_says_it(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("x;y;z;d;k\nmm;mm;mm;;kp/mm\n0;0;800;X;30000\n")
+    mapping = "x=x, y=y, z=z, direction=d, stiffness=k"
+    with pytest.raises(InputError, match=r"a\.csv:2: unit 'kp/mm' of 'k'; expected N/mm\. Say .*stiffness_N_per_mm=k:"):
+        read_measurements(str(file), nist(), columns=mapping)
+    assert len(read_measurements(str(file), nist(), columns=f"{mapping}:N/mm")) == 1
+
+
 @settings(max_examples=150, deadline=None)
 @example(content=b"\x01\r,M")  # a row of units longer than the heading
 @given(content=st.binary(max_size=60) | st.text(alphabet="x_m0;,\t\n\r\"'.#N/A1 ", max_size=80).map(str.encode))
