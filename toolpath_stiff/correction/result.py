@@ -192,6 +192,10 @@ class Update(FolderResult):
         of = "what was read off these readings leaves" if self.described else beside
         if of and left > LACKING * floor:
             clauses.append(f"{of} {left:.2f} % at left-out points, scatter {floor:.2f} %")
+        refitted = self.steps[self.steps.index(self.model) - bool(self.kept_law)].held
+        if len(of_instrument) < len(names) and gain_in_standard_errors(refitted, last) < -RISEN:
+            foretold = f"{100 * refitted.mean_error:.2f} % beside the refitted one"
+            clauses.append(f"{left:.2f} % are left at left-out points beside the strut law as given, {foretold}")
         return clauses
 
     @property

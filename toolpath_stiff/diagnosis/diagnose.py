@@ -197,14 +197,15 @@ def with_plan(diagnosis: Diagnosis, progress: Callable[[str], None] = lambda tex
     Of an answer that is only `described`, what would confirm it. No rows with any other verdict than these two, and
     where they would gain nothing: the first remark says so.
     """
-    # Under several noise models the most demanding one that leaves rivals: a plan for it serves the others, too.
+    # Under several noise models the most demanding one that leaves rivals, with those of the others.
     open_ones = [j for j in diagnosis.judgements.values() if j.verdict == diagnosis.verdict]
     if diagnosis.verdict not in ("ambiguous", "described") or not open_ones:
         return diagnosis
     progress("planning the next measurements")
     try:
         proposal = plan(
-            diagnosis.machine, diagnosis.data, seed=diagnosis.seed, judgement=open_ones[-1],
+            diagnosis.machine, diagnosis.data, seed=diagnosis.seed,
+            judgement=replace(open_ones[-1], explanations=diagnosis.explanations),
             effect_files=diagnosis.predictor.effect_files, strut_spread=diagnosis.noise.strut_spread,
         )  # fmt: skip
     except InputError as error:
