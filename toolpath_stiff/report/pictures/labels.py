@@ -38,7 +38,7 @@ def label_places(axes: Axes, places: Sequence[tuple[float, float]], texts: Seque
         # A line and a text: an annotation's arrow takes as long to clip at the text as a view takes to draw.
         ends = in_data([(x, y), (near, max(written[-1][1], frame.y0 + LINE / 2))])
         axes.plot(*ends.T, color=INK, linewidth=0.8, zorder=9.5, clip_on=False)
-        axes.text(*ends[1], text, ha=side, va="center", zorder=10, bbox=ground)
+        axes.text(ends[1, 0], ends[1, 1], text, ha=side, va="center", zorder=10, bbox=ground)
     for colour, width in (("white", 3.5), (INK, 1.6)):
         ring: Look = {"markeredgecolor": colour, "markeredgewidth": width, "markerfacecolor": "none"}
         axes.plot(*spots.T, marker="o", markersize=9.0, linestyle="none", zorder=10, **ring)
