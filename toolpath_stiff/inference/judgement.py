@@ -292,7 +292,7 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
     that stands out, in words, else "".
     """
     if gates.enough:
-        return _posterior(problem, noise, candidates, True, [f.name for f in candidates.families]), ""
+        return _posterior(problem, noise, candidates, True, [f.name for f in candidates.hidden]), ""
     outside, form = (-np.inf, "") if gates.singles else _outside(problem, candidates)
 
     def posterior(standing: Sequence[Fit]) -> dict[str, float]:
@@ -390,21 +390,19 @@ def put_to_vote(
 
     What lowers no error at left-out points is no answer, nor is a second effect that lowers none, or that the form of
     the first may stand for. A name that has not outvoted every rival of another part is one of several: beside it stand
-    those that outvote it, then those that are likely, then the closest of the others and of what a strut law that had
-    to move may stand for. A model that passes is not the only explanation where its nuisances have taken up more than
+    those that are likely, the others and what a strut law that had to move may stand for, the closest votes first. A
+    model that passes is not the only explanation where its nuisances have taken up more than
     they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would hide is
     told instead.
     """
     verdict, explanations = decide(gates, probability)
-    base, ballots, ahead, lost = candidates.base, dict[str, FloatArray](), list[str](), list[str]()
+    base, ballots, lost = candidates.base, dict[str, FloatArray](), set[str]()
     fits = {NONE: base} | {family.name: best for family, best in candidates.offered}
     fits |= {pair.name: pair for pair in gates.tried if pair.possible} | gates.fits
     if verdict == "adequate":
-        open_ones = (
-            explanations if noise.guess != "high" and may_leave(problem, noise, candidates.hidden, base) > LEFT else ()
-        )
-        ahead = [name for name in TAKEN_UP if name in fits]
-        likely = standing = [*dict.fromkeys([NONE, *ahead, *open_ones])]
+        settled = noise.guess == "high" or may_leave(problem, noise, candidates.hidden, base) <= LEFT
+        taken_up = [name for name in TAKEN_UP if name in fits]
+        likely = standing = [*dict.fromkeys([NONE, *taken_up, *(() if settled else explanations)])]
     elif verdict in ("identified", "ambiguous"):
         left_out = {name: held_out(fits[name], problem.point) for name in {NONE, *explanations}}
         found = [n for n in explanations if n == NONE or lowers_error(left_out[NONE], left_out[n])]
@@ -420,12 +418,12 @@ def put_to_vote(
             rivals = {name: fit for name, fit in fits.items() if name != NONE or gates.none_stands}
             ballots = votes(problem, fits[top], rivals_of(fits[top], rivals))
             ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
-            lost = [name for name, differences in ballots.items() if outvoted(differences)]
+            lost = {name for name, differences in ballots.items() if outvoted(differences)}
             open_rivals = [name for name in ballots if name not in lost]
             open_pairs = [pair for pair in gates.tried if pair.name in open_rivals and pair.name not in gates.fits]
             gates.fits |= {pair.name: refine(problem, pair) for pair in open_pairs}
             fits |= gates.fits
-            likely, ahead = standing, [name for name in open_rivals if outvoted(-ballots[name])]
+            likely = standing
             verdict, standing = "ambiguous" if open_rivals else verdict, [top, *standing, *open_rivals]
             if verdict == "ambiguous" and gates.none_stands and is_small(problem, base, [fits[n] for n in likely]):
                 standing.append(NONE)
@@ -436,17 +434,22 @@ def put_to_vote(
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
     ballots = closest(ballots, of_law)
-    # Likeliest first, but for those that are outvoted: differences of votes below that are chance.
-    even = [name for name in standing if name not in lost]
-    # What stands beside a model that passes is not beyond chance; a law that had to move is.
-    least = np.inf if verdict == "adequate" else STANDS
-    sure = [name for name in even if name in {standing[0], *ahead} or probability.get(name, 0.0) >= least]
-    fits, weight = fits | instead, probability.get
-    first, *rest = entries(problem, fits, sure)  # what is alike counts together
-    rest.sort(key=lambda names: ({*ahead}.isdisjoint(names), -sum(weight(name, 0.0) for name in names)))
-    sure = [name for names in (first, *rest) for name in names]
-    order = (*sure, *(name for name in ballots if name in {*even, *instead}), *even, *standing)
-    return "ambiguous" if instead or verdict == "adequate" else verdict, shortened(problem, fits, order), ballots
+    first, *others = dict.fromkeys([*standing, *instead])
+
+    def behind(name: str) -> tuple[bool, float]:
+        """By votes; of the part of the first, which has none, by odds. Beside a model that passes, by chance alone."""
+        if name in ballots:
+            return name in lost, float(ballots[name].sum())
+        if verdict == "adequate":
+            return False, -np.inf if name in TAKEN_UP else np.inf
+        return False, float(np.log(max(probability.get(first, 0.0), 1e-300) / max(probability.get(name, 0.0), 1e-300)))
+
+    order = [first, *sorted(others, key=behind)]
+    return (
+        "ambiguous" if instead or verdict == "adequate" else verdict,
+        shortened(problem, fits | instead, order),
+        ballots,
+    )
 
 
 def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
