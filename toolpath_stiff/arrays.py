@@ -38,7 +38,7 @@ def numbered(counts: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def portions(counts: IntArray, most: int) -> Iterator[slice]:
-    """Slices of rows that together have at most `most` entries each, and at least one row."""
+    """Slices of rows whose `counts` add up to at most `most`; each slice has at least one row."""
     ends = np.cumsum(counts)
     first, before = 0, 0
     while first < len(ends):

@@ -14,7 +14,7 @@ Document = Mapping[str, Any]  # what a JSON file holds, or a part of it, by the 
 
 
 def to_dict(value: Any) -> Any:
-    """Plain data: dataclasses as dictionaries, their fields in order; None is kept, numpy becomes Python."""
+    """Plain data of a result: dataclasses become dictionaries, fields in order; numpy becomes Python; None is kept."""
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: to_dict(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, Mapping):

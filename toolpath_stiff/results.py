@@ -140,7 +140,7 @@ class FolderResult(Result):
     inputs: tuple[str, ...] = ()  # files that were read, which must not be written over
 
     def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content, or what makes it, of every file that `save` writes; pictures and pages with `plots`.
+        """Name -> content (or a function that makes it) of each file that `save` writes; pictures, pages with `plots`.
 
         Examples
         --------
