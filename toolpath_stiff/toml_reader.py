@@ -113,7 +113,7 @@ class TomlReader:
 
 
 def _places(lines: Sequence[str], data: Document) -> dict[str, int]:
-    """Line of each dotted name, first of its name: keys, tables, what holds them; `tools[2]` is of a list of tables."""
+    """Line of the first mention of each dotted name: keys, tables, their parents; `tools[2]` is in a list of tables."""
     places: dict[str, int] = {}
     above: dict[str, int] = {}
     counts: Counter[str] = Counter()
