@@ -147,7 +147,7 @@ Made = Annotated[str | None, Option("-o --out", "FILE", help="machine file to wr
 
 
 def _made_by(function: Callable[..., TextFile]) -> Callable[..., int]:
-    """A command that writes, or prints, what a public function makes of a file."""
+    """A command that writes or prints the file that a public function makes from another."""
 
     def make(args: Namespace, out: Made = None) -> int:
         made = run.call(args, function)
