@@ -452,7 +452,7 @@ class Case:
         self.record("cut", f"cuts as {Path(file).name} says", call("set_cut", file), cut=name)
 
     def find(self, kind: str, progress: Progress | None = None, **given: Any) -> Any:
-        """A result as a step, in results/: analyze, compensate, compare, diagnose, update, plan, place, draft, set_up.
+        """Result as a step, in results/: analyze, compensate, compare, diagnose, update, plan, place, draft, set_up.
 
         What the public function of that name gives for the machine, readings and program of the case, with further
         arguments of it; `draft_effect` for "draft", whose effect the case uses from then on. "set_up" is the program
