@@ -118,7 +118,7 @@ def show_machine(
 
 
 def _draw(args: Namespace, out: str | None, name: str, makers: Mapping[str, Callable[[], bytes]]) -> str:
-    """Write --out, or all to reports unless JSON is printed; what was written. Raises `InputError`."""
+    """Write drawings to --out, or to reports unless JSON is printed; text of the files written. Raises `InputError`."""
     files = [Path(out)] if out else [] if args.json else [Path(f"reports/{name}{suffix}") for suffix in makers]
     if out and files[0].suffix.lower() not in makers:
         raise InputError(f"--out {out}", expected=f"a name that ends in {' or '.join(makers)}")
