@@ -48,7 +48,7 @@ def rows_of(table: Table, elapsed: FloatArray | None = None) -> Rows:
 
     if "dx" in table:
         direction = np.stack([column(name, 0.0) for name in ("dx", "dy", "dz")], axis=1)
-        with np.errstate(invalid="ignore"):  # the lengths are nan for rows without one
+        with np.errstate(invalid="ignore"):  # a direction of no length gives nan
             direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
     else:
         direction = np.array([AXES[name] for name in table["direction"]])
@@ -101,7 +101,7 @@ class DrawnCase:
     layout: str = ""
 
     def measure(self, table: Table, rows: Rows, rng: Generator, stated_sd: bool = False) -> Table:
-        """A table with the column `stiffness_N_per_mm`, and `sd_N_per_mm` if it is to be stated; `rows` in SI."""
+        """Measured table with column `stiffness_N_per_mm`, and `sd_N_per_mm` if it is to be stated; `rows` in SI."""
         shown, nuisances = readings(self.nominal, self.machine, rows), self.nuisances
         bad = np.flatnonzero(~(np.isfinite(shown) & (shown > 0.0)))
         if len(bad):

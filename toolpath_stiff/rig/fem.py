@@ -288,7 +288,7 @@ def _work(machine: FemMachine, rows: Rows, state: CommandedRows, pose: IntArray)
 
 
 def sound_machine(nominal: Nominal) -> FemMachine:
-    """The machine without fault or spread, whose struts make up for what the other parts give (least squares)."""
+    """The machine without fault or spread; its struts make up for the give of the other parts (least squares)."""
     return FemMachine(law=np.array(_calibrated(nominal.text, nominal.name)))
 
 

@@ -227,7 +227,7 @@ def gauge(hidden: HiddenMachine, rows: Rows) -> FloatArray:
 
 @dataclass(frozen=True)
 class Nuisances:
-    """Standard deviations. The sizes are the issue's; repeat noise is the caller's (2 % unless said).
+    """Standard deviations of disturbances in any campaign. Sizes are the issue's; repeat noise is the caller's, or 2 %.
 
     Attributes
     ----------

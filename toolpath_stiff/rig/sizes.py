@@ -80,7 +80,7 @@ class Scale:
         return parameters, {key: float(f"{value:.6g}") for key, value in figures.items()}
 
     def _reach(self, name: str, shape: Shape, size: float, start: float = 0.02) -> tuple[float, FloatArray]:
-        """Strength in (0, 1] at which the rms change is `size` within 2 %, and that change; 1 if no strength does.
+        """Strength in (0, 1] at which the rms change is `size` within 2 %, and that change; 1 if none reaches it.
 
         The change grows about in proportion to the strength, so scaling the strength by what is missing converges.
         """

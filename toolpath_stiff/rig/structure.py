@@ -224,7 +224,7 @@ def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]
 def _end_rotations(
     unit: FloatArray, length: FloatArray, relative: FloatArray, platform_turn: FloatArray, moment: FloatArray
 ) -> FloatArray:
-    """(n, N, N) for springs `moment` (n, 6): squares of the struts' rotations against frame and platform, without spin.
+    """(n, N, N) stiffness of springs `moment` (n, 6) against the struts' rotations to frame and platform, without spin.
 
     A strut that stays straight turns by u x (displacement of its ends) / L; its spin about u meets no resistance.
     """
