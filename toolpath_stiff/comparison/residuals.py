@@ -72,7 +72,7 @@ def modelled(predictor: Predictor) -> FloatArray:
     data, log_model = predictor.data, predictor.log_stiffness()
     bad = np.flatnonzero(~np.isfinite(log_model))
     if len(bad):
-        model_stiffness(predictor.base, data)  # which effect leaves none, at which pose, if it is one
+        model_stiffness(predictor.base, data)  # names the effect, if one leaves no stiffness, and the pose
         raise InputError(
             "the model has no stiffness for this reading",
             hint="check the pose and the machine file's effects",

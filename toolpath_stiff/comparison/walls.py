@@ -104,7 +104,7 @@ class WallComparison(FolderResult):
         values = {"measured": um_from_m(self.measured), "foretold": um_from_m(self.foretold), "residual": residuals}
         means = {name: np.bincount(which, column) / count for name, column in values.items()}
         squares = np.bincount(which, (residuals - means["residual"][which]) ** 2)
-        pooled = squares.sum() / max(len(residuals) - len(count), 1)  # a line of few points scatters as the others do
+        pooled = squares.sum() / max(len(residuals) - len(count), 1)  # a line of few points takes the others' scatter
         scatter = np.maximum(squares / np.maximum(count - 1, 1), pooled) / count
         sure = SURE * np.sqrt(scatter + (np.bincount(which, um_from_m(self.deviation)) / count) ** 2)
         fails = np.abs(means["residual"]) > sure
