@@ -44,7 +44,7 @@ class Alike:
 
 
 def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: int) -> dict[str, Alike]:
-    """Named effect -> terms of the dictionary that fit the readings as well in its place; without those of none.
+    """Named effect -> terms of the dictionary that fit the readings as well in its place; only effects with such terms.
 
     Parameters
     ----------

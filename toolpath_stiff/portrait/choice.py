@@ -28,7 +28,7 @@ BEGINNINGS = 3  # further links at which the search begins
 ROUGH, SHAPE = 2.5, 0.0015
 HELD = 0.90  # probability that a set of links or variables adds up to
 FAINT = 0.02  # share below which a description, or a term as the leading one of it, is left out of the sums
-Leading = tuple[Term, float, bool]  # may be the leading term; its probability; whether it was tried in the chosen one
+Leading = tuple[Term, float, bool]  # possible leading term; probability; True if tried in the chosen description
 
 
 def summed(leading: Sequence[Leading], of: Callable[[Term], str]) -> list[tuple[str, float]]:

@@ -44,8 +44,8 @@ Shapes = tuple[tuple[Shape, ...], FloatArray]  # shape and constants; (s, n) or 
 BUMPS, MOST_EDGES = 5, 5
 SHORTEST_PITCH = 8e-3  # m, period in a strut's length: screws of mills have leads of 5 to 40 mm
 MOST_TURNS = 5  # of a wave over a place: clamps and grooves of a table
-TURNED = 0.1  # rms change of stiffness at which a resistance to turning is looked for: it is not linear in its size
-MOST_HELD = 1000  # readings of which the dictionary keeps columns; of more shapes alone, with seven digits
+TURNED = 0.1  # rms change of stiffness at which a resistance to turning, not linear in size, is searched for
+MOST_HELD = 1000  # readings; beyond, the dictionary keeps no columns, only shapes with seven digits
 PHASES = 3  # phases over half a turn; the other half is covered by the other sign
 
 
@@ -266,7 +266,7 @@ class Ground:
         return np.array(rows).reshape(tangents.shape)
 
     def slope(self, term: Term) -> FloatArray:
-        """(n,) m/N by which what a term adds grows with its size; its `column` unless it is not linear in it."""
+        """(n,) derivative of a term's contribution in m/N by its size; equal to its `column` if linear in size."""
         if not term.size or term.action not in PARALLEL:
             return self.column(term)
         return self._parallel(term, self.shape(term), term.size)[1]

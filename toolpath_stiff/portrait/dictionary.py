@@ -1,4 +1,4 @@
-"""The dictionary: for every link of the load path its own compliance, times each shape of what it can depend on.
+"""The dictionary: for each link of the load path its compliance, times each shape of each variable it may depend on.
 
 Drawn up from the mechanics of a machine, not from any simulator: which forces a link carries says where its compliance
 shows, and a link depends on what it feels. A table feels where the work stands on it; a strut its length, its force and
@@ -191,7 +191,7 @@ def _relative(ground: Ground, plain: Term, variable: str, column: str, kept: Int
 
 
 def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:
-    """What a variable comes in: set-ups by name, a tilt, its two leans and swings, else once; none where unknown."""
+    """Variants of a variable: set-ups by name; of a tilt its size, leans and swings; otherwise one. None if unknown."""
     if not ground.known(variable):
         return []
     if variable == "setup":
