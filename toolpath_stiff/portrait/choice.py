@@ -46,7 +46,7 @@ def fewest(summed: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]
 
 
 def choose(selection: Selection) -> tuple[Description | None, list[Leading], float]:
-    """One to three terms, none where nothing stands out from chance; what may lead; how often chance does as much.
+    """One to three terms (None: nothing beyond chance), candidates for leading term, probability that chance does it.
 
     The leading term is the first one. What else may be is told with posterior probabilities, the likeliest first.
     """
