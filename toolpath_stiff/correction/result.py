@@ -185,7 +185,7 @@ class Update(FolderResult):
                     change = f"{100 * before.mean_error:.2f} to {100 * after.mean_error:.2f} %"
                     clauses.append(f"{words.format(value)} the error at left-out points rises, {change}")
         left, floor = 100 * last.mean_error, self.noise.floor_percent
-        # A form that leaves more than scatter stands for something else, which elsewhere does otherwise; what it leaves
+        # A form that leaves more than scatter stands in for something else, which acts differently elsewhere; what
         # an instrument's error leaves would be taken for the machine's.
         names, of_instrument = self.model.fit.names, self.model.instruments
         beside = f"{joined(names)} together leave" if of_instrument and len(of_instrument) < len(names) else ""

@@ -193,7 +193,7 @@ def step_up(task: UpdateTask, before: LadderStep, groups: Sequence[Sequence[Cand
 
 
 def ladder_of(task: UpdateTask, start: LadderStep, wanted: Sequence[Sequence[Candidate]]) -> list[LadderStep]:
-    """Steps that add the effects asked for, each lower than the one before; one step if no order does."""
+    """Steps that add the requested effects, each with a lower error than the last; one step if no order gives that."""
     rest, steps = list(wanted), [start]
     while rest:
         task.progress(f"fitting {', '.join(candidates[0].name for candidates in rest)}")
@@ -315,7 +315,7 @@ def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Suppo
     """Judge the refitted strut law of a step against the same effects with the file's law."""
     task.progress("judging the strut law")
     fit, problem = after.fit, task.problem
-    groups = [[candidate] for candidate in fit.candidates]  # all anew: beside a refitted law some effects may vanish
+    groups = [[candidate] for candidate in fit.candidates]  # chosen anew: beside a refitted law some may be absent
     given = LadderStep.of(LAW_GIVEN, fitted_with(task, base_fit(problem, law_free=False), groups), task.data)
     differences = votes(problem, fit, {LAW_GIVEN: given.fit})[LAW_GIVEN]
     reasons, instruments = [], dict[str, str]()
@@ -343,7 +343,7 @@ def as_well(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, 
 
 
 def mistakable(task: UpdateTask, rivals: Mapping[str, str], believed: str) -> list[str]:
-    """That what is taken for the machine's may be an instrument's, or the other way; nothing where the user knows."""
+    """Reason why a machine effect may be an instrument's error, or the reverse; empty if the user has decided."""
     if not rivals or task.believe == believed:
         return []
     kind = "an error of the instrument" if believed == MACHINE else "an effect of the machine"
