@@ -166,7 +166,7 @@ class Update(FolderResult):
 
     @cached_property
     def rises(self) -> list[str]:
-        """Conditions under which left-out points are foretold worse than as given, beyond chance; a draft that lacks.
+        """Conditions under which left-out points are predicted worse than as given, beyond chance; insufficient forms.
 
         Load, set-up and tool: a path is under one of each as a whole, and what falls on average may rise there.
         """

@@ -80,7 +80,7 @@ class LadderStep:
         }
 
     def law_ends(self, given: StrutLaw, widening: float) -> list[Document]:
-        """The strut law at its lengths, N/um; a constant law's length and deviations of a law that was kept: None."""
+        """Strut law at its lengths, N/um; None for a constant law's length and for deviations of a law kept."""
         law = scaled_law(given, self.fit.law)
         count = len(law.parameters)  # a constant law has one stiffness, which belongs to no length
         deviations = widening * np.sqrt(np.maximum(np.diag(self.fit.covariance)[:count], 0.0))
