@@ -170,7 +170,7 @@ def first_campaign(
 
 
 def _poses(machine: Hexapod, menu: Menu, n: int, rng: Generator) -> FloatArray:
-    """(n, 6): one pose and its images, then vertical ones, then n // 2 tilted ones; as unlike each other as can be."""
+    """(n, 6) poses as unlike each other as possible: one and its images, others vertical, then n // 2 tilted."""
     levels = menu.heights or axis_levels(machine)
     if len(levels) < 4:
         raise InputError(f"a first campaign at {len(levels)} heights", expected="4 or more")

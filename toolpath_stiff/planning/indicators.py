@@ -62,7 +62,7 @@ def with_indicators(machine: Hexapod, visits: Visits, loops: Sequence[str], nois
     members = np.concatenate([np.tile(rows, (len(loops), 1)), across], axis=1)
     owner = np.concatenate([np.arange(len(visits)), np.tile(beside, len(loops))])
     of_visits = {name: getattr(visits, name)[owner] for name in ("pose", "extension", "wait", "setup", "label")}
-    source = np.concatenate([np.arange(len(taken)), np.tile(rows.ravel(), len(loops))])  # of which readings they are
+    source = np.concatenate([np.arange(len(taken)), np.tile(rows.ravel(), len(loops))])  # reading that each is of
     loop = np.concatenate([taken.loop, np.repeat(loops, rows.size)])
     readings = replace(
         taken.select(source),

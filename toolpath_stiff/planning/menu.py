@@ -85,7 +85,7 @@ class Menu:
             raise InputError("costs of a plan", expected="a pose that costs something")
 
     def with_options(self, **options: Any) -> Self:
-        """The menu with those options that are given. Who names the heights knows how low a set-up may be used."""
+        """The menu with the given options. Stated heights drop the floors: whoever states them knows each set-up's."""
         given: Any = {
             name: tuple(v) if isinstance(v, list) else v for name, v in options.items() if v not in (None, (), [])
         }

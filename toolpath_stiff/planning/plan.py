@@ -175,7 +175,7 @@ class RivalPlan:
 
     @cached_property
     def pairs(self) -> tuple[PairGap, ...]:
-        """The gaps, the narrowest first, the links at which two rivals differ, and where an indicator reads them."""
+        """Gaps between pairs of rivals, the narrowest first, with the differing links and indicators across them."""
         pairs = []
         for names, share in self.shares.items():
             both = [rival for rival in self.rivals if rival.name in names]
@@ -224,7 +224,7 @@ class RivalPlan:
 
     @property
     def gains(self) -> bool:
-        """True where the truth becomes likelier, or the verdict settled, on average, and more of it would go on so."""
+        """True if on average the truth becomes likelier or the verdict settled, and further visits would add to it."""
         rises = (self.after.truth - self.before.truth, self.after.settled - self.before.settled)
         return bool(max(rises) >= LEAST_GAIN and (self.separable or self.repeats is not None))
 

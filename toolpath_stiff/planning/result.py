@@ -161,7 +161,7 @@ def plan_csv(rows: Sequence[PlanRow]) -> str:
 
 
 def elements_apart(machine: MachineTool) -> list[str]:
-    """Rivals of a first campaign on a machine of elements: each of its joints that turn soft, else its elements."""
+    """Rivals of a first campaign on a machine of elements: each joint soft in torsion, then each other element soft."""
     turn = [f"joint_torsion:{element.name}" for element in machine.elements if turns(element)]
     soft = [f"weak_element:{element.name}" for element in machine.elements if not turns(element)]
     return [*turn, *soft][:MOST_RIVALS]

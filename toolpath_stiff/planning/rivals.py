@@ -84,7 +84,7 @@ def fitted_rivals(problem: Problem, names: Sequence[str], effects: Mapping[str, 
 
 
 def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: str = "") -> list[Rival]:
-    """Effects by name, or `none`, at their usual sizes, before any data; `setup` is what a set-up's own effect is of.
+    """Effects by name, or `none`, at their usual sizes, before any data; `setup` is for effects that act on a set-up.
 
     The size is the middle of the usual range on a logarithmic scale and known within `UNKNOWN_SIZE` of it; the strut
     law within `LAW_PRIOR`.

@@ -111,7 +111,7 @@ class Visits:
         costs, tool, rows = self.menu.costs, self.menu.tool_extensions[0], list(chosen)
         setups = [self.menu.setups[0], *self.setup[rows].tolist()]
         equipped = set(zip(setups, [tool, *self.extension[rows].tolist()], strict=True))
-        known = [  # a new set-up is tried with the tool that is in the spindle
+        known = [  # a new set-up needs no tool change for the tool in the spindle
             there in equipped or (there[0] not in setups and there[1] == tool)
             for there in zip(self.setup.tolist(), self.extension.tolist(), strict=True)
         ]
@@ -269,7 +269,7 @@ def draw_poses(machine: MachineTool, menu: Menu, count: int, rng: Generator) -> 
 
 
 def axis_levels(machine: MachineTool) -> tuple[float, ...]:
-    """Five heights in m, from the lowest to the highest that the tip reaches on the machine's axis, its base frame's Z.
+    """Five heights, m, from the lowest to the highest that the tip reaches on the machine's axis, its base frame's Z.
 
     They begin a tenth of the way from each end.
     """
@@ -299,7 +299,7 @@ def _upright(machine: MachineTool, levels: FloatArray) -> FloatArray:
 
 
 def reachable(machine: MachineTool, pose: FloatArray, tool_extension: float, margin: float = MARGIN) -> BoolArray:
-    """(n,) whether the machine takes poses (n, 6) with such a tool, clear of its limits and of a strut law at zero."""
+    """(n,) True where the machine takes poses (n, 6) with such a tool, clear of its limits and of strut stiffness 0."""
     rotation = rotation_matrices(pose[:, 3:])
     stance = solved(machine, pose[:, :3], rotation, machine.reference_tool_length + tool_extension)
     good = reach(machine, pose[:, :3], stance, rotation).margin >= margin
