@@ -17,6 +17,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.chain import STILL
 from toolpath_stiff.machine.chain_search import all_solutions
 from toolpath_stiff.machine.file import load_machine, parse_machine
+from toolpath_stiff.machine.limits import machine_limits
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 
 DATA = Path(__file__).parent / "data"
@@ -266,6 +267,7 @@ RAIL = (DATA / "robot200.toml").read_text().split("[[pose]]")[0].replace(
     "[[axis]]                       # modified",
     axis("E1", "linear", axis=[0, 1, 0], low=0, high=4000) + "[[axis]] # modified",
 ).replace('at = "base"', 'frame = "E1"\ncentre_mm = [0, 0, 0]')  # fmt: skip
+UR_ON_RAIL = UR.replace("[[axis]]", axis("E1", "linear", axis=[0, 1, 0], low=0, high=4000) + "[[axis]]", 1)
 GLIDE = """
 name = "glide"
 kind = "hexaglide"
@@ -358,14 +360,26 @@ def test_elements_carry_what_virtual_work_says(name):
     assert tried == {"table": 2, "pentapod": 5, "delta": 3}.get(name, 6)
 
 
-def test_a_rail_stays_where_it_is_put():
-    machine, bare = KINDS["rail"], MACHINES["robot200"]
-    position, rotation = bare.forward(np.deg2rad([[5.0, 12.0, 45.0, -30.0, -60.0, -165.0]]))
-    start = np.array([1.5, 0, 0, 0, 0, 0, 0])
-    stance = machine.solve(position + np.array([0.0, 1.5, 0.0]), rotation, configuration=0, start=start)
-    expected = bare.solve(position, rotation, configuration=0, start=start[1:])
-    np.testing.assert_allclose(stance.joints[0], [1.5, *expected.joints[0]], atol=1e-12)
-    np.testing.assert_allclose(stance.tip_compliance(), expected.tip_compliance(), rtol=1e-12, atol=1e-18)
+@pytest.mark.parametrize(("arm", "text"), [("robot200", RAIL), ("offset wrist", UR_ON_RAIL)])
+def test_a_rail_stays_where_it_is_put(arm, text):
+    """At 0, where the file says or where it starts; its own limits bound nothing."""
+    bare, q = KINDS[arm], np.deg2rad([[5.0, 12.0, 45.0, -30.0, -60.0, -165.0]])
+    position, rotation = bare.forward(q)
+    expected = bare.solve(position, rotation, configuration=0, start=q[0])
+    for place, stands, start in ((0.0, "", None), (1.5, "stands_mm = 1500.0", None), (0.7, "", 0.7)):
+        machine = parse_machine(text.replace("max_mm = 4000", f"max_mm = 4000\n{stands}"))
+        assert machine.standing_joints == {"E1": place if start is None else 0.0}
+        first = None if start is None else np.array([start, *q[0]])
+        there = position + np.array([0.0, place, 0.0])
+        stance = machine.solve(there, rotation, configuration=0, start=first)
+        assert stance.joints[0, 0] == place
+        assert not any("E1" in limit.name for limit in machine_limits(machine))
+        np.testing.assert_allclose(machine.forward(stance.joints)[0], there, atol=1e-9)
+        if start is not None:
+            np.testing.assert_allclose(stance.joints[0, 1:], expected.joints[0], atol=1e-9)
+            np.testing.assert_allclose(stance.tip_compliance(), expected.tip_compliance(), rtol=1e-8, atol=1e-16)
+    with pytest.raises(InputError, match=r"stands_mm = 9000; expected 0 to 4000"):
+        parse_machine(text.replace("max_mm = 4000", "max_mm = 4000\nstands_mm = 9000"))
 
 
 def test_joints_wind_on_along_a_path():
