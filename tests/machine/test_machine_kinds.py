@@ -206,6 +206,19 @@ def test_the_delta_is_lineardeltakins(folder):
     near(1e3 * position, [(module.forward(j) - height)[:3] for j in 1e3 * joints])
 
 
+def test_rotarydeltakins(folder):
+    machine = KINDS["arms"]
+    sizes = {"platformradius": 180, "thighlength": 320, "shinlength": 830, "footradius": 120}
+    module = Module("rotarydeltakins", {f"rotarydeltakins.{pin}": value for pin, value in sizes.items()}, folder)
+    pose = np.random.default_rng(9).uniform(-1.0, 1.0, (200, 6)) * [250, 250, 100, 0, 0, 0]
+    pose[:, 2] += 1e3 * machine.default_origin[2]
+    joints = machine.solve(pose[:, :3] / 1e3).joints
+    height = np.array([0.0, 0.0, 95.0, 0.0, 0.0, 0.0])  # LinuxCNC's z is the joints' height
+    near(np.rad2deg(joints), [module.inverse(p + height, 3) for p in pose])
+    position, _ = machine.forward(joints)
+    near(1e3 * position, [(module.forward(j) - height)[:3] for j in np.rad2deg(joints)])
+
+
 def test_a_cantilever_with_an_arm_is_the_closed_form():
     beam = """
 name = "cantilever"
@@ -288,11 +301,20 @@ compliance_nm_per_N = 12.0
 default_origin_mm = [0.0, 0.0, -850.0]
 rapid_mm_per_min = 20000
 """
+ARMS = (DATA / "delta.toml").read_text().split("[[pose]]")[0].replace('kind = "linear_delta"', 'kind = "rotary_delta"')
+for _old, _new in (
+    (r"carriage_joint_radius_mm = \S+", "hip_radius_mm = 180.0"),
+    (r"carriage_mm = .*", "arm_deg = [-50.0, 85.0]"),
+    (r"\[carriage\]", "[arm]"),
+    (r"rail_radius_mm = .*", "length_mm = 320.0"),
+    (r"centre_height_mm = .*", ""),
+):
+    ARMS = re.sub(_old, _new, ARMS)
 KINDS = {
     **MACHINES,
     **{
         name: parse_machine(text)
-        for name, text in (("head", HEAD), ("table", HEAD_TABLE), ("rail", RAIL), ("glide", GLIDE))
+        for name, text in (("head", HEAD), ("table", HEAD_TABLE), ("rail", RAIL), ("glide", GLIDE), ("arms", ARMS))
     },
     "offset wrist": parse_machine(UR),
 }
@@ -305,7 +327,8 @@ def poses(name: str, share: np.ndarray, joints: np.ndarray):
         low, high = np.clip(machine.joint_limits, -3.0, 3.0).T
         joints = low + (high - low) * 0.5 * (joints[:, : len(low)] + 1.0)
         return machine.forward(np.where(np.array(machine.joint_names) == "E1", 0.0, joints))  # a rail stands still
-    size = {"delta": [0.2, 0.2, 0.1, 0, 0, 0], "pentapod": [0.2, 0.2, 0.1, 0.3, 0.3, 0]}.get(name, [0.1] * 6)
+    flat = [0.2, 0.2, 0.1, 0, 0, 0]
+    size = {"delta": flat, "arms": flat, "pentapod": [0.2, 0.2, 0.1, 0.3, 0.3, 0]}.get(name, [0.1] * 6)
     pose = share * size + machine.default_origin
     return pose[:, :3], machine.rotation_of(pose[:, 3:])
 
@@ -330,7 +353,13 @@ def test_forward_undoes_inverse_with_any_tool(name, seed):
     np.testing.assert_allclose(again[1], rotation[reached], atol=1e-9)
 
 
-MOVED = {"joint ": 5, "carriage ": 2, "foot ": 0, "strut ": 0}  # the load of an element that its joint works against
+MOVED = {
+    "joint ": 5,
+    "carriage ": 2,
+    "foot ": 0,
+    "strut ": 0,
+    "arm ": 4,
+}  # the load of an element that its joint works against
 
 
 @pytest.mark.parametrize("name", [name for name in KINDS if name not in ("mill5", "mill3", "head")])
@@ -357,7 +386,7 @@ def test_elements_carry_what_virtual_work_says(name):
         force = load.rows(stance.position)[0, row, :3]
         np.testing.assert_allclose(force * np.sign(force @ slope), slope, atol=1e-8)
         tried += 1
-    assert tried == {"table": 2, "pentapod": 5, "delta": 3}.get(name, 6)
+    assert tried == {"table": 2, "pentapod": 5, "delta": 3, "arms": 3}.get(name, 6)
 
 
 @pytest.mark.parametrize(("arm", "text"), [("robot200", RAIL), ("offset wrist", UR_ON_RAIL)])

@@ -14,7 +14,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
-from toolpath_stiff.machine import delta, hexaglide, hexapod_file, pentapod, serial_file
+from toolpath_stiff.machine import delta, hexaglide, hexapod_file, pentapod, rotary_delta, serial_file
 from toolpath_stiff.machine.limits import upright_middle
 from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.machine.schema import MachineToml
@@ -25,6 +25,7 @@ KINDS: dict[str, Callable[[MachineToml], MachineTool]] = {
     "hexapod": hexapod_file.read,
     "serial": serial_file.read,
     "delta": delta.read,
+    "rotary_delta": rotary_delta.read,
     "pentapod": pentapod.read,
     "hexaglide": hexaglide.read,
 }
