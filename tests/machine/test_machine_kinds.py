@@ -508,6 +508,11 @@ def test_a_word_of_a_missing_axis_is_refused(name, letter):
         MACHINES[name].rotation_of(words)
 
 
+def test_a_mill_without_an_axis_does_not_tilt_its_tool():
+    stance = MACHINES["mill3"].solve(np.zeros((2, 3)) + [0, 0, 0.2], rotation_matrices([[0, 0, 0], [0.3, 0, 0]]))
+    assert np.isfinite(stance.joints).all(axis=1).tolist() == [True, False]
+
+
 MASSES = (("J2", 160.0, [560.0, 0.0, 0.0]), ("J3", 120.0, [95.0, 630.0, 0.0]), ("J6", 45.0, [0.0, 0.0, 90.0]))
 
 

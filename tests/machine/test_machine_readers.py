@@ -63,6 +63,8 @@ def test_urdf_is_the_robot_with_its_tool_and_limits():
         np.testing.assert_allclose(ours, theirs, atol=1e-12)
     np.testing.assert_allclose(machine.joint_limits, ROBOT.joint_limits, rtol=1e-12)
     assert machine.wrist is not None  # right angles survive the way through rpy
+    assert not any("turn it" in note for note in made.notes)
+    assert "z of link6 does not run back" in " ".join(tps.machine_from_urdf(DATA / "robot200.urdf", "link6").notes)
     assert [element.name for element in machine.elements][:2] == ["joint 1", "joint 2"]
 
 
@@ -209,6 +211,7 @@ BAD_URDF = [
     (URDF.replace('xyz="1.1200000000000001 0 0"', 'xyz="1120 0 0"'), "tip", "These look like mm or degrees"),
     (URDF.replace('type="revolute"', 'type="planar"', 1), "tip", "joint J1 is planar"),
     (URDF.replace("<robot", "<robot xmlns:xacro='x'").replace("<link", "<xacro:link", 1), "tip", "Run xacro"),
+    (URDF.replace('link name="link4"', 'link name="${p}link4"'), "tip", "Run xacro"),
     (URDF[:300], "tip", "not XML"),
     (URDF.replace('axis xyz="0 0 1"', 'axis xyz="0 0 0"', 1), "tip", "axis 0 0 0"),
     (URDF.replace('axis xyz="0 0 1"', 'axis xyz="0 0"', 1), "tip", "three numbers"),

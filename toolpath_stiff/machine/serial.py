@@ -289,7 +289,7 @@ class Serial(MachineTool):
     def _of_linear_axes(self, rotary: RotaryAxes, tip: FloatArray, axes: FloatArray) -> FloatArray:
         """(j, n) values of three linear axes and the rotary ones: angles first, then the linear axes meet the tip."""
         values = np.zeros((len(self.joints), tip.shape[1]))
-        angles = rotary.angles(axes)
+        angles, pointed = rotary.angles(axes)
         for i, angle in zip(rotary.joints, angles, strict=True):
             values[i] = angle
         tool, work = self.frames(values)
@@ -300,7 +300,7 @@ class Serial(MachineTool):
         volume = (a * np.cross(b, c, axis=0)).sum(axis=0)
         for i, (second, third) in zip(linear, ((b, c), (c, a), (a, b)), strict=True):  # Cramer's rule
             values[i] = (missing * np.cross(second, third, axis=0)).sum(axis=0) / volume
-        return np.where(np.isfinite(angles).all(axis=0), values, np.nan)
+        return np.where(pointed, values, np.nan)
 
     def standing(self, joints: FloatArray, tool_length: ArrayLike = np.nan) -> Stance:
         """How it stands at joint values (n, j)."""
