@@ -509,7 +509,7 @@ def test_a_word_of_a_missing_axis_is_refused(name, letter):
 
 
 def test_a_mill_without_an_axis_does_not_tilt_its_tool():
-    stance = MACHINES["mill3"].solve(np.zeros((2, 3)) + [0, 0, 0.2], rotation_matrices([[0, 0, 0], [0.3, 0, 0]]))
+    stance = MACHINES["mill3"].solve([[0.0, 0.0, 0.2]] * 2, rotation_matrices([[0, 0, 0], [0.3, 0, 0]]))
     assert np.isfinite(stance.joints).all(axis=1).tolist() == [True, False]
 
 
