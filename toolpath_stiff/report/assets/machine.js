@@ -65,13 +65,31 @@ class MachineBody {
       { name: "tool", link: "tool", points: [moved(pose, turn, [0, 0, joints.tool]), pose.slice(0, 3)] },
     ];
   }
+  // The floor in the light of a lamp above, with the shadows of struts, links and platform.
+  ground(g, view, bodies, height) {
+    const on = ([x, y]) => view.project([x, y, height]), [x, y] = on(centreOf(this.feet));
+    const far = 2.1 * this.size * view.zoom, lamp = g.createRadialGradient(0, 0, 0, 0, 0, far);
+    lamp.addColorStop(0, `${ink.rapid}3c`);
+    lamp.addColorStop(1, `${ink.rapid}00`);
+    g.save();
+    g.transform(1, 0, 0, view.axes()[2][2], x, y);
+    g.fillStyle = lamp;
+    g.fillRect(-far, -far, 2 * far, 2 * far);
+    g.restore();
+    Object.assign(g, { globalAlpha: 0.17, lineCap: "round", lineJoin: "round" });
+    g.beginPath();
+    for (const { name, points } of bodies) if (name !== "bed") points.map(on).forEach(([px, py], k) =>
+      (k ? g.lineTo(px, py) : g.moveTo(px, py)));
+    stroke(g, "#0a0e12", (this.hangs ? 0.05 : 0.12) * this.size * view.zoom);
+    Object.assign(g, { globalAlpha: 1, lineCap: "butt" });
+  }
   // What is drawn at a pose, to be sorted by depth. Of `work`, [low, high] of X, Y and Z of the cuts, the part is drawn
   // on its table; `close`: the work is looked at, what stands before it lets it show through; `floor`: mm, of the legs.
   items(view, pose, { work, close, floor }) {
     const { size, hangs } = this, items = [], front = view.project(pose.slice(0, 3))[2] + 0.02 * size;
     const clear = close && hangs ? Math.max(0.1, Math.min(0.8, 1.2 - 0.5 * size * view.zoom / view.width)) : 1;
-    const metal = mix(ink.rapid, ink.panel, 0.25), pale = mix(metal, ink.panel, 0.4);
-    const dark = mix(metal, ink.plunge, 0.25), stand = mix(ink.rapid, ink.panel, 0.45);
+    const bright = mix(ink.panel, "#fff", 0.5), metal = mix(ink.rapid, bright, 0.25), pale = mix(metal, bright, 0.4);
+    const dark = mix(metal, ink.plunge, 0.25), stand = mix(ink.rapid, bright, 0.45);
     const through = (place) => Math.min(clear + 0.2, close && view.project(place)[2] > front ? 0.3 : 1);
     const colour = (link, name, plain) => (lit(this.lit, link, name) ? ink.accent : plain);
     const add = (shape, a, b, radius, paint, alpha = through(between(a, b, 0.5))) =>
@@ -94,7 +112,7 @@ class MachineBody {
       } else if (hangs) {
         const cut = between(a, b, 0.58), ends = colour("joints", name, colour(link, name, ink.plunge));
         add(cylinder, a, cut, 0.03, plain);
-        add(cylinder, cut, b, 0.019, colour(link, name, mix(ink.plunge, ink.panel, 0.45)));
+        add(cylinder, cut, b, 0.019, colour(link, name, mix(ink.plunge, bright, 0.45)));
         joint(a, 0.045, ends);
         joint(b, 0.032, ends);
       } else if (this.slides) add(beam, a, b, 0.13, plain);
@@ -112,6 +130,8 @@ class MachineBody {
     if (hangs && !close) for (const p of ring) add(cylinder, p, [p[0], p[1], floor], 0.016, frame);
     const [[fx, fy, fz]] = this.feet;
     if (!hangs && !this.slides) add(cylinder, [fx, fy, fz - 0.1 * size], [fx, fy, fz], 0.2, frame);
+    if (!close && view.axes()[2][2] > 0) items.push({ depth: -2e9,
+      paint: (g) => this.ground(g, view, bodies, hangs ? floor : fz - 0.1 * size) });
     if (this.slides || !work && !hangs) return items;
     // The table, which all else stands on, and the part.
     const [x, y, z] = work ?? [...(this.data.reach?.[0][0] ?? pose).slice(0, 2), floor].map((v) => [v, v]);

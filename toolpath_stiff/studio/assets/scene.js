@@ -27,8 +27,7 @@ class MachineScene {
   // [low, high] of X, Y and Z of the cuts; null without a program.
   work() {
     const path = this.paths[0];
-    return path ? path.xyz.map((of) => of.reduce(([low, high], v, i) => (path.of[i] === RAPIDS ? [low, high]
-      : [Math.min(low, v), Math.max(high, v)]), [Infinity, -Infinity])) : null;
+    return path ? extentOf(path.xyz, (i) => path.of[i] !== RAPIDS) : null;
   }
   box() {
     if (!this.state) return [[-1, 1], [-1, 1], [-1, 1]];
