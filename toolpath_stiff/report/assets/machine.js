@@ -38,8 +38,10 @@ class MachineBody {
   }
   // What a view of the whole machine is fitted to: a ring and a ball do not reach the corners of their box.
   outline(pose) {
-    return [...(this.hangs && this.data.reach?.flat() || []), ...this.at(pose).flatMap(({ points }) => points),
-      ...this.feet.map(([x, y]) => [x, y, this.floor - 0.1 * this.size])];
+    const { size, floor } = this, thick = this.hangs ? 0 : 0.14 * size;
+    const feet = this.feet.map(([x, y]) => [x, y, floor - 0.1 * size]);
+    return [...feet, ...this.at(pose).flatMap(({ points }) => points)].flatMap((p) => cornersOf(p.map((v) =>
+      [v - thick, v + thick]))).concat(this.hangs && this.data.reach?.flat() || []);
   }
   drawReach(g, view) {
     const rows = this.data.reach, line = (points, close) => { trace(g, points.map((p) => view.project(p)), close);
@@ -69,8 +71,7 @@ class MachineBody {
   ground(g, view, bodies, height) {
     const on = ([x, y]) => view.project([x, y, height]), [x, y] = on(centreOf(this.feet));
     const far = 2.1 * this.size * view.zoom, lamp = g.createRadialGradient(0, 0, 0, 0, 0, far);
-    lamp.addColorStop(0, `${ink.rapid}3c`);
-    lamp.addColorStop(1, `${ink.rapid}00`);
+    ["3c", "00"].forEach((alpha, at) => lamp.addColorStop(at, ink.rapid + alpha));
     g.save();
     g.transform(1, 0, 0, view.axes()[2][2], x, y);
     g.fillStyle = lamp;
@@ -128,16 +129,15 @@ class MachineBody {
     const frame = colour("frame", "", stand), ring = hangs ? byAngle(this.feet) : [];
     ring.forEach((p, i) => add(cylinder, p, ring[(i + 1) % ring.length], 0.022, frame));
     if (hangs && !close) for (const p of ring) add(cylinder, p, [p[0], p[1], floor], 0.016, frame);
-    const [[fx, fy, fz]] = this.feet;
-    if (!hangs && !this.slides) add(cylinder, [fx, fy, fz - 0.1 * size], [fx, fy, fz], 0.2, frame);
-    if (!close && view.axes()[2][2] > 0) items.push({ depth: -2e9,
-      paint: (g) => this.ground(g, view, bodies, hangs ? floor : fz - 0.1 * size) });
+    const [[fx, fy, fz]] = this.feet, ground = hangs ? floor : fz - 0.1 * size;
+    if (!hangs && !this.slides) add(cylinder, [fx, fy, ground], [fx, fy, fz], 0.2, frame);
+    if (!close) items.push({ depth: -2e9, paint: (g) => this.ground(g, view, bodies, ground) });
     if (this.slides || !work && !hangs) return items;
     // The table, which all else stands on, and the part.
     const [x, y, z] = work ?? [...(this.data.reach?.[0][0] ?? pose).slice(0, 2), floor].map((v) => [v, v]);
     const half = work ? 0.8 * Math.max(x[1] - x[0], y[1] - y[0]) : 0.22 * size, low = z[0] - (work ? 0.012 * size : 0);
     const about = (ends) => [-half, half].map((v) => (ends[0] + ends[1]) / 2 + v);
-    const below = close || !hangs ? low - 0.04 * size : Math.min(floor, low - 0.05 * size);
+    const below = close ? low - 0.04 * size : Math.min(ground, low - 0.05 * size);
     items.push({ ...block(view, [about(x), about(y), [below, low]], colour("table", "", pale)), depth: -1e9 });
     if (work) items.push({ ...block(view, [...[x, y].map(([a, b]) => [a - 0.01 * size, b + 0.01 * size]),
       [low, Math.max(z[0], low) + 1e-3]], mix(ink.curve, ink.panel, 0.88)), depth: -9e8 });

@@ -39,7 +39,7 @@ class MachineScene {
   outline() {
     if (!this.state || this.focus === "part" && this.paths[0]) return null;
     const { body } = this, r = this.state.readings, work = this.work();
-    if (this.focus !== "work" || !body.hangs) return body.outline(this.pose);
+    if (this.focus !== "work" || !body.hangs) return [...body.outline(this.pose), ...(work ? cornersOf(work) : [])];
     const near = [...(r ? r.x_mm.map((x, i) => [x, r.y_mm[i], r.z_mm[i]]) : []), ...(work ? cornersOf(work) : [])];
     return near.length ? [...near, ...body.at(this.pose).at(-2).points] : body.data.reach.flat();
   }
