@@ -1,12 +1,18 @@
 """The cut of an analysis in figures: errors of walls and floors by part and by line, the worst places, a tolerance."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from toolpath_stiff.analysis.statistics import EvaluatedPath, parts_of_path
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
-from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document
 from toolpath_stiff.units import deg_from_rad, mm3_from_m3, mm_from_m, nm_from_m, um_from_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.cutting.cut import Cut
 
 SURFACES = ("left", "right", "floor")  # of the path, seen along the feed
 PLACES = 5  # worst ones that are named

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -27,7 +27,6 @@ from toolpath_stiff.analysis.statistics import (
 from toolpath_stiff.analysis.turning import FIXED, TurnChoice, choose_turn
 from toolpath_stiff.analysis.uncertainty import band_figures
 from toolpath_stiff.arrays import BoolArray, FloatArray
-from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
@@ -45,6 +44,9 @@ from toolpath_stiff.stiffness.model import (
     effects_stated,
 )
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.cutting.cut import Cut
 
 STANDING = ("weakest", "out_of_reach_samples", "extrapolated_share")  # of a machine compared with
 

@@ -202,7 +202,7 @@ class ElementDiagnosis(FolderResult):
             return sorted((self.plausible or [self.problem.none])[0].scatter.wild)
         pulls, error = self.pulls, (self.joints or self.problem.none).residual * self.pulls.size
         left, moved = (np.bincount(pulls.pull, part**2)[pulls.pull] for part in (error, pulls.value - error))
-        off = np.sqrt(left / np.maximum(moved, 1e-300))
+        off = np.sqrt(left / np.maximum(moved, pulls.least**2))
         return np.flatnonzero(off > FAR_OFF * SD_OF_MEDIAN * np.median(off)).tolist()
 
     @property

@@ -4,32 +4,29 @@ A key that is not known is an error, so that a typing mistake cannot fall back t
 key, value and bound.
 """
 
-from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 from toolpath_stiff import defaults
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
-from toolpath_stiff.machine import delta, hexaglide, hexapod_file, pentapod, serial_file
 from toolpath_stiff.machine.limits import upright_middle
 from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.machine.schema import MachineToml
 from toolpath_stiff.toml_reader import LARGEST_BYTES, shortened
 
-# What `kind` of a machine file may say -> the reader of such files.
-KINDS: dict[str, Callable[[MachineToml], MachineTool]] = {
-    "hexapod": hexapod_file.read,
-    "serial": serial_file.read,
-    "delta": delta.read,
-    "pentapod": pentapod.read,
-    "hexaglide": hexaglide.read,
+# What `kind` of a machine file may say -> the module whose `read` reads such files, imported when one is read.
+KINDS = {
+    "hexapod": "hexapod_file",
+    "serial": "serial_file",
+    "delta": "delta",
+    "pentapod": "pentapod",
+    "hexaglide": "hexaglide",
 }
-
-
 ALIASES = {"linear_delta": "delta"}
 
 
@@ -92,7 +89,7 @@ def parse_machine(text: str, file: str = "machine.toml") -> MachineTool:
     kind = ALIASES.get(str(kind), kind)
     if not isinstance(kind, str) or kind not in KINDS:
         raise toml.fault("", "kind", f" = {shortened(kind)}", expected=f"one of {', '.join(KINDS)}")
-    machine = KINDS[kind](toml)
+    machine: MachineTool = import_module(f"toolpath_stiff.machine.{KINDS[kind]}").read(toml)
     if isinstance(machine, Hexapod):
         return machine
     if "setup" not in toml.data:

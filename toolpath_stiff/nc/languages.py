@@ -63,6 +63,8 @@ LATE_SIGN = re.compile(
     r"(?:[A-Z]++[\d.+-]*+\s++)*(?:CR|[XYZ])\s*=)",
     re.IGNORECASE,
 )
+# What Siemens' language has not, and programs in the ISO dialect of the same controls have.
+_ISO = re.compile(r"\s*\(|[^;(]*(?<![A-Z])G(?:2[018]|43|8\d|9[89])(?![\d.])|\s*O\d", re.IGNORECASE)
 LATHE_LINES = 2000  # lines: a lathe's program shows what it is at its beginning
 _NO_CODE = re.compile(r"\([^)]*\)?|;.*|<[^>]*>")  # comments, names
 _M6, _Y = r"M0*6(?![\d.])", r"(?<![A-Z])Y[-+]?[\d.#\[]"
@@ -108,13 +110,18 @@ def recognise(lines: tuple[str, ...], name: str, dialect: Dialect) -> tuple[str,
         return LANGUAGES[dialect.name], f"as asked for: --dialect {dialect.name}"
     if looks_like_cutter_location(lines, name):
         return CUTTER_LOCATION_FILE, "its ending, or statements such as GOTO/"
-    if name.lower().endswith((".mpf", ".spf")):
-        return _SIEMENS, "its ending"
     for index, line in enumerate(lines[:LATHE_LINES]):
         language = language_of(line) if index < HEAD_LINES else _HEIDENHAIN if PLAIN_LANGUAGE.match(line) else None
         language = language or (_SIEMENS if LATE_SIGN.match(line) else None)
         if language is not None:
             return language, f"line {index + 1}: {line.strip()[:40]!r}"
+    if name.lower().endswith((".mpf", ".spf")):
+        iso = next((line for line in lines[:LATHE_LINES] if _ISO.match(line)), None)
+        return (
+            (_SIEMENS, "its ending")
+            if iso is None
+            else (G_CODE, f"the ISO dialect in spite of its ending: {iso[:40]!r}")
+        )
     return G_CODE, "no sign of another language"
 
 

@@ -6,8 +6,11 @@ the templates, in the script's data as JSON without `<`, `>`, `&`; the script wr
 content security policy lets only our own script run.
 """
 
+from __future__ import annotations
+
 import base64
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
@@ -16,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report import analysis_tables as words
@@ -24,10 +26,12 @@ from toolpath_stiff.report.curves import beyond_scale, cutting_box, extremes_by_
 from toolpath_stiff.report.cut import cut_tables
 from toolpath_stiff.report.pages import Part, markup, part, render
 from toolpath_stiff.report.scene import machine_scene
-from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.cutting.cut import Cut
 
 SCRIPTS = ("stage.js", "viewer.js", "solids.js", "machine.js", "profile.js", "listing.js", "analysis.js")
 
@@ -159,6 +163,8 @@ def page_data(analysis: Analysis) -> Document:
 
 def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
     """The finished part in machine coordinates, its error in um, the page's row of the sample that made each place."""
+    from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
+
     quads, error, sample = surface_of(cut, MOST_QUADS)
     corners = mm_from_m(in_machine(quads.reshape(-1, 3), analysis.origin))
     frame = np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)

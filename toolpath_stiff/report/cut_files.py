@@ -9,7 +9,6 @@ from toolpath_stiff.analysis.cut_figures import cut_columns, line_columns
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import AnyArray
 from toolpath_stiff.column_files import csv_pieces
-from toolpath_stiff.report.surface import surface_of
 from toolpath_stiff.report.words import shortened
 from toolpath_stiff.units import mm_from_m, um_from_m
 
@@ -42,6 +41,8 @@ def surface_vtk(analysis: Analysis) -> Iterator[str]:
 
     VTK's legacy format (The VTK User's Guide, 11th ed., "Simple Legacy Formats").
     """
+    from toolpath_stiff.report.surface import surface_of
+
     assert analysis.cut is not None
     quads, error, sample = surface_of(analysis.cut, MOST_QUADS)
     n = len(quads)

@@ -20,9 +20,7 @@ UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 TIP_TURNS = (
     "PLANE, cycle 19 and CYCLE800 turn the tool about its tip where it stands: how the machine's axes turn is not known"
 )
-HOW_AXES_TURN = (
-    "STAY", "MOVE", "TURN", "F", "FMAX", "SEQ+", "SEQ-", "SYM", "DIST", "ABST", "MB", "MBMAX", "TABLEROT", "COORDROT",
-)  # fmt: skip
+HOW_AXES_TURN = "STAY MOVE TURN F FMAX SEQ+ SEQ- SYM+ SYM- DIST ABST MB MBMAX TABLEROT COORDROT".split()
 SPATIAL = "the angles of cycle 19 are spatial angles, not positions of the machine's axes"
 
 
@@ -59,13 +57,13 @@ def apply(state: State, block: CurrentBlock) -> None:
 
 
 def shift(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCL DEF 7.1 and on: the datum, absolute or by a step; in a tilted plane along its axes."""
+    """CYCL DEF 7.1 and on, TRANS DATUM: the datum, absolute or by a step; in a tilted plane along its axes."""
     plain = state.plain
     values, outer = list(plain.shift), list(plain.outer)
     if block.has("TABLE"):
         datum(state, block, code)
     for axis, letter in enumerate(AXES[:3]):
-        value, step = block.take(letter), block.take(f"I{letter}")
+        value, step = 0.0 if code == "TRANS DATUM RESET" else block.take(letter), block.take(f"I{letter}")
         if value is not None:
             values[axis], outer[axis] = value * state.length_scale, outer[axis] if value else 0.0
         if step is not None:
@@ -148,7 +146,7 @@ def turn_tool(state: State, block: CurrentBlock) -> None:
 def datum(state: State, block: CurrentBlock, code: str) -> None:
     """CYCL DEF 247 and 7.1 #: the datum of a table; the program's first is its zero."""
     number, plain = block.take("TABLE" if block.has("TABLE") else "Q339"), state.plain
-    other = plain.preset not in (None, number) or (plain.preset is None and len(state.recorder) > 0)
+    other = plain.preset not in (None, number) or (plain.preset is None and state.recorder.cuts)
     problem = "another datum than before: where it is stands in a table of the control"
     block.refuse_if(
         other or any(plain.shift) or plain.tilt is not None, None, problem, "one datum, and cycle 7 for others"

@@ -107,7 +107,9 @@ def feed(state: State, block: CurrentBlock) -> bool:
         state.feed = value * inch_tenths(state)
         block.refuse_if(not state.feed >= SLOWEST, "F", "is no feed that moves", "F above 0")
     if block.take("FAUTO") is not None:
-        block.refuse_if(state.plain.tool_feed is None, "FAUTO", "without F in TOOL CALL", "F with a number")
+        block.refuse_if(
+            state.plain.tool_feed is None, "FAUTO", "without F in TOOL CALL", "F with a number, or --feed MM_PER_MIN"
+        )
         state.feed = state.plain.tool_feed
     return rapid
 

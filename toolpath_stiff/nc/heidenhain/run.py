@@ -44,6 +44,7 @@ class HeidenhainRun(ProgramRun):
 
     def __init__(self, request: Request, tally: Tally | None = None) -> None:
         super().__init__(request, tally, fast=False)
+        self.state.plain.tool_feed = request.controller.feed
         self._plain = self._lexer = PlainRun(self.state, as_g_code(self.lines), self.name)
         self._statements: dict[int, PlainStatement] = {}
         self._has_labels = any("LBL" in line.upper() for line in self.lines)  # without any no statement runs again
@@ -192,7 +193,7 @@ class HeidenhainRun(ProgramRun):
             if reads is not None:
                 index = self._work_out(reads[4] or "0", place)
                 self._scope(reads[1])[reads[1]] = system_value(self.state, reads[2], reads[3], index)
-        elif head[0] == "Q" or head in FORMULAS:
+        elif (head[0] == "Q" and head[1] != "S") or head in FORMULAS:
             name, formula, place = assigned(head, rest, place)
             self._scope(name)[name] = self._work_out(formula, place)
         elif head == "CALL LBL":

@@ -22,10 +22,11 @@ _COMMENT = re.compile(r'"[^"]*"|;.*')
 _HEAD = re.compile(
     r"(?:BEGIN|END)\s+PGM|BLK\s+FORM(?:\s+(?:0[.,][12]|[A-Z]+))?|TOOL\s+(?:CALL|DEF)|CYCL\s+DEF\s*\d+(?:\s*[.,]\d+)?"
     r"|CYCL\s+CALL(?:\s+P[OA][ST]\b)?|CALL\s+(?:LBL|PGM)|FN\s*\d+\s*:|FUNCTION\s+(?:RESET\s+)?[A-Z]+|PLANE\s+[A-Z]+"
-    r"|(?:APPR|DEP)\s+[A-Z]+|TCH\s+PROBE(?:\s+\d+)?|(?:SEL|PATTERN|INIT)\s+[A-Z]+|Q[LRS]?\d+(?=\s*=)|[A-Z]+"
+    r"|(?:APPR|DEP)\s+[A-Z]+|TCH\s+PROBE(?:\s+\d+)?|(?:SEL|PATTERN|INIT)\s+[A-Z]+|Q[LRS]?\d+(?=\s*=)|DECLARE\s+STRING"
+    r"|TRANS\s+DATUM(?:\s+(?:AXIS|RESET))?|[A-Z]+"
 )
 _WORD = re.compile(
-    r"(R0(?![\d.,])|R[LR]|DR[+-](?!\s*[\d.,Q])|F\s*MAX|F\s*AUTO|MB\s*MAX|SEQ[+-]|STAY|TURN|MOVE|SYM|(?:TABLE|COORD)\s+ROT"
+    r"(R0(?![\d.,])|R[LR]|DR[+-](?!\s*[\d.,Q])|F\s*MAX|F\s*AUTO|MB\s*MAX|S(?:EQ|YM)[+-]|STAY|TURN|MOVE|(?:TABLE|COORD)\s+ROT"
     r"|AXIS\s+(?:POS|SPAT)|PATHCTRL\s+(?:AXIS|VECTOR)|F\s+(?:TCP|CONT)|REFPNT\s+[A-Z-]+)"
     rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
     rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
@@ -41,7 +42,7 @@ _OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|17)\.[1-5])")
 _VALUES = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
 # Heads whose rest has another form, or does not matter.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|TCH|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
+    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|TCH|FN|Q|DECLARE|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
     r"|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 

@@ -61,6 +61,8 @@ def tool_number(state: State, block: CurrentBlock) -> int | None:
 def tool_definition(state: State, block: CurrentBlock, code: str) -> None:
     """TOOL DEF: length and radius of a tool; without them it is the next one of the magazine."""
     number, length, radius = tool_number(state, block), block.take("L"), block.take("R")
+    if block.take("F") is not None:
+        state.note(block.line, block.values["F"], "a feed with a tool, as simulators have it: TOOL CALL has it")
     if number is None or (length is None and radius is None):
         return
     state.tools = {} if state.tools is None else state.tools

@@ -60,5 +60,10 @@ def carry_out(state: State, block: CurrentBlock) -> None:
         if code.rank > STEPS["motion"]:
             code.act(state, block, code.name)
     for letter in sorted(block.free):
-        block.refuse_if(letter not in WORDS, letter, "is not used by any code of its block", hint="remove it")
+        block.refuse_if(
+            letter not in WORDS,
+            letter,
+            "is not used by any code of its block",
+            hint="remove it, or give a call its own block",
+        )
         state.note(block.line, block.values[letter], "how the control moves: the path is taken as programmed")

@@ -92,6 +92,8 @@ def swivel(state: State, block: CurrentBlock, code: str) -> None:
         about = [angle if axis == number else 0.0 for number in range(3)]
         turned = product(turned, rotation_matrix((about[0], about[1], about[2])))
     added = kind % 10 == 1 and plain.tilt is not None
+    framed = any(plain.shift) or plain.inner != UNIT
+    block.refuse_if(added and framed, "ST", "adds to a plane under a frame (TRANS, ROT)", "TRANS before it")
     before, outer = (plain.tilt or UNIT, plain.outer) if added else (UNIT, [0.0] * 3)
     for matrix, point in ((before, points[0]), (product(before, turned), points[1])):
         outer = [o + row[0] for o, row in zip(outer, product(matrix, [[v] for v in point]), strict=True)]

@@ -36,6 +36,8 @@ ALONG_Y = re.compile(r"(?<![A-Z_$])Y\s*[-+=\d.]")
 IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
+REMARK = re.compile(r"^\s*(?:N\d+\s*)?\([^()]*\)$", re.ASCII)  # as the ISO dialect and some posts have it
+ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
@@ -44,7 +46,7 @@ RUNS = "the program runs from its beginning, not searched, tested or simulated (
 
 def _array(name: str) -> str:
     """The name of the array that an element belongs to; of another variable none that there is."""
-    return name.partition("[")[0] + "[]" if "[" in name else ""
+    return name.partition("[")[0] + "[]" if ELEMENT.search(name) else ""
 
 
 class SiemensRun(ParametricRun):
@@ -72,7 +74,7 @@ class SiemensRun(ParametricRun):
         self._begins: list[re.Match[str]] = []
         texts, opened = list[str](), -1
         for row, line in enumerate(self.lines):
-            code, plain = code_text(line), PLAIN.fullmatch(line)
+            code, plain = REMARK.sub("", code_text(line)), PLAIN.fullmatch(line)
             begin, program = HEAD.match(code), PROGRAM.match(code)
             assert begin is not None
             self._begins.append(begin)
@@ -141,7 +143,8 @@ class SiemensRun(ParametricRun):
     # Variables
 
     def _scope(self, name: str) -> tuple[Values, str]:
-        """Where a variable is kept, R parameters for all programs, and its name there."""
+        """Where a variable is kept, R parameters for all programs, and its name there, an index as its number."""
+        name = INDEX.sub(self._index, name)
         parameter, base = re.fullmatch(r"R\[?(\d+)\]?", name), name.partition("[")[0]
         if parameter:
             return self.variables.common, f"R{parameter[1]}"
@@ -150,6 +153,11 @@ class SiemensRun(ParametricRun):
             scope, other = called.references[base]
             return scope, other + name.removeprefix(base)
         return self.variables.levels[-1], name
+
+    def _index(self, found: re.Match[str]) -> str:
+        """The number of a variable that is an index; the name of an axis stays."""
+        scope, name = self._scope(found[0])
+        return f"{scope[name]:g}" if name in scope else found[0]
 
     def _variable(self, name: str, column: int) -> Value:
         """The value of a variable; nan for a machine builder's in a move in machine coordinates."""

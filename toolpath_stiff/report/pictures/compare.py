@@ -75,8 +75,10 @@ def variables(comparison: Comparison) -> Figure:
     limits = _limits(comparison)
     panels: list[tuple[float, float, Variable | ReadingNames]] = []
     held_against: list[Variable | ReadingNames] = [*comparison.numbers, *comparison.names]
+    about = [(test, _variables_of(test)) for test in comparison.tests]
     for variable in held_against:
-        tests = [test for test in comparison.tests if _about(test, variable.name)]
+        own = (variable.name, f"{variable.name} ")  # itself, or a level of this label
+        tests = [test for test, names in about if any(name == own[0] or name.startswith(own[1]) for name in names)]
         strongest = max((abs(test.statistic) for test in tests), default=0.0)
         panels.append((-strongest, min((test.p_adjusted for test in tests), default=1.0), variable))
     panels.sort(key=lambda panel: panel[0])
@@ -114,10 +116,9 @@ def _key(figure: Figure, comparison: Comparison) -> None:
         figure.text(left, low, f"\u25cf {axis}", color=DIRECTIONS[axis], **style)
 
 
-def _about(test: FoundPattern, name: str) -> bool:
-    """Whether a pattern is about this variable, or a level of this label, or the same as one that is."""
-    about = [test.pattern.variable, *(same.partition(": ")[2] for same in test.pattern.same)]
-    return any(variable == name or variable.startswith(f"{name} ") for variable in about)
+def _variables_of(test: FoundPattern) -> list[str]:
+    """What a pattern is about: its own variable, and those of patterns that are the same."""
+    return [test.pattern.variable, *(same.partition(": ")[2] for same in test.pattern.same)]
 
 
 def _limits(comparison: Comparison) -> tuple[float, float]:
