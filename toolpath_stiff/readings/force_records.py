@@ -1,4 +1,4 @@
-"""Records of a dynamometer in slots: mean force over whole turns, without drift, and what comes back turn by turn.
+"""Dynamometer records of slots: mean force over whole turns, without drift, and harmonics of the turn.
 
 A turn cuts where the force swings by half as much as in the strongest turns, and is air where it swings hardly more
 than in the quietest; over a radius of feed after entry and before exit the slot is not full. The zero is a straight
@@ -28,17 +28,17 @@ LAYOUT = (
     "time_s or sample_rate_Hz, fx_N, fy_N, fz_N, feed_per_tooth_mm or feed_mm_per_min, spindle_rpm, depth_mm; record, "
     "if several"
 )
-CUTS, AIR = 0.5, 1.5  # swing of turns that cut, of the strongest ones'; of turns in air, of the quietest ones'
+CUTS, AIR = 0.5, 1.5  # limits of the swing: of cutting turns, over the strongest; of turns in air, over the quietest
 STRONG = 90.0  # per cent of the turns that are weaker than the strongest, and stronger than the quietest
 LEAST_TURNS = 5  # of the full slot
-SPEED_RANGE = 0.03  # by which the spindle may turn faster or slower than is said
-FINER = 8  # times finer than the spectrum of the record its speed is looked for
+SPEED_RANGE = 0.03  # relative range of spindle speed about the stated one
+FINER = 8  # refinement of the search for the speed over the record's spectrum
 
 
 def read_records(
     file: str, columns: Mapped, flutes: int
 ) -> Iterator[tuple[str, tuple[float, float, float], FloatArray, tuple[str, ...]]]:
-    """Name, settings (feed m per tooth, depth m, turns a second), rows (m, 4) s and N of each record; the remarks.
+    """Name, settings (feed m per tooth, depth m, turns a second) and rows (m, 4) s and N of each record; remarks.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def read_records(
 def mean_force(
     name: str, signal: FloatArray, rate: float, cutter: Cutter, feed: float, side: int
 ) -> tuple[FloatArray, ComplexArray, list[str]]:
-    """(3,) N, mean force over the whole turns of the full slot; (2,) N, its `harmonics` to the side; and remarks.
+    """(3,) N, mean force over the whole turns of the full slot; (2,) N, its `harmonics` sideways; remarks.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def mean_force(
 
 
 def _cut_and_air(turn: IntArray, force: FloatArray, filling: int) -> tuple[IntArray, IntArray]:
-    """Whole turns of the full slot, and turns in air; a slot is full `filling` turns after entry.
+    """Whole turns of the full slot, and turns in air; the slot is full `filling` turns after entry.
 
     `turn` (m,) of the forces (m, 3).
     """
@@ -142,14 +142,14 @@ def _cut_and_air(turn: IntArray, force: FloatArray, filling: int) -> tuple[IntAr
     cutting = max(np.split(runs, np.flatnonzero(np.diff(runs) > 1) + 1), key=len)
     if AIR * quiet > CUTS * strongest:
         return cutting, first[:0]
-    # Where the swing hardly differs from the air's, the first touch may already push.
+    # Even where the swing hardly differs from that in air, first contact may already push.
     reach = min(filling // 10 + 1, (len(swing) - 1) // 2)
     touched = np.convolve(swing > AIR * quiet, np.ones(2 * reach + 1), "same") > 0.5
     return cutting[filling : len(cutting) - filling], np.flatnonzero(~touched)
 
 
 def _heard_rate(time: FloatArray, force: FloatArray, rate: float, flutes: int) -> float:
-    """Turns a second at which the teeth pass, near the rate that is said; that one where none are heard."""
+    """Turns a second at which the teeth pass, near the stated rate; the stated rate if no teeth are heard."""
     count = FINER * len(time)
     even = np.linspace(time[0], time[-1], len(time))
     power = np.zeros(count // 2 + 1)
@@ -167,6 +167,6 @@ def _heard_rate(time: FloatArray, force: FloatArray, rate: float, flutes: int) -
 
 
 def harmonics(turns: FloatArray, force: FloatArray, flutes: int) -> ComplexArray:
-    """(2,) N, of forces (m,) N after (m,) turns what comes back once a turn and once a tooth."""
+    """(2,) N: components of forces (m,) N, after (m,) turns, that recur once a turn and once a tooth."""
     waves = np.exp(-2j * np.pi * np.array([[1], [flutes]]) * turns)
     return np.asarray((waves * force).mean(axis=1))
