@@ -191,7 +191,7 @@ class DateScatter:
         return cls(float(sd), "differences of successive dates", np.sort(peak / scale * usual))
 
     def probability(self, day: FloatArray, ln: FloatArray) -> float:
-        """That mere noise shows as large a |t| somewhere as this series (Davison and Hinkley 1997, 4.2.3)."""
+        """Probability that noise alone shows as large a |t| as this series (Davison and Hinkley 1997, 4.2.3)."""
         ratio = float(np.abs(ln @ _contrasts(day)).max() / self.sd)
         return (1 + len(self.largest) - int(np.searchsorted(self.largest, ratio))) / (1 + len(self.largest))
 
