@@ -22,7 +22,7 @@ BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
 OF_THE_WORK = ("tangential", "axial", "normal", "radial")  # loads that turn with the work; others are of the machine
 TURNING_BACK = 1e-6  # of a limit's span
 MOST_TRIED = 60  # poses of a path at which every configuration is tried
-FEW_CORNERS = 0.2  # share of the rows; a second load of every pose costs more than these poses twice
+FEW_CORNERS = 0.2  # share of the rows; with fewer, a second load at every pose costs more than these poses twice
 Progress = Callable[[int, int], None]
 OF_POSES, OF_REACH = ("stiffness", "substituted", "joints", "extrapolated"), ("margin", "limit", "value")
 # Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, length of the tool (nan: the reference tool).
@@ -163,7 +163,7 @@ def _poses(position: FloatArray, abc: FloatArray, tool: float, rows: IntArray | 
 
 
 def corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolArray:
-    """(n,) where a move ends and the next one starts in the row after: one pose, two tangents. None where few are."""
+    """(n,) True where a move ends and the next starts in the next row: one pose, two tangents. All False if few."""
     corner = np.zeros(len(position), dtype=bool)
     corner[:-1] = True
     for values in (*position.T, *abc.T, np.nan_to_num(lengths, nan=-1.0)):

@@ -20,7 +20,7 @@ def lines_named(lines: IntArray) -> str:
 
 
 def joint_warnings(path: EvaluatedPath, changes: IntArray | Sequence[int] = ()) -> list[str]:
-    """Lines of cuts in which a joint turns back, or is too slow; `changes`: samples before which the joints jump."""
+    """Warnings on lines of cuts in which a joint turns back or is too slow; `changes`: samples before joints jump."""
     samples, machine, warnings = path.samples, path.machine, []
     rotary = np.array(machine.joint_kinds) == "rotary"
     if not rotary.any() and not np.isfinite(machine.joint_speeds).any():

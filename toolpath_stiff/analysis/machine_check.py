@@ -17,7 +17,7 @@ from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 # N/um of a strut: screws, bearings and joints in series. Below, it is no machine tool; above, no screw.
 STRUT_SOFTEST, STRUT_STIFFEST = 1.0, 1000.0
 SOFTEST_ARM = 0.05  # N/um at the tool of a stretched arm; assumed
-ODD_STRUT, MOST_ODD = 0.005, 2  # of the usual length: no other strut is nearer to one that a slip has moved
+ODD_STRUT, MOST_ODD = 0.005, 2  # share of the usual length within which an odd strut has no other; most odd struts
 # N/um at the tool: "usually less than 1" for articulated robots, "very often greater than 50" for machining centres
 # (Pan, Zhang, Zhu, Wang 2006, J. Mater. Process. Technol. 173, 301).
 ROBOT, MACHINING_CENTRE, BEYOND = 1.0, 50.0, 1000.0

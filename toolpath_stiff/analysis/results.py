@@ -48,7 +48,7 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 if TYPE_CHECKING:
     from toolpath_stiff.cutting.cut import Cut
 
-STANDING = ("weakest", "out_of_reach_samples", "extrapolated_share")  # of a machine compared with
+STANDING = ("weakest", "out_of_reach_samples", "extrapolated_share")  # copied from the machine compared with
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -168,7 +168,7 @@ class Analysis(EvaluatedPath, FolderResult):
         if self.on_other is not None:
             other = self.on_other.to_dict()
             document["compare"] = compare_summaries(document, other)
-            option = f"--compare {other['machine']}"  # without these conditions the two machines may look the same
+            option = f"--compare {other['machine']}"  # otherwise the machines may look the same without a reason
             idle = [f"{option}: {row['effect']} does not act: {row['reason']}" for row in other["effects_idle"]]
             document["warnings"] = [*self.warnings, *idle]
         return document

@@ -22,7 +22,7 @@ from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
-ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"  # what headline figures are about
+ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"  # samples of headline figures
 WEAKEST_PLACES = 3
 ROUNDED = 1e-9  # m: a move of half a step must not count as shorter through rounding
 
