@@ -59,7 +59,7 @@ def names(shown_by: str, plots: bool = True, omit: Collection[str] = ()) -> tupl
 def files(
     result: Any, *, plots: bool = True, omit: Collection[str] = (), **look: Any
 ) -> dict[str, Content | Callable[[], Content]]:
-    """Name -> content, or what makes it, of a result's files but for `omit`: data, with `plots` pictures and page."""
+    """Name -> content, or its maker, of a result's files except `omit`; `plots`: also pictures and page."""
     view = view_of(result.shown_by)
     contents: dict[str, Content | Callable[[], Content]] = {
         name: partial(make, result) for name, make in view.DATA.items() if name not in omit

@@ -57,6 +57,6 @@ def add_heading(figure: Figure, analysis: Analysis) -> None:
 
 
 def add_legend(figure: Figure, keys: Sequence[tuple[Artist, str]], corner: tuple[float, float], **layout: Any) -> None:
-    """What lines, markers and surfaces mean; `corner` in parts of the figure, the rest as of matplotlib's legend."""
+    """Add a legend of lines, markers, surfaces; `corner` in parts of the figure, the rest as in matplotlib's legend."""
     artists, texts = zip(*keys, strict=True)
     figure.legend(artists, texts, bbox_to_anchor=corner, borderaxespad=0.0, frameon=False, **layout)
