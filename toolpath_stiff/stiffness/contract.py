@@ -179,7 +179,7 @@ class LoadPath(ArrayColumns):
         return replace(super().take(rows), stance=self.stance.take(rows))
 
     def element(self, name: str) -> tuple[slice, Spring | LoadRows]:
-        """Columns of an element's loads among all, and these; of a machine of elements. Raises `EffectError`."""
+        """Columns of an element's loads, and these loads; of a machine of elements. Raises `EffectError`."""
         assert isinstance(self.stance, Stance)
         start = 0
         for element, load in zip(self.machine_tool.elements, self.stance.loads, strict=True):

@@ -55,7 +55,7 @@ def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArra
 
 
 def added_by(effects: Iterable[ActiveEffect], path: LoadPath) -> tuple[FloatArray | None, FloatArray | None]:
-    """What effects add: (n, 6, 6) at the tip, (n, r) m/N and rad/(N m) in the elements' loads; None: nothing."""
+    """Contributions of effects: (n, 6, 6) at the tip, (n, r) m/N and rad/(N m) in the elements' loads; or None."""
     at_tip: FloatArray | None = None
     in_elements: FloatArray | None = None
     for active in effects:

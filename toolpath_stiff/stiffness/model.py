@@ -146,7 +146,7 @@ def build_model(
 
 
 def _assembled(given: MachineTool, actives: Sequence[ActiveEffect], conditions: Conditions) -> StiffnessModel:
-    """Geometry effects applied one after the other, to the true machine and to what the control takes it for."""
+    """Model with geometry effects applied one by one, to the true machine and to that which the control assumes."""
     effects = tuple(active for active in actives if not active.effect.is_instrument)
     machine = control = given
     for active in effects if isinstance(given, Hexapod) else ():
@@ -233,7 +233,7 @@ def load_path(
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     n = len(tip)
     length = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    if isinstance(model.control, Hexapod) and n:  # the struts get the lengths that it computes; it may not know all
+    if isinstance(model.control, Hexapod) and n:  # the struts get the lengths that the control computes
         hexapod = as_hexapod(model.machine, "a control")
         turn = np.broadcast_to(np.eye(3) if rotation is None else np.asarray(rotation, dtype=float), (n, 3, 3))
         lengths = solve_struts(model.control, tip, turn, length).lengths

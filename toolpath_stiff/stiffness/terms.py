@@ -147,7 +147,7 @@ FORMULAS: dict[tuple[str, tuple[str, ...]], tuple[str, Callable[..., FloatArray]
     ),
     ("threshold", ("from", "end")): (
         "max(0, (v - from) / (end - from))",
-        lambda v, end, **edges: np.maximum((v - edges["from"]) / (end - edges["from"]), 0.0),  # a word of Python's
+        lambda v, end, **edges: np.maximum((v - edges["from"]) / (end - edges["from"]), 0.0),  # a Python keyword
     ),
     ("threshold", ("beyond",)): (
         "max(0, 1 - beyond / v)", lambda v, beyond: np.maximum(1.0 - beyond / np.maximum(v, IDLE), 0.0)
