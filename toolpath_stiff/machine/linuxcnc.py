@@ -28,7 +28,7 @@ ASSUMED_STIFFNESS = n_per_m_from_n_per_um(50.0)
 
 
 def units_of(hal: Path) -> str:
-    """`mm` or `inch` from LINEAR_UNITS of the ini files beside a HAL file.
+    """`mm` or `inch`, from LINEAR_UNITS of the ini files beside a HAL file.
 
     Raises `InputError` if they do not agree or say.
     """
@@ -42,7 +42,7 @@ def units_of(hal: Path) -> str:
 
 
 def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tuple[Hexapod, list[str]]:
-    """A machine from the text of a HAL file.
+    """Machine from the text of a HAL file.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def machine_from_hal(text: str, units: str, file: str = "kinematics.hal") -> tup
 
 
 def read_pins(text: str, module: str, file: str, known: re.Pattern[str] | None = None) -> dict[str, float]:
-    """Pins of a module that a HAL file sets. Raises `InputError` at the line of what is no number or set twice."""
+    """Pins of a module that a HAL file sets. Raises `InputError` at the line of a non-number or of a pin set twice."""
     values: dict[str, float] = {}
     for number, line in enumerate(text.splitlines(), 1):
         match = SETP.match(line.split("#")[0])
@@ -113,9 +113,9 @@ def read_pins(text: str, module: str, file: str, known: re.Pattern[str] | None =
 
 
 def _with_assumptions(frame: FloatArray, platform: FloatArray, file: str) -> Hexapod:
-    """Limits and stiffness that LinuxCNC does not know, from the machine's own size."""
+    """Hexapod with limits and stiffness that LinuxCNC does not state, assumed from the machine's own size."""
     size = float(np.linalg.norm(frame[:, :2], axis=1).mean())
-    height = float(frame[:, 2].mean() + 0.87 * size)  # struts then lean by about 45 degrees
+    height = float(frame[:, 2].mean() + 0.87 * size)  # so that struts lean by about 45 degrees
     neutral = (0.0, 0.0, height, 0.0, 0.0, 0.0)
     struts = platform + np.array(neutral[:3]) - frame
     middle = float(np.sqrt(np.einsum("ij,ij->i", struts, struts)).mean())

@@ -26,7 +26,7 @@ RADIANS = 2.0 * np.pi + 0.01
 
 @dataclass(frozen=True)
 class ControlFiles:
-    """What HAL and ini files of one machine say: pins of its kinematics in mm, limits by joint in mm or degrees.
+    """Content of HAL and ini files of a machine: kinematics pins in mm, limits by joint in mm or degrees.
 
     `coordinates` are the letters of the joints, "" where nobody says.
     """
@@ -39,23 +39,23 @@ class ControlFiles:
     coordinates: str = ""
 
     def pin(self, name: str, default: float | None = None) -> float:
-        """The value of a pin. Raises `InputError` where it must be set and is not."""
+        """Value of a pin. Raises `InputError` if it must be set and is not."""
         if name not in self.pins and default is None:
             raise InputError(f"{self.module}.{name} is not set", expected=f"setp {self.module}.{name}", file=self.file)
         return self.pins.get(name, default or 0.0)
 
     def length(self, name: str, default: float | None = None) -> float:
-        """Mm of a pin."""
+        """Value of a pin in mm."""
         return self.pin(name, default) * self.scale
 
     def bounds(self, joint: int, linear: bool) -> FloatArray | None:
-        """M or rad; None: nobody says."""
+        """Limits of a joint in m or rad; None if not stated."""
         if joint not in self.limits:
             return None
         return m_from_mm(self.limits[joint] * self.scale) if linear else rad_from_deg(self.limits[joint])
 
     def limits_of(self, axes: str, letters: str) -> Document:
-        """Keys of [limits] by letter, None where nobody says; `letters` are the joints' unless the files name them."""
+        """Keys of [limits] by letter, None if not stated; `letters` name the joints unless the files do."""
         letters = self.coordinates or letters
         keys: dict[str, FloatArray | None] = {}
         for axis in axes:
@@ -67,7 +67,7 @@ class ControlFiles:
 
 
 def control_files(hal: str, ini: str, module: str, scale: float, file: str) -> ControlFiles:
-    """From the texts of both. Raises `InputError` for a pin that is no number."""
+    """`ControlFiles` from the texts of both files. Raises `InputError` for a pin that is no number."""
     limits: dict[int, dict[str, float]] = {}
     joint = -1
     for line in ini.splitlines():
@@ -84,14 +84,14 @@ def control_files(hal: str, ini: str, module: str, scale: float, file: str) -> C
 
 
 def module_of(hal: str, ini: str) -> str:
-    """The kinematics module that the files load; "" where they load none that is known."""
+    """Kinematics module that the files load; "" if they load no known one."""
     named = re.search(r"(?m)^\s*KINEMATICS\s*=\s*([\w-]+)", ini)
     words = [named[1]] if named else re.findall(r"(?m)^\s*loadrt\s+([\w-]+)", hal) + PIN.findall(hal)
     return next((word for word in words if word in (*KINDS, "genhexkins", "rotarydeltakins")), "")
 
 
 def machine_from_control(files: ControlFiles, name: str) -> tuple[str, list[str]]:
-    """A machine file and notes. Raises `InputError` for pins that are missing and modules without a kind."""
+    """A machine file and notes. Raises `InputError` for missing pins and for modules without a kind."""
     if files.module not in KINDS:
         known = ", ".join(("genhexkins", *KINDS))
         raise InputError(f"no machine of {files.module or 'a kinematics module'}", expected=known, file=files.file)
@@ -135,7 +135,7 @@ def _head(files: ControlFiles) -> tuple[str, list[str]]:
 
 
 def _rows(files: ControlFiles, rows: list[tuple[float, float, float]]) -> tuple[str, list[str]]:
-    """Modified DH rows of alpha in rad, a and d in mm."""
+    """`[[axis]]` rows by modified DH, from alpha in rad, a and d in mm."""
     parts = []
     for i, (alpha, a, d) in enumerate(rows):
         if abs(alpha) > RADIANS:
