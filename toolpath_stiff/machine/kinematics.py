@@ -148,7 +148,7 @@ def singularity_index(machine: Hexapod, struts: Struts) -> FloatArray:
     The determinant of the six strut screws does not depend on the point that moments are taken about, so
     neither tool length nor the choice of units enters the ratio.
     """
-    with np.errstate(divide="ignore", invalid="ignore"):  # singular at the neutral pose too: nan is out of reach
+    with np.errstate(divide="ignore", invalid="ignore"):  # nan, if singular at the neutral pose, is out of reach
         return np.asarray(np.abs(np.linalg.det(struts.jacobian)) / neutral_determinant(machine))
 
 

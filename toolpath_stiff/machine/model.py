@@ -159,7 +159,7 @@ class StrutLaw:
 
 
 def _piecewise(position: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
-    """Linear between values (p,) at rising knots (p,), at positions of any shape; the end pieces go on outside."""
+    """Linear interpolation of values (p,) at rising knots (p,), at positions of any shape; end pieces go on outside."""
     i = _segment(position, knots)
     slope = (values[1:] - values[:-1]) / (knots[1:] - knots[:-1])
     return np.asarray(values[i] + slope[i] * (position - knots[i]))

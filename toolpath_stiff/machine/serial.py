@@ -145,7 +145,7 @@ class Serial(MachineTool):
         return RotaryAxes([int(self.chain[i]) for i in loop], tuple(z[i] for i in loop), base @ tool[-1].axes[..., 0])
 
     def motion_at_zero(self, name: str) -> FloatArray:
-        """(3,) base axes: the way an axis moves the tool against the work, or turns it, at joint values of 0."""
+        """(3,) base axes: how an axis moves the tool against the work, or turns it, at joint values of 0."""
         number = int(np.flatnonzero(self.chain == self.joint_names.index(name))[0])
         return _directions(*self.frames(np.zeros((len(self.joints), 1))))[number][:, 0]
 

@@ -67,7 +67,7 @@ SCHEMA = {
     "pose[]": {},
 }
 SECTIONS_BESIDE = [name for name in SCHEMA if name]
-# Limits of all rotary axes within a turn of 2 pi: such degrees are radians. Angles of a row that are multiples of a
+# Rotary limits that are all within 2 pi are radians, not degrees. Angles of a row that are multiples of a
 # right angle in radians, to the digits that people write.
 RADIANS, RIGHT_ANGLE, WRITTEN = 6.29, np.pi / 2.0, 1e-3
 PARALLEL = 1e-3  # sine of the angle, or volume, below which directions count as dependent

@@ -83,7 +83,7 @@ def _chain(robot: ET.Element, tip: str, fault: Fault) -> list[ET.Element]:
     """Joints from the root link to the tip."""
     above: dict[str, ET.Element] = {}
     named: dict[tuple[str, str], ET.Element] = {}
-    for element in (*robot.findall("link"), *robot.findall("joint")):  # those of transmissions and plug-ins lie deeper
+    for element in (*robot.findall("link"), *robot.findall("joint")):  # others, of plug-ins, lie deeper
         if named.setdefault((element.tag, name := element.get("name", "")), element) is not element or not name:
             raise fault(f"{element.tag} {name!r} is there twice", expected="a name of its own", at=element)
     for joint in robot.findall("joint"):
