@@ -215,7 +215,7 @@ def _tip(toml: MachineToml, tool: Document) -> FixedFrame:
 
 
 def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
-    """`[[axis]]` rows of X, Y, Z by limits: the work's side where an element moves against one; and of a trunnion."""
+    """`[[axis]]` rows of X, Y, Z from limits, on the work's side if an element moves against one; also a trunnion's."""
     convention = values[""].get("convention")
     if convention not in (None, XYZAC, XYZBC):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{XYZAC!r}, {XYZBC!r}, or [[axis]] rows")
