@@ -19,7 +19,7 @@ MOTIONS = ("G0", "G1", "G2", "G3")
 
 
 def switch_on(state: State, block: CurrentBlock, code: str) -> None:
-    """G41, G42 D: the tool is left or right of the contour, by the diameter in the tool table; D of G41.1 is it."""
+    """G41, G42 D: the tool is left or right of the contour, by its diameter in the tool table; G41.1: by D itself."""
     word, frames = block.codes[code], state.frames
     straight = state.dialect.increments  # Fanuc, Haas
     _check_codes(state, block, ("plane", "units", "M tool change"))

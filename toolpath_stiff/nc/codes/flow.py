@@ -19,7 +19,7 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def macro_call(state: State, block: CurrentBlock, code: str) -> None:
-    """G65, G66, G67: refuse them here, on a control that has none; `parametric` carries them out."""
+    """G65, G66, G67: refused here, on a control without macro calls; elsewhere `parametric` carries them out."""
     raise block.fail(code, "is a macro call of Fanuc's and Haas' controls", hint="name the control with --dialect")
 
 

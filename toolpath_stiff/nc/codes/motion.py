@@ -216,7 +216,7 @@ def set_home(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _leave_program_coordinates(state: State, block: CurrentBlock, word: Word, axes: Collection[int]) -> None:
-    """Note a move of `axes` (none: all) by machine coordinates: under G68 allowed only off the rotated plane."""
+    """Prepare a move of `axes` (none: all) by machine coordinates: under G68 only off the rotated plane."""
     block.refuse_if(state.frames.tip_held, word, "while tool centre point control is on (G43.4)", "G49 before it")
     both = not axes or set(axes) >= XY
     if not both:

@@ -31,7 +31,7 @@ FRAMES = {"MSYS": _FRAME, "MCS": _FRAME, "CSYS": _FRAME, "ZERO": _ZERO}
 
 
 def units(state: CutterLocationState, statement: MajorStatement) -> None:
-    """Set the length unit; points must not precede it, as they would be in mm."""
+    """Set the length unit; inches after the first points are refused, as those were taken as mm."""
     scale = LENGTH_UNITS.get(",".join(statement.words))
     if scale is None:
         raise state.fail(statement.shown, "UNITS/MM or UNITS/INCHES")

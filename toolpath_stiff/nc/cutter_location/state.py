@@ -42,7 +42,7 @@ class CutterLocationState(Record):
     turn: float = 1.0  # -1: counter-clockwise; nan: a speed of the surface
     revolutions: float = 0.0  # that SPINDL/ON goes back to
     on_contour: bool = False  # Creo's OUTPUT_ON_PROFILE: points of the contour beside CUTCOM
-    frames: dict[str, tuple[float, ...]] = field(default_factory=dict)  # who names a coordinate system: its numbers
+    frames: dict[str, tuple[float, ...]] = field(default_factory=dict)  # naming word -> its numbers
 
     # The tool.
     diameter: float = math.nan

@@ -1,4 +1,4 @@
-"""Variables of parametric programs: local, common and named ones, and what the control keeps in numbered ones.
+"""Variables of parametric programs: local, common and named ones, and numbered ones of the control.
 
 RS274/NGC: LinuxCNC's manual, "Parameters" ("Numbered Parameters", "Subroutine Parameters", "Named Parameters",
 "Predefined Named Parameters"). Macro B: Fanuc's operator's manuals, "Custom macro" ("Variables", "System variables");
@@ -18,10 +18,10 @@ from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, tool_of
 from toolpath_stiff.nc.words import AXES, Block, Word
 
-# What a program may set: NGC's numbered parameters below those of the control; Macro B's locals and commons.
+# Variables that a program may set: NGC's numbered parameters below the control's; Macro B's locals and commons.
 LOCALS = {NGC: 30, MACRO_B: 33, EITHER: 30}
 NGC_LAST = 5000
-DEBUG_SWITCH = 5599  # whether (DEBUG,...) comments print
+DEBUG_SWITCH = 5599  # if set, (DEBUG,...) comments print
 COMMON = (range(100, 200), range(500, 1000))  # Fanuc's series 16 to 31i, Haas; the second survive power-off
 NGC_POSITION, NGC_TOOL, NGC_OFFSET = 5420, 5400, 5220
 MACRO_POSITIONS = (5001, 5041)  # block end; present position, with the tool length: the same without one
