@@ -38,7 +38,7 @@ def skip_docstrings() -> None:
     They are made while it is imported, and take two thirds of that. To be called before the first picture.
     """
     artist: Any = import_module("matplotlib.artist")
-    artist.Artist._update_set_signature_and_docstring = lambda: None
+    artist.Artist._update_set_signature_and_docstring = lambda *_: None  # where it is gone, nothing happens
     artist.kwdoc = lambda _: ""
 
 

@@ -20,7 +20,10 @@ UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 TIP_TURNS = (
     "PLANE, cycle 19 and CYCLE800 turn the tool about its tip where it stands: how the machine's axes turn is not known"
 )
-HOW_AXES_TURN = "STAY MOVE TURN F FMAX SEQ+ SEQ- SYM+ SYM- DIST ABST MB MBMAX TABLEROT COORDROT".split()
+HOW_AXES_TURN = (
+    "STAY", "MOVE", "TURN", "F", "FMAX", "SEQ+", "SEQ-", "SYM+", "SYM-", "DIST", "ABST", "MB", "MBMAX", "TABLEROT",
+    "COORDROT",
+)  # fmt: skip
 SPATIAL = "the angles of cycle 19 are spatial angles, not positions of the machine's axes"
 
 
