@@ -245,7 +245,7 @@ class _Way:
         self.head_lines = np.array([head.line for head in heads], dtype=np.int64)
 
     def stretches(self, last: int, move: int) -> list[tuple[int, int]]:
-        """Lines from move `last` (-1: the start of the file) to a later one: the first left out, the last in it."""
+        """Stretches of lines from move `last` (-1: file start) to a later one; first line excluded, last included."""
         stretches, start = [], int(self.line[last + 1])
         first, stop = np.searchsorted(self.jump_moves, [last + 1, move + 1]).tolist()
         for jump in self.jumps[first:stop]:
@@ -259,7 +259,7 @@ class _Way:
         return [row for low, high in ends for row in range(low, high)]
 
     def events(self, moves: IntArray) -> IntArray:
-        """Headings above the lines of moves, jumps before them: where neither grows the run passes no heading."""
+        """Number of headings above the lines of moves and of jumps before them: if it stays, no heading is passed."""
         above = np.searchsorted(self.head_lines, self.line[moves + 1], side="right")
         return np.stack([above, np.searchsorted(self.jump_moves, moves + 1)])
 

@@ -1,4 +1,4 @@
-"""Cutter-location files: the points, tool axes and feeds that CAM systems hand to post processors, in APT's words.
+"""Reader of cutter-location files: the points, tool axes and feeds of a CAM system's output, in APT words.
 
 `statements` splits lines; `vocabulary` is the table of words, whose functions are in `modes`, `motion` and `cycles`;
 each takes the `state` and a statement. `state` also makes moves of what `circles` and `tool_axes` compute.

@@ -97,7 +97,7 @@ def _check(block: CurrentBlock, number: int, values: Values) -> None:
 
 
 def call(state: State, block: CurrentBlock, change: Values | None = None) -> None:
-    """The cycle defined last, at the present point (CYCL CALL, M99, M89); `change`: other parameters of this call."""
+    """Run the last cycle defined, at the present point (CYCL CALL, M99, M89); `change`: parameters for this call."""
     plain, normal = state.plain, PLANES[state.plane][2]
     if plain.cycle is None:
         raise block.fail(None, "calls a cycle, and none is defined", "CYCL DEF before it")

@@ -84,7 +84,7 @@ class Follower(Record):
             self.passed.append(self.passed[-1] + bool(shows))
 
     def follow(self, text: str) -> None:
-        """Take every command. Raises `InputError` for what gives no path: probing, splines, tools of unknown length."""
+        """Take every command. Raises `InputError` for what has no path: probing, splines, tools of unknown length."""
         for match in CALL.finditer(text):
             number, name, inner = match.groups()
             action = getattr(self, f"_on_{name.lower()}", None)

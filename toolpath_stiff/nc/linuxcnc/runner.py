@@ -71,7 +71,7 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str) -> Run:
 
 
 def _execute(command: list[str], folder: Path) -> int:
-    """Exit code, or less the signal that ended it; a process that sleeps uses no processor time: the clock ends it."""
+    """Exit code, or minus the signal that ended it. Wall time is limited too: a sleeping process uses no CPU time."""
     environment = {"HOME": str(folder), "PATH": "/usr/bin:/bin", "LC_ALL": "C", "TMPDIR": str(folder)}
     with (folder / ERRORS).open("wb") as errors:
         try:
