@@ -16,7 +16,7 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import scaled_law
-from toolpath_stiff.machine.model import EffectEntry, Hexapod, StrutLaw, as_hexapod
+from toolpath_stiff.machine.model import EffectEntry, Hexapod, StrutLaw
 from toolpath_stiff.stiffness.active import read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.units import n_per_mm_from_n_per_m
@@ -121,13 +121,12 @@ def with_effects(machine: Machine, effects: Mapping[str, Document], strut_law: S
     """A machine with further effects, name -> the keys of its entry in a machine file, and with another strut law."""
     entries, stated = _entries(effects), machine.stated
     read = [entry for entry in entries if find_effect(entry.name, machine.effect_files).is_instrument]
-    carrying = stated.with_changes(
-        effects=(*stated.effects, *(entry for entry in entries if entry not in read)),
-        instruments=(*stated.instruments, *read),
-    )
-    if strut_law is not None:
-        return machine.carrying(as_hexapod(carrying, "a strut law").with_changes(strut_law=strut_law))
-    return machine.carrying(carrying)
+    carried = {
+        "effects": (*stated.effects, *(entry for entry in entries if entry not in read)),
+        "instruments": (*stated.instruments, *read),
+    }
+    law = {} if strut_law is None else {"strut_law": strut_law}
+    return machine.carrying(stated.with_changes(**carried, **law))
 
 
 def _entries(effects: Mapping[str, Document]) -> list[EffectEntry]:

@@ -44,8 +44,6 @@ def check(
     >>> [(finding.line, finding.severity) for finding in found.errors]
     [(3, 'error')]
     """
-    part = program_from(program)
-    on = None if machine is None else machine_from(machine)
-    hexapod = None if on is None else on.model.machine
-    request = part.placed(origin_si(origin_mm_deg), ZERO if hexapod is None else hexapod.default_origin)
-    return check_program(request, hexapod, m_from_mm(step_mm))
+    part, on = program_from(program), None if machine is None else machine_from(machine).model.machine
+    request = part.placed(origin_si(origin_mm_deg), ZERO if on is None else on.default_origin)
+    return check_program(request, on, m_from_mm(step_mm))

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from toolpath_stiff.api import inputs
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, cut_setup
-from toolpath_stiff.api.inputs import origin_si
+from toolpath_stiff.api.inputs import origin_si, read_at
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.comparison.walls import WallComparison, read_walls
@@ -20,7 +20,6 @@ from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.nc.reader import read
 from toolpath_stiff.options import Option, checked
-from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Progress, teller
 from toolpath_stiff.units import m_from_mm
 
@@ -80,7 +79,7 @@ def compensate(
     on, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
     model, setup = on.running(part), _known(cut_setup(cut, material, stock_mm))
     default = model.machine.default_origin
-    first, place = _read(part, origin, default)
+    first, place = read_at(part, origin, default)
     tell = teller(progress)
 
     def evaluate(program: ReadProgram) -> Cut:
@@ -151,7 +150,7 @@ def compare_walls(
     on, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
     model, setup = on.running(part), _known(cut_setup(cut, material, stock_mm))
     points, normal, deviation, notes = read_walls(str(data), columns)
-    first, place = _read(part, origin, model.machine.default_origin)
+    first, place = read_at(part, origin, model.machine.default_origin)
     foretold = evaluate_cut(model, first, place, setup, m_from_mm(step_mm), progress)
     notes = (*notes, *foretold.assumptions, *foretold.warnings)
     compared = compare_points(foretold, first.moves, points, normal, deviation, notes)
@@ -162,9 +161,3 @@ def _known(setup: CutSetup | None) -> CutSetup:
     if setup is None:
         raise InputError("nothing is known of the cut", hint="say --cut FILE, or --material and --stock")
     return setup
-
-
-def _read(part: Program, origin: Pose | None, default: Pose) -> tuple[ReadProgram, Pose]:
-    """A program as read for a zero, and where that then is."""
-    first = part.moves(origin, default)
-    return first, origin or (first.origin if first.origin_source == "program" else default)

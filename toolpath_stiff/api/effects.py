@@ -1,10 +1,10 @@
 """The physical effects that a machine can carry: the catalogue, and one's own."""
 
 from collections.abc import Iterable
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
+from toolpath_stiff.api.inputs import template
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import KINDS
@@ -83,8 +83,7 @@ def effect_template(name: str) -> TextFile:
     """
     if not name.isidentifier():
         raise InputError(f"{name!r} cannot be an effect's name", expected="a name such as my_screw")
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / "effect.py.txt").read_text("utf-8")
-    return TextFile(name, text.replace("EFFECT_NAME", name).replace("EFFECT_FILE", f"{name}.py"))
+    return TextFile(name, template("effect.py").replace("EFFECT_NAME", name).replace("EFFECT_FILE", f"{name}.py"))
 
 
 def effect_name(file: str | Path, ending: str = ".py") -> str:

@@ -2,10 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 from toolpath_stiff.analysis.turning import BEST, FEED, FIXED
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.moves import ReadProgram
+from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import Option, number_in, numbers
 from toolpath_stiff.poses import Pose, pose_in_si
 
@@ -30,6 +33,17 @@ Turn = Annotated[str | float, Option("--turn", "fixed|feed|best|DEG", read=turn_
 # Coarser than 0.01 mm is not machining; beyond nine decimals a double has no more digits.
 Decimals = Annotated[int | None, Option("--decimals", at_least=2, at_most=9)]
 Linearised = Annotated[float | None, Option("--linearise", "mm", above=0, at_most=10)]
+
+
+def template(file: str) -> str:
+    """The text of a packaged template."""
+    return (Path(__file__).parents[1] / "data" / "templates" / f"{file}.txt").read_text("utf-8")
+
+
+def read_at(part: Program, origin: Pose | None, default: Pose) -> tuple[ReadProgram, Pose]:
+    """A program as read for a zero, and where that then is."""
+    first = part.moves(origin, default)
+    return first, origin or (first.origin if first.origin_source == "program" else default)
 
 
 def finite(name: str, value: Any) -> float:

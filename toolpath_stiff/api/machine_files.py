@@ -1,11 +1,11 @@
 """Machine files made: templates, and what other programs' files say of a machine."""
 
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.api.inputs import template
+from toolpath_stiff.files import read_text
 from toolpath_stiff.machine import dh_table, freecad, urdf
 from toolpath_stiff.machine.file import KINDS
 from toolpath_stiff.machine.linuxcnc import hexapod_of_pins
@@ -41,8 +41,9 @@ def machine_template(
     """
     target = Path(file)
     name = "machine" if kind == Hexapod.kind else kind
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / f"{name}.toml.txt").read_text("utf-8")
-    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
+    text = (
+        template(f"{name}.toml").replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
+    )
     return TextFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
 
 
@@ -110,8 +111,7 @@ def machine_from_urdf(
     toolpath_stiff.errors.InputError: cannot read the URDF file 'nowhere.urdf': No such file or directory
     """
     path = Path(file)
-    text = read_bytes(path, "the URDF file").decode("utf-8", "replace")
-    return TextFile(path.stem, *urdf.machine_from_urdf(text, tip, path.name))
+    return TextFile(path.stem, *urdf.machine_from_urdf(read_text(path, "the URDF file"), tip, path.name))
 
 
 @checked
@@ -172,5 +172,4 @@ def machine_from_freecad(
     toolpath_stiff.errors.InputError: cannot read the FreeCAD machine 'nowhere.fcm': No such file or directory
     """
     path = Path(file)
-    text = read_bytes(path, "the FreeCAD machine").decode("utf-8", "replace")
-    return TextFile(path.stem, *freecad.machine_from_fcm(text, order, path.name))
+    return TextFile(path.stem, *freecad.machine_from_fcm(read_text(path, "the FreeCAD machine"), order, path.name))

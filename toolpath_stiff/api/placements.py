@@ -13,7 +13,7 @@ from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.turning import BEST, FEED, FIXED, check_free_turn
 from toolpath_stiff.api import inputs
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, cut_setup
-from toolpath_stiff.api.inputs import origin_si, pose_si
+from toolpath_stiff.api.inputs import origin_si, pose_si, read_at
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
@@ -143,8 +143,7 @@ def place(
     model, origin, turns = on.running(part), origin_si(origin_mm_deg), (tilt_a_deg, tilt_b_deg, rotate_deg)
     default, setup = model.machine.default_origin, cut_setup(cut, material, stock_mm)
     _check_together(write is None, decimals is None and linearise_mm is None, objective, setup is None, turn)
-    read = part.moves(origin, default)
-    present, step = origin or (read.origin if read.origin_source == "program" else default), m_from_mm(step_mm)
+    (read, present), step = read_at(part, origin, default), m_from_mm(step_mm)
     now = None if setup is None else evaluate_cut(model, read, present, setup, step, progress)
     task = PlacementTask(
         model=model,
@@ -220,15 +219,13 @@ def _turn_of_tool(machine: MachineTool, turn: str | float) -> list[Range]:
 
 def _from_base(
     base_mm: Sequence[float], box: Sequence[Range | None], heights_mm: Sequence[float]
-) -> tuple[list[Range | None], list[float]]:
+) -> tuple[Sequence[Range | None], list[float]]:
     """Bounds and heights that are given, counted from the machine's base. Raises `InputError`."""
     base = [inputs.finite("--base", value) for value in base_mm]
     if len(base) != 3:
         raise InputError(f"--base of {len(base)} numbers", expected="X,Y,Z in mm")
-    moved: list[Range | None] = []
-    for side, offset in zip(box, base, strict=True):
-        ends = side if side is None else np.add(side, offset).tolist()
-        moved.append(tuple(ends) if isinstance(ends, list) else ends)
+    sides = zip(box, base, strict=True)
+    moved = [side if side is None else tuple(np.add(_pair(side), offset).tolist()) for side, offset in sides]
     return moved, [z + base[2] for z in heights_mm]
 
 
@@ -289,9 +286,8 @@ def try_placement(
     on, part = machine_from(machine), program_from(program)
     model, direction = on.running(part), parse_load(load)
     read = part.moves(None, model.machine.default_origin)
-    return PlacementTrial(
-        read, Evaluator(model, work_path(read, m_from_mm(step_mm), direction, model.machine), direction, force_N)
-    )
+    path = work_path(read, m_from_mm(step_mm), direction, model.machine)
+    return PlacementTrial(read, Evaluator(model, path, direction, force_N))
 
 
 @checked

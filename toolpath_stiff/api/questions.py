@@ -93,10 +93,6 @@ class Question:
         assert self.data is not None
         return self.data.on(self.on)
 
-    def hexapod(self, asking: str) -> Hexapod:
-        """The machine as its file has it. Raises `InputError` where it is of another kind, which `asking` cannot do."""
-        return as_hexapod(self.model, asking)
-
     @property
     def has_pulls(self) -> bool:
         """Whether the measurements are forces and displacements as vectors, on a machine of elements."""
@@ -118,7 +114,7 @@ class Question:
     def diagnosed(self, tell: Callable[[str], None], *words: str, inputs: Iterable[str] = ()) -> Diagnosis:
         """A diagnosis of the readings; `words` are further ones of the command that gives it."""
         return replace(
-            diagnose_readings(self.hexapod("diagnose"), self.readings, progress=tell, **self.common),
+            diagnose_readings(as_hexapod(self.model, "diagnose"), self.readings, progress=tell, **self.common),
             names=self.request.data,
             line=self.request.command("diagnose", *words),
             asked=self.request,
