@@ -26,10 +26,10 @@ SYMBOLS = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
 SHOWN = np.array([n_per_mm2_from_pa(1.0)] * 3 + [n_per_mm_from_n_per_m(1.0)] * 3)  # N/mm2 and N/mm per SI
 SPREAD = 0.3  # relative standard deviation where none is stated: of one aluminium, published ones spread by a factor 2
 UNKNOWN = (0.3, 1.0)  # standard deviation of what is not known, shares of Ktc and Kte: the size of radial ones
-TAPER = 1e-6  # m of chip over which the force at the edge sets in: assumed, so that no force jumps
+TAPER, TAPERS_UM = 1e-6, (1e-3, 10.0)  # m of chip over which the force at the edge sets in: assumed, so that none jumps
 STRONGEST = 1e5  # N/mm2, N/mm: twenty times a nickel alloy
 KEYS = ("material", "origin", "cutting_N_per_mm2", "edge_N_per_mm", "covariance", "spread_percent", "thinnest_chip_um",
-        "thickest_chip_um")  # fmt: skip
+        "thickest_chip_um", "edge_sets_in_um")  # fmt: skip
 Fault = Callable[[str, str, str], InputError]  # of a key: what is wrong, what was expected
 
 
@@ -84,6 +84,7 @@ class Coefficients:
             "covariance": [[json_number(value, 9) for value in row] for row in covariance.tolist()],
             "thinnest_chip_um": json_number(um_from_m(self.thinnest)),
             "thickest_chip_um": json_number(um_from_m(self.thickest)),
+            **({} if self.taper == TAPER else {"edge_sets_in_um": json_number(um_from_m(self.taper))}),
         }
 
 
@@ -165,6 +166,12 @@ def coefficients_from(table: Document, fault: Fault) -> Coefficients:
         if "spread_percent" not in table:
             remarks.append(f"standard deviation of {100.0 * SPREAD:g} % assumed")
     covariance = covariance + np.diag(np.where(unknown, size, 0.0) ** 2)
+    taper, (least, most) = table.get("edge_sets_in_um"), TAPERS_UM
+    if taper is None:
+        taper = um_from_m(TAPER)
+        remarks.append(f"the force at the edge sets in over {taper:g} um of chip (edge_sets_in_um assumed)")
+    elif not is_number(taper) or not least <= taper <= most:
+        raise fault("edge_sets_in_um", f"edge_sets_in_um = {shortened(taper)}", f"{least:g} to {most:g} um of chip")
     chips = [table.get(key) for key in ("thinnest_chip_um", "thickest_chip_um")]
     thinnest, thickest = (m_from_um(float(chip)) if is_number(chip) else np.nan for chip in chips)
     return Coefficients(
@@ -175,6 +182,7 @@ def coefficients_from(table: Document, fault: Fault) -> Coefficients:
         origin="; ".join(remarks),
         thinnest=thinnest,
         thickest=thickest,
+        taper=m_from_um(taper),
     )
 
 
