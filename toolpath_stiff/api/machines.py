@@ -1,10 +1,9 @@
-"""Machines with the effects that act on them; machine files made."""
+"""Machines with the effects that act on them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -14,21 +13,17 @@ from toolpath_stiff.analysis.evaluation import joint_columns
 from toolpath_stiff.analysis.machine_check import MachineCheck, check_machine
 from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.files import read_bytes, write_atomically
-from toolpath_stiff.machine import dh_table, freecad, urdf
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.elements import Stance
-from toolpath_stiff.machine.file import KINDS, load_machine, packaged_machines
+from toolpath_stiff.machine.file import load_machine, packaged_machines
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.limits import Reach, reach_along, stand
-from toolpath_stiff.machine.linuxcnc import hexapod_of_pins
-from toolpath_stiff.machine.linuxcnc_files import read_control
-from toolpath_stiff.machine.linuxcnc_kinds import MODULES, machine_from_control
 from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
-from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_text
+from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.program import Program
-from toolpath_stiff.options import Option, checked, names
+from toolpath_stiff.options import Option, checked
 from toolpath_stiff.poses import pose_in_mm, pose_in_si
-from toolpath_stiff.results import DataFrame, Figure, Result, TextFile, frame_of
+from toolpath_stiff.results import DataFrame, Figure, Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import NO_SETUP, StiffnessModel, build_model, check_setup
@@ -423,162 +418,3 @@ def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects
 def machine_from(machine: Machine | str | Path) -> Machine:
     """A machine, loaded if it is a name or a file."""
     return machine if isinstance(machine, Machine) else Machine.load(machine)
-
-
-@checked
-def machine_template(
-    file: str | Path = "mine.toml",
-    *,
-    kind: Annotated[str, Option("--kind", choices=tuple(KINDS))] = Hexapod.kind,
-) -> TextFile:
-    """A commented machine file to edit, named after its file; nothing is written before `save`.
-
-    Parameters
-    ----------
-    file
-        That it will be.
-    kind
-        Of machine: six telescopic struts, or joints in series, five struts, a linear or rotary delta, struts on moving
-        feet.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_template("mill.toml").name
-    'mill'
-    """
-    target = Path(file)
-    name = "machine" if kind == Hexapod.kind else kind
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / f"{name}.toml.txt").read_text("utf-8")
-    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
-    return TextFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
-
-
-@checked
-def machine_from_linuxcnc(
-    file: Annotated[str | Path, Option("FILE.hal|FILE.ini")],
-    units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None,
-) -> TextFile:
-    """The machine of the kinematics pins in LinuxCNC's HAL and ini files.
-
-    Of genhexkins strut stiffness and limits are assumed; of other modules (trivkins, 5axiskins, xyzac-trt-kins,
-    xyzbc-trt-kins, genserkins, pumakins, pentakins, lineardeltakins, rotarydeltakins) compliances are left to fill in.
-
-    Parameters
-    ----------
-    file
-        The HAL file, with the ini files beside it that load it, or the ini file, with the HAL files that it loads.
-    units
-        Of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, lacks pins, or nobody says the unit.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_from_linuxcnc("nowhere.hal")
-    Traceback (most recent call last):
-    toolpath_stiff.errors.InputError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
-    """
-    path = Path(file)
-    files = read_control(path, {*MODULES, "genhexkins"}, units)
-    if files.module not in ("", "genhexkins"):
-        return TextFile(path.stem, *machine_from_control(files, path.stem))
-    machine, notes = hexapod_of_pins(files)
-    heading = f"Made from {path.name}, pins in {files.units}.\n" + "\n".join(notes)
-    return TextFile(machine.name, machine_toml(machine, heading), notes)
-
-
-@checked
-def machine_from_urdf(
-    file: Annotated[str | Path, Option("FILE.urdf")], tip: Annotated[str, Option("--tip", "LINK")]
-) -> TextFile:
-    """The robot of a URDF file, from its root link to a tip link; compliances are left to fill in.
-
-    Parameters
-    ----------
-    file
-        The URDF file.
-    tip
-        The link whose frame is that of the tool's tip, z to the shank; a flange, where the tool is added by hand.
-
-    Raises
-    ------
-    InputError
-        Not a chain, limits that are missing, units that cannot be.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_from_urdf("nowhere.urdf", "flange")
-    Traceback (most recent call last):
-    toolpath_stiff.errors.InputError: cannot read the URDF file 'nowhere.urdf': No such file or directory
-    """
-    path = Path(file)
-    text = read_bytes(path, "the URDF file").decode("utf-8", "replace")
-    return TextFile(path.stem, *urdf.machine_from_urdf(text, tip, path.name))
-
-
-@checked
-def machine_from_dh(
-    file: Annotated[str | Path, Option("TABLE")],
-    convention: Annotated[str, Option("--convention", choices=("modified", "standard"))],
-) -> TextFile:
-    """The robot of a table of Denavit-Hartenberg rows; compliances are left to fill in.
-
-    Parameters
-    ----------
-    file
-        Columns alpha_deg, a_mm, d_mm, offset_deg, min_deg, max_deg and, if there, name and type (R, or P with min_mm,
-        max_mm).
-    convention
-        Of the rows: modified (Craig) or standard; they do not show it.
-
-    Raises
-    ------
-    InputError
-        A cell that is no number, a limit that is missing.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_from_dh("nowhere.csv", "modified")
-    Traceback (most recent call last):
-    toolpath_stiff.errors.InputError: cannot read DH rows 'nowhere.csv': No such file or directory
-    """
-    name = Path(str(file)).stem
-    return TextFile(name, *dh_table.machine_from_dh(str(file), name, f"{convention} DH"))
-
-
-@checked
-def machine_from_freecad(
-    file: Annotated[str | Path, Option("FILE.fcm")],
-    order: Annotated[Sequence[str], Option("--order", "X,Y,...", read=names)] = (),
-) -> TextFile:
-    """The mill of a FreeCAD machine (.fcm); compliances are left to fill in.
-
-    Parameters
-    ----------
-    file
-        The machine.
-    order
-        Axes from the base outwards, where the file does not say which carries which.
-
-    Raises
-    ------
-    InputError
-        Not a machine, an order that nobody says, mirrored axes.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_from_freecad("nowhere.fcm")
-    Traceback (most recent call last):
-    toolpath_stiff.errors.InputError: cannot read the FreeCAD machine 'nowhere.fcm': No such file or directory
-    """
-    path = Path(file)
-    text = read_bytes(path, "the FreeCAD machine").decode("utf-8", "replace")
-    return TextFile(path.stem, *freecad.machine_from_fcm(text, order, path.name))

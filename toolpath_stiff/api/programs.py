@@ -11,7 +11,6 @@ from toolpath_stiff.analysis.turning import FIXED
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, Tolerance, cut_setup
 from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, Turn, origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
@@ -125,6 +124,8 @@ def analyze(
     analysis = on(first, second, counter(progress, f"{part.name}: samples"))
     cut_of = None
     if setup is not None:
+        from toolpath_stiff.cutting.cut import evaluate_cut
+
         at, model = (analysis.program, analysis.origin, setup, analysis.step), analysis.model
         ways = model.machine.configurations
         if len(ways) > 1 and analysis.at.configuration in ways:

@@ -52,9 +52,9 @@ def hexapod_of_pins(files: ControlFiles) -> tuple[Hexapod, list[str]]:
 
 
 def _with_assumptions(frame: FloatArray, platform: FloatArray, file: str) -> Hexapod:
-    """Limits and stiffness that LinuxCNC does not know, from the machine's own size."""
+    """Hexapod with limits and stiffness that LinuxCNC does not state, assumed from the machine's own size."""
     size = float(np.linalg.norm(frame[:, :2], axis=1).mean())
-    height = float(frame[:, 2].mean() + 0.87 * size)  # struts then lean by about 45 degrees
+    height = float(frame[:, 2].mean() + 0.87 * size)  # so that struts lean by about 45 degrees
     neutral = (0.0, 0.0, height, 0.0, 0.0, 0.0)
     struts = platform + np.array(neutral[:3]) - frame
     middle = float(np.sqrt(np.einsum("ij,ij->i", struts, struts)).mean())

@@ -67,7 +67,7 @@ def _head(files: ControlFiles) -> tuple[str, list[str]]:
 
 
 def _rows(files: ControlFiles, rows: list[tuple[float, float, float]]) -> tuple[str, list[str]]:
-    """Modified DH rows of alpha in rad, a and d in mm."""
+    """`[[axis]]` rows by modified DH, from alpha in rad, a and d in mm."""
     parts = []
     for i, (alpha, a, d) in enumerate(rows):
         if abs(alpha) > RADIANS:

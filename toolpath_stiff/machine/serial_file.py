@@ -1,4 +1,4 @@
-"""Files of serial machines: joints by Denavit-Hartenberg rows, by origin and axis, or a mill's axes by their limits."""
+"""Files of serial machines: joints by Denavit-Hartenberg rows, by origin and axis, or as a mill's axes with limits."""
 
 from collections.abc import Sequence
 
@@ -68,15 +68,15 @@ SCHEMA = {
     "pose[]": {},
 }
 SECTIONS_BESIDE = [name for name in SCHEMA if name]
-# Limits of all rotary axes within a turn of 2 pi: such degrees are radians. Angles of a row that are multiples of a
+# Rotary limits that are all within 2 pi are radians, not degrees. Angles of a row that are multiples of a
 # right angle in radians, to the digits that people write.
 RADIANS, RIGHT_ANGLE, WRITTEN = 6.29, np.pi / 2.0, 1e-3
-PARALLEL = 1e-3  # sine of the angle, or volume, of directions that are taken for one
-SHORTEST_ARM = 0.05  # m from the first joint to the tip: less is a description in metres
+PARALLEL = 1e-3  # sine of the angle, or volume, below which directions count as dependent
+SHORTEST_ARM = 0.05  # m from the first joint to the tip: less means a description in metres
 
 
 def read(toml: MachineToml) -> Serial:
-    """A serial machine of a machine file. Raises `InputError`."""
+    """Serial machine from a machine file. Raises `InputError`."""
     values = read_sections(toml, SCHEMA, SECTIONS_BESIDE, stated=False)
     if rows := read_rows(toml, "axis", AXIS):
         names, convention = [row["name"] for row in rows], values[""].get("convention", MODIFIED)
@@ -112,11 +112,11 @@ def read(toml: MachineToml) -> Serial:
 def _of_rows(
     toml: MachineToml, rows: Sequence[Document], values: Sections, convention: str
 ) -> tuple[tuple[ChainJoint, ...], tuple[ChainJoint, ...], FixedFrame, FixedFrame]:
-    """Joints of tool and work, the tip in the last frame of the one, the work in that of the other."""
+    """Joints of tool and work; placements of the tip and of the work in the last frame of each."""
     if convention not in (MODIFIED, STANDARD):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{MODIFIED!r} or {STANDARD!r}")
     sides: dict[str, list[ChainJoint]] = {"tool": [], "work": []}
-    rests = {"tool": STILL, "work": STILL}  # what follows the last joint of each side
+    rests = {"tool": STILL, "work": STILL}  # placement after the last joint of each side
     for nth, row in enumerate(rows, 1):
         section, side = f"axis[{nth}]", row.get("side", "tool")
         if side not in sides:
@@ -150,7 +150,7 @@ def _is_linear(toml: MachineToml, section: str, row: Document) -> bool:
 
 
 def _placements(toml: MachineToml, section: str, row: Document, convention: str) -> tuple[FixedFrame, FixedFrame]:
-    """What stands between the joint before and this one, and what follows this one."""
+    """Placements between the previous joint and this one, and after this one."""
     dh, free = [key for key in DH if key in row], [key for key in ("xyz_mm", "rpy_deg", "axis") if key in row]
     if dh and free:
         raise toml.fault(section, free[0], f": the row has {dh[0]} too", expected="a DH row, or an origin and an axis")
@@ -196,7 +196,7 @@ def _travel(toml: MachineToml, section: str, row: Document, linear: bool) -> dic
 
 
 def _check_units(toml: MachineToml, joints: Sequence[ChainJoint]) -> None:
-    """Refuse what is most likely written in radians, and linear axes X, Y, Z that are left-handed."""
+    """Refuse values most likely written in radians, and linear axes X, Y, Z that are left-handed."""
     ends = [abs(np.rad2deg(end)) for joint in joints if not joint.linear for end in (joint.low, joint.high)]
     if ends and max(ends) < RADIANS and max(ends) > 0.0:
         mistake = f": no rotary axis turns by more than {max(ends):.4g} deg; are these radians?"
@@ -204,7 +204,7 @@ def _check_units(toml: MachineToml, joints: Sequence[ChainJoint]) -> None:
 
 
 def _tip(toml: MachineToml, tool: Document) -> FixedFrame:
-    """The tip in the flange; its axes by two columns, the third checked if it is there."""
+    """Placement of the tip in the flange; its axes by two columns, the third checked if given."""
     given = {name: tool[name] for name in ("x_axis", "y_axis", "z_axis") if name in tool}
     if not given:
         return FixedFrame(np.eye(3), m_from_mm(tool["tip_mm"]))
@@ -220,7 +220,7 @@ def _tip(toml: MachineToml, tool: Document) -> FixedFrame:
 
 
 def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
-    """`[[axis]]` rows of X, Y, Z by limits: the work's side where an element moves against one; and of a trunnion."""
+    """`[[axis]]` rows of X, Y, Z from limits, on the work's side if an element moves against one; also a trunnion's."""
     convention = values[""].get("convention")
     if convention not in (None, XYZAC, XYZBC):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{XYZAC!r}, {XYZBC!r}, or [[axis]] rows")
@@ -231,7 +231,7 @@ def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
     moved = [name for row in read_rows(toml, "element", ELEMENT) for name in row.get("moves_with", ())]
     side = {axis: "work" if f"-{axis}" in moved else "tool" for axis in "XYZ"}
     rows: list[Document] = []
-    # The axis that most elements move with is nearest the base; rows do not cross sides, so the order serves both.
+    # The axis with which most elements move is nearest the base; rows keep to a side, so one order serves both.
     for axis in sorted("XYZ", key=lambda axis: -moved.count(axis) - moved.count(f"-{axis}")):
         direction = np.eye(3)["XYZ".index(axis)] * (1.0 if side[axis] == "tool" else -1.0)
         row = {"name": axis, "type": "linear", "side": side[axis], "axis": direction}
@@ -257,7 +257,7 @@ def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
 
 
 def _ends(toml: MachineToml, values: Sections, axis: str) -> Document:
-    """Keys of the limits of a mill's axis; a rotary one without limits turns without end."""
+    """Keys of the limits of a mill's axis; a rotary axis without limits turns endlessly."""
     unit = "mm" if axis in "XYZ" else "deg"
     ends = values.get("limits", {}).get(f"{axis}_{unit}", None if unit == "mm" else np.array([-np.inf, np.inf]))
     if ends is None:
@@ -268,7 +268,7 @@ def _ends(toml: MachineToml, values: Sections, axis: str) -> Document:
 
 
 def _check_solvable(toml: MachineToml, machine: Serial) -> None:
-    """A pose needs three linear axes that span space and up to two rotary ones, named by words; or six joints."""
+    """Refuse machines other than three linear axes that span space with up to two named rotary ones, or six joints."""
     linear = [joint.name for joint in machine.joints if joint.linear]
     rotary = [joint.name for joint in machine.joints if not joint.linear]
     expected = "three linear axes and up to two rotary ones, or six joints"

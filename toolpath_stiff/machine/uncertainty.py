@@ -1,4 +1,4 @@
-"""`[uncertainty]` of a machine file, checked: which parameters were fitted, and how well they are known."""
+"""`[uncertainty]` of a machine file, checked: fitted parameters, and their uncertainty."""
 
 from collections.abc import Sequence
 
@@ -24,13 +24,13 @@ STATED = {
     "form_percent": Key(unit="%", shape=(2,), low=0.0, high=np.inf),
     "places_mm_deg": Key(unit="mm, deg", shape=(1, 6), many=True),
 }
-NOT_NEGATIVE = -1e-8  # smallest eigenvalue of a correlation matrix that rounding in a file may leave
+NOT_NEGATIVE = -1e-8  # smallest eigenvalue of a correlation matrix that rounding in a file may cause
 
 
 def read_uncertainty(
     toml: MachineToml, parameters: Sequence[str], entries: Sequence[EffectEntry]
 ) -> Uncertainty | None:
-    """The section of a file with these parameters and effects; None where there is none. Raises `InputError`."""
+    """Section of a file with these parameters and effects; None if there is none. Raises `InputError`."""
 
     def fault(key: str, mistake: str, expected: str) -> InputError:
         return toml.fault(SECTION, key, mistake, expected)

@@ -28,7 +28,7 @@ def standing(
 
     `places` are file and line of each. Raises `InputErrors` for rows that cannot be.
     """
-    by_joints, errors, notes = ~np.isnan(joints).any(axis=1), list[MeasurementError](), list[str]()
+    by_joints, errors, notes = np.asarray(~np.isnan(joints).any(axis=1)), list[MeasurementError](), list[str]()
     position, rotation, joints = pose[:, :3], rotation_matrices(np.nan_to_num(pose[:, 3:])), joints.copy()
     apart, turned = np.full((2, len(pose)), np.nan)
 
@@ -73,7 +73,7 @@ def standing(
         joints[~by_joints] = np.where(missed, machine.solve(*alone).joints, tried[kept])
         if machine.configurations[kept]:
             notes.append(f"poses without joint values: taken in the configuration {machine.configurations[kept]}")
-    if (lost := np.isnan(joints).any(axis=1)).any():
+    if (lost := np.asarray(np.isnan(joints).any(axis=1))).any():
         refuse(lost, "no joint values lead to the pose", hint=f"{hint}; {ELSEWHERE}" if hint else ELSEWHERE)
     turning = joints[by_joints][:, [kind != "linear" for kind in machine.joint_kinds]]
     if len(np.unique(turning, axis=0)) >= SEVERAL and turning.any() and np.abs(turning).max() < SMALL_TURNS:

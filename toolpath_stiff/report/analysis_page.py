@@ -6,8 +6,11 @@ the templates, in the script's data as JSON without `<`, `>`, `&`; the script wr
 content security policy lets only our own script run.
 """
 
+from __future__ import annotations
+
 import base64
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
@@ -16,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report import analysis_tables as words
@@ -24,10 +26,12 @@ from toolpath_stiff.report.curves import beyond_scale, cutting_box, extremes_by_
 from toolpath_stiff.report.cut import cut_tables
 from toolpath_stiff.report.pages import Part, markup, part, render
 from toolpath_stiff.report.scene import machine_scene
-from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
+
+if TYPE_CHECKING:
+    from toolpath_stiff.cutting.cut import Cut
 
 SCRIPTS = ("stage.js", "viewer.js", "solids.js", "machine.js", "profile.js", "listing.js", "analysis.js")
 
@@ -64,7 +68,7 @@ def _thinned_note(shown: int, samples: int) -> str:
 
 
 def _tables(analysis: Analysis, weakest: Sequence[int], rows: IntArray) -> list[tuple[str, Markup, bool]]:
-    """Title, content and whether it is wide, of each table; `weakest` of the page's `rows`: the weakest places."""
+    """Title, content and True if wide, of each table; `weakest` of the page's `rows`: the weakest places."""
     summary, other = analysis.to_dict(), analysis.on_other
     operations, unsupported = summary["per_operation"], summary["unsupported"]
     more = words.and_more(operations, words.MOST_ROWS, "operations")
@@ -109,13 +113,13 @@ def _places(places: Sequence[Document], weakest: Sequence[int]) -> ShownTable:
 
 MOST_QUADS = 8_000  # of walls and of floors on the page
 MOST_SAMPLES = 200_000  # on the page: some 5 MB; the tables are always of all samples
-OTHER_COLUMNS = 4000  # columns of pixels that the other machine's curve is thinned to
-NONE = 65535  # a value that does not exist
+OTHER_COLUMNS = 4000  # columns of pixels to which the other machine's curve is thinned
+NONE = 65535  # stands for a missing value
 OUT_OF_REACH, PLUNGE = 8, 16  # flags beside the motion
 
 
 def page_data(analysis: Analysis) -> Document:
-    """What the page's script reads: lengths in mm, angles in degrees, stiffness in N/mm.
+    """Data for the page's script: lengths in mm, angles in degrees, stiffness in N/mm.
 
     Positions are 16-bit fractions of the path's own box (`frame`: a 1 m box gives 0.015 mm), stiffness and margin of
     their own ranges, NONE where there is none.
@@ -158,7 +162,9 @@ def page_data(analysis: Analysis) -> Document:
 
 
 def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
-    """The finished part in machine coordinates, its error in um, the page's row of the sample that made each place."""
+    """Finished part in machine coordinates, its error in um, and the page's row of the sample that made each place."""
+    from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
+
     quads, error, sample = surface_of(cut, MOST_QUADS)
     corners = mm_from_m(in_machine(quads.reshape(-1, 3), analysis.origin))
     frame = np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)
@@ -182,15 +188,15 @@ def _scale(analysis: Analysis) -> Document:
 
 
 def page_rows(analysis: Analysis) -> IntArray:
-    """Rows of the samples that the page holds: all of them, or the extremes of equal stretches of rows."""
+    """Rows of the samples on the page: all, or the extremes of equal stretches of rows."""
     n = len(analysis.samples)
     if n <= MOST_SAMPLES:
         return np.arange(n)
     change = np.flatnonzero(np.diff(analysis.samples.motion) != 0)
     ends = np.concatenate([change, change + 1]) if 2 * len(change) < MOST_SAMPLES // 4 else change[:0]
     stiffness = np.where(analysis.samples.cutting, analysis.at.stiffness, np.nan)
-    curves = [(stiffness, 6)]  # and the share of the page's samples that a curve gets a column of pixels for
-    if analysis.set_aside.any():  # a column's extremes may be plunges: the headline has its own
+    curves = [(stiffness, 6)]  # with one in how many of the page's samples a curve gets a column of pixels
+    if analysis.set_aside.any():  # a column's extremes may be plunges, so the headline gets its own columns
         curves = [(np.where(analysis.set_aside, np.nan, stiffness), 8), (stiffness, 24)]
     extremes = [extremes_by_column(np.arange(n, dtype=float), k, MOST_SAMPLES // part) for k, part in curves]
     even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too

@@ -35,7 +35,7 @@ def _remark(history: StrutHistory) -> str:
 
 
 def history_text(history: StrutHistory, undated: bool = False) -> list[str]:
-    """Lines for the terminal; without dates and without both signs of the force only where `undated` are wanted."""
+    """Lines for the terminal; without dates and without both signs of the force, only if `undated` are wanted."""
     if not (undated or _shown(history)):
         return []
     sentences = [f"  {plain(line)}" for line in (_remark(history), *history.sentences) if line]

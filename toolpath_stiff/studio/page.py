@@ -1,4 +1,4 @@
-"""The studio's page: one document of its own scripts and styles, live or, as an export, with the state within it."""
+"""The studio's page: one document with its own scripts and styles, live or exported with the state in it."""
 
 import html
 from importlib import resources
@@ -13,7 +13,7 @@ OWN = ("scene.js", "panels.js", "studio.js")
 
 
 def page() -> str:
-    """The live page; it holds no state and no token."""
+    """The live page, without any state or token."""
     return _document("null", "connect-src 'self'; ", "toolpath_stiff studio")
 
 
