@@ -96,7 +96,7 @@ def height_above(
 def bounds(
     part: AnyArray, x: FloatArray, y: FloatArray, half: float, arc: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """M from a piece to the middle of a cell of diagonal 2 `half`; what it leaves there is between the others."""
+    """Distance (m) of a piece from a cell's middle (diagonal 2 `half`), lower and upper bound of height left there."""
     along, beside, spoke = foot(part, x, y, arc)
     place, reach, flat = within(along, part["extent"]), part["reach"], part["flat"]
     far = distance(beside, place - along, spoke, arc)
