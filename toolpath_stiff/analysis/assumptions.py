@@ -9,7 +9,7 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.stiffness.model import acting_effects, conditions_stated
-from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
 
 
 def assumptions_of(analysis: EvaluatedPath, turned: str = "") -> list[str]:
@@ -62,6 +62,10 @@ def _of_elements(analysis: EvaluatedPath, turned: str) -> list[str]:
     sentences = [f"what gives way is {names}; everything else is rigid"]
     if analysis.at.configuration:
         sentences.append(f"the configuration of the joints is kept over the program: {analysis.at.configuration}")
+    for name, value in machine.standing_joints.items():
+        linear = machine.joint_kinds[machine.joint_names.index(name)] == "linear"
+        where = f"{mm_from_m(value):g} mm (stands_mm)" if linear else f"{deg_from_rad(value):g} deg (stands_deg)"
+        sentences.append(f"{name} stands at {where}")
     if turned:
         sentences.append(turned)
     elif len(machine.joint_names) > 5:

@@ -115,16 +115,6 @@ class Cut:
         return self.errors[:, :2]
 
     @property
-    def wall_low(self) -> FloatArray:
-        """(n, 2) m, its smallest value over the height."""
-        return self.lowest[:, :2]
-
-    @property
-    def wall_high(self) -> FloatArray:
-        """(n, 2) m, its largest value over the height."""
-        return self.highest[:, :2]
-
-    @property
     def turning(self) -> BoolArray:
         """(n,) True where a tool cuts while it changes its orientation: no surface error is predicted there."""
         return np.asarray(self.samples.cutting & (self.work.tilts[self.samples.move] == TURNING))

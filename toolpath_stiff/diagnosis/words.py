@@ -8,6 +8,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Diagnosis
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.inference.adequacy import LEFT
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.discrepancies import RANGE_LENGTH
 from toolpath_stiff.inference.drawn import seen_readings
@@ -17,16 +18,14 @@ from toolpath_stiff.inference.judgement import (
     ADEQUATE,
     FALSE_ALARM,
     HELD,
-    LEFT,
     NONE,
     OUTSIDE,
     POSITIVE,
     STANDS,
-    TAKEN_UP,
     Judgement,
 )
 from toolpath_stiff.inference.noise import REST
-from toolpath_stiff.inference.nuisances import findings, nuisance_words
+from toolpath_stiff.inference.nuisances import TAKEN_UP, findings, nuisance_words
 from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded

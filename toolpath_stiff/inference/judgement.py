@@ -32,21 +32,22 @@ from math import comb
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.adequacy import LEFT, instead_of_law, is_small, may_leave
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.doubts import noise_doubt, question
 from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fair_forms import fair_rivals
-from toolpath_stiff.inference.fits import refine, with_given_law
+from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.foretold import carried, votes
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.inference.nuisances import findings, fitted_nuisances, mean_left_by_nuisances
-from toolpath_stiff.inference.rivals import ONE_BODY, SERIES, entries, lowers_error, rivals_of, rivals_of_law
+from toolpath_stiff.inference.nuisances import TAKEN_UP, not_told
+from toolpath_stiff.inference.rivals import entries, lowers_error, rivals_of
 from toolpath_stiff.inference.several import search_pairs
-from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded, rooms
+from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
 from toolpath_stiff.inference.votes import Votes, closest, outvoted
 from toolpath_stiff.stiffness.contract import Effect
 
@@ -66,10 +67,6 @@ SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alo
 # Odds below which a second effect is not considered where one suffices: "positive" evidence begins at 3 (Kass and
 # Raftery 1995, Bayes factors).
 POSITIVE = 3.0
-# Share of the stiffness that `adequate` may leave along a path; assumed: a third of what cutting forces are known to.
-LEFT = 0.03
-ONE_SIDED = 1.645  # normal quantile of 95 %
-TAKEN_UP = {"joint_offset": "joint", "weak_strut": "strut"}  # effects that nuisances take up -> kind of nuisance
 
 
 @dataclass(frozen=True)
@@ -196,18 +193,21 @@ class Candidates:
     within: tuple[str, ...] = ()
 
     @property
+    def hidden(self) -> list[Family]:
+        """Effects that may be there unseen, beside what the nuisances assume."""
+        return [family for family in self.families if family.name not in self.within]
+
+    @property
     def offered(self) -> list[tuple[Family, Fit]]:
-        """Effects that fit best when present, each with that fit."""
-        return [(f, f.best) for f in self.families if f.best is not None and f.name not in self.within]
+        """Effects that fit best when they are there, with that fit."""
+        return [(family, family.best) for family in self.hidden if family.best is not None]
 
 
 def find_candidates(problem: Problem, noise: Noise, effects: Sequence[Effect]) -> Candidates:
     """Fit every effect with each of its choices beside the strut law."""
     base = problem.score_base()
     forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
-    told = {entry["nuisance"] for entry in findings(fitted_nuisances(base, noise))}
-    within = tuple(name for name, nuisance in TAKEN_UP.items() if nuisance not in told)
-    return Candidates(base, tuple(score_families(problem, effects, base)), forms, within)
+    return Candidates(base, tuple(score_families(problem, effects, base)), forms, not_told(base, noise))
 
 
 @dataclass
@@ -266,9 +266,13 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: in
             singles.append(family)
     gates.singles = tuple(family.name for family in singles)
     evidence, tried = {family.name: family.log_evidence for family in families}, []
-    for k, fit in enumerate(search_pairs(problem, [f for f in families if f.name not in candidates.within], base)):
+    # What stands out beside no effect may do so beside one.
+    within = {*candidates.within}.intersection(*(not_told(fit, noise) for fit in gates.fits.values()))
+    found = search_pairs(problem, [f for f in families if f.name not in within], base)
+    for k, fit in enumerate(found):
         pair = fit
-        if k < TESTED and fit.log_evidence > max(evidence[name] for name in fit.names) + SURVIVES:
+        matters = k < TESTED or fit.log_evidence > found[0].log_evidence - FAR
+        if matters and fit.log_evidence > max(evidence[name] for name in fit.names) + SURVIVES:
             passed = passes(fit.name, fit)
             # Tables omit the interaction of two effects; the final fit gives its gain in likelihood.
             more = gates.fits[fit.name].log_posterior - fit.log_posterior
@@ -288,7 +292,7 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
     that stands out, in words, else "".
     """
     if gates.enough:
-        return _posterior(problem, noise, candidates, True, [f.name for f in candidates.families]), ""
+        return _posterior(problem, noise, candidates, True, [f.name for f in candidates.hidden]), ""
     outside, form = (-np.inf, "") if gates.singles else _outside(problem, candidates)
 
     def posterior(standing: Sequence[Fit]) -> dict[str, float]:
@@ -386,17 +390,19 @@ def put_to_vote(
 
     What lowers no error at left-out points is no answer, nor is a second effect that lowers none, or that the form of
     the first may stand for. A name that has not outvoted every rival of another part is one of several: beside it stand
-    those that outvote it, then those that are likely, then the closest of the others and of what a strut law that had
-    to move may stand for. A model that passes is not the only explanation where its nuisances have taken up more than
+    those that are likely, the others and what a strut law that had to move may stand for, the closest votes first. A
+    model that passes is not the only explanation where its nuisances have taken up more than
     they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would hide is
     told instead.
     """
     verdict, explanations = decide(gates, probability)
-    base, ballots, ahead = candidates.base, dict[str, FloatArray](), list[str]()
-    fits = {NONE: base} | {family.name: best for family, best in candidates.offered} | gates.fits
+    base, ballots, lost = candidates.base, dict[str, FloatArray](), set[str]()
+    fits = {NONE: base} | {family.name: best for family, best in candidates.offered}
+    fits |= {pair.name: pair for pair in gates.tried if pair.possible} | gates.fits
     if verdict == "adequate":
-        open_ones = explanations if noise.guess != "high" and _may_leave(problem, noise, candidates) > LEFT else ()
-        likely = standing = [*dict.fromkeys([NONE, *(name for name in TAKEN_UP if name in fits), *open_ones])]
+        settled = noise.guess == "high" or may_leave(problem, noise, candidates.hidden, base) <= LEFT
+        taken_up = [name for name in TAKEN_UP if name in fits]
+        likely = standing = [*dict.fromkeys([NONE, *taken_up, *(() if settled else explanations)])]
     elif verdict in ("identified", "ambiguous"):
         left_out = {name: held_out(fits[name], problem.point) for name in {NONE, *explanations}}
         found = [n for n in explanations if n == NONE or lowers_error(left_out[NONE], left_out[n])]
@@ -412,24 +418,36 @@ def put_to_vote(
             rivals = {name: fit for name, fit in fits.items() if name != NONE or gates.none_stands}
             ballots = votes(problem, fits[top], rivals_of(fits[top], rivals))
             ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
-            open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
-            # The likeliest first, except those outvoted: smaller differences of votes are chance.
-            likely = sorted(standing, key=lambda name: (name != top, name in ballots and name not in open_rivals))
-            ahead = [name for name in open_rivals if outvoted(-ballots[name])]
-            verdict, standing = "ambiguous" if open_rivals else verdict, [top, *ahead, *likely, *open_rivals]
-            if verdict == "ambiguous" and gates.none_stands and _is_small(problem, base, [fits[n] for n in likely]):
+            lost = {name for name, differences in ballots.items() if outvoted(differences)}
+            open_rivals = [name for name in ballots if name not in lost]
+            open_pairs = [pair for pair in gates.tried if pair.name in open_rivals and pair.name not in gates.fits]
+            gates.fits |= {pair.name: refine(problem, pair) for pair in open_pairs}
+            fits |= gates.fits
+            likely = standing
+            verdict, standing = "ambiguous" if open_rivals else verdict, [top, *standing, *open_rivals]
+            if verdict == "ambiguous" and gates.none_stands and is_small(problem, base, [fits[n] for n in likely]):
                 standing.append(NONE)
     else:
         return verdict, explanations, {}
-    instead, of_law = _instead_of_law(problem, fits[likely[0]])
+    instead, of_law = instead_of_law(problem, fits[likely[0]])
     gates.fits |= instead
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
     ballots = closest(ballots, of_law)
-    sure = [name for name in standing if name in {standing[0], *ahead} or probability.get(name, 0.0) >= STANDS]
+    first, *others = dict.fromkeys([*standing, *instead])
+
+    def behind(name: str) -> tuple[bool, float]:
+        """By votes; of the part of the first, which has none, by odds. Beside a model that passes, by chance alone."""
+        if name in ballots:
+            return name in lost, float(ballots[name].sum())
+        if verdict == "adequate":
+            return False, -np.inf if name in TAKEN_UP else np.inf
+        return False, float(np.log(max(probability.get(first, 0.0), 1e-300) / max(probability.get(name, 0.0), 1e-300)))
+
+    order = [first, *sorted(others, key=behind)]
     return (
         "ambiguous" if instead or verdict == "adequate" else verdict,
-        shortened(problem, fits | instead, (*sure, *(n for n in ballots if n in {*standing, *instead}), *standing)),
+        shortened(problem, fits | instead, order),
         ballots,
     )
 
@@ -440,54 +458,6 @@ def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -
     kept = groups[:MOST_OPEN]
     kept[-1:] = [group for group in groups[MOST_OPEN:] if NONE in group] or kept[-1:]
     return tuple(name for group in kept for name in group)
-
-
-def _may_leave(problem: Problem, noise: Noise, candidates: Candidates) -> float:
-    """Mean relative error at the readings' poses up to which a model that passes may still be off.
-
-    What an effect may hide there beside the refitted law (95 %), of all the one that hides most, and what struts,
-    joints and links that are not quite those of the model leave on average. Where the scatter is only guessed, at least
-    what it does not account for of the error of the model as given: whether that is scatter, too, nobody knows.
-    """
-    families = [family for family in candidates.families if family.name not in candidates.within]
-    hidden = max((room.left for room, _ in rooms(problem, families, candidates.base)), default=0.0)
-    tip = problem.predictor.data.tip
-    error = float(np.abs(np.expm1(-problem.residual(np.zeros(2), ())[tip])).mean()) if noise.guess else 0.0
-    beyond = float(max(error**2 - (noise.floor_percent / 100.0) ** 2, 0.0) ** 0.5)
-    return max(beyond, hidden + mean_left_by_nuisances(candidates.base, tip))
-
-
-def _moved_by_law(problem: Problem, fit: Fit) -> float:
-    """Mean relative change (95 %) of the stiffness at the readings by the refitted strut law."""
-    columns = fit.jacobian[problem.predictor.data.tip, :2]
-    spread = np.sqrt(np.einsum("ni,ij,nj->n", columns, fit.covariance[:2, :2], columns))
-    return float(np.mean(np.abs(columns @ fit.law) + ONE_SIDED * spread))
-
-
-def _is_small(problem: Problem, base: Fit, explanations: Sequence[Fit]) -> bool:
-    """True if the model alone would be off by no more (95 %) than an adequate one may be, were any of these true."""
-    tip, most = problem.predictor.data.tip, _moved_by_law(problem, base)
-    for fit in explanations:
-        deviates = np.sqrt(max(2.0 * (fit.log_posterior - base.log_posterior), 1e-12))
-        change = float(np.abs(fit.residual - base.residual)[tip].mean())
-        most = max(most, change * (1.0 + ONE_SIDED / deviates) + mean_left_by_nuisances(fit, tip))
-    return most <= LEFT
-
-
-def _instead_of_law(problem: Problem, fit: Fit) -> tuple[dict[str, Fit], Votes]:
-    """Explanations with the file's strut law that hold as well as one whose law had to move; all their votes.
-
-    The closest first. None where the law has moved the stiffness by less than an adequate model may leave along a path,
-    beyond chance.
-    """
-    if _moved_by_law(problem, fit) <= LEFT:
-        return {}, {}
-    given = with_given_law(problem, fit)
-    if not outvoted(votes(problem, fit, {NONE: given})[NONE]):
-        return {}, {}
-    rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (SERIES, *ONE_BODY)).values()}
-    ballots = votes(problem, fit, rivals)
-    return {name: rivals[name] for name in ballots if not outvoted(ballots[name])}, ballots
 
 
 def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:

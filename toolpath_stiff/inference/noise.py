@@ -27,7 +27,15 @@ from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, copied, from_repeats, scatter_apart
+from toolpath_stiff.inference.repeats import (
+    OUTLIER_WIDTH,
+    OUTLIERS,
+    Repeats,
+    clampings_of,
+    copied,
+    from_repeats,
+    scatter_apart,
+)
 from toolpath_stiff.readings.measurements import Readings
 
 # Sd of the rms change of ln stiffness, along each axis, by links that the model takes to be rigid; assumed. Twice as
@@ -78,6 +86,8 @@ class Noise:
         (n,) readings of the tip among those of other loops, which are what is told of; None: all.
     rest
         Rms change of ln stiffness by each axis of the links that the model takes for rigid, sd.
+    apart
+        Whether each axis of a clamping scatters for itself.
     """
 
     name: str
@@ -93,6 +103,7 @@ class Noise:
     tip: BoolArray | None = None
     rest: float = REST
     clampings: FloatArray | None = None
+    apart: bool = False
 
     @property
     def guess(self) -> str:
@@ -212,8 +223,10 @@ def _noise_of_tip(
         origin = f"estimated from {repeats.differences} differences between repeats: "
         origin += _percent(repeats.repeat, repeats.clamping)
         origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
+        origin += ", each axis of it for itself" if repeats.apart else ""
         repeat, clamping, words = scatter_apart(data, repeats)
-        return (model("measured", repeat, clamping, repeats.freedom, origin + words, remark),)
+        measured = model("measured", repeat, clamping, repeats.freedom, origin + words, remark)
+        return (replace(measured, apart=repeats.apart),)
     if known.any():
         repeat, each, origin = _of_stated(np.where(known, relative, total), data, total)
         if not known.all():
@@ -284,7 +297,7 @@ def covariance(noise: Noise, predictor: Predictor) -> Covariance:
     shared = [noise.strut_spread * predictor.strut_columns(), noise.joint_error * predictor.joint_columns]
     shared.append(noise.rest * predictor.rest_columns())
     rows = np.ascontiguousarray(np.concatenate(shared, axis=1).T)
-    clamps = Groups.by(predictor.data.clamp)
+    clamps = clampings_of(predictor.data, noise.apart)
     common: float | FloatArray = noise.clamping**2
     if noise.clampings is not None:
         common = clamps.sums(noise.clampings**2) / np.bincount(clamps.of)

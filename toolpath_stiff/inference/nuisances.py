@@ -18,6 +18,7 @@ from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.units import mm_from_m
 
 FINDING = 3.0  # standard deviations from which a nuisance is a finding
+TAKEN_UP = {"joint_offset": "joint", "weak_strut": "strut"}  # effects that nuisances take up, of which kind
 STRUTS = 6
 ENDS = ("frame", "platform")
 
@@ -70,6 +71,12 @@ def mean_left_by_nuisances(fit: Fit, rows: BoolArray) -> float:
 def findings(entries: Sequence[Document]) -> list[Document]:
     """Entries that deviate further than chance and than is assumed."""
     return [entry for entry in entries if entry["sigma"] > FINDING and entry["times_assumed"] > 1.0]
+
+
+def not_told(fit: Fit, noise: Noise) -> tuple[str, ...]:
+    """Effects of which there is no more beside a fit than the nuisances assume."""
+    told = {entry["nuisance"] for entry in findings(fitted_nuisances(fit, noise))}
+    return tuple(name for name, nuisance in TAKEN_UP.items() if nuisance not in told)
 
 
 def nuisance_words(entry: Document) -> str:

@@ -4,6 +4,8 @@ By restricted maximum likelihood of the differences between repeats (Patterson a
 machine does cancels.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -25,6 +27,7 @@ FACTORS, SHARES = np.geomspace(0.3, 3.3, 61), np.geomspace(*OUTLIER_ENDS, 16)
 WORTH = 0.63
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
 MOST_TRIMS = 8
+MOST_APART = 600  # clampings along axes: of more only those of a clamping as a whole are looked at
 LARGEST_RATIO, ZOOMS = 5.0, 6  # of clamping to repeat noise; ever finer grids on which it is looked for
 # Standard deviations at which larger deviations are capped: the wildest tells nothing about the others.
 FARTHEST = 1.5 * OUTLIER_WIDTH
@@ -69,6 +72,8 @@ class Repeats:
         Whether clamping was estimated.
     wild
         Share of wild readings.
+    apart
+        Whether each axis of a clamping scatters for itself, as where gauge and indicator are set anew along each.
     """
 
     repeat: float
@@ -76,6 +81,7 @@ class Repeats:
     differences: int
     clamps: bool
     wild: float
+    apart: bool = False
 
     @property
     def total(self) -> float:
@@ -92,18 +98,22 @@ def from_repeats(data: Readings) -> Repeats | None:
     """Noise from repeats; None if there are too few.
 
     What differs between repeats beside chance, the time since zeroing and the order, is projected out first, so that
-    a drift is not taken for noise. Differences beyond `WILD` standard deviations are set aside as wild for a first
-    estimate; scatter and share of wild readings are then weighed together over all differences.
+    a drift is not taken for noise; where too few differences would be left, it counts as noise, on the safe side.
+    Differences beyond `WILD` standard deviations are set aside as wild for a first estimate; scatter and share of wild
+    readings are then weighed together over all differences.
     """
+    return _from_repeats(data, drifts=True) or _from_repeats(data, drifts=False)
+
+
+def _from_repeats(data: Readings, *, drifts: bool) -> Repeats | None:
     groups = repeat_groups(data)
     every, result = np.bincount(groups)[groups] > 1, None
     kept = every
     for _ in range(MOST_TRIMS):
-        contrasts = _Contrasts(data.select(kept), groups[kept]) if kept.any() else None
-        if contrasts is None or contrasts.count < FEWEST_CONTRASTS:
+        some = data.select(kept)
+        if not kept.any() or _Contrasts(some, groups[kept], Groups.by(some.clamp), drifts).count < FEWEST_CONTRASTS:
             break
-        repeat, clamping, clamps = _maximum_likelihood(contrasts)
-        result = Repeats(repeat, clamping if clamps else min(CLAMPING, repeat), contrasts.count, clamps, OUTLIERS)
+        contrasts, result = _likeliest(some, groups[kept], drifts)
         wild = contrasts.deviations(result.repeat, result.clamping) > WILD
         if not wild.any():
             break
@@ -111,9 +121,32 @@ def from_repeats(data: Readings) -> Repeats | None:
         kept = np.isin(np.arange(len(data)), left) & (np.bincount(groups[left], minlength=groups.max() + 1)[groups] > 1)
     if result is None:
         return None
-    deviations = _Contrasts(data.select(every), groups[every]).deviations(result.repeat, result.clamping)
+    some = data.select(every)
+    contrasts = _Contrasts(some, groups[every], clampings_of(some, result.apart), drifts)
+    deviations = contrasts.deviations(result.repeat, result.clamping)
     factor, share = _mixture(deviations, np.bincount(groups)[groups[every]])
     return replace(result, repeat=factor * result.repeat, wild=share)
+
+
+def clampings_of(data: Readings, apart: bool) -> Groups:
+    """Readings that a clamping moves alike: all of it, or of each axis by itself."""
+    clamps = Groups.by(data.clamp)
+    return Groups.by(3 * clamps.of + np.abs(data.direction).argmax(axis=1)) if apart else clamps
+
+
+def _likeliest(data: Readings, groups: IntArray, drifts: bool) -> tuple[_Contrasts, Repeats]:
+    """Contrasts and the scatter that makes them likeliest: of clampings as a whole, or of each axis for itself."""
+    ways = []
+    for apart in (False, True):
+        clamps = clampings_of(data, apart)
+        if not apart or clamps.count <= MOST_APART:
+            contrasts = _Contrasts(data, groups, clamps, drifts)
+            if not apart or contrasts.tells:
+                repeat, clamping, likelihood = _maximum_likelihood(contrasts)
+                clamping = clamping if contrasts.tells else min(CLAMPING, repeat)
+                found = Repeats(repeat, clamping, contrasts.count, contrasts.tells, OUTLIERS, apart)
+                ways.append((likelihood, contrasts, found))
+    return max(ways, key=lambda way: way[0])[1:]
 
 
 def scatter_apart(data: Readings, every: Repeats) -> tuple[float | FloatArray, float | FloatArray, str]:
@@ -137,11 +170,12 @@ def scatter_apart(data: Readings, every: Repeats) -> tuple[float | FloatArray, f
             continue
         total = np.exp(logs)
         clamping = np.array([part.clamping for part in known])
-        if kind == "along":
+        own_clampings = kind == "in set-up" or every.apart
+        if not own_clampings:
             clamping = np.full(len(known), min(every.clamping, float(total.min()) / np.sqrt(2.0)))
         repeat = np.array([np.sqrt(p.total**2 - c**2 * p.clamps) for p, c in zip(known, clamping, strict=True)])
         each = ", ".join(f"{100 * t:.2g} % {kind} {name}" for t, name in zip(total, names, strict=True))
-        return repeat[which], clamping[which] if kind == "in set-up" else float(clamping[0]), f"; {each}"
+        return repeat[which], clamping[which] if own_clampings else float(clamping[0]), f"; {each}"
     return every.repeat, every.clamping, ""
 
 
@@ -188,15 +222,16 @@ class _Contrasts:
         Whether every reading was clamped by itself: the differences then hold clamping too.
     """
 
-    def __init__(self, data: Readings, groups: IntArray) -> None:
-        means, clamps = Groups.by(groups), Groups.by(data.clamp)
+    def __init__(self, data: Readings, groups: IntArray, clamps: Groups, drifts: bool) -> None:
+        means = Groups.by(groups)
         sizes = np.bincount(means.of)
 
         def centred(columns: FloatArray) -> FloatArray:
             return np.asarray(columns - (means.sums(columns.T) / sizes)[:, means.of].T)
 
         logs = np.log(data.stiffness)[:, None]
-        axes, size, _ = np.linalg.svd(centred(_drifts(data, np.exp(logs - centred(logs))[:, 0])), full_matrices=False)
+        moved = centred(_drifts(data, np.exp(logs - centred(logs))[:, 0])) * drifts
+        axes, size, _ = np.linalg.svd(moved, full_matrices=False)
         fixed = axes[:, size > 1e-9 * max(float(size[0]), np.sqrt(sizes.max()))]
 
         def left(columns: FloatArray) -> FloatArray:
@@ -245,8 +280,8 @@ def _drifts(data: Readings, stiffness: FloatArray) -> FloatArray:
     return np.stack(regressors, axis=1)
 
 
-def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
-    """Repeat noise and clamping that make the contrasts most likely; True if they reveal clamping at all.
+def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, float]:
+    """Repeat noise and clamping that make the contrasts most likely, and the logarithm of how likely.
 
     With the logarithm of clamping as penalty: the likelihood of a few clampings is often largest at none, however much
     there is, and what readings share would be taken for the machine's. It moves an estimate by a standard error at most
@@ -262,4 +297,5 @@ def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
         volume = 0.5 * np.log(widths).sum(axis=1) - np.log(np.maximum(ratios, 1e-12))
         best = int(np.argmin((contrasts.count - 1) * np.log(np.maximum(repeat, 1e-12)) + volume))
         low, high = ratios[max(best - 1, 0)], ratios[min(best + 1, len(ratios) - 1)]
-    return float(repeat[best]), float(ratios[best] * repeat[best]), contrasts.tells
+    likelihood = -contrasts.count * np.log(max(repeat[best], 1e-12)) - 0.5 * np.log(widths[best]).sum()
+    return float(repeat[best]), float(ratios[best] * repeat[best]), float(likelihood)

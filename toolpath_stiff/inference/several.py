@@ -20,6 +20,7 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.inference.candidates import CandidateTable, tabulate
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
+from toolpath_stiff.inference.size_priors import FADES, VISIBLE
 
 SCORED = 8  # sets of effects whose tables are scored
 SWEEPS = 60  # of the coordinate descent
@@ -81,8 +82,7 @@ class LinearSearch:
         pieces = [
             (table, columns, bounds)
             for family in families
-            # Of a vector, whose every choice could stand for much, the likeliest alone; it pays for all of them.
-            for table in (family.best.tables if family.best and family.effect.vector else family.tables)
+            for table in family.tables
             for columns, bounds in _linear_pieces(table, problem.base_compliance)
         ]
         self.tables = tuple(table for table, _, _ in pieces)
@@ -161,6 +161,8 @@ class LinearSearch:
         p = self.columns.shape[1]
         price += np.log(2.0) * (high > low).sum(axis=1)  # of subsets of components, then of choices
         price += np.log([self.choices[name] for name in self.owner])[rows[:, ::p] // p].sum(axis=1)
+        strongest = np.abs(sizes).reshape(len(rows), -1, p).max(axis=2)  # too faint to be seen: none of its own
+        price += 0.5 * ((np.maximum(VISIBLE - strongest, 0.0) / FADES) ** 2).sum(axis=1)
         # A set with an absent effect is a smaller set.
         whole = np.all(present.reshape(len(rows), -1, p).any(axis=2), axis=1)
         return sizes / scale[rows], np.where(whole, 0.5 * gains - 0.5 * volume - price, -np.inf)

@@ -91,6 +91,8 @@ class ChainJoint:
         The axes that its description gave the frame, in the frame.
     speed
         m/s or rad/s that it reaches; inf: nobody says.
+    stands
+        m or rad: where it stands on a machine whose poses do not take it.
     """
 
     name: str
@@ -100,6 +102,7 @@ class ChainJoint:
     high: float = np.inf
     given: FixedFrame = STILL
     speed: float = np.inf
+    stands: float = 0.0
 
 
 def modified_dh(alpha: float, a: float, offset: float, d: float) -> FixedFrame:

@@ -24,6 +24,7 @@ KINDS = {
     "hexapod": "hexapod_file",
     "serial": "serial_file",
     "delta": "delta",
+    "rotary_delta": "rotary_delta",
     "pentapod": "pentapod",
     "hexaglide": "hexaglide",
 }

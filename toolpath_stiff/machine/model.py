@@ -294,8 +294,13 @@ class MachineTool:
 
     @property
     def joint_limits(self) -> FloatArray:
-        """(j, 2) m or rad, low and high; -inf and inf for none."""
+        """(j, 2) m or rad, low and high; -inf and inf: none, or a joint that stands."""
         return np.tile([-np.inf, np.inf], (len(self.joint_names), 1))
+
+    @property
+    def standing_joints(self) -> dict[str, float]:
+        """Joint that no pose takes, such as a rail -> m or rad where it stands."""
+        return {}
 
     @property
     def joint_speeds(self) -> FloatArray:

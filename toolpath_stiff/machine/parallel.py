@@ -52,12 +52,15 @@ class Legs:
         (n, 6, 3) m from the tip to a point of each line of force.
     compliance
         (n, 6) m/N.
+    turns
+        (n, c, 3, 3) axes of the bodies that carry legs, in base axes, of which their own are given; None: the base's.
     """
 
     joints: FloatArray
     directions: FloatArray
     arms: FloatArray
     compliance: FloatArray
+    turns: FloatArray | None = None
 
     @cached_property
     def determinant(self) -> FloatArray:
@@ -137,9 +140,10 @@ class Parallel(MachineTool):
         loads: list[Spring | LoadRows] = [
             LoadRows(forces[:, i : i + 1], legs.compliance[:, i : i + 1]) for i in range(len(self.legs))
         ]
-        for carriage in self.carriages:
-            rods = list(carriage.rods)
-            carried = body_under_rods(forces[:, rods], legs.directions[:, rods], carriage.to_joints, carriage.axes)
+        for i, carriage in enumerate(self.carriages):
+            rods, turn = list(carriage.rods), np.eye(3) if legs.turns is None else legs.turns[:, i]
+            to_joints = carriage.to_joints @ np.swapaxes(turn, -1, -2)
+            carried = body_under_rods(forces[:, rods], legs.directions[:, rods], to_joints, turn @ carriage.axes)
             loads.append(LoadRows(carried, carriage.compliance))
         frames = [Frame(np.eye(3)[..., None], np.zeros((3, 1))), Frame(columns_of(axes), tip.T)]
         return Stance(

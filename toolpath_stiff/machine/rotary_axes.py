@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.machine.chain import turned, turned_from_left
 
 ON_AXIS = 1e-9  # sine of the angle between tool and first axis below which that axis only spins the tool
@@ -41,8 +41,8 @@ class RotaryAxes:
             total = turned_about(axis, angle, total)
         return total
 
-    def angles(self, rotation: FloatArray) -> FloatArray:
-        """(k, n) rad that orient the tool as (3, 3, n); nan where impossible."""
+    def angles(self, rotation: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """(k, n) rad that point the tool as (3, 3, n), and (n,) whether any do."""
         best, *others = self._pairs(rotation)
         stand = self.rotation(best)
         for pair in others:
@@ -51,8 +51,7 @@ class RotaryAxes:
             better = (rotation * other).sum(axis=(0, 1)) > (rotation * stand).sum(axis=(0, 1)) + ASIDE
             best, stand = np.where(better, pair, best), np.where(better, other, stand)
         pointing = (rotation[:, 2] * stand[:, 2]).sum(axis=0)
-        # 1 - cos of the angle is half its square.
-        return np.where(pointing > 1.0 - 0.5 * ASIDE**2, best, np.nan)
+        return best, np.asarray(pointing > 1.0 - 0.5 * ASIDE**2)  # 1 - cos of the angle is half its square
 
     def _pairs(self, rotation: FloatArray) -> list[FloatArray]:
         n = rotation.shape[2]

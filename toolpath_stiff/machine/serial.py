@@ -102,8 +102,15 @@ class Serial(MachineTool):
 
     @property
     def joint_limits(self) -> FloatArray:
-        """(j, 2) m or rad; inf for none."""
-        return np.array([(joint.low, joint.high) for joint in self.joints])
+        """(j, 2) m or rad; inf: none, or a joint that stands."""
+        stand = self.standing_joints
+        return np.array([(-np.inf, np.inf) if j.name in stand else (j.low, j.high) for j in self.joints])
+
+    @property
+    def standing_joints(self) -> dict[str, float]:
+        """Joints beyond the last six of a chain with the tool -> where they stand; a mill has none."""
+        beyond = () if self.rotary_axes else (*self.tool_joints[:-6], *self.work_joints)
+        return {joint.name: joint.stands for joint in beyond}
 
     @property
     def joint_speeds(self) -> FloatArray:
@@ -255,32 +262,34 @@ class Serial(MachineTool):
         if self.rotary_axes:
             yield 0, self._of_linear_axes(self.rotary_axes, tip, axes)
             return
-        held = np.zeros(len(self.joints)) if start is None else start
-        held = np.clip(held, *self.joint_limits.T)[:, None]
+        held = (np.array([joint.stands for joint in self.joints]) if start is None else start)[:, None]
         tool, work = self.frames(held)
         joints = np.repeat(held, tip.shape[1], axis=1)
+        first = len(self.tool_joints) - 6
+        moving, still = self.chain[first : first + 6], held[self.chain[:first]]
         if self.wrist is None:
-            count, in_base = len(self.tool_joints), turned_from_left(work[-1].axes[..., 0], axes)
+            in_base = turned_from_left(work[-1].axes[..., 0], axes)
             target = turned_from_left(work[-1].axes[..., 0], tip[:, None])[:, 0] + work[-1].origin
             in_base = np.broadcast_to(in_base, (3, 3, tip.shape[1]))
-            mine = self.chain[:count]
-            joints[mine] = follow(
-                self.tool_joints, self.tool_frames, target, in_base, None if start is None else start[mine]
-            ).T
+
+            def frames(values: FloatArray) -> list[Frame]:
+                return self.tool_frames(np.concatenate([np.repeat(still, values.shape[1], 1), values]))[first:]
+
+            before = None if start is None else start[moving]
+            joints[moving] = follow(self.tool_joints[first:], frames, target, in_base, before).T
             yield 0, joints
             return
-        first = len(self.tool_joints) - 6
         base = tool[first].placement.inverse().then(work[-1].placement)
         local = turned_from_left(base.axes, tip[:, None])[:, 0] + base.origin[:, None]
         local_axes = turned_from_left(base.axes, np.broadcast_to(axes, (3, 3, tip.shape[1])))
         for number, values in self.wrist.solutions(local_axes, local, configuration):
-            joints[self.chain[first : first + 6]] = values
+            joints[moving] = values
             yield number, joints.copy()
 
     def _of_linear_axes(self, rotary: RotaryAxes, tip: FloatArray, axes: FloatArray) -> FloatArray:
         """(j, n) values of three linear axes and the rotary ones: angles first, then the linear axes meet the tip."""
         values = np.zeros((len(self.joints), tip.shape[1]))
-        angles = rotary.angles(axes)
+        angles, pointed = rotary.angles(axes)
         for i, angle in zip(rotary.joints, angles, strict=True):
             values[i] = angle
         tool, work = self.frames(values)
@@ -291,7 +300,7 @@ class Serial(MachineTool):
         volume = (a * np.cross(b, c, axis=0)).sum(axis=0)
         for i, (second, third) in zip(linear, ((b, c), (c, a), (a, b)), strict=True):  # Cramer's rule
             values[i] = (missing * np.cross(second, third, axis=0)).sum(axis=0) / volume
-        return np.where(np.isfinite(angles).all(axis=0), values, np.nan)
+        return np.where(pointed, values, np.nan)
 
     def standing(self, joints: FloatArray, tool_length: ArrayLike = np.nan) -> Stance:
         """Stance at joint values (n, j)."""

@@ -28,6 +28,8 @@ MODIFIED, STANDARD, XYZAC, XYZBC = "modified DH", "standard DH", "linuxcnc xyzac
 LENGTH, ANGLE = Key(unit="mm", required=False), Key(unit="deg", required=False, low=-3600.0, high=3600.0)
 POINT, DIRECTION = Key(unit="mm", shape=(3,), required=False), Key(shape=(3,), low=-1.0, high=1.0, required=False)
 TEXT = Key(text=True, required=False)
+ENDS = ("min", "max", "stands")
+UNITS = {"mm": m_from_mm, "deg": rad_from_deg}
 AXIS = {
     "name": Key(text=True),
     "type": Key(text=True),
@@ -38,13 +40,12 @@ AXIS = {
     "rpy_deg": Key(unit="deg", shape=(3,), low=-360.0, high=360.0, required=False),
     "axis": DIRECTION,
     **{
-        f"{side}_{unit}": Key(unit=unit, required=False, infinite=True, low=-np.inf, high=np.inf)
-        for side in ("min", "max")
-        for unit in ("mm", "deg")
+        f"{key}_{unit}": Key(unit=unit, required=False, infinite=True, low=-np.inf, high=np.inf)
+        for key in ENDS
+        for unit in UNITS
     },
     **{
-        f"speed_{unit}_per_s": Key(unit=f"{unit}/s", low=0.0, open_low=True, high=1e5, required=False)
-        for unit in ("mm", "deg")
+        f"speed_{unit}_per_s": Key(unit=f"{unit}/s", low=0.0, open_low=True, high=1e5, required=False) for unit in UNITS
     },
 }
 DH = ("a_mm", "d_mm", "alpha_deg", "offset_deg")
@@ -126,9 +127,8 @@ def _of_rows(
         before, after = _placements(toml, section, row, convention)
         given = STILL if any(key in row for key in DH) else after
         place = rests[side].then(before)
-        unit, si = ("mm", m_from_mm) if linear else ("deg", rad_from_deg)
-        speed = si(row.get(f"speed_{unit}_per_s", np.inf))
-        sides[side].append(ChainJoint(row["name"], linear, place, *_bounds(toml, section, row, linear), given, speed))
+        travel = _travel(toml, section, row, linear)
+        sides[side].append(ChainJoint(row["name"], linear, place, given=given, **travel))
         rests[side] = after
     _check_units(toml, sides["tool"] + sides["work"])
     tip, work = values.get("tool"), values.get("work", {})
@@ -173,21 +173,26 @@ def _placements(toml: MachineToml, section: str, row: Document, convention: str)
     return modified_dh(angles[0], lengths[0], angles[1], lengths[1]), STILL
 
 
-def _bounds(toml: MachineToml, section: str, row: Document, linear: bool) -> tuple[float, float]:
-    """Limits in m or rad; every joint must have both, so that none is unlimited by mistake."""
+def _travel(toml: MachineToml, section: str, row: Document, linear: bool) -> dict[str, float]:
+    """Limits, speed and place of a joint, SI; every joint has both limits, so that none is without them by mistake."""
     unit, other = ("mm", "deg") if linear else ("deg", "mm")
+    if strange := [key for key in row if key in (*(f"{k}_{other}" for k in ENDS), f"speed_{other}_per_s")]:
+        kind = "linear" if linear else "rotary"
+        raise toml.fault(section, strange[0], f": the axis is {kind}", expected=strange[0].replace(other, unit))
     for side in ("min", "max"):
-        for key in (f"{side}_{other}", f"speed_{other}_per_s"):
-            if key in row:
-                expected, kind = key.replace(other, unit), "linear" if linear else "rotary"
-                raise toml.fault(section, key, f": the axis is {kind}", expected=expected)
         if f"{side}_{unit}" not in row:
             expected = f"its limit in {unit}; {'-' if side == 'min' else ''}inf where it has none"
             raise toml.fault(section, f"{side}_{unit}", " is missing", expected)
     low, high = row[f"min_{unit}"], row[f"max_{unit}"]
+    stands = row.get(f"stands_{unit}", float(np.clip(0.0, low, high)))
     if not low < high:
         raise toml.fault(section, f"max_{unit}", f" = {high:g}", expected=f"more than min_{unit} = {low:g}")
-    return (m_from_mm(low), m_from_mm(high)) if linear else (rad_from_deg(low), rad_from_deg(high))
+    if not low <= stands <= high:
+        raise toml.fault(
+            section, f"stands_{unit}", f" = {stands:g}", expected=f"{low:g} to {high:g}, as its limits are"
+        )
+    figures = {"low": low, "high": high, "stands": stands, "speed": row.get(f"speed_{unit}_per_s", np.inf)}
+    return {name: UNITS[unit](value) for name, value in figures.items()}
 
 
 def _check_units(toml: MachineToml, joints: Sequence[ChainJoint]) -> None:

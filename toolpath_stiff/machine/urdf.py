@@ -37,7 +37,7 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
     except expat.ExpatError as error:
         raise InputError(f"not XML: {expat.ErrorString(error.code)}", file=file, line=error.lineno) from None
     for element in robot.iter():
-        if "}" in element.tag:  # a namespace, as xacro has
+        if "}" in element.tag or any("${" in value for value in element.attrib.values()):  # xacro's
             raise fault(*macros, at=element)
     chain = _chain(robot, tip, fault)
     rows, rest, notes, masses, frame = [], STILL, [], [], ""
@@ -61,6 +61,8 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
     if not rows:
         raise fault("no joint moves on the way to the tip", expected="a chain of joints")
     notes.insert(0, f"Made from {file}: {len(rows)} joints; limits of effort are left out.")
+    if not rest.axes[:, 2] @ rest.origin < 0.0:
+        notes.append(f"z of {tip} does not run back to the arm, as that of a tool's tip does: turn it in [tool]")
     name = robot.get("name", "robot")
     return file_text(
         name, "serial", f"URDF {file}", notes, [*rows, tool_section(rest), JOINTS, SPINDLE, *masses]

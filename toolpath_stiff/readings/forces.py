@@ -45,7 +45,7 @@ class CoefficientFit(FolderResult):
         (n, 3) N on the tool along the feed, to its left, up: measured mean, fitted, and measured less what the slots
         of all other feeds predict; nan where not recorded or not to be had.
     run_out
-        (n,) m, as what comes back once a turn tells; 0 of a single flute.
+        (n,) m, as what comes back once a turn tells; nan of a single flute and of mean forces, which show none.
     notes
         What was assumed, and read differently.
     inputs
@@ -90,8 +90,8 @@ class CoefficientFit(FolderResult):
             sentences.append(f"whether forces rise straight with the feed: {feeds} feeds hardly test it, {FEW} would")
         if len(np.unique(self.depth)) == 1:
             sentences.append("whether forces rise with the depth of cut: all slots are equally deep")
-        if self.cutter.flutes == 1:
-            sentences.append("run-out: a single flute shows none")
+        if np.isnan(self.run_out).all():
+            sentences.append("run-out: mean forces and a single flute show none")
         elif self.cutter.flutes == 2:
             sentences.append("run-out square to the two flutes: theirs differ only by its part along them")
         return sentences
@@ -174,16 +174,18 @@ def fit_coefficients(
     if (count := len(np.unique(feed))) < 3:
         fault = f"slots at {count} feed{'s' * (count != 1)}"
         raise MeasurementError(fault, expected="3 or more, so that a straight line can be wrong; 5 are better")
-    force = np.array(forces)
-    run_out, angle = np.zeros(len(feed)), np.zeros(len(feed))
-    for _ in range(ROUNDS):  # with run-out some teeth cut less, which bends the lines slightly
-        cutter = replace(cutter, run_out=float(np.median(run_out)), run_out_angle=float(angle[0]))
+    force, told = np.array(forces), cutter.flutes > 1 and bool(np.isfinite(waves).all())
+    run_out, angle = np.full(len(feed), np.nan), np.zeros(len(feed))
+    if told:
+        cutter = replace(cutter, run_out=0.0)
+    for _ in range(ROUNDS):  # with run-out some teeth cut less, which bends the lines a little
         response = slot_responses(cutter, feed, depth, angle)
         values, covariance, determined = least_squares(response, force)
-        if cutter.flutes > 1 and values[0] > 0.0:
+        if told and values[0] > 0.0:
             known = Coefficients(values[:3], values[3:], covariance)
             slots = zip(waves, feed, depth, strict=True)
             run_out, angle = np.array([_run_out(*slot, cutter, known) for slot in slots]).T
+            cutter = replace(cutter, run_out=float(np.median(run_out)), run_out_angle=float(angle[0]))
     _check_signs(values, covariance, axes)
     coefficients = Coefficients(
         values[:3],
@@ -196,9 +198,14 @@ def fit_coefficients(
     )
     fitted = np.where(np.isnan(force), np.nan, product(response, values[:, None])[..., 0])
     off = left_out(response, force, feed)
-    notes = tuple(f"{', '.join(names)}: {remark}" for remark, names in noted.items())
+    notes = [f"{', '.join(names)}: {remark}" for remark, names in noted.items()]
+    if values[2] + 2.0 * np.sqrt(covariance[2, 2]) < 0.0:
+        notes.append(
+            f"Kac is less than 0 with axes {axes}: chips would push this cutter out of the work, against its helix; "
+            "does the third axis point down? Then say it with the other sign"
+        )
     columns_of_slots = (tuple(records), feed, depth, force, fitted, off, run_out)
-    return CoefficientFit(coefficients, determined, cutter, *columns_of_slots, notes, tuple(files))
+    return CoefficientFit(coefficients, determined, cutter, *columns_of_slots, tuple(notes), tuple(files))
 
 
 def _rotation(axes: str) -> list[tuple[int, float]]:
@@ -218,7 +225,8 @@ def _check_signs(values: FloatArray, covariance: FloatArray, axes: str) -> None:
             raise MeasurementError(
                 f"{symbol} = {values[SYMBOLS.index(symbol)] * SHOWN[0]:.0f} N/mm2 with axes {axes}",
                 expected="more than 0: a tooth is pushed back",
-                hint=f"the axis {axis} points the other way, or two are exchanged: say --axes, as --axes=-y,x,z",
+                hint=f"the axis {axis} points the other way, or two are exchanged: say --axes, as --axes=-y,x,z; "
+                "of forces on the tool --axes=-x,-y,-z",
             )
 
 

@@ -27,7 +27,7 @@ def text(fit: CoefficientFit) -> str:
     lines += ShownTable(("coefficient", ">value", ">95 %", "unit"), rows).lines(2)
     lines += ["", f"  largest residual          {_largest(fit.force - fit.fitted)}"]
     lines += [f"  a feed left out is off by {_largest(fit.left_out)}"]
-    if fit.cutter.flutes > 1:
+    if np.isfinite(fit.run_out).any():
         low, high = (um_from_m(float(end)) for end in (fit.run_out.min(), fit.run_out.max()))
         lines += [f"  run-out, by what differs from tooth to tooth: {low:.1f} to {high:.1f} um"]
     lines += ["", "  the records do not tell", *(f"    {sentence}" for sentence in fit.silent)]
