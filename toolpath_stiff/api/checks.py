@@ -1,4 +1,4 @@
-"""What a program uses and leaves out, apart from its stiffness: this loads the readers of all languages."""
+"""Check of a program apart from stiffness: the words it uses and those left out; loads the readers of all languages."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The micrometres that cutting forces make of a part: a program without them, measured walls held against them."""
+"""Compensation of a program for deflection by cutting forces, and measured walls compared with the predicted error."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -43,7 +43,7 @@ def compensate(
     Parameters
     ----------
     program, machine
-        What it runs on, what runs.
+        The program, and the machine that runs it.
     cut, material, stock_mm
         As of `analyze`.
     origin_mm_deg
@@ -51,7 +51,7 @@ def compensate(
     step_mm
         Largest distance of two samples.
     decimals
-        Of the numbers written; unless given, 4 in mm, 5 in inch.
+        Decimals of the numbers written; unless given, 4 in mm, 5 in inch.
     progress
         Called with what is being done.
 
@@ -115,11 +115,11 @@ def compare_walls(
         Points of a coordinate measuring machine: x_mm,y_mm,z_mm in program coordinates, nx,ny,nz out of the part, and
         deviation_um along that, + material left, unless the points themselves have it.
     machine, program
-        What the part was cut on, by what.
+        The machine that cut the part, and the program that it ran.
     cut, material, stock_mm
         As of `analyze`.
     columns
-        Which columns the file calls otherwise: "deviation=dev:mm", or such a dict.
+        Columns that the file names differently: "deviation=dev:mm", or such a dict.
     origin_mm_deg, step_mm
         Where program zero sat; largest distance of two samples.
     progress
@@ -165,6 +165,6 @@ def _known(setup: CutSetup | None) -> CutSetup:
 
 
 def _read(part: Program, origin: Pose | None, default: Pose) -> tuple[ReadProgram, Pose]:
-    """A program as read for a zero, and where that then is."""
+    """A program read for a zero, and the zero's position."""
     first = part.moves(origin, default)
     return first, origin or (first.origin if first.origin_source == "program" else default)
