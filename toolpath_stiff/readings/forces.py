@@ -146,7 +146,7 @@ def fit_coefficients(
     cutter
         That cut them.
     columns
-        Which columns the files call otherwise.
+        Columns that the files name differently.
     axes
         Directions of the dynamometer's axes: those that point along the feed, to its left and up.
     material

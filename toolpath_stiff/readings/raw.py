@@ -119,7 +119,7 @@ def reduce(*raw: str | Path, columns: Mapped = None, compression_positive: bool 
     raw
         Files and folders of them: CSV, or FILE.xlsx[#SHEET]. Of struts on a bench also tables of their stiffnesses.
     columns
-        Which columns the files call otherwise: "strut=hp, date=day_ms:ms, force=Kraft:kN", or such a dict; unless
+        Columns that the files name differently: "strut=hp, date=day_ms:ms, force=Kraft:kN", or such a dict; unless
         given, as FILE.columns.toml beside a file says.
     compression_positive
         Whether the forces of struts on a bench count compression positive.
