@@ -108,7 +108,7 @@ class Delta(Level):
 
     def _feet(self, carriages: FloatArray) -> FloatArray:
         """(n, 6, 3) m, the rods' joints on carriages at heights (n, 3) m."""
-        height = np.repeat(carriages, 2, axis=1)[..., None] * UP
+        height: FloatArray = np.repeat(carriages, 2, axis=1)[..., None] * UP
         return rod_joints(self.outwards, self.carriage_radius, self.spacing) + height
 
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
