@@ -1,7 +1,7 @@
 """Effect files of one's own that the user has agreed to run: recorded by SHA-256, outside any case.
 
 A case may come from anybody, and its effect files are code. Nothing in a case can say that its code is harmless, so the
-record stands in the user's configuration folder, a file a sum.
+record stands in the user's configuration folder, a file per sum.
 """
 
 import hashlib

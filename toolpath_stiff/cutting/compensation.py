@@ -176,7 +176,7 @@ class Compensation(Result):
     rewritten
         The program as written; the untouched one where nothing could be shifted.
     lines
-        A row a line of the program and side of its feed on which it makes a final wall, by columns: line, side,
+        A row per line of the program and side of its feed on which it makes a final wall, by columns: line, side,
         length_mm, shift_um (mean, + into the work); of the mean over the wall's height, mean and mean size along the
         line and the largest, before and after (error, size, peak; um, + material left); spread_um, the mean range over
         the height, which no shift removes; left_alone, the reason or "". Nan after, where other lines make it then.
@@ -242,7 +242,7 @@ class Compensation(Result):
         return dict(certain(without_nan(to_dict(document | {name: getattr(self, name) for name in names}))))
 
     def to_frame(self) -> DataFrame:
-        """A row a line and side, as `lines`."""
+        """A row per line and side, as `lines`."""
         return frame_of(dict(self.lines))
 
     def _short(self) -> str:

@@ -234,7 +234,7 @@ class Workpiece:
 def stages_of(
     stock: Stock, moves: Moves, cutters: Mapping[int, Cutter], orient: Orient = np.asarray
 ) -> Iterator[Workpiece]:
-    """One workpiece a stage, with the pieces cut up to the stage's end; the last has all of them.
+    """One workpiece per stage, with the pieces cut up to the stage's end; the last has all of them.
 
     `orient` as of `sweeps_of`. Raises `ProgramError`.
     """

@@ -27,7 +27,7 @@ HalLine = tuple[str, int, str]  # file, line, text
 
 @dataclass(frozen=True)
 class ControlFiles:
-    """What HAL and ini files of one machine say.
+    """Content of the HAL and ini files of one machine.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class ControlFiles:
 
 
 def read_control(path: Path, modules: Collection[str], units: str | None = None) -> ControlFiles:
-    """From a HAL file with the ini files beside it that load it, or from an ini file with the HAL files that it loads.
+    """Content of a HAL file and the ini files beside it that load it, or of an ini file and the HAL files it loads.
 
     `modules` are the kinematics modules that are known; `units` are "mm" or "inch", else LINEAR_UNITS.
     Raises `InputError` for a pin that is no number, ini files that contradict each other, and no unit.

@@ -217,7 +217,7 @@ def read_measurements(
 
 
 def _table_1() -> Table:
-    """The paper's Table 1, printed one row a point."""
+    """The paper's Table 1, printed one row per point."""
     text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
     printed = parse_table(text, NIST_TABLE_1, Columns(POSITION))
     rows = tuple(

@@ -181,7 +181,7 @@ def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
 
 
 def _scale(analysis: Analysis) -> Document:
-    """Ends of the colour scale, N/mm, and whether values lie beyond them."""
+    """Ends of the colour scale, N/mm, and True if values lie beyond them."""
     limits = scale_limits(analysis)
     below, above = beyond_scale(analysis, limits)
     return {"ends": limits, "beyond_low": below, "beyond_high": above}
