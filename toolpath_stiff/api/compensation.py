@@ -107,7 +107,7 @@ def compare_walls(
     step_mm: inputs.Step = 1.0,
     progress: Progress | None = None,
 ) -> WallComparison:
-    r"""Measured walls of a part against the error of the surface that its cut foretells: where the model fails.
+    r"""Measured walls of a part against the surface error that its cut predicts: where the model fails.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the pap
 
 @dataclass(frozen=True)
 class Machine(Result):
-    """A machine with the physical effects that act on it, and what it runs under.
+    """A machine with the physical effects that act on it, and the conditions that it runs under.
 
     `Machine.load` makes one from a packaged machine or a machine file.
 

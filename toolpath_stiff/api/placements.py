@@ -303,7 +303,7 @@ def rewrite(
     decimals: inputs.Decimals = None,
     linearise_mm: inputs.Linearised = None,
 ) -> RewrittenProgram:
-    r"""Write a program so that, run where its zero sits now, it does what it would do untouched at another placement.
+    r"""Write a program so that, run at its present zero, it does what the untouched one would do at another placement.
 
     Parameters
     ----------

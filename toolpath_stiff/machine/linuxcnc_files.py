@@ -73,13 +73,13 @@ class ControlFiles:
         return self.pin(name, default) * self.scale
 
     def bounds(self, joint: int, linear: bool) -> FloatArray | None:
-        """M or rad; None: nobody says."""
+        """Limits of a joint, m or rad; None: not stated."""
         if joint not in self.limits:
             return None
         return m_from_mm(self.limits[joint] * self.scale) if linear else rad_from_deg(self.limits[joint])
 
     def limits_of(self, axes: str, letters: str) -> Document:
-        """Keys of [limits] by letter, None where nobody says; `letters` are the joints' unless the files name them."""
+        """Keys of [limits] by letter, None if not stated; `letters` are the joints' unless the files name them."""
         letters = self.coordinates or letters
         keys: dict[str, FloatArray | None] = {}
         for axis in axes:
