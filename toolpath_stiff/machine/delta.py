@@ -38,7 +38,7 @@ SCHEMA = {
 
 @dataclass(frozen=True, kw_only=True)
 class Level(Parallel):
-    """What deltas of either drive share: three parallelograms that keep the effector level.
+    """Common part of linear and rotary deltas: three parallelograms that keep the effector level.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Level(Parallel):
         return rotation_matrices(abc)
 
     def level(self, axes: FloatArray) -> BoolArray:
-        """(n,) whether tool axes (n, 3, 3) are those that the rods keep."""
+        """(n,) True where tool axes (n, 3, 3) are those that the rods keep."""
         return np.asarray(np.abs(axes - np.eye(3)).max(axis=(1, 2)) < 1e-9)
 
     def effector_arms(self, extension: FloatArray) -> FloatArray:
@@ -103,7 +103,7 @@ class Delta(Level):
 
 
 def rod_joints(outwards: FloatArray, radius: float, spacing: float) -> FloatArray:
-    """(6, 3) m, joints of the rods on a circle, both of a tower together."""
+    """(6, 3) m, joints of the rods on a circle, the two of a tower together."""
     sides = 0.5 * spacing * np.cross(UP, outwards)
     return np.stack([radius * outwards - sides, radius * outwards + sides], axis=1).reshape(6, 3)
 

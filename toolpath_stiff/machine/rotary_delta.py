@@ -30,7 +30,7 @@ ARMS = -OUTWARDS
 
 @dataclass(frozen=True, kw_only=True)
 class RotaryDelta(Level):
-    """A rotary delta; the hips stand in the plane z = 0.
+    """A rotary delta; the hips lie in the plane z = 0.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class RotaryDelta(Level):
 
     @property
     def joint_kinds(self) -> tuple[str, ...]:
-        """Of each arm "rotary"."""
+        """Kind of each arm's joint: "rotary"."""
         return ("rotary",) * 3
 
     def legs_at(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> Legs:
@@ -77,7 +77,7 @@ class RotaryDelta(Level):
         )
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
-        """The arms, and what other machines of rods have."""
+        """The arms, and the lines that other machines with rods have."""
         knees, hips = self._knees(stance.joints)[0], self.hip_radius * ARMS
         arms = [
             (f"arm {i + 1}", np.stack([np.broadcast_to(hips[i], knees[:, i].shape), knees[:, i]], 1)) for i in range(3)
