@@ -17,6 +17,7 @@ ERROR_KEYS = {
     "loadings": (2, "a row of {columns} numbers or more for each parameter"),
     "struts_percent": (0, "a number, 0 or more"),
     "joints_mm": (0, "a number, 0 or more"),
+    "learned": (2, "rows of {columns} numbers each"),
     "form_percent": (1, "two numbers, the second no smaller, 0 or more: at the measured places, away from them"),
     "places_mm_deg": (2, "rows of six numbers: x, y, z in mm, roll, pitch, yaw in degrees"),
 }
@@ -75,7 +76,7 @@ def _read_errors(toml: MachineToml, table: object, parameters: int) -> ErrorMode
     position, angles = np.hsplit(values["places_mm_deg"], 2)
     places = coordinates(m_from_mm(position), rad_from_deg(angles))
     struts, joints = 0.01 * float(values["struts_percent"]), m_from_mm(float(values["joints_mm"]))
-    return ErrorModel(values["loadings"], struts, joints, near, away, places)
+    return ErrorModel(values["loadings"], struts, joints, near, away, places, values["learned"])
 
 
 def _is_correlation(matrix: FloatArray) -> bool:
@@ -93,6 +94,6 @@ def _fits(key: str, value: FloatArray, parameters: int) -> bool:
         return False
     if key == "loadings":
         return len(value) == parameters and value.shape[1] >= GEOMETRY
-    if key == "places_mm_deg":
-        return value.size > 0 and value.shape[1] == 6
+    if key in ("learned", "places_mm_deg"):
+        return value.size > 0 and value.shape[1] == (GEOMETRY if key == "learned" else 6)
     return bool((value >= 0.0).all()) and (key != "form_percent" or (len(value) == 2 and value[0] <= value[1]))
