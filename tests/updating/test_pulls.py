@@ -391,9 +391,7 @@ def test_poses_in_other_axes_than_the_joints(tmp_path: Path) -> None:
         if angle < 1.0:
             assert f"other axes, xyz_mm = {(-turn.T @ shift).round(1).tolist()}" in str(tps.diagnose(data, ROBOT))
             continue
-        with pytest.raises(
-            tps.TpsError, match=r"90.csv:2: .* \(so in 19 more rows\); expected .*\[work\] (.*)"
-        ) as error:
+        with pytest.raises(tps.TpsError, match=r"90.csv:2: .*so in 19 more rows\); expected .*\[work\] (.*)") as error:
             tps.diagnose(data, ROBOT)
         keys = str(error.value).split("[work] ")[1].split(". ")[0].replace(", rpy", "\nrpy")
         work = tmp_path / "work.toml"
@@ -404,7 +402,7 @@ def test_poses_in_other_axes_than_the_joints(tmp_path: Path) -> None:
 
 
 def test_a_dial_that_hardly_moves_does_not_judge_the_joints(tmp_path: Path) -> None:
-    """Dials across the force read next to nothing at some pulls: any model's error is many times such a reading."""
+    """Dials across the force read next to nothing at some pulls, where any error is many times the reading."""
     off = tmp_path / "off.toml"
     off.write_text(ROBOT.read_text("utf-8").replace("[620.0, 340.0, 460.0,", "[900.0, 500.0, 300.0,"), "utf-8")
     head, rows = rows_of(campaign(tmp_path / "a.csv", 9, "none", 0, 43))

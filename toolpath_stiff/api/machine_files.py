@@ -1,15 +1,16 @@
-"""Machine files made: templates, and what other programs' files say of a machine."""
+"""Machine files to be made: templates, and machines converted from other programs' files."""
 
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.api.inputs import template
+from toolpath_stiff.files import read_text
 from toolpath_stiff.machine import dh_table, freecad, urdf
 from toolpath_stiff.machine.file import KINDS
-from toolpath_stiff.machine.linuxcnc import UNITS_MM, machine_from_hal, units_of
-from toolpath_stiff.machine.linuxcnc_kinds import control_files, machine_from_control, module_of
+from toolpath_stiff.machine.linuxcnc import hexapod_of_pins
+from toolpath_stiff.machine.linuxcnc_files import read_control
+from toolpath_stiff.machine.linuxcnc_kinds import MODULES, machine_from_control
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_text
 from toolpath_stiff.options import Option, checked, names
@@ -27,9 +28,10 @@ def machine_template(
     Parameters
     ----------
     file
-        That it will be.
+        Name of the file to be.
     kind
-        Of machine: six telescopic struts, or joints in series, five struts, a linear delta, struts on moving feet.
+        Kind of machine: six telescopic struts, or joints in series, five struts, a linear or rotary delta, struts on
+        moving feet.
 
     Examples
     --------
@@ -39,27 +41,28 @@ def machine_template(
     """
     target = Path(file)
     name = "machine" if kind == Hexapod.kind else kind
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / f"{name}.toml.txt").read_text("utf-8")
-    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
+    text = (
+        template(f"{name}.toml").replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
+    )
     return TextFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
 
 
 @checked
 def machine_from_linuxcnc(
-    file: Annotated[str | Path, Option("FILE.hal")],
+    file: Annotated[str | Path, Option("FILE.hal|FILE.ini")],
     units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None,
 ) -> TextFile:
-    """The machine of the kinematics pins in a LinuxCNC HAL file.
+    """The machine of the kinematics pins in LinuxCNC's HAL and ini files.
 
     Of genhexkins strut stiffness and limits are assumed; of other modules (trivkins, 5axiskins, xyzac-trt-kins,
-    xyzbc-trt-kins, genserkins, pumakins, pentakins, lineardeltakins) compliances are left to fill in.
+    xyzbc-trt-kins, genserkins, pumakins, pentakins, lineardeltakins, rotarydeltakins) compliances are left to fill in.
 
     Parameters
     ----------
     file
-        The HAL file; kinematics and limits of joints are read in the ini files beside it.
+        The HAL file, with the ini files beside it that load it, or the ini file, with the HAL files that it loads.
     units
-        Of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
+        Unit of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
 
     Raises
     ------
@@ -74,14 +77,11 @@ def machine_from_linuxcnc(
     toolpath_stiff.errors.InputError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
     """
     path = Path(file)
-    text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")
-    ini = "\n".join(ini.read_text("utf-8", "replace") for ini in sorted(path.parent.glob("*.ini")))
-    unit = units or units_of(path)
-    if (module := module_of(text, ini)) not in ("", "genhexkins"):
-        files = control_files(text, ini, module, UNITS_MM[unit], path.name)
+    files = read_control(path, {*MODULES, "genhexkins"}, units)
+    if files.module not in ("", "genhexkins"):
         return TextFile(path.stem, *machine_from_control(files, path.stem))
-    machine, notes = machine_from_hal(text, unit, path.name)
-    heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
+    machine, notes = hexapod_of_pins(files)
+    heading = f"Made from {path.name}, pins in {files.units}.\n" + "\n".join(notes)
     return TextFile(machine.name, machine_toml(machine, heading), notes)
 
 
@@ -111,8 +111,7 @@ def machine_from_urdf(
     toolpath_stiff.errors.InputError: cannot read the URDF file 'nowhere.urdf': No such file or directory
     """
     path = Path(file)
-    text = read_bytes(path, "the URDF file").decode("utf-8", "replace")
-    return TextFile(path.stem, *urdf.machine_from_urdf(text, tip, path.name))
+    return TextFile(path.stem, *urdf.machine_from_urdf(read_text(path, "the URDF file"), tip, path.name))
 
 
 @checked
@@ -128,7 +127,7 @@ def machine_from_dh(
         Columns alpha_deg, a_mm, d_mm, offset_deg, min_deg, max_deg and, if there, name and type (R, or P with min_mm,
         max_mm).
     convention
-        Of the rows: modified (Craig) or standard; they do not show it.
+        Convention of the rows, which they do not show: modified (Craig) or standard.
 
     Raises
     ------
@@ -173,5 +172,4 @@ def machine_from_freecad(
     toolpath_stiff.errors.InputError: cannot read the FreeCAD machine 'nowhere.fcm': No such file or directory
     """
     path = Path(file)
-    text = read_bytes(path, "the FreeCAD machine").decode("utf-8", "replace")
-    return TextFile(path.stem, *freecad.machine_from_fcm(text, order, path.name))
+    return TextFile(path.stem, *freecad.machine_from_fcm(read_text(path, "the FreeCAD machine"), order, path.name))

@@ -47,7 +47,7 @@ GROUPS = {
 }
 MODULES = {name: module for module, commands in GROUPS.items() for name in commands}
 
-DESCRIPTION = "Stiffness of a hexapod (Stewart-platform) mill along a real NC program."
+DESCRIPTION = "Stiffness of a machine tool along an NC program: hexapods, mills, deltas, milling robots."
 EPILOG = """\
 examples:
   tps analyze part.nc                      stiffness along the path: reports/part/report.html

@@ -208,7 +208,7 @@ def ladder_of(task: UpdateTask, start: LadderStep, wanted: Sequence[Sequence[Can
 
 
 def _drawn(task: UpdateTask, full: Fit) -> Drawn | None:
-    """How the effects stand that were drawn from the readings, against the model without them."""
+    """Status of the effects whose form was read off these readings, against the model without them; None if none."""
     others = [[c] for c in full.candidates if not seen_readings([c.effect], task.data).any()]
     if len(others) == len(full.candidates):
         return None

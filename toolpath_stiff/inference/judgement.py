@@ -1,4 +1,4 @@
-"""From readings to a verdict: the whole way on this page, a function and a type a step.
+"""The steps from readings to a verdict, all on this page, a function and a type for each.
 
 | step | function | gives |
 | --- | --- | --- |
@@ -55,9 +55,9 @@ NONE = "none"
 OUTSIDE = "outside the catalogue"
 # What is expected before anything is measured; assumed. Whoever measures has a reason, but most machines are sound.
 PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.10
-FALSE_ALARM = 0.05  # of the base model's gate
+FALSE_ALARM = 0.05  # false alarms of the base model's gate
 ADEQUATE = 0.005  # below this probability an explanation does not explain the data
-MOST_OPEN = 3  # entries that an ambiguous verdict lists; all votes are in the document
+MOST_OPEN = 3  # most entries that an ambiguous verdict lists; the document has all votes
 NAMED = 0.90  # probability from which a single name is the answer
 HELD = 0.95  # probability that the plausible set adds up to where it is not a single name
 STANDS = 0.05  # probability from which something outside the catalogue, or another pair, is not ruled out
@@ -71,7 +71,7 @@ POSITIVE = 3.0
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the data say under one noise model.
+    """Verdict of the data under one noise model, with its grounds.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class Judgement:
 
     @property
     def likeliest(self) -> Fit:
-        """The fit of the likeliest hypothesis: of those left standing, else the closest."""
+        """Fit of the likeliest hypothesis left standing; if none is, of the closest."""
         for name in self.explanations:
             if name == NONE or name in self.fits:
                 return self.fits.get(name, self.base)
@@ -173,7 +173,7 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
 
 @dataclass(frozen=True)
 class Candidates:
-    """Everything that was searched, on tables of added compliance.
+    """All effects searched, on tables of added compliance.
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ def find_candidates(problem: Problem, noise: Noise, effects: Sequence[Effect]) -
 
 @dataclass
 class Gates:
-    """Which explanations leave no more than noise would.
+    """Explanations that leave no more than noise would.
 
     Attributes
     ----------
@@ -238,16 +238,16 @@ class Gates:
 
     @property
     def enough(self) -> bool:
-        """Whether the model explains the data without a further effect."""
+        """True if the model explains the data without a further effect."""
         return self.base.probability > FALSE_ALARM
 
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: int) -> Gates:
-    """The model alone, then single effects, then pairs: of the likeliest those that beat each of their two and pass."""
+    """Test the model alone, then single effects, then pairs; of likely pairs, those that beat both members and pass."""
     draws = simulate(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
     signs = signatures(problem, (table for family in families for table in family.tables))
-    # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
+    # With the law's prior, as in the simulations: a law dragged far off by a missing effect is no fit.
     gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
     gates = Gates(absolute_gate(problem, base.residual, base.jacobian, draws, forms, signs, gain))
     if gates.enough:
@@ -274,19 +274,19 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: in
         matters = k < TESTED or fit.log_evidence > found[0].log_evidence - FAR
         if matters and fit.log_evidence > max(evidence[name] for name in fit.names) + SURVIVES:
             passed = passes(fit.name, fit)
-            # What two effects do to each other is not in their tables: the final fit says by how much it is likelier.
+            # Tables omit the interaction of two effects; the final fit gives its gain in likelihood.
             more = gates.fits[fit.name].log_posterior - fit.log_posterior
             pair = replace(fit, log_evidence=fit.log_evidence + more)
             gates.pairs += (pair,) if passed else ()
         tried.append(pair)
     gates.tried = tuple(sorted(tried, key=lambda fit: (-fit.log_evidence, fit.name)))
-    # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
+    # The base model stays in the running if only the best candidate's gain speaks against it, not its residuals.
     gates.none_stands = min(gates.base.squares_probability, gates.base.structure_probability) > ADEQUATE
     return gates
 
 
 def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) -> tuple[dict[str, float], str]:
-    """Probabilities of the explanations that pass, a further effect at odds of 3 to 1 only; 0 of those kept out.
+    """Probabilities of the explanations that pass, 0 for those kept out; a further effect only at odds of 3 to 1.
 
     Where no single effect passes, something outside the catalogue is weighed, too: then with the form of discrepancy
     that stands out, in words, else "".
@@ -309,7 +309,7 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
 
 
 def _sparing(gates: Gates, posterior: Callable[[Sequence[Fit]], dict[str, float]]) -> dict[str, float]:
-    """Probabilities without pairs that add to the best effect, unless pairs are likelier enough; others are rivals."""
+    """Probabilities without pairs that contain the best effect, unless pairs are likely enough; other pairs stay."""
     weights = posterior(gates.pairs)
     best = max(gates.singles, key=lambda name: weights[name], default="")
     if not best or sum(weights[pair.name] for pair in gates.pairs) >= POSITIVE * weights[best]:
@@ -318,7 +318,7 @@ def _sparing(gates: Gates, posterior: Callable[[Sequence[Fit]], dict[str, float]
 
 
 def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
-    """Log evidence that something outside the catalogue is missing, and the likeliest form of it.
+    """Log evidence for something missing that is outside the catalogue, and its likeliest form.
 
     Alone, or beside one of the two best effects. That a further one is missing beside an effect is as rare as of two
     effects, and it may be any of them: who picks the best of fifteen without that price makes the unknown too likely.
@@ -355,7 +355,7 @@ def _prior(families: Sequence[Family], count: int) -> float:
 
 
 def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit: Fit) -> float:
-    """Log evidence when the size of the noise is itself known to `noise.freedom` degrees of freedom only.
+    """Log evidence if the size of the noise is itself known only to `noise.freedom` degrees of freedom.
 
     Integrated over it, the normal likelihood exp(-q / 2) of the weighted squares q of n readings becomes Student's,
     (1 + q / freedom)^(-(freedom + n) / 2): many readings that fit badly say as much of the noise as of the model.
@@ -368,13 +368,13 @@ def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit
 
 
 def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str, ...]]:
-    """The verdict, and the hypotheses that hold the truth with 95 % probability, the most likely first."""
+    """Verdict, and hypotheses that hold the truth with 95 % probability, the most likely first."""
     if gates.enough:
         likely = _smallest_set(posterior)
         return "adequate", likely if NONE in likely else (*likely, NONE)
     if gates.singles:
         named = "identified" if max(posterior.values()) >= NAMED else "ambiguous"
-        # Above a half, what counts against the model is likelier chance than any effect.
+        # Above one half, the evidence against the model is more likely chance than any effect.
         return "adequate" if posterior[NONE] > 0.5 else named, _smallest_set(posterior)
     if OUTSIDE in posterior:
         return "unexplained", ()
@@ -437,7 +437,7 @@ def put_to_vote(
     first, *others = dict.fromkeys([*standing, *instead])
 
     def behind(name: str) -> tuple[bool, float]:
-        """By votes; of the part of the first, which has none, by odds. Beside a model that passes, by chance alone."""
+        """Sort key: votes; without votes (part of the first) the odds; beside a model that passes, chance alone."""
         if name in ballots:
             return name in lost, float(ballots[name].sum())
         if verdict == "adequate":
@@ -462,7 +462,7 @@ def _votes_of_few(problem: Problem, families: Sequence[Family], fit: Fit, rivals
 
 
 def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
-    """Explanations without those beyond the `MOST_OPEN` entries that come first; the model alone stays."""
+    """Explanations in the first `MOST_OPEN` entries; the model alone stays in any case."""
     groups = entries(problem, fits, tuple(dict.fromkeys(names)))
     kept = groups[:MOST_OPEN]
     kept[-1:] = [group for group in groups[MOST_OPEN:] if NONE in group] or kept[-1:]
@@ -470,7 +470,7 @@ def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -
 
 
 def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
-    """How far each further effect may go beside the likeliest explanation.
+    """Largest size of each further effect that may go unseen beside the likeliest explanation.
 
     A further effect is as likely beforehand as one effect is beside none, or a pair beside one of its effects. Where
     the readings say nothing of it, it keeps that probability: a few per cent. So it is in no set that holds the truth
@@ -485,7 +485,7 @@ def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
 
 
 def _smallest_set(posterior: Mapping[str, float], named: float = NAMED) -> tuple[str, ...]:
-    """The one hypothesis that holds `named`, else the fewest that hold `HELD`."""
+    """The one hypothesis that holds `named` of the probability; otherwise the fewest that hold `HELD`."""
     ranked = sorted(posterior.items(), key=lambda item: (-item[1], item[0]))
     if ranked and ranked[0][1] >= named:
         return (ranked[0][0],)

@@ -1,4 +1,4 @@
-"""What repeats tell of the noise: repeat noise, clamping, and the share of wild readings.
+"""Noise from repeats: repeat noise, clamping, and the share of wild readings.
 
 By restricted maximum likelihood of the differences between repeats (Patterson and Thompson 1971), in which what the
 machine does cancels.
@@ -16,20 +16,20 @@ from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.readings.measurements import Readings
 
-# Share of wild readings where repeats do not tell, and how much wider they scatter; assumed. Where repeats tell, their
+# Share of wild readings if repeats do not tell, and how much wider they scatter; assumed. If repeats tell, their
 # share is expected about the assumed one (sd of its logarithm), within the ends.
 OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0
 OUTLIER_SPREAD, OUTLIER_ENDS = 1.5, (0.005, 0.20)
-# The grid on which scatter and share are weighed: factors on the first estimate of the scatter, shares.
+# Grid over which scatter and share are weighed: factors on the first estimate of the scatter, shares.
 FACTORS, SHARES = np.geomspace(0.3, 3.3, 61), np.geomspace(*OUTLIER_ENDS, 16)
-# Degrees of freedom that a difference is worth for the scatter when it may be wild: what 300 simulations each of 6 to
+# Degrees of freedom that a difference is worth for the scatter if it may be wild: from 300 simulations each of 6 to
 # 71 differences, 2 % of the readings wild, give (0.74 to 0.62).
 WORTH = 0.63
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
 MOST_TRIMS = 8
 MOST_APART = 600  # clampings along axes: of more only those of a clamping as a whole are looked at
 LARGEST_RATIO, ZOOMS = 5.0, 6  # of clamping to repeat noise; ever finer grids on which it is looked for
-# Standard deviations as which a larger deviation counts: how far off the wildest is tells nothing of the others.
+# Standard deviations at which larger deviations are capped: the wildest tells nothing about the others.
 FARTHEST = 1.5 * OUTLIER_WIDTH
 ALIKE = ("position", "angles", "direction", "force", "tool_extension", "setup", "loop")  # columns of repeats
 # Normal deviate, of 0.01 %, at which scatters that are the same would be told apart by axis or by set-up: were their
@@ -39,7 +39,7 @@ WILD = 3.0  # standard deviations beyond which a difference between repeats is s
 
 
 def repeat_groups(data: Readings, apart: Sequence[str] = ()) -> IntArray:
-    """(n,) number of each reading's group: the same pose, direction, load, tool, set-up and loop.
+    """(n,) number of each reading's group: same pose, direction, load, tool, set-up and loop.
 
     `apart`: those of `ALIKE` in which the readings of a group may differ.
     """
@@ -51,7 +51,7 @@ def repeat_groups(data: Readings, apart: Sequence[str] = ()) -> IntArray:
 
 
 def copied(data: Readings) -> bool:
-    """Whether every repeat is the same number as the reading that it repeats: that tells nothing of any scatter."""
+    """True if every repeat is the same number as the reading it repeats, which tells nothing about scatter."""
     groups = repeat_groups(data)
     _, first = np.unique(groups, return_index=True)
     again = np.bincount(groups)[groups] > 1
@@ -60,7 +60,7 @@ def copied(data: Readings) -> bool:
 
 @dataclass(frozen=True)
 class Repeats:
-    """What repeats tell.
+    """Noise estimated from repeats.
 
     Attributes
     ----------
@@ -85,17 +85,17 @@ class Repeats:
 
     @property
     def total(self) -> float:
-        """What a reading scatters, clamped anew if that was."""
+        """Relative sd of a reading, including clamping if readings were clamped anew."""
         return float(np.hypot(self.repeat, self.clamping)) if self.clamps else self.repeat
 
     @property
     def freedom(self) -> float:
-        """Degrees of freedom that the scatter is worth: fewer than differences, as any of them may be wild."""
+        """Degrees of freedom of the scatter: fewer than the differences, as any of them may be wild."""
         return WORTH * self.differences
 
 
 def from_repeats(data: Readings) -> Repeats | None:
-    """Noise from repeats, or None without enough of them.
+    """Noise from repeats; None if there are too few.
 
     What differs between repeats beside chance, the time since zeroing and the order, is projected out first, so that
     a drift is not taken for noise; where too few differences would be left, it counts as noise, on the safe side.
@@ -150,7 +150,7 @@ def _likeliest(data: Readings, groups: IntArray, drifts: bool) -> tuple[_Contras
 
 
 def scatter_apart(data: Readings, every: Repeats) -> tuple[float | FloatArray, float | FloatArray, str]:
-    """Repeat noise and clamping, (n,) where repeats scatter otherwise along other axes or in other set-ups; and words.
+    """Repeat noise and clamping, (n,) if repeats scatter differently along axes or between set-ups; and words.
 
     Beyond chance: the logarithms of their scatters differ by more than their degrees of freedom allow (chi-squared,
     `DIFFERENT`). Readings of one clamping along different axes share no more scatter than the quietest axis has.
@@ -201,7 +201,7 @@ def _mixture(deviations: FloatArray, size: IntArray) -> tuple[float, float]:
 
 
 class _Contrasts:
-    """Differences between repeats: what is left of n ln readings y beside group means, time and order, M y.
+    """Differences between repeats: residuals M y of n ln readings y beside group means, time and order.
 
     M takes least squares' residuals. Their covariance is M (repeat^2 + clamping^2 Z Z^T) M, Z with a column of ones and
     noughts a clamping; all that a likelihood asks of it are the eigenvalues of Z^T M Z, as many as there are
@@ -241,7 +241,7 @@ class _Contrasts:
         n, self.alone = len(groups), clamps.alone
         clamped = np.zeros((n, 0)) if clamps.alone else left((clamps.of[:, None] == np.arange(clamps.count)) * 1.0)
         values, vectors = np.linalg.eigh(clamped.T @ clamped)
-        largest = np.bincount(clamps.of).max(initial=0)  # of the eigenvalues, if nothing were projected out
+        largest = np.bincount(clamps.of).max(initial=0)  # largest eigenvalue if nothing were projected out
         kept = values > largest * n * np.finfo(float).eps
         self.left, self.reached, self.values = left(logs)[:, 0], clamped @ vectors[:, kept], values[kept]
         self.redundancy = 1.0 - 1.0 / sizes[means.of] - (fixed**2).sum(axis=1)
@@ -250,13 +250,13 @@ class _Contrasts:
 
     @property
     def tells(self) -> bool:
-        """Whether the differences tell clamping from repeat noise."""
+        """True if the differences tell clamping from repeat noise."""
         rank = len(self.values)
         spread = float(np.ptp(self.values)) if rank == self.count else float(self.values.max(initial=0.0))
         return spread > 1e-6 and rank >= 3
 
     def deviations(self, repeat: float, clamping: float) -> FloatArray:
-        """(n,) how far each reading is off, in standard deviations, where it is left out itself."""
+        """(n,) deviation of each reading from the others, in standard deviations."""
         repeat = max(repeat, 1e-12)
         ratio, variance = (clamping / repeat) ** 2, repeat**2 + (clamping**2 if self.alone else 0.0)
         weights = ratio / (1.0 + ratio * self.values)
@@ -266,7 +266,7 @@ class _Contrasts:
 
 
 def _drifts(data: Readings, stiffness: FloatArray) -> FloatArray:
-    """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing.
+    """(n, 1 or 4) systematic differences between repeats: order, and a drift since zeroing.
 
     `stiffness` (n,) is the mean of each reading's repeats: a reading's own would carry its noise into the regressor,
     which then takes that very noise away.

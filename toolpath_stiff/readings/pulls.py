@@ -1,4 +1,4 @@
-"""Pulls: displacements of a machine of elements under known forces, as vectors or along a dial; stiffnesses as well.
+"""Pulls: displacements of a machine of elements under known forces, as vectors or along a dial; also stiffnesses.
 
 A row is a pull: where the machine stands (pose of the tip, or values of its joints, or both, held against each other),
 the force on the tool (its vector, or the tension of a cable and the pulley that it runs to), what moved (components, or
@@ -44,9 +44,9 @@ FORCE_AXES, MOVED_AXES = (tuple(f"{what}_axes_{axis}_deg" for axis in "abc") for
 USED = "direction", "force_N", "displacement_um", "sd_um", "repeat"  # beside vectors
 FRAMES = "force_axes", "sensor_axes"  # of the components, of `AXES`
 AXES = "base", "tip", "work"  # the tip's own at each row; the axes of poses, those of [work] of the machine file
-NOT_READ = ("nan", "n/a", "na", "-")  # cells that say so, as empty ones do
+NOT_READ = ("nan", "n/a", "na", "-")  # cells that count as empty
 FARTHEST = -1e6, 1e6  # um, of a dial
-SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
+SMALLEST = m_from_um(1e-3)  # least displacement by which others are scaled
 ALONG = 0.99  # cosine between dial and force from which a reading never vanishes: F d^T C d, C positive definite
 
 
@@ -89,12 +89,12 @@ class Pulls(ArrayColumns):
 
     @cached_property
     def pull(self) -> IntArray:
-        """(m,) number of the pull that each is read of: of its row."""
+        """(m,) number of the pull (the row) that each reading belongs to."""
         return np.unique(np.char.add(self.file, self.line.astype(str)), return_inverse=True)[1].reshape(-1)
 
     @cached_property
     def size(self) -> FloatArray:
-        """(m,) m, length of the displacement that each reading is a component of."""
+        """(m,) m, length of the displacement whose component each reading is."""
         return np.asarray(np.maximum(np.sqrt(np.bincount(self.pull, self.value**2))[self.pull], self.least))
 
     @cached_property
@@ -110,14 +110,14 @@ class Pulls(ArrayColumns):
         return np.asarray(np.maximum(np.where(aside, usual * force, 0.0), SMALLEST))
 
     def vectors(self, values: FloatArray) -> FloatArray:
-        """(pulls, 3) in base axes of values (m,) of the components that were read."""
+        """(pulls, 3) vectors in base axes from values (m,) of the components read."""
         total = np.zeros((int(self.pull.max()) + 1, 3))
         np.add.at(total, self.pull, values[:, None] * self.direction)
         return total
 
     @property
     def setup(self) -> TextArray:
-        """(m,) no set-up is named."""
+        """(m,) "": no set-up is named."""
         return np.full(len(self), "")
 
     @property
@@ -127,21 +127,21 @@ class Pulls(ArrayColumns):
 
     @property
     def tip(self) -> BoolArray:
-        """(m,) every reading is of the tip."""
+        """(m,) True: every reading is of the tip."""
         return np.ones(len(self), dtype=bool)
 
     @property
     def of_tip(self) -> "Pulls":
-        """All of them."""
+        """The readings of the tip: all."""
         return self
 
     @property
     def direction(self) -> FloatArray:
-        """(m, 3) along which each was read."""
+        """(m, 3) direction in which each was read."""
         return self.along[:, :3]
 
     def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
-        """Effects that pulls cannot test -> the columns that they lack."""
+        """Effects that pulls cannot test -> columns that are missing for them."""
         return lacking_columns(effects, self.missing)
 
 
@@ -173,7 +173,7 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
 
 
 def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> list[Table]:
-    """The files that give forces as vectors or by cables, as tables; the others give stiffnesses along directions."""
+    """Tables of the files that give forces as vectors or by cables; the others give stiffnesses along directions."""
     known = Columns((*COLUMNS.numbers, *_further(machine)), (*COLUMNS.texts, *FRAMES))
     tables = [mapped_table(name, "measurements", known, mapping) for name in files]
     further = {*FORCE, TENSION, *_joint_columns(machine)}
@@ -181,7 +181,7 @@ def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = No
 
 
 def _check_columns(table: Table, machine: MachineTool) -> None:
-    """Refuse a table that lacks poses or all joints, forces, or what moved."""
+    """Refuse a table that lacks poses or all joints, forces, or displacements."""
     if not {*POSITION} <= {*table.heading}:
         missing = [named for named in _names_of_joints(machine) if {*named}.isdisjoint(table.heading)]
         check_needed(table, [by_number for _, by_number in missing], f"all joints, or {', '.join(POSITION)}")
@@ -195,7 +195,7 @@ def _check_columns(table: Table, machine: MachineTool) -> None:
 
 @dataclass(frozen=True)
 class _Pull:
-    """One row, SI; nan where a cell is empty or a column absent."""
+    """One row, SI; nan for an empty cell or an absent column."""
 
     pose: tuple[float, ...]
     joints: tuple[float, ...]
@@ -213,7 +213,7 @@ class _Pull:
 
     @classmethod
     def of(cls, file: str, joints: Mapping[str, tuple[int, bool]], line: int, record: Mapping[str, str]) -> "_Pull":
-        """A row of a file. Raises `MeasurementError`."""
+        """Pull from a row of a file. Raises `MeasurementError`."""
         record = {name: "" if cell.strip().lower() in NOT_READ else cell for name, cell in record.items()}
 
         def mm(names: Sequence[str]) -> tuple[float, ...]:
@@ -260,13 +260,13 @@ class _Pull:
 
 
 def _unloaded(record: Mapping[str, str]) -> bool:
-    """Whether a row says that nothing moved under no force: where the readings are counted from."""
+    """True if a row states no motion under no force: the origin of the readings."""
     cells = [record.get(name, "").strip() for name in (*FORCE, TENSION, "force_N", *MOVED, "displacement_um")]
     return any(cells) and set("".join(cells)) <= set("+-.0")
 
 
 def _component(record: Mapping[str, str], name: str) -> float:
-    """A component of a load; 0 where the file has no such column."""
+    """A component of a load; 0 if the file has no such column."""
     return number(record, name) if name in record else 0.0
 
 
@@ -277,28 +277,28 @@ def _turn(record: Mapping[str, str], names: Sequence[str]) -> FloatArray:
 
 
 def _names_of_joints(machine: MachineTool) -> list[tuple[str, str]]:
-    """Columns that a joint's value may stand in: `joint_J1_deg`, `joint_1_deg`."""
+    """Column names for a joint's value: `joint_J1_deg`, `joint_1_deg`."""
     kinds = zip(machine.joint_names, machine.joint_kinds, strict=True)
     both = [(name.replace(" ", "_"), "mm" if kind == "linear" else "deg") for name, kind in kinds]
     return [(f"joint_{name}_{unit}", f"joint_{i}_{unit}") for i, (name, unit) in enumerate(both, 1)]
 
 
 def _joint_columns(machine: MachineTool) -> dict[str, tuple[int, bool]]:
-    """Column -> number of the joint and whether it is linear."""
+    """Column -> number of the joint, and True if it is linear."""
     return {name: (i, name.endswith("mm")) for i, names in enumerate(_names_of_joints(machine)) for name in names}
 
 
 def _further(machine: MachineTool) -> tuple[str, ...]:
-    """Columns that pulls have beside those of stiffnesses."""
+    """Columns of pulls besides those of stiffnesses."""
     loads = (*FORCE, *MOMENT, *FORCE_AXES, TENSION, *CABLE, *PULL)
     return (*loads, *MOVED, *MOVED_AXES, *DIAL, *TARGET, *_joint_columns(machine))
 
 
 def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) -> Pulls:
-    """The machine stood at each row's pose or joints; a reading for each component that was read."""
+    """Pulls from rows, the machine at each row's pose or joints; one reading for each component read."""
     pose, joints = np.array([row.pose for row in rows]), np.array([row.joints for row in rows])
     stance, assumed = standing(machine, pose, joints, [(row.file, row.line) for row in rows])
-    turn = np.broadcast_to(np.eye(3) if stance.rotation is None else stance.rotation, (len(rows), 3, 3))
+    turn = stance.axes
     pull, target = (np.einsum("nij,nj->ni", turn, [getattr(row, name) for row in rows]) for name in ("pull", "target"))
     cable = np.array([row.pulley for row in rows]) - stance.position - pull
     by_cable = np.array([[row.tension] for row in rows]) * cable / np.linalg.norm(cable, axis=1, keepdims=True)
@@ -328,7 +328,7 @@ def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) 
 
 
 def _of_stiffnesses(files: Sequence[str], machine: MachineTool, mapping: Mapped) -> Pulls:
-    """Readings of force over displacement along a direction, as pulls by that force with a dial along it."""
+    """Force over displacement along a direction, as pulls by that force read with a dial along it."""
     data = read_measurements(files, machine, columns=mapping)
     wrench, along = (np.hstack([part, np.zeros((len(data), 3))]) for part in (data.direction * data.force[:, None],
                                                                              data.direction))  # fmt: skip

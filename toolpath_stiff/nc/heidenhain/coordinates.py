@@ -33,7 +33,7 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 
 def put(state: State, block: CurrentBlock, inner: Matrix) -> None:
-    """Put a turn, mirror image and scale, the tilting and the shifts into force; the tool stands still meanwhile."""
+    """Put a rotation, mirror image and scale, the tilting and the shifts in force; the tool does not move."""
     plain, frames = state.plain, state.frames
     outside_contour(state, block, "changes coordinates", state.beside is not None or plain.side)
     whole, shift = inner, plain.shift
@@ -45,7 +45,7 @@ def put(state: State, block: CurrentBlock, inner: Matrix) -> None:
 
 
 def apply(state: State, block: CurrentBlock) -> None:
-    """Put what is in force into the frames."""
+    """Put the transformations in force into the frames."""
     plain = state.plain
     inner = [[plain.scale * v for v in row] for row in UNIT]
     if plain.angle:
@@ -138,7 +138,7 @@ def tilt(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def turn_tool(state: State, block: CurrentBlock) -> None:
-    """Turn the tool upright on the tilted plane; where its tip then is, is not known."""
+    """Turn the tool upright on the tilted plane, after which the position of its tip is unknown."""
     plain = state.plain
     axis = [row[2] for row in plain.tilt] if plain.tilt is not None else [0.0, 0.0, 1.0]
     state.assume(TIP_TURNS)

@@ -1,4 +1,4 @@
-"""The table of statements of the plain language: head, function, meaning, source; what is refused, and why.
+"""Table of statements of the plain language: head, function, meaning, source; and refused statements with reasons.
 
 The functions are in `contour`, `approach`, `coordinates`, `cycles`, `functions`; `run` carries out the flow (LBL, CALL,
 FN). M functions that mean what they mean in G code are the one table's (`codes.registry`).
@@ -23,7 +23,7 @@ _SPECIAL = f"{_CYCLES}, Special cycles"
 
 
 def _parts(cycle: int, first: int, last: int) -> str:
-    """The statements that a cycle of older controls consists of."""
+    """Statements of which a cycle of older controls consists."""
     return "|".join(f"CYCL DEF {cycle}.{part}" for part in range(first, last + 1))
 
 
@@ -140,14 +140,14 @@ _BUILDERS, _PARAMETER = re.compile(r"CYCL DEF 3\d\d"), re.compile(r"(Q[LRS]?)\d"
 
 @lru_cache(256)
 def look_up(head: str) -> Code | None:
-    """The row of a statement's head; of Q parameters that of "Q", of the machine builder's cycles that of 300."""
+    """Row of a statement's head; Q parameters have the row "Q", the machine builder's cycles that of 300."""
     head = "TCH PROBE" if head.startswith("TCH PROBE") else "CYCL DEF 300" if _BUILDERS.fullmatch(head) else head
     parameter = _PARAMETER.match(head)
     return STATEMENTS.get(parameter[1].rstrip("LR") if parameter else head)
 
 
 def refusal_of(head: str) -> tuple[str, str]:
-    """What a statement without a row is, and what to do instead."""
+    """Description of a statement without a row, and what to do instead."""
     for name in (head, " ".join(head.split()[:2]), head.split(maxsplit=1)[0]):
         if name in REFUSED:
             return f"is {REFUSED[name].what}, which is not supported", REFUSED[name].hint
@@ -157,7 +157,7 @@ def refusal_of(head: str) -> tuple[str, str]:
 
 
 def meaning_of(name: str) -> str:
-    """What a statement or an M function is taken for.
+    """Meaning of a statement or M function to the reader.
 
     Examples
     --------
