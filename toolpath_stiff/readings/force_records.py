@@ -1,6 +1,6 @@
-"""Records of a dynamometer in slots: mean force over whole turns, without drift, and what comes back turn by turn.
+"""Dynamometer records of slots: mean force over whole turns, without drift, and harmonics of the turn.
 
-A file with neither a time nor a rate of sampling holds mean forces, a row a slot.
+A file with neither a time nor a rate of sampling holds mean forces, a row per slot.
 
 A turn cuts where its mean force is half of the strongest turns' or more, and is air where the force swings hardly more
 than in the quietest. (Not where it swings: many teeth in a full slot make it swing less than its entry does.) Over a
@@ -38,14 +38,14 @@ SLIGHT = 0.2  # of the swing: means no further apart are of one kind; that of on
 STEADY = 0.05  # of the mean force, within which a turn is as the usual one
 STRONG = 90.0  # per cent of the turns that are weaker than the strongest, and stronger than the quietest
 LEAST_TURNS = 5  # of the full slot
-SPEED_RANGE = 0.03  # by which the spindle may turn faster or slower than is said
-FINER = 8  # times finer than the spectrum of the record its speed is looked for
+SPEED_RANGE = 0.03  # relative range of spindle speed about the stated one
+FINER = 8  # refinement of the search for the speed over the record's spectrum
 
 
 def read_records(
     file: str, columns: Mapped, flutes: int
 ) -> Iterator[tuple[str, tuple[float, float, float], FloatArray, tuple[str, ...]]]:
-    """Name, settings (feed m per tooth, depth m, turns a second), rows (m, 4) s and N of each record; the remarks.
+    """Name, settings (feed m per tooth, depth m, turns a second) and rows (m, 4) s and N of each record; remarks.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def read_records(
 def mean_force(
     name: str, signal: FloatArray, rate: float, cutter: Cutter, feed: float, side: int
 ) -> tuple[FloatArray, ComplexArray, list[str]]:
-    """(3,) N, mean force over the whole turns of the full slot; (2,) N, its `harmonics` to the side; and remarks.
+    """(3,) N, mean force over the whole turns of the full slot; (2,) N, its `harmonics` sideways; remarks.
 
     Of a record that is a mean itself there are no harmonics: nan.
 
@@ -138,7 +138,7 @@ def mean_force(
 
 
 def _cut_and_air(turn: IntArray, force: FloatArray, filling: int) -> tuple[IntArray, IntArray]:
-    """Whole turns of the full slot, and turns in air; a slot is full `filling` turns after entry.
+    """Whole turns of the full slot, and turns in air; the slot is full `filling` turns after entry.
 
     `turn` (m,) of the forces (m, 3).
     """
@@ -157,7 +157,7 @@ def _cut_and_air(turn: IntArray, force: FloatArray, filling: int) -> tuple[IntAr
     cutting = max(np.split(runs, np.flatnonzero(np.diff(runs) > 1) + 1), key=len)
     if not aired:
         return cutting, first[:0]
-    # Where the swing hardly differs from the air's, the first touch may already push.
+    # Even where the swing hardly differs from that in air, first contact may already push.
     reach = min(filling // 10 + 1, (len(swing) - 1) // 2)
     touched = np.convolve(swing > AIR * quiet, np.ones(2 * reach + 1), "same") > 0.5
     usual = np.median(push[cutting])
@@ -166,7 +166,7 @@ def _cut_and_air(turn: IntArray, force: FloatArray, filling: int) -> tuple[IntAr
 
 
 def _heard_rate(time: FloatArray, force: FloatArray, rate: float, flutes: int) -> float:
-    """Turns a second at which the teeth pass, near the rate that is said; that one where none are heard."""
+    """Turns a second at which the teeth pass, near the stated rate; the stated rate if no teeth are heard."""
     count = FINER * len(time)
     even = np.linspace(time[0], time[-1], len(time))
     power = np.zeros(count // 2 + 1)
@@ -184,6 +184,6 @@ def _heard_rate(time: FloatArray, force: FloatArray, rate: float, flutes: int) -
 
 
 def harmonics(turns: FloatArray, force: FloatArray, flutes: int) -> ComplexArray:
-    """(2,) N, of forces (m,) N after (m,) turns what comes back once a turn and once a tooth."""
+    """(2,) N: components of forces (m,) N, after (m,) turns, that recur once a turn and once a tooth."""
     waves = np.exp(-2j * np.pi * np.array([[1], [flutes]]) * turns)
     return np.asarray((waves * force).mean(axis=1))

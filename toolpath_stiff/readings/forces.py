@@ -1,4 +1,4 @@
-"""Coefficients of the cutting force from records of a dynamometer: how sure they are, what is not told by them."""
+"""Coefficients of the cutting force from dynamometer records, their uncertainty, and what the records leave open."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,8 +21,8 @@ from toolpath_stiff.units import mm_from_m, um_from_m
 
 AXES = ("x", "y", "z")
 FEW = 5  # feeds below which a straight line is hardly tested
-PROBE, NONE = 1e-6, 1e-9  # m, the run-out that is tried first; what counts as none
-BINS, ROUNDS = 720, 4  # angles of a turn; rounds in which fit and run-out settle
+PROBE, NONE = 1e-6, 1e-9  # m, run-out tried first; run-out that counts as none
+BINS, ROUNDS = 720, 4  # angles of a turn; rounds until fit and run-out settle
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -70,14 +70,14 @@ class CoefficientFit(FolderResult):
 
     @property
     def reach(self) -> float:
-        """How many standard deviations an interval of 95 % reaches to either side: Student's t."""
+        """Half width of a 95 % interval in standard deviations: Student's t."""
         from scipy.special import stdtrit
 
         return float(stdtrit(len(self.feed) - 2, SURE))
 
     @property
     def silent(self) -> list[str]:
-        """What the records cannot tell, a sentence each."""
+        """Sentences on what the records cannot tell."""
         low, high = (um_from_m(float(value)) for value in (self.feed.min(), self.feed.max()))
         sentences = [
             f"other feeds per tooth than {low:.4g} to {high:.4g} um: thinner chips, as in finishing, are extrapolated"
@@ -97,7 +97,7 @@ class CoefficientFit(FolderResult):
         return sentences
 
     def to_dict(self) -> Document:
-        """Coefficients as a setup file takes them, with their intervals; one entry a record; what is not determined."""
+        """Coefficients in the form of a setup file, with intervals; one entry per record; what is not determined."""
         columns, values = self.columns(), self.coefficients.values * SHOWN
         deviation = self.coefficients.deviation * SHOWN * self.reach
         document = {
@@ -114,11 +114,11 @@ class CoefficientFit(FolderResult):
         return dict(without_nan(document))
 
     def to_frame(self) -> DataFrame:
-        """One row a record, as `columns`."""
+        """One row per record, with the columns of `columns`."""
         return frame_of(self.columns())
 
     def columns(self) -> dict[str, list[object]]:
-        """One row a record: feed, depth, measured, fitted, measured less the prediction of the other feeds."""
+        """One row per record: feed, depth, force measured, fitted, and less the prediction from other feeds."""
         columns: dict[str, list[object]] = {
             "record": list(self.records),
             "feed_per_tooth_um": um_from_m(self.feed).round(6).tolist(),
@@ -146,7 +146,7 @@ def fit_coefficients(
     cutter
         That cut them.
     columns
-        Which columns the files call otherwise.
+        Columns that the files name differently.
     axes
         Directions of the dynamometer's axes: those that point along the feed, to its left and up.
     material
@@ -163,7 +163,7 @@ def fit_coefficients(
     for file in files:
         for name, setting, signal, how in read_records(file, columns, cutter.flutes):
             mean, wave, remarks = mean_force(name, signal, setting[2], cutter, setting[0], turned[1][0])
-            # A dynamometer reads what acts on the work.
+            # A dynamometer reads the force on the work.
             forces.append([-sign * mean[axis] for axis, sign in turned])
             waves.append(-turned[1][1] * wave)
             settings.append(setting)
@@ -216,7 +216,7 @@ def _rotation(axes: str) -> list[tuple[int, float]]:
 
 
 def _check_signs(values: FloatArray, covariance: FloatArray, axes: str) -> None:
-    """Raise `MeasurementError` where the coefficients say that an axis points the other way."""
+    """Raise `MeasurementError` if the coefficients imply that an axis points the other way."""
     surely = values + 2.0 * np.sqrt(np.diagonal(covariance)) <= 0.0
     for symbol, axis, wrong in (("Ktc", "to the left", values[0] <= 0.0), ("Krc", "along the feed", surely[1])):
         if wrong:
@@ -231,14 +231,14 @@ def _check_signs(values: FloatArray, covariance: FloatArray, axes: str) -> None:
 def _run_out(
     wave: ComplexArray, feed: float, depth: float, cutter: Cutter, coefficients: Coefficients
 ) -> tuple[float, float]:
-    """M and rad, the run-out that makes the force across the feed come back once a turn (`harmonics`) as it does."""
+    """Size (m) and angle (rad) of the run-out that explains the force across the feed once a turn (`harmonics`)."""
     turns = (np.arange(BINS) + 0.5) / BINS
     run_out, angle = PROBE, 0.0
-    for _ in range(ROUNDS):  # teeth that lose contact make it bend
+    for _ in range(ROUNDS):  # teeth that lose contact make it nonlinear
         tried = replace(cutter, run_out=run_out, run_out_angle=angle)
         force = force_at(slot(tried, feed, depth, coefficients), TURN * turns[None])[0, :, 1]
         once, tooth = wave / harmonics(turns, force, cutter.flutes)
         run_out = min(max(run_out * float(np.abs(once)), NONE), feed)
-        # What passes once a tooth tells where in its turn the record begins.
+        # The component once a tooth gives the angle at which the record begins.
         angle += float(np.angle(once) - np.angle(tooth) / cutter.flutes)
     return run_out, angle
