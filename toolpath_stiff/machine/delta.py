@@ -103,7 +103,7 @@ class Delta(Parallel):
 
 
 def rod_joints(outwards: FloatArray, radius: float, spacing: float) -> FloatArray:
-    """(6, 3) m, joints of the rods on a circle, both of a tower together."""
+    """(6, 3) m, joints of the rods on a circle, the two of a tower together."""
     sides = 0.5 * spacing * np.cross(UP, outwards)
     return np.stack([radius * outwards - sides, radius * outwards + sides], axis=1).reshape(6, 3)
 

@@ -44,7 +44,7 @@ class RotaryDelta(Delta):
 
     @property
     def joint_kinds(self) -> tuple[str, ...]:
-        """Of each arm "rotary"."""
+        """Kind of each arm's joint: "rotary"."""
         return ("rotary",) * 3
 
     def joints_of(self, places: FloatArray) -> FloatArray:
