@@ -23,6 +23,7 @@ from toolpath_stiff.cutting.coefficients import (
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.identification import least_squares, left_out, slot_responses
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.readings.force_records import mean_force
 
 FLAT = Cutter(1, 0.010, 0.0, 3, np.radians(30.0))
 BULL = Cutter(1, 0.010, 0.001, 3, np.radians(30.0))
@@ -134,6 +135,22 @@ def test_records_give_coefficients_and_run_out(tmp_path, capsys):
     assert (tmp_path / "out" / "forces.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.parametrize("entry", [0, 45])
+@pytest.mark.parametrize("swing", [10.0, 60.0])
+def test_a_slot_may_swing_less_than_its_entry(entry, swing):
+    """Many teeth even the force of a slot out, which a single tooth of the entry is not; nor need there be an entry."""
+    turns = np.arange(20 + entry + 60 + 20)
+    level = np.clip((turns - 20.0 + 0.5) / max(entry, 0.5), 0.0, 1.0) * (turns < len(turns) - 20)
+    amplitude = np.where(level <= 0.0, 0.0, np.where(level < 1.0, 60.0, swing))
+    time = np.arange(0.0, len(turns) / 100.0, 1 / 5000.0)
+    turn = (time * 100.0).astype(int)
+    force = level[turn] * 80.0 + amplitude[turn] * np.sin(2 * np.pi * 300.0 * time) + 5.0 * time
+    noise = np.random.default_rng(2).normal(0.0, 1.0, (2, len(time)))
+    signal = np.stack([time, noise[0], force + noise[1], 0.5 * force], axis=1)
+    mean, _, remarks = mean_force("slot", signal, 100.0, FLAT, 4e-5, 1)
+    assert mean == pytest.approx([0.0, 80.0, 40.0], abs=0.5) and not remarks
+
+
 BROKEN = {
     "an axis points the other way": ({}, {"axes": "x,-y,z"}, "Ktc = -"),
     "two axes are exchanged": ({}, {"axes": "-y,x,z"}, "Ktc = -"),
@@ -167,6 +184,24 @@ def test_feed_in_mm_a_minute_is_that_of_the_teeth(tmp_path):
             .replace(f'"={fed}"', f'"={fed * 3 * 6000}"')
         )
     assert tps.forces(files, cut).coefficients.values == pytest.approx(first.coefficients.values, rel=1e-9)
+
+
+def test_a_table_of_mean_forces(tmp_path):
+    """As papers print them, forces on the tool: the textbook's straight lines give the known coefficients back."""
+    _, cut = write_records(tmp_path, ())
+    rows = [f"{fed * 1e3},{x},{y},{z}" for fed, (x, y, z) in zip(FEEDS, slot_means(FEEDS), strict=True)]
+    file = tmp_path / "means.csv"
+    file.write_text("\n".join(["fz per tooth,Fx,Fy,Fz", "mm,N,N,N", *rows]))
+    mapping = {"feed_per_tooth": "fz per tooth", "fx": "Fx", "fy": "Fy", "fz": "Fz", "depth": "=3"}
+    fit = tps.forces(file, cut, columns=mapping, axes="-x,-y,-z")
+    assert fit.coefficients.values == pytest.approx(KNOWN, rel=1e-9)
+    assert np.isnan(fit.run_out).all() and "mean forces" in fit.silent[-1] and "run-out, by" not in str(fit)
+    assert "does the third axis point down?" in str(tps.forces(file, cut, columns=mapping, axes="-x,-y,z"))
+    with pytest.raises(InputError, match="of forces on the tool --axes=-x,-y,-z"):
+        tps.forces(file, cut, columns=mapping)
+    file.write_text("\n".join(["fz per tooth,Fx,Fy,Fz", *rows * 100]))
+    with pytest.raises(InputError, match="column time_s is missing"):
+        tps.forces(file, cut, columns=mapping)
 
 
 def test_materials_have_origins_and_bands():

@@ -8,8 +8,9 @@ from toolpath_stiff.api.inputs import template
 from toolpath_stiff.files import read_text
 from toolpath_stiff.machine import dh_table, freecad, urdf
 from toolpath_stiff.machine.file import KINDS
-from toolpath_stiff.machine.linuxcnc import UNITS_MM, machine_from_hal, units_of
-from toolpath_stiff.machine.linuxcnc_kinds import control_files, machine_from_control, module_of
+from toolpath_stiff.machine.linuxcnc import hexapod_of_pins
+from toolpath_stiff.machine.linuxcnc_files import read_control
+from toolpath_stiff.machine.linuxcnc_kinds import MODULES, machine_from_control
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_text
 from toolpath_stiff.options import Option, checked, names
@@ -29,7 +30,8 @@ def machine_template(
     file
         That it will be.
     kind
-        Of machine: six telescopic struts, or joints in series, five struts, a linear delta, struts on moving feet.
+        Of machine: six telescopic struts, or joints in series, five struts, a linear or rotary delta, struts on moving
+        feet.
 
     Examples
     --------
@@ -47,18 +49,18 @@ def machine_template(
 
 @checked
 def machine_from_linuxcnc(
-    file: Annotated[str | Path, Option("FILE.hal")],
+    file: Annotated[str | Path, Option("FILE.hal|FILE.ini")],
     units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None,
 ) -> TextFile:
-    """The machine of the kinematics pins in a LinuxCNC HAL file.
+    """The machine of the kinematics pins in LinuxCNC's HAL and ini files.
 
     Of genhexkins strut stiffness and limits are assumed; of other modules (trivkins, 5axiskins, xyzac-trt-kins,
-    xyzbc-trt-kins, genserkins, pumakins, pentakins, lineardeltakins) compliances are left to fill in.
+    xyzbc-trt-kins, genserkins, pumakins, pentakins, lineardeltakins, rotarydeltakins) compliances are left to fill in.
 
     Parameters
     ----------
     file
-        The HAL file; kinematics and limits of joints are read in the ini files beside it.
+        The HAL file, with the ini files beside it that load it, or the ini file, with the HAL files that it loads.
     units
         Of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
 
@@ -75,14 +77,11 @@ def machine_from_linuxcnc(
     toolpath_stiff.errors.InputError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
     """
     path = Path(file)
-    text = read_text(path, "the file of HAL pins")
-    ini = "\n".join(ini.read_text("utf-8", "replace") for ini in sorted(path.parent.glob("*.ini")))
-    unit = units or units_of(path)
-    if (module := module_of(text, ini)) not in ("", "genhexkins"):
-        files = control_files(text, ini, module, UNITS_MM[unit], path.name)
+    files = read_control(path, {*MODULES, "genhexkins"}, units)
+    if files.module not in ("", "genhexkins"):
         return TextFile(path.stem, *machine_from_control(files, path.stem))
-    machine, notes = machine_from_hal(text, unit, path.name)
-    heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
+    machine, notes = hexapod_of_pins(files)
+    heading = f"Made from {path.name}, pins in {files.units}.\n" + "\n".join(notes)
     return TextFile(machine.name, machine_toml(machine, heading), notes)
 
 

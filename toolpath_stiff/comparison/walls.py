@@ -1,4 +1,4 @@
-"""Measured walls against the errors that a cut foretells: where the model of cut and machine fails.
+"""Measured walls compared with the errors predicted for a cut: where the model of cut and machine fails.
 
 A point is held against the final wall beside which it lies: its measured deviation along the normal, out of the part,
 against the error that is foretold at its height. The lines of the program are the places; a line fails where its mean
@@ -54,7 +54,7 @@ def read_walls(file: str, columns: Mapped = None) -> tuple[FloatArray, FloatArra
 
 @dataclass(frozen=True, eq=False, repr=False)
 class WallComparison(FolderResult):
-    """Measured points of walls against the errors that a cut foretells; SI, n points that lie on a final wall.
+    """Measured points of walls compared with the errors predicted for a cut; SI, n points on a final wall.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class WallComparison(FolderResult):
 
     @property
     def factor(self) -> tuple[float, float]:
-        """Measured errors over the foretold ones, by least squares, and its standard deviation from their scatter."""
+        """Ratio of measured to predicted errors by least squares, and its standard deviation from their scatter."""
         square = float((self.foretold**2).sum())
         if not square:
             return float("nan"), float("nan")
@@ -97,14 +97,14 @@ class WallComparison(FolderResult):
 
     @property
     def lines(self) -> list[dict[str, Any]]:
-        """Of each line and side: points, measured and foretold error, residual, what is sure of it, and the verdict."""
+        """For each line and side: points, measured and predicted error, residual, its uncertainty, verdict."""
         keys, which = np.unique(np.stack([self.line, self.side]), axis=1, return_inverse=True)
         count = np.bincount(which)
         residuals = um_from_m(self.measured - self.foretold)
         values = {"measured": um_from_m(self.measured), "foretold": um_from_m(self.foretold), "residual": residuals}
         means = {name: np.bincount(which, column) / count for name, column in values.items()}
         squares = np.bincount(which, (residuals - means["residual"][which]) ** 2)
-        pooled = squares.sum() / max(len(residuals) - len(count), 1)  # a line of few points scatters as the others do
+        pooled = squares.sum() / max(len(residuals) - len(count), 1)  # a line of few points takes the others' scatter
         scatter = np.maximum(squares / np.maximum(count - 1, 1), pooled) / count
         sure = SURE * np.sqrt(scatter + (np.bincount(which, um_from_m(self.deviation)) / count) ** 2)
         fails = np.abs(means["residual"]) > sure
@@ -113,7 +113,7 @@ class WallComparison(FolderResult):
         return records(columns)
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of compare.json."""
+        """Content of compare.json."""
         factor, spread = self.factor
         sizes = {"measured": self.measured, "residual": self.measured - self.foretold}
         means = {f"mean_{name}_um": float(um_from_m(np.abs(values).mean())) for name, values in sizes.items()}
@@ -122,7 +122,7 @@ class WallComparison(FolderResult):
         return dict(certain(without_nan(document | further)))
 
     def to_frame(self) -> DataFrame:
-        """A row a point: line, side, height on the wall (mm), measured and foretold error, its deviation (um)."""
+        """One row a point: line, side, height on the wall (mm), measured and predicted error, its deviation (um)."""
         columns = {f"{name}_um": um_from_m(getattr(self, name)) for name in ("measured", "foretold", "deviation")}
         place = {"line": self.line, "side": np.array(["left", "right"])[self.side], "height_mm": mm_from_m(self.height)}
         return frame_of({**place, **columns})
@@ -134,7 +134,7 @@ class WallComparison(FolderResult):
 def compare_walls(
     cut: Cut, moves: Moves, points: FloatArray, normal: FloatArray, deviation: FloatArray, notes: tuple[str, ...] = ()
 ) -> WallComparison:
-    """Points (n, 3) m with normals (n, 3) and deviations (n,) m, nan: by the points, against the walls of a cut.
+    """Compare points (n, 3) m, normals (n, 3), deviations (n,) m (nan: taken from the points) with the walls of a cut.
 
     `moves` are the program's, in whose coordinates the points are. Raises `MeasurementError` where none lies on a wall.
     """
@@ -165,7 +165,7 @@ def compare_walls(
     ends, mean = cut.wall_heights[rows, sides], cut.wall_mean[rows, sides]
     height = np.clip(points[on, 2] - cut.samples.position[rows, 2], ends[:, 0], ends[:, 1])
     foretold = profile_at(cut.wall_profiles[rows, sides], ends, height[:, None])[:, 0]
-    known = np.abs(mean) > 0.0  # coefficients scatter the errors of all heights alike
+    known = np.abs(mean) > 0.0  # an error of the coefficients scales the errors at all heights alike
     scaled = np.divide(np.abs(foretold), np.abs(mean), out=np.ones(len(mean)), where=known)
     return WallComparison(
         line=cut.samples.line[rows],

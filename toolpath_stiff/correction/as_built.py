@@ -1,4 +1,4 @@
-"""Where struts and joints most likely are, by what an update leaves of the readings.
+"""Most likely positions of struts and joints, from the residuals that an update leaves.
 
 Every fit counts struts that are not alike and joints off their places as scatter that all readings share (`noise`).
 What they scatter by on this machine the readings tell, as far as they can: of offsets u of prior covariance 1 with
@@ -23,13 +23,13 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.portrait.portrait import LACKING
 
 AS_BUILT = "struts and joints as read"
-FURTHEST = 3.0  # standard deviations from which on an offset is no tolerance: the model lacks something else
+FURTHEST = 3.0  # standard deviations beyond which an offset is not a tolerance: the model lacks something else
 CERTAIN = 2.0  # standard errors by which the error at left-out points must fall beside an instrument's error
-DIGITS = 9  # of ln and m, on which all processors agree
+DIGITS = 9  # decimals of ln and m on which all processors agree
 
 
 def as_built(task: UpdateTask, before: LadderStep) -> tuple[Hexapod, LadderStep] | None:
-    """The machine with the likeliest offsets, and the step that this is; None where left-out points ask for none."""
+    """The machine with the most likely offsets, and this step; None if left-out points do not support them."""
     fit, noise = before.fit, task.noise_model
     known = fit.scatter.covariance.shared[:GEOMETRY]
     pull = fit.scatter.precision.times(known)
@@ -39,7 +39,7 @@ def as_built(task: UpdateTask, before: LadderStep) -> tuple[Hexapod, LadderStep]
     if np.abs(likely).max() > FURTHEST or not falls > (CERTAIN if before.instruments else 0.0):
         return None
     if before.instruments and 100 * before.held.mean_error > LACKING * noise.floor_percent:
-        return None  # what the form of an instrument's error leaves is none of the machine's
+        return None  # residuals left by the form of an instrument's error are not the machine's
     sd = np.repeat([noise.strut_spread, noise.joint_error], [6, GEOMETRY - 6])
     earlier = np.zeros(GEOMETRY) if task.machine.as_built is None else task.machine.as_built
     machine = task.machine.with_changes(
@@ -51,7 +51,7 @@ def as_built(task: UpdateTask, before: LadderStep) -> tuple[Hexapod, LadderStep]
 
 
 def _held_out(fit: Fit, known: FloatArray, pull: FloatArray, held: HeldOut) -> HeldOut:
-    """Residuals at left-out points, law, sizes and offsets by the others: `known` (42, n), `pull` known V^-1.
+    """Residuals at left-out points, with law, sizes and offsets from the others: `known` (42, n), `pull` known V^-1.
 
     With A = V^-1, V_ss^-1 r_s of the readings that stay is A r with r_o less A_oo^-1 (A r)_o (Schur's complement).
     """

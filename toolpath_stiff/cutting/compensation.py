@@ -94,7 +94,7 @@ def walls_of(cut: Cut, written: Moves, row_of: IntArray, untouched: Moves) -> Wa
         share=share,
         shift=shift,
         error=cut.wall_mean[rows] + sides * shift[:, None],
-        spread=(cut.wall_high - cut.wall_low)[rows],
+        spread=(cut.highest - cut.lowest)[rows, :2],
         width=cut.ae[rows],
         weight=cut.samples.weight[rows],
     )

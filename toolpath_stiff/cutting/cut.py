@@ -115,16 +115,6 @@ class Cut:
         return self.errors[:, :2]
 
     @property
-    def wall_low(self) -> FloatArray:
-        """(n, 2) m, its smallest value over the height."""
-        return self.lowest[:, :2]
-
-    @property
-    def wall_high(self) -> FloatArray:
-        """(n, 2) m, its largest."""
-        return self.highest[:, :2]
-
-    @property
     def turning(self) -> BoolArray:
         """(n,) whether a tool turns on its way and cuts: no error of what it makes is foretold."""
         return np.asarray(self.samples.cutting & (self.work.tilts[self.samples.move] == TURNING))

@@ -19,7 +19,7 @@ from toolpath_stiff.cutting.chips import chip_integrals, chip_pieces, flute_laws
 from toolpath_stiff.cutting.patches import TURN, Contact
 from toolpath_stiff.cutting.torus import torus_forces, torus_mean
 
-PEAK_STEPS = 24  # angles of a tooth's pitch among which the peak is looked for: within 1 % of it
+PEAK_STEPS = 18  # angles from an edge's first touch to its last among which the peak is looked for, besides bends
 EACH = np.eye(6)  # sets of coefficients of which one is 1
 
 
@@ -35,15 +35,36 @@ def peak_force(contact: Contact) -> FloatArray:
     """(n, 3) N on the tool: of each component the value of largest size in a turn."""
     cutter, values = contact.cutter, contact.coefficients.values[:, None]
     peaks = np.zeros((len(contact.feed), 3))
-    pitches = cutter.flutes if cutter.run_out else 1
-    steps = PEAK_STEPS * pitches
-    angle = TURN * pitches / cutter.flutes * np.arange(steps) / steps
+    flutes = TURN * np.arange(cutter.flutes if cutter.run_out else 1)[:, None] / cutter.flutes
     for block, part in contact.blocks():
-        force = forces_of_sets(part, np.broadcast_to(angle, (len(part.feed), steps)), values)
+        angle = (_peak_angles(part)[:, None] + flutes).reshape(len(part.feed), -1)
+        force = forces_of_sets(part, angle, values)
         force = _sideways(force, part.turning[:, None])
         largest = np.abs(force).argmax(axis=1)
         peaks[block] = np.take_along_axis(force, largest[:, None], axis=1)[:, 0]
     return peaks
+
+
+def _peak_angles(contact: Contact) -> FloatArray:
+    """(n, 6 + PEAK_STEPS) rad of a flute: where force bends, and from its first touch to its last.
+
+    It bends where an end of an edge, or its corner's, passes entry or exit: the peak of a light cut is there.
+    """
+    patches = contact.seen_clockwise().patches
+    angles = np.zeros((len(contact.feed), 6 + PEAK_STEPS))
+    if len(patches.station):
+        first = np.flatnonzero(np.diff(patches.station, prepend=-1))
+        rows = patches.station[first]
+        low, entry = (np.minimum.reduceat(ends, first) for ends in (patches.low, patches.entry))
+        high, leave = (np.maximum.reduceat(ends, first) for ends in (patches.high, patches.exit))
+        heights = np.stack([low, np.clip(contact.cutter.corner_radius, low, high), high], axis=1)
+        ends = np.stack([entry, np.minimum(leave, np.pi)], axis=1)
+        bends = (contact.lag[rows, None, None] * heights[:, :, None] + ends[:, None]).reshape(-1, 6)
+        begin = bends.min(axis=1)
+        span = np.minimum(bends.max(axis=1) - begin, TURN / contact.cutter.flutes)
+        angles[rows, :6] = bends
+        angles[rows, 6:] = begin[:, None] + span[:, None] * (np.arange(PEAK_STEPS) + 0.5) / PEAK_STEPS
+    return angles
 
 
 def force_at(contact: Contact, angle: FloatArray) -> FloatArray:

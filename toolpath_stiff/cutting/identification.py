@@ -17,7 +17,7 @@ from toolpath_stiff.errors import MeasurementError
 
 LEAST_SCATTER = 1e-6  # of the largest force: no dynamometer reads finer
 SURE = 0.975  # quantile of Student's t: intervals of 95 %
-SOUGHT = Coefficients(np.zeros(3), np.zeros(3), np.zeros((6, 6)))  # of which the taper alone is known
+SOUGHT = Coefficients(np.zeros(3), np.zeros(3), np.zeros((6, 6)), taper=0.0)  # as the straight lines have it
 
 
 def slot(cutter: Cutter, feed: float, depth: float, coefficients: Coefficients = SOUGHT) -> Contact:

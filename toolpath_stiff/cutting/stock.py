@@ -57,17 +57,11 @@ class Stock:
 
     def tops(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """(n,) m of the top at points x, y; -inf beside the stock."""
-        if self.top.size == 1:
-            end = self.corner + self.cell
-            inside = (x >= self.corner[0]) & (x < end[0]) & (y >= self.corner[1]) & (y < end[1])
-            return np.where(inside, self.top[0, 0], -np.inf)
         i, j, inside = self._cells(x, y)
         return np.where(inside, self.top[i, j], -np.inf)
 
     def bottoms(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """(n,) m of the underside at points x, y."""
-        if self.top.size == 1:
-            return np.full(len(x), self.bottom[0, 0])
         i, j, _ = self._cells(x, y)
         return np.asarray(self.bottom[i, j])
 

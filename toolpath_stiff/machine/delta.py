@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.machine.elements import Element, Stance
 from toolpath_stiff.machine.parallel import Carriage, Legs, Parallel
 from toolpath_stiff.machine.parallel_file import (
@@ -30,9 +30,8 @@ from toolpath_stiff.machine.words import refuse_words
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import m_from_mm, m_from_nm
 
-TOWERS = np.deg2rad([90.0, 210.0, 330.0])
-OUTWARDS = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in TOWERS])
-SIDEWAYS = np.cross([0.0, 0.0, 1.0], OUTWARDS)
+UP = np.array([0.0, 0.0, 1.0])
+OUTWARDS = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in np.deg2rad([90.0, 210.0, 330.0])])
 
 
 SCHEMA = {
@@ -50,13 +49,13 @@ SCHEMA = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Delta(Parallel):
-    """A linear delta.
+class Level(Parallel):
+    """What deltas of either drive share: three parallelograms that keep the effector level.
 
     Attributes
     ----------
-    carriage_radius, effector_radius
-        m, of the rods' joints about the machine's axis.
+    effector_radius
+        m, of the rods' joints about the effector's axis.
     joint_height
         m, of the effector's joints above the tip of the reference tool.
     rod_length, spacing
@@ -65,10 +64,9 @@ class Delta(Parallel):
         m/N of one rod with its joints.
     """
 
-    kind: ClassVar[str] = "delta"
     turns: ClassVar[int] = 0
+    outwards: ClassVar[FloatArray] = OUTWARDS  # (3, 3), from the machine's axis to each tower
 
-    carriage_radius: float
     effector_radius: float
     joint_height: float
     rod_length: float
@@ -80,30 +78,48 @@ class Delta(Parallel):
         refuse_words(self.name, abc, "")
         return rotation_matrices(abc)
 
+    def level(self, axes: FloatArray) -> BoolArray:
+        """(n,) whether tool axes (n, 3, 3) are those that the rods keep."""
+        return np.asarray(np.abs(axes - np.eye(3)).max(axis=(1, 2)) < 1e-9)
+
+    def effector_arms(self, extension: FloatArray) -> FloatArray:
+        """(n, 6, 3) m from the tip to the rods' joints, of tools (n,) m longer than the reference tool."""
+        height = UP * (self.joint_height + extension)[:, None, None]
+        return rod_joints(self.outwards, self.effector_radius, self.spacing) + height
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delta(Level):
+    """A linear delta; `carriage_radius` m of the rods' joints about the machine's axis."""
+
+    kind: ClassVar[str] = "delta"
+
+    carriage_radius: float
+
     def legs_at(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> Legs:
         """The six rods; nan where a carriage is too far away, or the tool is turned."""
-        up = np.array([0.0, 0.0, 1.0])
-        arms = _rod_joints(self.effector_radius, self.spacing) + (self.joint_height + extension)[:, None, None] * up
+        arms = self.effector_arms(extension)
         towers = (self.carriage_radius - self.effector_radius) * OUTWARDS[:, :2]
         apart = ((towers - tip[:, None, :2]) ** 2).sum(axis=-1)
-        level = np.abs(axes - np.eye(3)).max(axis=(1, 2)) < 1e-9
-        carriages = tip[:, 2:] + arms[:, :1, 2] + np.sqrt(np.where(level[:, None], self.rod_length**2 - apart, np.nan))
-        feet = _rod_joints(self.carriage_radius, self.spacing) + np.repeat(carriages, 2, axis=1)[..., None] * up
-        rods = feet - tip[:, None] - arms
+        height = np.sqrt(np.where(self.level(axes)[:, None], self.rod_length**2 - apart, np.nan))
+        carriages = tip[:, 2:] + arms[:, :1, 2] + height
+        rods = self._feet(carriages) - tip[:, None] - arms
         return Legs(carriages, rods / self.rod_length, arms, np.full((len(tip), 6), self.rod_compliance))
+
+    def _feet(self, carriages: FloatArray) -> FloatArray:
+        """(n, 6, 3) m, the rods' joints on carriages at heights (n, 3) m."""
+        height: FloatArray = np.repeat(carriages, 2, axis=1)[..., None] * UP
+        return rod_joints(self.outwards, self.carriage_radius, self.spacing) + height
 
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
         """(n, 6, 3) m each: the rods' joints on the carriages and on the effector."""
-        up = np.array([0.0, 0.0, 1.0])
-        begin = _rod_joints(self.carriage_radius, self.spacing) + np.repeat(stance.joints, 2, axis=1)[..., None] * up
-        end = _rod_joints(self.effector_radius, self.spacing) + self.joint_height * up
-        return begin, stance.position[:, None] + end
+        return self._feet(stance.joints), stance.position[:, None] + self.effector_arms(np.zeros(1))
 
 
-def _rod_joints(radius: float, spacing: float) -> FloatArray:
+def rod_joints(outwards: FloatArray, radius: float, spacing: float) -> FloatArray:
     """(6, 3) m, joints of the rods on a circle, both of a tower together."""
-    sides = 0.5 * spacing * np.array([-1.0, 1.0])
-    return np.concatenate([radius * OUTWARDS[i] + sides[:, None] * SIDEWAYS[i] for i in range(3)])
+    sides = 0.5 * spacing * np.cross(UP, outwards)
+    return np.stack([radius * outwards - sides, radius * outwards + sides], axis=1).reshape(6, 3)
 
 
 def read(toml: MachineToml) -> Delta:
@@ -121,10 +137,10 @@ def read(toml: MachineToml) -> Delta:
     compliance = give_of(carriage)
     carriages = []
     for i in range(3):
-        place = centre * OUTWARDS[i] + np.array([0.0, 0.0, height])
-        axes = np.column_stack([OUTWARDS[i], SIDEWAYS[i], [0.0, 0.0, 1.0]])
+        place = centre * OUTWARDS[i] + height * UP
+        axes = np.column_stack([OUTWARDS[i], np.cross(UP, OUTWARDS[i]), UP])
         rods = (2 * i, 2 * i + 1)
-        joints = _rod_joints(radius, spacing)[list(rods)] - place
+        joints = rod_joints(OUTWARDS, radius, spacing)[list(rods)] - place
         carriages.append(Carriage(Element(f"carriage {i + 1}", "frame"), rods, axes, compliance, joints))
     return Delta(
         **shared_fields(toml, values),

@@ -19,11 +19,12 @@ from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.machine.schema import MachineToml
 from toolpath_stiff.toml_reader import LARGEST_BYTES, shortened
 
-# What `kind` of a machine file may say -> the module whose `read` reads such files, imported when one is read.
+# Value of `kind` in a machine file -> module whose `read` reads such files, imported when needed.
 KINDS = {
     "hexapod": "hexapod_file",
     "serial": "serial_file",
     "delta": "delta",
+    "rotary_delta": "rotary_delta",
     "pentapod": "pentapod",
     "hexaglide": "hexaglide",
 }
@@ -31,7 +32,7 @@ ALIASES = {"linear_delta": "delta"}
 
 
 def packaged_machines() -> dict[str, Path]:
-    """Name -> file of the machines that ship with the package."""
+    """Name -> file of each machine that ships with the package."""
     folder = Path(__file__).parent.parent / "data" / "machines"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
@@ -59,7 +60,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> MachineTool:
     """
     known = packaged_machines()
     if str(name_or_file) in known:
-        return deepcopy(_packaged(known[str(name_or_file)]))  # its arrays are the caller's own
+        return deepcopy(_packaged(known[str(name_or_file)]))  # a copy: the arrays belong to the caller
     path = Path(name_or_file)
     if not is_file(path):
         template = command_line("machine", "new", path.with_suffix(".toml") if path.name else "mine.toml")

@@ -17,7 +17,7 @@ UNITS = {"metric": 1.0, "imperial": MM_PER_INCH}
 
 
 def machine_from_fcm(text: str, order: Sequence[str], file: str) -> tuple[str, list[str]]:
-    """A machine file and notes from the text of a FreeCAD machine; `order` of the axes from the base where it has none.
+    """A machine file and notes, from the text of a FreeCAD machine; `order`: axes from the base, if it states none.
 
     Raises `InputError` for what is no machine, an order that nobody says, and mirrored axes.
     """
@@ -71,7 +71,7 @@ def _joint(axis: Document) -> tuple[FloatArray, FloatArray]:
 
 
 def _in_order(axes: dict[str, Document], order: Sequence[str], fault: Fault) -> list[str]:
-    """Names from the base outwards, by parents, else by --order."""
+    """Names from the base outwards, by parents, otherwise by --order."""
     if len(axes) < 2:
         return list(axes)
     depth = {}

@@ -1,4 +1,4 @@
-"""`[uncertainty]` of a machine file, checked: which parameters were fitted, and how well they are known."""
+"""`[uncertainty]` of a machine file, checked: fitted parameters, and their uncertainty."""
 
 from collections.abc import Sequence
 
@@ -20,13 +20,13 @@ ERROR_KEYS = {
     "form_percent": (1, "two numbers, the second no smaller, 0 or more: at the measured places, away from them"),
     "places_mm_deg": (2, "rows of six numbers: x, y, z in mm, roll, pitch, yaw in degrees"),
 }
-NOT_NEGATIVE = -1e-8  # smallest eigenvalue of a correlation matrix that rounding in a file may leave
+NOT_NEGATIVE = -1e-8  # smallest eigenvalue of a correlation matrix that rounding in a file may cause
 
 
 def read_uncertainty(
     toml: MachineToml, parameters: Sequence[str], entries: Sequence[EffectEntry]
 ) -> Uncertainty | None:
-    """The section of a file with these parameters and effects; None where there is none. Raises `InputError`."""
+    """Section of a file with these parameters and effects; None if there is none. Raises `InputError`."""
 
     def fault(key: str, mistake: str, expected: str) -> InputError:
         return toml.fault("uncertainty", key, mistake, expected)
@@ -58,7 +58,7 @@ def read_uncertainty(
 
 
 def _read_errors(toml: MachineToml, table: object, parameters: int) -> ErrorModel | None:
-    """`[uncertainty.errors]`; None where there is none. Raises `InputError`."""
+    """`[uncertainty.errors]`; None if there is none. Raises `InputError`."""
     section = f"uncertainty.{ERRORS}"
     if table is None:
         return None
@@ -88,7 +88,7 @@ def _is_correlation(matrix: FloatArray) -> bool:
 
 
 def _fits(key: str, value: FloatArray, parameters: int) -> bool:
-    """True where an array of `ERROR_KEYS` has the size that it needs and no number that cannot be."""
+    """True if an array of `ERROR_KEYS` has the required size and no impossible number."""
     if not np.isfinite(value).all():
         return False
     if key == "loadings":

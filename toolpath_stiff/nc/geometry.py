@@ -38,7 +38,7 @@ def normal_of(plane: str) -> Vector:
 
 
 class ArcError(Exception):
-    """What is wrong with an arc: found, expected."""
+    """Error of an arc: what was found, what was expected."""
 
     def __init__(self, problem: str, expected: str) -> None:
         super().__init__(problem)
@@ -46,7 +46,7 @@ class ArcError(Exception):
 
 
 def refuse_arc_if(wrong: object, problem: str, expected: str) -> None:
-    """Raise `ArcError` where something is wrong."""
+    """Raise `ArcError` if `wrong`."""
     if wrong:
         raise ArcError(problem, expected)
 
@@ -103,7 +103,7 @@ def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) 
 
 
 def check_bulge(radius: float, sweep: float) -> None:
-    """Raise `ArcError` if an arc leaves its start further than coordinates may be apart: its ends do not bound it.
+    """Raise `ArcError` if an arc goes further from its start than coordinates may: its ends do not bound it.
 
     Examples
     --------
@@ -141,7 +141,7 @@ def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, inc
 def turn_between(first: float, last: float, clockwise: bool) -> float:
     """Signed turn in rad from one polar angle to another, above 0 and up to a whole one in size."""
     sweep = (first - last if clockwise else last - first) % math.tau
-    # The modulus of a tiny negative difference is almost a whole turn, and must be one.
+    # A tiny negative difference modulo a turn is almost a whole turn, and must count as one.
     if sweep < LEAST_SWEEP:
         sweep = math.tau
     return -sweep if clockwise else sweep

@@ -63,7 +63,7 @@ def _thinned_note(shown: int, samples: int) -> str:
 
 
 def _tables(analysis: Analysis, weakest: Sequence[int], rows: IntArray) -> list[tuple[str, Markup, bool]]:
-    """Title, content and whether it is wide, of each table; `weakest` of the page's `rows`: the weakest places."""
+    """Title, content and True if wide, of each table; `weakest` of the page's `rows`: the weakest places."""
     summary, other = analysis.to_dict(), analysis.on_other
     operations, unsupported = summary["per_operation"], summary["unsupported"]
     more = words.and_more(operations, words.MOST_ROWS, "operations")
@@ -108,13 +108,13 @@ def _places(places: Sequence[Document], weakest: Sequence[int]) -> ShownTable:
 
 MOST_QUADS = 8_000  # of walls and of floors on the page
 MOST_SAMPLES = 200_000  # on the page: some 5 MB; the tables are always of all samples
-OTHER_COLUMNS = 4000  # columns of pixels that the other machine's curve is thinned to
-NONE = 65535  # a value that does not exist
+OTHER_COLUMNS = 4000  # columns of pixels to which the other machine's curve is thinned
+NONE = 65535  # stands for a missing value
 OUT_OF_REACH, PLUNGE = 8, 16  # flags beside the motion
 
 
 def _data(analysis: Analysis, rows: IntArray) -> Document:
-    """What the page's script reads of some samples: lengths in mm, angles in degrees, stiffness in N/mm.
+    """Data of some samples for the page's script: lengths in mm, angles in degrees, stiffness in N/mm.
 
     Positions are 16-bit fractions of the path's own box (`frame`: a 1 m box gives 0.015 mm), stiffness and margin of
     their own ranges, NONE where there is none.
@@ -158,7 +158,7 @@ def _data(analysis: Analysis, rows: IntArray) -> Document:
 
 
 def _part(analysis: Analysis, rows: IntArray) -> Document:
-    """The finished part in machine coordinates, its error in um, the page's row of the sample that made each place."""
+    """Finished part in machine coordinates, its error in um, and the page's row of the sample that made each place."""
     from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
 
     assert analysis.cut is not None
@@ -178,15 +178,15 @@ def _part(analysis: Analysis, rows: IntArray) -> Document:
 
 
 def page_rows(analysis: Analysis) -> IntArray:
-    """Rows of the samples that the page holds: all of them, or the extremes of equal stretches of rows."""
+    """Rows of the samples on the page: all, or the extremes of equal stretches of rows."""
     n = len(analysis.samples)
     if n <= MOST_SAMPLES:
         return np.arange(n)
     change = np.flatnonzero(np.diff(analysis.samples.motion) != 0)
     ends = np.concatenate([change, change + 1]) if 2 * len(change) < MOST_SAMPLES // 4 else change[:0]
     stiffness = np.where(analysis.samples.cutting, analysis.at.stiffness, np.nan)
-    curves = [(stiffness, 6)]  # and the share of the page's samples that a curve gets a column of pixels for
-    if analysis.set_aside.any():  # a column's extremes may be plunges: the headline has its own
+    curves = [(stiffness, 6)]  # with one in how many of the page's samples a curve gets a column of pixels
+    if analysis.set_aside.any():  # a column's extremes may be plunges, so the headline gets its own columns
         curves = [(np.where(analysis.set_aside, np.nan, stiffness), 8), (stiffness, 24)]
     extremes = [extremes_by_column(np.arange(n, dtype=float), k, MOST_SAMPLES // part) for k, part in curves]
     even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too

@@ -21,10 +21,10 @@ from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, significant
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
-text = words.text  # what a terminal shows
+text = words.text  # the view's text for the terminal
 document = document_of  # what diagnose.json holds
 PAGE = "report.html"
-# Picture -> the question that it answers, and how it is read.
+# Picture -> the question that it answers, and how to read it.
 QUESTIONS = {
     "ladder.png": (
         "Which effect explains the data, and how surely?",
@@ -45,7 +45,7 @@ QUESTIONS = {
 
 
 def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
-    """The page, the pictures within."""
+    """The page, with the pictures in it."""
     about, beside = words.data_text(diagnosis), beside_text(diagnosis.beside)
     head = Head(
         title=f"Diagnosis: {about[1]}",

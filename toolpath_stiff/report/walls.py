@@ -1,4 +1,4 @@
-"""Measured walls against foretold errors, in words and tables."""
+"""Text and tables on measured walls against predicted errors."""
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.comparison.walls import WallComparison
@@ -13,7 +13,7 @@ VERDICT = {True: "the model fails", False: "as foretold"}
 
 
 def text(comparison: WallComparison) -> str:
-    """What was measured and foretold together, each line with its verdict, notes; for the terminal."""
+    """Text for the terminal on measured and predicted errors, each line with its verdict, and notes."""
     document, (factor, spread) = comparison.to_dict(), comparison.factor
     rows = sorted(document["lines"], key=lambda row: -abs(row["residual_um"]))
     rows = [{**row, "fails": VERDICT[row["fails"]]} for row in rows]

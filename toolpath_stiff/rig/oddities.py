@@ -1,4 +1,4 @@
-"""Oddities: what a blind draw hides outside the catalogue, for testing the verdict "something else is missing".
+"""Oddities: faults outside the catalogue for blind draws, which test the verdict "something else is missing".
 
 Each is one formula on table or readings that the columns of any campaign show; `size` scales it. They are invented for
 the purpose, with the shapes that damaged or badly set machines show; no source gives figures for them.

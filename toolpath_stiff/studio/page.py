@@ -1,4 +1,4 @@
-"""The studio's page: one document of its own scripts and styles, live or, as an export, with the state within it."""
+"""The studio's page: one document with its own scripts and styles, live or exported with the state in it."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ OWN = ("studio/scene.js", "studio/panels.js", "studio/studio.js")
 
 
 def page() -> str:
-    """The live page; it holds no state and no token."""
+    """The live page, without any state or token."""
     return _page("toolpath_stiff studio", connect="connect-src 'self'; ")
 
 

@@ -16,7 +16,7 @@ from toolpath_stiff.nc.heidenhain.points import feed, in_plane, named, plane_of_
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
-NO_ARC_MM = 1e-3  # an arc of LCT that is shorter is none: the line goes on smoothly
+NO_ARC_MM = 1e-3  # an arc of LCT shorter than this is left out: the line continues smoothly
 OF_CENTER = "lines and arcs of APPR and DEP (LEN, R) are those of the tool's centre"
 
 
@@ -34,7 +34,7 @@ def approach(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _point(state: State, block: CurrentBlock, code: str) -> dict[int, float]:
-    """Axis -> coordinate, of the polar forms by PR and PA."""
+    """Axis -> coordinate, also from the polar forms by PR and PA."""
     if " P" not in code:
         return named(state, block)
     with plane_of_pole(state, block) as pole:
@@ -50,7 +50,7 @@ def begin_contour(
     rate: float | None,
     heading: complex,
 ) -> None:
-    """Carry out an APPR, now that the direction of the first contour element is known; feeds before and in it."""
+    """Carry out an APPR, once the direction of the first contour element is known; feeds before and in it."""
     state.plain.approach, (first, second, normal), after = None, PLANES[state.plane], state.feed
     contour, start, to_arc = complex(there[first], there[second]), in_plane(state, present(state)), code.endswith("LCT")
     rapid = state.plain.fast and not to_arc
@@ -68,7 +68,7 @@ def begin_contour(
     state.feed = rate
     if center is None or abs(apex - place) > NO_ARC_MM:
         _go(state, block, apex, center, -turn)
-    if cutter is not None:  # the tool stands beside the contour's first point, from where that goes on
+    if cutter is not None:  # the tool stands beside the contour's first point, where the contour continues
         cutter.position = state.frames.to_program(state.frames.position)
         cutter.anchor = apex
         state.frames.position = state.frames.to_control(cutter.moved(cutter.position, contour))
@@ -81,7 +81,7 @@ def begin_contour(
 def _way(
     state: State, block: CurrentBlock, code: str, apex: complex, away: complex, side: int, other: complex
 ) -> tuple[complex, complex | None, int]:
-    """Where the line or arc ends that leaves a point in a direction, the arc's centre and its turn.
+    """End of the line or arc that leaves a point in a direction, the arc's centre and its turn.
 
     An approach is such a way back: `side` is then the other one than the contour's. `other`: where LCT begins or ends.
     """
@@ -102,7 +102,7 @@ def _way(
 
 
 def size_of(state: State, block: CurrentBlock, letter: str, scale: float | None = None) -> float:
-    """A length (an angle with `scale` 1) that APPR and DEP need: above 0, R of CT but not 0."""
+    """Length (with `scale` 1 an angle) that APPR and DEP need: above 0; R of CT may be negative, but not 0."""
     value = block.take(letter) or 0.0
     signed = letter == "R" and block.block.words[0].text.endswith((" CT", " PCT"))
     wrong = value == 0.0 or (value < 0.0 and not signed) or (letter == "CCA" and value > 360.0)
@@ -111,7 +111,7 @@ def size_of(state: State, block: CurrentBlock, letter: str, scale: float | None 
 
 
 def depart(state: State, block: CurrentBlock, code: str) -> None:
-    """DEP: leaves the contour and ends the compensation there; the tool then stands at its end without one."""
+    """DEP: leave the contour and end the compensation there; the tool then stands at its end without one."""
     plain, (first, second, normal) = state.plain, PLANES[state.plane]
     if plain.heading is None:
         raise block.fail(None, "without a contour element in the plane before it", "L, C, CR or CT before it")
@@ -142,7 +142,7 @@ def _go(
 
 
 def stop(state: State, block: CurrentBlock) -> None:
-    """Compensation off where the tool centre stands, which is the programmed point from here on."""
+    """End the compensation where the tool centre stands, which becomes the programmed point."""
     switch_off(state, block, "R0")
     if state.beside is not None:
         state.frames.position = [p + b for p, b in zip(state.frames.position, state.beside, strict=True)]

@@ -61,7 +61,7 @@ def take_side(block: CurrentBlock) -> str | None:
 def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:
     """R0, RL, RR of a straight statement: the tool on the contour, left of it, right of it."""
     side, cutter = take_side(block), state.cutter
-    if state.plain.approach is not None:  # which says the side
+    if state.plain.approach is not None:  # which decides the side
         block.refuse_if(side == "R0", side, "behind an APPR", "no R0")
         return
     if side is None or (side == "R0" and cutter is None) or (cutter and SIDES.get(side) == cutter.side):
@@ -202,7 +202,7 @@ def line(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _to_machine(state: State, block: CurrentBlock, code: str, there: dict[int, float], rapid: bool) -> None:
-    """M91: machine coordinates; those that are not known, and the points of M92, are left out of the path."""
+    """M91: machine coordinates; unknown ones, and the points of M92, are left out of the path."""
     plain, unit = state.plain, state.length_scale
     block.take("R0")
     lost = {axis for axis, value in there.items() if code == "M92" or math.isnan(value)}
@@ -256,7 +256,7 @@ def _round(
 
 
 def direction(block: CurrentBlock, step: float = 0.0) -> int:
-    """+1 or -1 of DR+ and DR-; without it of an angle's step."""
+    """+1 or -1 by DR+ and DR-; without them by the sign of an angle's step."""
     plus, minus = block.take("DR+"), block.take("DR-")
     block.refuse_if(plus is None and minus is None and not step, None, "without its direction", "DR+ or DR-")
     return 1 if plus is not None or (minus is None and step > 0.0) else -1
@@ -274,7 +274,7 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
-    """CT, CTP: an arc to a point that goes on smoothly from the contour element before."""
+    """CT, CTP: an arc to a point that continues smoothly from the previous contour element."""
     heading = state.plain.heading
     if heading is None:
         raise block.fail(None, "without a contour element in the plane before it", "L, C, CR or CT before it")
@@ -296,11 +296,11 @@ def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def corner(state: State, block: CurrentBlock, code: str) -> None:
-    """CHF, RND: the corner between the contour elements before and behind it is cut off, or rounded."""
+    """CHF, RND: cut off or round the corner between the contour elements before and after."""
     block.refuse_if(state.plain.held is None, None, "without a contour element before it", "L, C, CR or CT before it")
     size = block.take("#") if code == "CHF" and block.has("#") else block.take("R")
     rate = block.take("F")
-    if rate is not None:  # holds for the corner alone
+    if rate is not None:  # holds only for the corner
         block.values["F alone"] = Word("F", rate * inch_tenths(state), 1, "F")
     block.refuse_if(not size or size < 0.0, None, "without its size", "RND R5, CHF 2")
     block.values["size"] = Word("R", (size or 0.0) * state.length_scale, 1, "R")
@@ -308,7 +308,7 @@ def corner(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict[int, float], rapid: bool) -> None:
-    """Carry out the element that waited, shortened, and its corner; the tool then stands where the next one begins."""
+    """Carry out the waiting element, shortened, and its corner; the tool then stands where the next element begins."""
     (block, held, rate), corner_block, modal = state.plain.held or (None, None, None), state.plain.corner, state.feed
     state.plain.held = state.plain.corner = None
     if block is None or held is None or corner_block is None:  # in a check, after the corner's own error

@@ -422,11 +422,11 @@ else {
     if (e.key.toLowerCase() === "z") { e.preventDefault(); act({ do: "undo" }); }
   });
   const news = new EventSource("/events");
-  news.onmessage = (e) => {
+  news.onmessage = async (e) => {
     const told = JSON.parse(e.data);
     drawJob(told.job);
     if (told.message) tell(told.message);
-    if (told.version !== version) refresh();
+    for (let k = 0; k < 2 && told.version !== version; k++) await refresh();  // one under way may be of before
   };
   news.onerror = () => { $("job").textContent = "the studio does not answer; it resumes when it is started again"; };
   refresh();
