@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -157,6 +157,17 @@ def check_program(request: Request, machine: MachineTool | None, step: float = d
     figures = move_figures(program.moves, machine.rapid_feed if machine else defaults.RAPID_FEED)
     if not checked.complete:  # extents of a part of the path say nothing about the whole
         figures |= {"extents_mm": {}, "extents_deg": {}}
-    stated: dict[str, Any] = {name: getattr(program, name) for name in ("interpreter", "dialect", "kinematics")}
-    stated |= {name: getattr(checked, name) for name in ("complete", "language", "needs", "used", "unsupported")}
-    return ProgramCheck(program.name, findings=in_order(findings), fastest_strut=speed, **stated | figures)
+    return ProgramCheck(
+        program=program.name,
+        interpreter=program.interpreter,
+        dialect=program.dialect,
+        kinematics=program.kinematics,
+        complete=checked.complete,
+        language=checked.language,
+        needs=checked.needs,
+        used=checked.used,
+        unsupported=checked.unsupported,
+        findings=in_order(findings),
+        **figures,
+        fastest_strut=speed,
+    )

@@ -1,4 +1,4 @@
-"""What a program uses and leaves out, apart from its stiffness: this loads the readers of all languages."""
+"""Check of a program apart from stiffness: the words it uses and those left out; loads the readers of all languages."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def check(
     origin_mm_deg: Origin = None,
     step_mm: Step = 1.0,
 ) -> ProgramCheck:
-    r"""What a program uses, what is not understood, extents and times; with a machine its reach and fastest strut.
+    r"""Words that a program uses and those not understood, extents, times; with a machine its reach and fastest strut.
 
     Where the reader would refuse the program the check says so and goes on with the next block.
 

@@ -1,4 +1,4 @@
-"""The micrometres that cutting forces make of a part: a program without them, measured walls held against them."""
+"""Compensation of a program for deflection by cutting forces, and measured walls compared with the predicted error."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +42,7 @@ def compensate(
     Parameters
     ----------
     program, machine
-        What it runs on, what runs.
+        The program, and the machine that runs it.
     cut, material, stock_mm
         As of `analyze`.
     origin_mm_deg
@@ -50,7 +50,7 @@ def compensate(
     step_mm
         Largest distance of two samples.
     decimals
-        Of the numbers written; unless given, 4 in mm, 5 in inch.
+        Decimals of the numbers written; unless given, 4 in mm, 5 in inch.
     progress
         Called with what is being done.
 
@@ -106,7 +106,7 @@ def compare_walls(
     step_mm: inputs.Step = 1.0,
     progress: Progress | None = None,
 ) -> WallComparison:
-    r"""Measured walls of a part against the error of the surface that its cut foretells: where the model fails.
+    r"""Measured walls of a part against the surface error that its cut predicts: where the model fails.
 
     Parameters
     ----------
@@ -114,11 +114,11 @@ def compare_walls(
         Points of a coordinate measuring machine: x_mm,y_mm,z_mm in program coordinates, nx,ny,nz out of the part, and
         deviation_um along that, + material left, unless the points themselves have it.
     machine, program
-        What the part was cut on, by what.
+        The machine that cut the part, and the program that it ran.
     cut, material, stock_mm
         As of `analyze`.
     columns
-        Which columns the file calls otherwise: "deviation=dev:mm", or such a dict.
+        Columns that the file names differently: "deviation=dev:mm", or such a dict.
     origin_mm_deg, step_mm
         Where program zero sat; largest distance of two samples.
     progress

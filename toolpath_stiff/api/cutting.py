@@ -1,4 +1,4 @@
-"""What several functions take of a cut: its setup file, or material and stock; a template of that file."""
+"""Input of functions that compute a cut: its setup file, or material and stock; a template of that file."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ Tolerance = Annotated[float | None, Option("--tolerance", "um", above=0, at_most
 
 
 def cut_setup(cut: Cutting, material: Material, stock_mm: StockBox) -> CutSetup | None:
-    """The setup that is given in one way or the other; None for none. Raises `InputError`."""
+    """The setup, given in one way or the other; None if not given. Raises `InputError`."""
     if isinstance(cut, CutSetup):
         return cut
     if cut is not None:

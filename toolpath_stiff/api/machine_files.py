@@ -1,4 +1,4 @@
-"""Machine files made: templates, and what other programs' files say of a machine."""
+"""Machine files to be made: templates, and machines converted from other programs' files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,10 +28,10 @@ def machine_template(
     Parameters
     ----------
     file
-        That it will be.
+        Name of the file to be.
     kind
-        Of machine: six telescopic struts, or joints in series, five struts, a linear or rotary delta, struts on moving
-        feet.
+        Kind of machine: six telescopic struts, or joints in series, five struts, a linear or rotary delta, struts on
+        moving feet.
 
     Examples
     --------
@@ -62,7 +62,7 @@ def machine_from_linuxcnc(
     file
         The HAL file, with the ini files beside it that load it, or the ini file, with the HAL files that it loads.
     units
-        Of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
+        Unit of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def machine_from_dh(
         Columns alpha_deg, a_mm, d_mm, offset_deg, min_deg, max_deg and, if there, name and type (R, or P with min_mm,
         max_mm).
     convention
-        Of the rows: modified (Craig) or standard; they do not show it.
+        Convention of the rows, which they do not show: modified (Craig) or standard.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Placements of the work: the search, any placement tried, the program written for a placement."""
+"""Placements of the work: the search, a trial of any placement, the program rewritten for a placement."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, ra
 
 FARTHEST_TURN_DEG = 720.0
 MOST_FRONT_POINTS = 1000
-ERROR = "error"  # the objective that takes a cut
+ERROR = "error"  # the objective that requires a cut
 Range = tuple[float, float] | float
 
 
@@ -79,13 +79,13 @@ def place(
     Parameters
     ----------
     program, machine
-        What it runs on, what runs.
+        The program, and the machine that runs it.
     x_mm, y_mm, z_mm
-        Of program zero, mm: low and high, or a number to fix it; unless given, as far as the machine reaches.
+        Position of program zero, mm: low and high, or a number to fix it; unless given, as far as the machine reaches.
     z_values_mm
         The only heights that there are, mm.
     base_mm
-        Where the work's table stands, from the machine's base: bounds and heights that are given count from there.
+        Position of the work's table from the machine's base: bounds and heights that are given count from there.
     rotate_deg, tilt_a_deg, tilt_b_deg
         Turn and tilts of the set-up, degrees: low and high, or a number to fix it.
     turn
@@ -103,7 +103,7 @@ def place(
     points
         Most points of the front.
     seed
-        Of the search.
+        Random seed of the search.
     origin_mm_deg
         The present placement, X, Y, Z or X, Y, Z, A, B, C of program zero; unless given, where the program's G10 says,
         else the machine's default.
@@ -118,7 +118,7 @@ def place(
     write
         The program itself, transformed so that, run at the present origin, it cuts at the placement: name of its file.
     decimals
-        Of its numbers; unless given, 4 in mm and degrees, 5 in inch.
+        Decimals of its numbers; unless given, 4 in mm and degrees, 5 in inch.
     linearise_mm
         Write arcs that the turn takes out of the planes as straight moves within so much; unless given, refuse them.
     progress
@@ -166,7 +166,7 @@ def place(
 
 
 def _check_together(unwritten: bool, as_written: bool, objective: str, uncut: bool, turn: str | float) -> None:
-    """Raise `InputError` for options that ask for others, or shut them out."""
+    """Raise `InputError` for options that require or exclude each other."""
     if unwritten and not as_written:
         raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     if (objective == ERROR) == uncut:
@@ -177,7 +177,7 @@ def _check_together(unwritten: bool, as_written: bool, objective: str, uncut: bo
 
 
 def _keep_out(text: str) -> KeepOut:
-    """`NAME:X0,Y0,Z0,X1,Y1,Z1`."""
+    """The box of `NAME:X0,Y0,Z0,X1,Y1,Z1`."""
     name, _, corners = text.rpartition(":")
     values = numbers(corners)
     if not name or len(values) != 6:
@@ -192,7 +192,7 @@ def _bounds(
     turns: Sequence[Range],
     tool: str | float,
 ) -> Bounds:
-    """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
+    """Bounds of the search, in SI; where not given, the machine's workspace."""
     heights = sorted(set(map(float, heights_mm)))
     sides = [*box[:2], (heights[0], heights[-1]) if heights else box[2]]
     workspace = mm_from_m(working_box(machine)).T.tolist()
@@ -208,7 +208,7 @@ def _bounds(
 
 
 def _turn_of_tool(machine: MachineTool, turn: str | float) -> list[Range]:
-    """Bounds of a constant turn of the tool about its axis, one or, as programmed, none. Raises `InputError`."""
+    """Bounds of a constant turn of the tool about its axis, one or, if as programmed, none. Raises `InputError`."""
     if turn == FIXED:
         return []
     check_free_turn(machine, turn)
@@ -237,7 +237,7 @@ def _pair(given: Range) -> tuple[float, float]:
 
 
 class PlacementTrial:
-    r"""A program that can be put anywhere, with the figures of every place at once; `try_placement` makes one.
+    r"""A program ready for trial at any placement, with figures in no time; made by `try_placement`.
 
     Examples
     --------
@@ -299,7 +299,7 @@ def rewrite(
     decimals: inputs.Decimals = None,
     linearise_mm: inputs.Linearised = None,
 ) -> RewrittenProgram:
-    r"""Write a program so that, run where its zero sits now, it does what it would do untouched at another placement.
+    r"""Write a program so that, run at its present zero, it does what the untouched one would do at another placement.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def rewrite(
     to_mm_deg, from_mm_deg
         Where program zero is to sit in effect, and where it sits: X, Y, Z or X, Y, Z, A, B, C.
     decimals
-        Of the numbers written; unless given, 4 in mm and degrees, 5 in inch.
+        Decimals of the numbers written; unless given, 4 in mm and degrees, 5 in inch.
     linearise_mm
         Write arcs that the turn takes out of the planes as straight moves within this; unless given they are refused.
 

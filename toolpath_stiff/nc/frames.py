@@ -154,7 +154,8 @@ class Frames:
 
     def to_setup(self, control: list[float]) -> list[float]:
         """Set-up coordinates of a point in control coordinates."""
-        return [*(c - r for c, r in zip(control[:3], self.fix_reference(), strict=True)), *control[3:]]
+        (a, b, c), (x, y, z, *angles) = self.reference or self.fix_reference(), control
+        return [x - a, y - b, z - c, *angles]
 
     def from_setup(self, setup: list[float]) -> list[float]:
         """Control coordinates of a point in set-up coordinates."""

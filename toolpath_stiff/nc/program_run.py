@@ -22,7 +22,7 @@ from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
+from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end, collector_at_rest
 from toolpath_stiff.nc.run_result import program_of
 from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, Then
 from toolpath_stiff.nc.words import Block, Word, read_block
@@ -79,6 +79,7 @@ class ProgramRun:
         """The program as run so far, with the warnings `ending` of its end."""
         return program_of(self.state, self.request, self.lines, self.jumps, ending)
 
+    @collector_at_rest()
     def run(self) -> list[Remark]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
         row, begun, numbered = 0, False, False  # after the first word, a tape mark is the last one

@@ -1,7 +1,9 @@
 """Records of a run: its calls and, for a check, its errors and codes."""
 
+import gc
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +13,18 @@ from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.words import Block
 
 MOST_ERRORS = 100
+
+
+@contextmanager
+def collector_at_rest() -> Iterator[None]:
+    """Python does not look for cycles meanwhile: a run leaves none, and most of its time went to looking."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
 
 
 @dataclass

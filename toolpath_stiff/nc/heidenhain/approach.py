@@ -11,7 +11,7 @@ from functools import partial
 
 from toolpath_stiff.nc.codes.cutter import switch_off
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import SIDES, begin_compensation, go, take_side
+from toolpath_stiff.nc.heidenhain.contour import SIDES, Circle, begin_compensation, go, take_side
 from toolpath_stiff.nc.heidenhain.points import feed, in_plane, named, plane_of_pole, polar, present
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
@@ -61,13 +61,13 @@ def begin_contour(
         begin_compensation(state, block, side)
     cutter, state.cutter = state.cutter, None
     apex = contour if cutter is None else contour + cutter.side * 1j * heading * cutter.radius
-    place, center, turn = _way(state, block, code, apex, -heading, -SIDES.get(side, 1), start)
+    place, about = _way(state, block, code, apex, -heading, -SIDES.get(side, 1), start)
     _go(state, block, place, rapid=rapid)
     if normal in there:
         go(state, block, {normal: there[normal]}, rapid=rapid)
     state.feed = rate
-    if center is None or abs(apex - place) > NO_ARC_MM:
-        _go(state, block, apex, center, -turn)
+    if about is None or abs(apex - place) > NO_ARC_MM:
+        _go(state, block, apex, about and (about[0], -about[1], 1))
     if cutter is not None:  # the tool stands beside the contour's first point, where the contour continues
         cutter.position = state.frames.to_program(state.frames.position)
         cutter.anchor = apex
@@ -80,25 +80,25 @@ def begin_contour(
 
 def _way(
     state: State, block: CurrentBlock, code: str, apex: complex, away: complex, side: int, other: complex
-) -> tuple[complex, complex | None, int]:
-    """End of the line or arc that leaves a point in a direction, the arc's centre and its turn.
+) -> tuple[complex, Circle | None]:
+    """End of the line or arc that leaves a point in a direction, and its circle.
 
     An approach is such a way back: `side` is then the other one than the contour's. `other`: where LCT begins or ends.
     """
     across, kind = side * 1j * away, code.split()[1].removeprefix("P")
     if kind in ("LT", "LN"):
-        return apex + size_of(state, block, "LEN") * (away if kind == "LT" else across), None, 0
+        return apex + size_of(state, block, "LEN") * (away if kind == "LT" else across), None
     state.assume(OF_CENTER)
     radius, swept = size_of(state, block, "R"), size_of(state, block, "CCA", 1.0) if kind == "CT" else 0.0
     turn = side if radius > 0.0 else -side
     center = apex + radius * across
     if kind == "CT":
-        return center + (apex - center) * cmath.exp(1j * turn * math.radians(swept)), center, turn
+        return center + (apex - center) * cmath.exp(1j * turn * math.radians(swept)), (center, turn, 1)
     apart = other - center
     problem = "whose arc holds the point from which, or to which, it goes"
     block.refuse_if(abs(apart) <= radius, None, problem, "another R")
     direction = apart / complex(radius, turn * math.sqrt(abs(apart) ** 2 - radius**2))
-    return center + radius * direction / abs(direction), center, turn
+    return center + radius * direction / abs(direction), (center, turn, 1)
 
 
 def size_of(state: State, block: CurrentBlock, letter: str, scale: float | None = None) -> float:
@@ -125,20 +125,18 @@ def depart(state: State, block: CurrentBlock, code: str) -> None:
         raise block.fail(None, "with or without its end point", "X and Y with LCT alone")
     stop(state, block)
     apex, end = in_plane(state, present(state)), complex(there.get(first, 0.0), there.get(second, 0.0))
-    place, center, turn = _way(state, block, code, apex, heading, cutter.side if cutter else 1, end)
-    if center is None or abs(place - apex) > NO_ARC_MM:
-        _go(state, block, place, center, turn)
+    place, about = _way(state, block, code, apex, heading, cutter.side if cutter else 1, end)
+    if about is None or abs(place - apex) > NO_ARC_MM:
+        _go(state, block, place, about)
     if to_point:
         _go(state, block, end)
     if depth is not None:
         go(state, block, {normal: depth})
 
 
-def _go(
-    state: State, block: CurrentBlock, place: complex, center: complex | None = None, turn: int = 0, rapid: bool = False
-) -> None:
+def _go(state: State, block: CurrentBlock, place: complex, about: Circle | None = None, rapid: bool = False) -> None:
     first, second, _ = PLANES[state.plane]
-    go(state, block, {first: place.real, second: place.imag}, center, turn, rapid=rapid)
+    go(state, block, {first: place.real, second: place.imag}, about, rapid)
 
 
 def stop(state: State, block: CurrentBlock) -> None:

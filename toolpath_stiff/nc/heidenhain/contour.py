@@ -38,6 +38,7 @@ PATHS, POLAR = f"{MANUAL}, Path contours: Cartesian coordinates", f"{MANUAL}, Pa
 COMPENSATED = (
     "RL, RR (G41, G42) begin and end perpendicular to the first and the last contour element and round outside corners"
 )
+Circle = tuple[complex, int, int]  # about a centre, +1 counter-clockwise or -1, turns begun
 SIDES = {"RL": LEFT, "RR": RIGHT}
 UNKNOWN_POINT = "goes to a point of the machine that the program does not give: left out of the path"
 
@@ -96,16 +97,10 @@ def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
 
 
 def go(
-    state: State,
-    block: CurrentBlock,
-    there: dict[int, float],
-    center: complex | None = None,
-    turn: int = 0,
-    turns: int = 1,
-    rapid: bool = False,
+    state: State, block: CurrentBlock, there: dict[int, float], about: Circle | None = None, rapid: bool = False
 ) -> None:
-    """A contour element from the present point; `turn`: an arc, +1 counter-clockwise. Waits if a corner follows."""
-    plain, (first, second, _) = state.plain, PLANES[state.plane]
+    """A contour element from the present point, straight or `about` a centre. Waits if a corner follows."""
+    plain, (first, second, _), (center, turn, turns) = state.plain, PLANES[state.plane], about or (None, 0, 1)
     start = present(state)
     begin, end = in_plane(state, start), complex(there.get(first, start[first]), there.get(second, start[second]))
     if plain.approach is not None:
@@ -124,17 +119,11 @@ def go(
         block.refuse_if(rapid or turns > 1 or there.keys() - {first, second}, None, *_NO_CORNER)
         plain.held = (block, (begin, end, center, turn), state.feed)
     else:
-        move(state, block, there, center, turn, turns, rapid)
+        move(state, block, there, about, rapid)
 
 
 def move(
-    state: State,
-    block: CurrentBlock,
-    there: dict[int, float],
-    center: complex | None = None,
-    turn: int = 0,
-    turns: int = 1,
-    rapid: bool = False,
+    state: State, block: CurrentBlock, there: dict[int, float], about: Circle | None = None, rapid: bool = False
 ) -> None:
     """Record a straight move or an arc from where the tool stands, as G0 to G3 do."""
     frames = state.frames
@@ -142,9 +131,10 @@ def move(
     control = frames.to_control([there.get(axis, value) for axis, value in enumerate(here)])
     if not frames.rotated:  # an axis that is not named keeps its number to the last digit
         control = [control[axis] if axis in there else value for axis, value in enumerate(frames.position)]
-    if center is None:
+    if about is None:
         record(state, block, RAPID if rapid else FEED, control, there)
         return
+    center, turn, turns = about
     block.refuse_if(state.beside, None, "is an arc right after R0", "a straight statement (L) between")
     first, second, _ = PLANES[state.plane]
     end = there.get(first, here[first]), there.get(second, here[second])
@@ -241,18 +231,16 @@ def circle(state: State, block: CurrentBlock, code: str) -> None:
         turns = max(1, math.ceil(abs(step.value) / 360.0 - 1e-9))
     with plane_of_pole(state, block) as center:
         there = polar(state, block, center) if code == "CP" else named(state, block)
-        _round(state, block, there, center, turn, turns)
+        _round(state, block, there, (center, turn, turns))
 
 
-def _round(
-    state: State, block: CurrentBlock, there: dict[int, float], center: complex, turn: int, turns: int = 1
-) -> None:
+def _round(state: State, block: CurrentBlock, there: dict[int, float], about: Circle) -> None:
     rapid = feed(state, block)
     block.refuse_if(rapid, "FMAX", "on an arc", "F with a number")
     side = take_side(block)
     same = side is None or SIDES.get(side, 0) == (state.cutter.side if state.cutter else 0)
     block.refuse_if(not same or state.beside, side, "changes on an arc", "a straight statement (L) for it")
-    go(state, block, there, center, turn, turns)
+    go(state, block, there, about)
 
 
 def direction(block: CurrentBlock, step: float = 0.0) -> int:
@@ -270,7 +258,7 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
     start, end = in_plane(state, present(state)), end_of(state, there)
     places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
     center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
-    _round(state, block, there, center, turn)
+    _round(state, block, there, (center, turn, 1))
 
 
 def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
@@ -292,7 +280,7 @@ def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
         return
     block.refuse_if(math.pi - abs(cmath.phase(chord)) < STRAIGHT_ON, None, "straight back", "another point")
     radius = abs(chord) ** 2 / (2.0 * chord.imag)  # to the left where positive
-    _round(state, block, there, start + radius * 1j * ahead, 1 if radius > 0.0 else -1)
+    _round(state, block, there, (start + radius * 1j * ahead, 1 if radius > 0.0 else -1, 1))
 
 
 def corner(state: State, block: CurrentBlock, code: str) -> None:
@@ -323,11 +311,16 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     corner_block.refuse_if(not rounded and not lines, None, "beside an arc", "CHF between two lines")
     with corner_block.placing():
         cut = cut_off(held, element, size, rounded)
-    begin, end, center, turn = cut or (held[1], held[1], None, 0)
+    rounding = cut or (held[1], held[1], None, 0)
     state.feed = rate
-    move(state, block, {first: begin.real, second: begin.imag}, held[2], held[3])
+    _along(state, block, held, rounding[0])
     alone = corner_block.values.get("F alone")
     state.feed = alone.value if alone else rate
     if cut is not None:
-        move(state, corner_block, {first: end.real, second: end.imag}, center, turn)
+        _along(state, corner_block, cut, cut[1])
     state.feed = modal
+
+
+def _along(state: State, block: CurrentBlock, element: Element, end: complex) -> None:
+    (first, second, _), (_, _, center, turn) = PLANES[state.plane], element
+    move(state, block, {first: end.real, second: end.imag}, None if center is None else (center, turn, 1))

@@ -166,7 +166,7 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
         there, given = there | {first: end.real, second: end.imag}, True
     block.refuse_if(not given, None, "an arc without a centre", "I, J, K, CR= or AR=")
     plain.fast = False
-    contour.go(state, block, there, middle, turn, turns)
+    contour.go(state, block, there, (middle, turn, turns))
 
 
 def tangent(state: State, block: CurrentBlock, code: str) -> None:

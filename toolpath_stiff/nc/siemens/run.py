@@ -28,7 +28,7 @@ from toolpath_stiff.nc.words import AXES, Block, Word
 
 HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
 PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
-PLAIN = re.compile(r"\s*(?:N\d+\s*)?((?:(?:[GXYZABCIJKFS]|CR=)[-+]?[\d.]+\s*)*)(?:;.*)?", re.ASCII | re.IGNORECASE)
+PLAIN = re.compile(r"\s*(?:N\d+\s*)?((?:(?:G|[XYZABCIJKFS]=?|CR=)[-+]?[\d.]+\s*)*)(?:;.*)?", re.ASCII | re.IGNORECASE)
 OFFSET = re.compile(r"\bG(?:5[4-7]|5(?:0[5-9]|[1-9]\d))(?!\d)")
 CHANGE = re.compile(r"(?<![A-Z])M0*6(?!\d)")
 OF_LATHES = re.compile(r"\bG(?:18|96)(?!\d)|\bLIMS\b|\bDIAM(?:ON|90)\b")
@@ -87,7 +87,9 @@ class SiemensRun(ParametricRun):
                 opened = -1
             if re.search(r"\bCT\b", code) and texts:  # it takes its direction from the block before
                 texts[-1] = "?"
-            texts.append(plain[1].upper().replace("CR=", "R") if plain is not None and begin[3] is None else "?")
+            texts.append(
+                plain[1].upper().replace("CR=", "R").replace("=", "") if plain is not None and begin[3] is None else "?"
+            )
         self._ends = {row for row in self._subs.values() if any(code_text(text).strip() for text in self.lines[:row])}
         self._plain = self._lexer = PlainRun(self.state, texts, self.name)
 
