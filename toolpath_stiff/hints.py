@@ -52,7 +52,7 @@ class Asked:
     effects
         Files with the user's own effects.
     columns
-        Which columns the files call otherwise, as --columns has it.
+        Columns that the files name differently, as --columns has it.
     stated
         What is stated of the noise, as words of the command line.
     """

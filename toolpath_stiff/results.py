@@ -37,7 +37,7 @@ def _door() -> Any:
 
 
 class Result(ABC):
-    """A result: what a function of this package found.
+    """Result of a function of this package.
 
     `print(result)` shows what the command line shows. Figures are in the shop's units, which every name carries.
     """

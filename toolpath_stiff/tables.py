@@ -1,4 +1,4 @@
-"""Tables that users supply: one heading, then one row a line; known columns by name, numbers with a decimal point.
+"""Tables that users supply: one heading, then one row per line; known columns by name, numbers with a decimal point.
 
 Text with commas, semicolons or tabs between the cells, or a sheet of an Excel workbook. The heading is the first line
 that is neither empty nor a comment; where a mapping names columns, the first that has them all: what instruments write

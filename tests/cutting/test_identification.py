@@ -229,6 +229,7 @@ def test_materials_have_origins_and_bands():
         ({"covariance": [[1, 2], [3, 4]]}, "covariance"),
         ({"covariance": (-np.eye(6)).tolist()}, "covariance"),
         ({"Ktc": 3}, "Ktc is not known"),
+        ({"edge_sets_in_um": 0}, "edge_sets_in_um = 0"),
     ],
 )
 def test_numbers_that_are_no_coefficients(tmp_path, change, message):
@@ -255,7 +256,12 @@ def test_a_stated_spread_is_the_same_for_all():
     }
     coefficients = coefficients_from(table, lambda key, mistake, expected: InputError(mistake))
     assert coefficients.deviation * SHOWN == pytest.approx([80, 20, 240, 2, 2, 0.1])
-    assert coefficients.origin == "a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed"
+    assert coefficients.origin.startswith(
+        "a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed; the force at the edge"
+    )
+    given = coefficients_from({**table, "edge_sets_in_um": 0.01}, lambda key, mistake, expected: InputError(mistake))
+    assert (given.taper, given.document()["edge_sets_in_um"]) == (1e-8, 0.01)
+    assert given.origin == "a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed"
 
 
 DYNOWARE = """DynoWare,Version 2.5.1.2

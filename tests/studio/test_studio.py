@@ -903,7 +903,7 @@ def test_the_export_is_read_without_a_studio_and_has_the_figures_of_the_commands
     state = again.idle()
     again.end()
     assert again.token not in content
-    head, mark, tail = content.partition('id="state">')
+    head, mark, tail = content.partition('id="data">')
     document, end, rest = tail.partition("</script>")
     exported = json.loads(document)
     exported["verdict"]["portrait"] = PORTRAIT  # these data leave nothing to portray

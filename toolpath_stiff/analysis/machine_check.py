@@ -83,7 +83,7 @@ class MachineCheck(Result):
         }
 
     def to_frame(self) -> DataFrame:
-        """One row a finding: severity (wrong, doubtful, warning), text."""
+        """One row per finding: severity (wrong, doubtful, warning), text."""
         kinds = (("wrong", self.wrong), ("doubtful", self.doubtful), ("warning", self.warnings))
         rows = [(severity, text) for severity, texts in kinds for text in texts]
         return frame_of(rows, columns=["severity", "text"])

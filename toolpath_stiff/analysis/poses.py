@@ -121,7 +121,7 @@ class PoseStiffness(Result):
         }
 
     def to_frame(self) -> DataFrame:
-        """One row a pose, with the columns of `tps pose --csv`."""
+        """One row per pose, with the columns of `tps pose --csv`."""
         return frame_of(self.columns)
 
     def to_dict(self) -> Document:

@@ -31,7 +31,6 @@ from toolpath_stiff.documents import Document, number, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Hexapod, MachineTool
-from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
@@ -176,10 +175,6 @@ class Analysis(EvaluatedPath, FolderResult):
     def _short(self) -> str:
         mean, low = number(self.mean_N_per_mm), number(self.min_N_per_mm)
         return f"{self.program.name} on {self.machine.name}, mean {mean} N/mm, min {low} N/mm"
-
-    def plot(self) -> Figure:
-        """The path in three views, coloured by stiffness."""
-        return self._figure()
 
     def plot_profile(self) -> Figure:
         """Stiffness along the path."""
@@ -335,7 +330,7 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
 def _summary(analysis: Analysis) -> Document:
     """Figures of `summary.json`, in the shop's units."""
     samples, program, there, band = analysis.samples, analysis.program, analysis.at, analysis.parameter_band
-    cutting, length = samples.cutting & there.reachable, mm_from_m(move_lengths(program.moves))
+    cutting, length = samples.cutting & there.reachable, mm_from_m(analysis.move_lengths)
     rapid, weight = program.moves.motion == RAPID, np.where(analysis.headline, samples.weight, 0.0)
     nearest = int(np.argmin(np.where(cutting, there.reach.margin, np.inf)))
     return {

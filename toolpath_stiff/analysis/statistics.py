@@ -9,7 +9,7 @@ from toolpath_stiff.analysis.evaluation import Evaluation, joint_columns
 from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_rows
 from toolpath_stiff.analysis.poses import POSE_COLUMNS
 from toolpath_stiff.analysis.uncertainty import ParameterBand, parameter_band
-from toolpath_stiff.arrays import AnyArray, BoolArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.nc.courses import move_lengths
@@ -68,6 +68,11 @@ class EvaluatedPath:
     def parameter_band(self) -> ParameterBand | None:
         """Uncertainty of the stiffness from the machine's fitted parameters; None if unknown."""
         return parameter_band(self.model, self.samples, self.load, self.force, self.at.stiffness)
+
+    @cached_property
+    def move_lengths(self) -> FloatArray:
+        """(m,) m, of every move."""
+        return move_lengths(self.program.moves)
 
     @cached_property
     def counted(self) -> BoolArray:
@@ -206,7 +211,7 @@ def parts_of_path(path: EvaluatedPath) -> tuple[list[IntArray], dict[int, IntArr
 def _parts(path: EvaluatedPath, of_move: IntArray, count: int) -> list[Document]:
     """Figures of `count` parts of a program; `of_move` (n,) is the part of each move."""
     samples, moves = path.samples, path.program.moves
-    length, rapid = move_lengths(moves), moves.motion == RAPID
+    length, rapid = path.move_lengths, moves.motion == RAPID
     duration = move_durations(moves, length, path.machine.rapid_feed) + moves.dwell
     margin = np.where(samples.cutting & path.at.reachable, path.at.reach.margin, np.inf)
     parts: list[Document] = []

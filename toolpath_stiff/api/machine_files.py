@@ -1,11 +1,11 @@
-"""Machine files made: templates, and what other programs' files say of a machine."""
+"""Machine files to be made: templates, and machines converted from other programs' files."""
 
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.api.inputs import template
+from toolpath_stiff.files import read_text
 from toolpath_stiff.machine import dh_table, freecad, urdf
 from toolpath_stiff.machine.file import KINDS
 from toolpath_stiff.machine.linuxcnc import hexapod_of_pins
@@ -28,10 +28,10 @@ def machine_template(
     Parameters
     ----------
     file
-        That it will be.
+        Name of the file to be.
     kind
-        Of machine: six telescopic struts, or joints in series, five struts, a linear or rotary delta, struts on moving
-        feet.
+        Kind of machine: six telescopic struts, or joints in series, five struts, a linear or rotary delta, struts on
+        moving feet.
 
     Examples
     --------
@@ -41,8 +41,9 @@ def machine_template(
     """
     target = Path(file)
     name = "machine" if kind == Hexapod.kind else kind
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / f"{name}.toml.txt").read_text("utf-8")
-    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
+    text = (
+        template(f"{name}.toml").replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
+    )
     return TextFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
 
 
@@ -61,7 +62,7 @@ def machine_from_linuxcnc(
     file
         The HAL file, with the ini files beside it that load it, or the ini file, with the HAL files that it loads.
     units
-        Of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
+        Unit of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
 
     Raises
     ------
@@ -110,8 +111,7 @@ def machine_from_urdf(
     toolpath_stiff.errors.InputError: cannot read the URDF file 'nowhere.urdf': No such file or directory
     """
     path = Path(file)
-    text = read_bytes(path, "the URDF file").decode("utf-8", "replace")
-    return TextFile(path.stem, *urdf.machine_from_urdf(text, tip, path.name))
+    return TextFile(path.stem, *urdf.machine_from_urdf(read_text(path, "the URDF file"), tip, path.name))
 
 
 @checked
@@ -127,7 +127,7 @@ def machine_from_dh(
         Columns alpha_deg, a_mm, d_mm, offset_deg, min_deg, max_deg and, if there, name and type (R, or P with min_mm,
         max_mm).
     convention
-        Of the rows: modified (Craig) or standard; they do not show it.
+        Convention of the rows, which they do not show: modified (Craig) or standard.
 
     Raises
     ------
@@ -172,5 +172,4 @@ def machine_from_freecad(
     toolpath_stiff.errors.InputError: cannot read the FreeCAD machine 'nowhere.fcm': No such file or directory
     """
     path = Path(file)
-    text = read_bytes(path, "the FreeCAD machine").decode("utf-8", "replace")
-    return TextFile(path.stem, *freecad.machine_from_fcm(text, order, path.name))
+    return TextFile(path.stem, *freecad.machine_from_fcm(read_text(path, "the FreeCAD machine"), order, path.name))

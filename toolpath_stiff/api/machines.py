@@ -35,7 +35,7 @@ FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the pap
 
 @dataclass(frozen=True)
 class Machine(Result):
-    """A machine with the physical effects that act on it, and what it runs under.
+    """A machine with the physical effects that act on it, and the conditions that it runs under.
 
     `Machine.load` makes one from a packaged machine or a machine file.
 
@@ -130,7 +130,7 @@ class Machine(Result):
     ) -> Machine:
         """The same machine under a set-up and a temperature.
 
-        Whether an effect knows the set-up is checked where it matters: beside a second machine one of them has to.
+        That an effect knows the set-up is checked later: of two machines compared, one must have such an effect.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class Machine(Result):
         return replace(self, setup=setup, temperature_C=temperature_C)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For another process: effects of one's own travel as their files, a class of such a file cannot."""
+        """Pickling for another process: effects of one's own travel as files, as their classes cannot."""
         files = tuple(str(Path(file).absolute()) for file in self.effect_files)
         told = (self.asked, files, self.setup, self.temperature_C, self.allow_unchecked_effects)
         return _machine_again, (self.stated, self.model.conditions, self.model.unchecked, told)
@@ -180,7 +180,7 @@ class Machine(Result):
 
     @property
     def name(self) -> str:
-        """Its short name."""
+        """Short name of the machine."""
         return self.model.machine.name
 
     @property
@@ -189,22 +189,22 @@ class Machine(Result):
         return self.model.given or self.model.machine
 
     def carrying(self, stated: MachineTool) -> Machine:
-        """The same with what another machine file would have."""
+        """The same machine with its file's content replaced."""
         model = build_model(stated, self.effect_files, conditions=self.model.conditions)
         return replace(self, model=replace(model, unchecked=self.model.unchecked))
 
     @property
     def effects(self) -> list[str]:
-        """Names of the effects that it carries, those that act on readings too."""
+        """Names of the machine's effects, those that act on readings included."""
         return [active.effect.name for active in (*self.model.effects, *self.model.instruments)]
 
     @property
     def origin_mm_deg(self) -> tuple[float, ...]:
-        """Where program zero sits unless a program or an argument says: X, Y, Z, A, B, C in machine coordinates."""
+        """Default position of program zero: X, Y, Z, A, B, C in machine coordinates."""
         return pose_in_mm(self.model.machine.default_origin)
 
     def running(self, program: Program | None = None, beside: Sequence[Machine] = ()) -> StiffnessModel:
-        """The model under what it runs under: what `load` was told, then a program's controller file, then its own.
+        """The model under its conditions: those given to `load`, else a program's controller file's, else its own.
 
         `beside` are machines that the same is said of. Raises `InputError` for a set-up that none of them knows.
 
@@ -239,7 +239,7 @@ class Machine(Result):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The files that it was read from."""
+        """Files from which the machine was read."""
         return (self.asked, *self.effect_files)
 
     def strut_lengths_mm(self, pose_mm_deg: Sequence[float]) -> FloatArray:
@@ -270,7 +270,7 @@ class Machine(Result):
         return {name: float(values[0]) for name, values in columns.items()}
 
     def to_frame(self) -> DataFrame:
-        """Its figures: quantity, value, unit, origin (published, recovered, assumed, fitted), remark.
+        """The machine's figures: quantity, value, unit, origin (published, recovered, assumed, fitted), remark.
 
         Examples
         --------
@@ -325,11 +325,11 @@ class Machine(Result):
         return mm_from_m(reach_along(self.model.machine, pose[:3], rays, rotation_matrices(pose[3:])))
 
     def picture(self, pose_mm_deg: Sequence[float] | None = None) -> bytes:
-        """What `plot` draws as a PNG."""
+        """The drawing of `plot`, as a PNG."""
         return self._picture(machine=self.model.machine, pose=self.standing(pose_mm_deg)[0])
 
     def page(self, pose_mm_deg: Sequence[float] | None = None) -> str:
-        """The machine at a pose as a page on which it can be turned, with its reach and its figures.
+        """The machine at a pose as an interactive page, with its reach and its figures.
 
         Examples
         --------
@@ -341,7 +341,7 @@ class Machine(Result):
         return str(self.view.page(self.model.machine, pose, stand))
 
     def text(self, pose_mm_deg: Sequence[float] | None = None) -> str:
-        """Its figures with their origin, and how far the limits are at a pose.
+        """The machine's figures with their origin, and the distances from its limits at a pose.
 
         Examples
         --------
@@ -383,7 +383,7 @@ class Machine(Result):
         return check_machine(self.running(), self.asked)
 
     def save(self, file: str | Path) -> Path:
-        """Write the machine file, effects included, whole or not at all.
+        """Write the machine file, effects included, completely or not at all.
 
         Examples
         --------
@@ -401,7 +401,7 @@ class Machine(Result):
 def _machine_again(
     stated: MachineTool, conditions: Conditions, unchecked: tuple[str, ...], told: tuple[Any, ...]
 ) -> Machine:
-    """A machine in another process."""
+    """A machine rebuilt in another process."""
     return Machine(replace(build_model(stated, told[1], conditions=conditions), unchecked=unchecked), *told)
 
 

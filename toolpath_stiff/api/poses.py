@@ -1,4 +1,4 @@
-"""A machine by itself: stiffness at single poses and over planes of the workspace."""
+"""A machine without a program: stiffness at single poses and over planes of the workspace."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ MOST_POINTS = 2001  # along a side of a map
 
 
 def read_poses(file: str | Path) -> tuple[FloatArray, tuple[str, ...]]:
-    r"""Poses (n, 6) in mm and degrees from a table (CSV, or FILE.xlsx[#SHEET]), and what is to be said of the reading.
+    r"""Poses (n, 6) in mm and degrees from a table (CSV, or FILE.xlsx[#SHEET]), and notes on the reading.
 
     Columns x_mm, y_mm, z_mm and, if there, a_deg, b_deg, c_deg.
 
@@ -117,7 +117,7 @@ def pose(pose_mm_deg: ArrayLike, machine: Machine | str | Path = "nist", *, forc
 
 
 def _angles(text: str) -> tuple[float, ...]:
-    """`A,B,C` in degrees."""
+    """Angles from `A,B,C` in degrees."""
     angles = numbers(text)
     if len(angles) != 3 or max(map(abs, angles)) > 180.0:
         raise ValueError("A,B,C in degrees, within +-180")

@@ -5,7 +5,7 @@
     data/           copies of the measurement files
     used/           the same without the readings that were set aside: commented out, so that line numbers stay
     programs/       copies of the programs
-    results/        a folder a result, as the commands write them
+    results/        a folder per result, as the commands write them
     exercise/       a blind exercise, if one was started
 
 No file is written twice: a change is a new file and a step that names it, so to undo is to forget the last steps.

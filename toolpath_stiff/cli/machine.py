@@ -38,7 +38,7 @@ def pose(
       tps pose --csv poses.csv > stiffness.csv
 
     Angles are roll A, pitch B, yaw C in degrees, R = Rz(C) Ry(B) Rx(A); the position is the tool tip in mm, machine
-    coordinates. --csv reads columns x_mm,y_mm,z_mm and, if there, a_deg,b_deg,c_deg; it writes one row a pose in the
+    coordinates. --csv reads columns x_mm,y_mm,z_mm and, if there, a_deg,b_deg,c_deg; it writes one row per pose in the
     same order, with empty cells where a pose is out of reach (exit code 1).
 
     Parameters

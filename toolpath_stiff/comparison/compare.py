@@ -101,7 +101,7 @@ class Comparison(FolderResult):
         return dict(self.document)
 
     def to_frame(self) -> DataFrame:
-        """One row a reading, as in `residuals.csv`: measured, modelled, deviation, and variables it may depend on."""
+        """One row per reading, as in `residuals.csv`: measured, modelled, deviation, and variables it may depend on."""
         import pandas as pd
 
         return pd.read_csv(StringIO(self.view.residuals_csv(self)))

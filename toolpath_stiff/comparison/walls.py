@@ -122,7 +122,7 @@ class WallComparison(FolderResult):
         return dict(certain(without_nan(document | further)))
 
     def to_frame(self) -> DataFrame:
-        """One row a point: line, side, height on the wall (mm), measured and predicted error, its deviation (um)."""
+        """One row per point: line, side, height on the wall (mm), measured and predicted error, its deviation (um)."""
         columns = {f"{name}_um": um_from_m(getattr(self, name)) for name in ("measured", "foretold", "deviation")}
         place = {"line": self.line, "side": np.array(["left", "right"])[self.side], "height_mm": mm_from_m(self.height)}
         return frame_of({**place, **columns})

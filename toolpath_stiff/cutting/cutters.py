@@ -1,4 +1,4 @@
-"""The cutters of a program: geometry, teeth, and how far the tool itself gives way; from tool tables and `cut.toml`."""
+"""Cutters of a program: geometry, teeth, and the tool's own compliance; from tool tables and `cut.toml`."""
 
 import math
 from collections.abc import Mapping
@@ -70,7 +70,7 @@ class Cutter:
 
 
 def radii_of(cutters: Mapping[int, Cutter], tools: IntArray) -> FloatArray:
-    """(n,) m, radius of the cutter of each tool number (n,); 0 of one that does not cut."""
+    """(n,) m, radius of the cutter of each tool number (n,); 0 for tools that do not cut."""
     radii = np.zeros(len(tools))
     for number, cutter in cutters.items():
         radii[tools == number] = cutter.radius
@@ -78,7 +78,7 @@ def radii_of(cutters: Mapping[int, Cutter], tools: IntArray) -> FloatArray:
 
 
 def merged_tool(table: ToolEntry, further: ToolEntry) -> ToolEntry:
-    """A tool of the tool table with what `cut.toml` says of it, which wins."""
+    """A tool of the tool table, overridden by its values in `cut.toml`."""
     known = {name: getattr(further, name) for name in ("length", "diameter", "stick_out")}
     known = {name: value for name, value in known.items() if not math.isnan(value)}
     words = {name: getattr(further, name) or getattr(table, name) for name in ("remark", "material")}
@@ -86,7 +86,7 @@ def merged_tool(table: ToolEntry, further: ToolEntry) -> ToolEntry:
 
 
 def cutter_of(tool: ToolEntry) -> Cutter:
-    """The cutter of a tool. Raises `InputError` where it is not known well enough; names what is missing."""
+    """The cutter of a tool. Raises `InputError` that names missing data."""
     name = f"tool {tool.number}"
     given: dict[str, float] = {"diameter_mm": tool.diameter, "stick_out_mm": tool.stick_out, **tool.cutter}
     given = {key: value for key, value in given.items() if not math.isnan(value)}
@@ -122,7 +122,7 @@ def cutter_of(tool: ToolEntry) -> Cutter:
 
 
 def _beam(given: Mapping[str, float], material: str) -> tuple[float, float, str]:
-    """Compliances of the tool's own beam across and along, m/N, and where they come from; nan: not known.
+    """Lateral and axial compliance of the tool as a beam, m/N, and their source; nan: unknown.
 
     A cantilever of the core's diameter: L^3 / 3EI across and L / EA along (Timoshenko, Strength of Materials).
     """

@@ -1,4 +1,4 @@
-"""Forces on a cutter from where it touches the stock: at an angle of the spindle, their mean and peak over a turn.
+"""Forces on a cutter from its contact with the stock: at an angle of the spindle, mean and peak over a revolution.
 
 All is linear in the six coefficients (tangential, radial, axial; of the chip and of the edge): with `EACH` as sets of
 values forces come per coefficient. Along the cylinder of a cutter the integral over the height is one over the angle,
@@ -20,11 +20,11 @@ from toolpath_stiff.cutting.patches import TURN, Contact
 from toolpath_stiff.cutting.torus import torus_forces, torus_mean
 
 PEAK_STEPS = 18  # angles from an edge's first touch to its last among which the peak is looked for, besides bends
-EACH = np.eye(6)  # sets of coefficients of which one is 1
+EACH = np.eye(6)  # six sets of coefficients, each with a single 1
 
 
 def mean_force(contact: Contact) -> FloatArray:
-    """(n, 3) N on the tool, mean over a turn of the spindle."""
+    """(n, 3) N on the tool, mean over a revolution of the spindle."""
     force, values = np.zeros((len(contact.feed), 3)), contact.coefficients.values[:, None]
     for block, part in contact.blocks():
         force[block] = _sideways(mean_forces_of_sets(part, values), part.turning)
@@ -32,7 +32,7 @@ def mean_force(contact: Contact) -> FloatArray:
 
 
 def peak_force(contact: Contact) -> FloatArray:
-    """(n, 3) N on the tool: of each component the value of largest size in a turn."""
+    """(n, 3) N on the tool: for each component the value of largest size in a revolution."""
     cutter, values = contact.cutter, contact.coefficients.values[:, None]
     peaks = np.zeros((len(contact.feed), 3))
     flutes = TURN * np.arange(cutter.flutes if cutter.run_out else 1)[:, None] / cutter.flutes
@@ -46,7 +46,7 @@ def peak_force(contact: Contact) -> FloatArray:
 
 
 def _peak_angles(contact: Contact) -> FloatArray:
-    """(n, 6 + PEAK_STEPS) rad of a flute: where force bends, and from its first touch to its last.
+    """(n, 6 + PEAK_STEPS) rad of a flute: kinks of the force, and angles from its first contact to its last.
 
     It bends where an end of an edge, or its corner's, passes entry or exit: the peak of a light cut is there.
     """
@@ -77,7 +77,7 @@ def force_at(contact: Contact, angle: FloatArray) -> FloatArray:
 
 
 def _sideways(force: FloatArray, turning: FloatArray) -> FloatArray:
-    """(..., 3) of forces (..., 3, 1) computed mirrored, in the stations' frame."""
+    """(..., 3) forces in the stations' frame, from forces (..., 3, 1) computed mirrored."""
     force[..., 1, 0] *= turning
     return force[..., 0]
 
@@ -93,7 +93,7 @@ def forces_of_sets(contact: Contact, angle: FloatArray, values: FloatArray) -> F
 
 
 def mean_forces_of_sets(contact: Contact, values: FloatArray) -> FloatArray:
-    """(n, 3, k) mean forces over a turn of k sets of coefficients, values (6, k); mirrored as `forces_of_sets`."""
+    """(n, 3, k) mean forces over a revolution of k sets of coefficients (6, k); mirrored as `forces_of_sets`."""
     seen = contact.seen_clockwise()
     straight = seen.above(seen.cutter.corner_radius)
     rows, arcs = straight.station, np.stack([straight.entry, straight.exit], axis=1)
@@ -107,7 +107,7 @@ def mean_forces_of_sets(contact: Contact, values: FloatArray) -> FloatArray:
 
 
 def _cylinder_forces(contact: Contact, angle: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, a, 3, k) forces along the cylinder, of all flutes: integrals of the chip over the height of each patch."""
+    """(n, a, 3, k) forces on the cylinder, all flutes: integrals of the chip over the height of each patch."""
     patches, lag = contact.above(contact.cutter.corner_radius), contact.lag
     station, feed = patches.station, contact.feed[patches.station, 0]
     entry, leave = np.minimum(patches.entry, np.pi)[:, None], np.minimum(patches.exit, np.pi)[:, None]
@@ -138,7 +138,7 @@ def _per_station(values: FloatArray, station: IntArray, count: int) -> FloatArra
 
 
 def _of_moments(moments: FloatArray, lag: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, a, 3, k) forces of k sets of coefficients from integrals (6, n, a) of the chip along the cylinder.
+    """(n, a, 3, k) forces for k sets of coefficients from integrals (6, n, a) of the chip along the cylinder.
 
     A left-hand helix pushes where a right-hand one draws.
     """

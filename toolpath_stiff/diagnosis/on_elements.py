@@ -216,7 +216,7 @@ class ElementDiagnosis(FolderResult):
         return self.problem.error_percent(residual, self.wild_rows)
 
     def to_frame(self) -> pd.DataFrame:
-        """One row a reading, as in `residuals.csv`."""
+        """One row per reading, as in `residuals.csv`."""
         return frame_of(self.columns())
 
     def columns(self) -> dict[str, AnyArray]:

@@ -157,7 +157,7 @@ def _most_left(diagnosis: Diagnosis) -> str:
 
 
 def _hidden(diagnosis: Diagnosis) -> str:
-    """What an adequate model may still hide: beside the readings, between them, in the law under a guessed noise."""
+    """Effects an adequate model may still hide: beside the readings, between them, in the law under a guessed noise."""
     text = _most_left(diagnosis) + _unread(diagnosis)
     if not diagnosis.noise.guess:
         return text

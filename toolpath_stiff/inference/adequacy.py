@@ -1,4 +1,4 @@
-"""How much of the stiffness a model may still be off by, and what a strut law that had to move may stand for."""
+"""Share of the stiffness by which a model may still be off, and explanations in place of a strut law that moved."""
 
 from collections.abc import Sequence
 
@@ -41,7 +41,7 @@ def moved_by_law(problem: Problem, fit: Fit) -> float:
 
 
 def is_small(problem: Problem, base: Fit, explanations: Sequence[Fit]) -> bool:
-    """Whether the model alone would be off by no more (95 %) than an adequate one, were any of these true."""
+    """True if, were any of these true, the model alone would be off by no more (95 %) than an adequate one."""
     tip, most = problem.predictor.data.tip, moved_by_law(problem, base)
     for fit in explanations:
         deviates = np.sqrt(max(2.0 * (fit.log_posterior - base.log_posterior), 1e-12))

@@ -1,4 +1,4 @@
-"""Doubts about the data: whether they are of this machine at all, and whether a stated noise fits their scatter."""
+"""Doubts about the data: are they of this machine at all, and does a stated noise fit their scatter."""
 
 import numpy as np
 

@@ -43,7 +43,7 @@ class ElementPredictor(Predictor):
 
     @cached_property
     def full_path(self) -> LoadPath:
-        """Load path with a row a reading, as instruments see it."""
+        """Load path with a row per reading, as instruments see it."""
         return measured_path(self.base, self.data)
 
     def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:

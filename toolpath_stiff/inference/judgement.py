@@ -1,4 +1,4 @@
-"""From readings to a verdict: the whole way on this page, a function and a type a step.
+"""The steps from readings to a verdict, all on this page, a function and a type for each.
 
 | step | function | gives |
 | --- | --- | --- |
@@ -437,7 +437,7 @@ def put_to_vote(
     first, *others = dict.fromkeys([*standing, *instead])
 
     def behind(name: str) -> tuple[bool, float]:
-        """By votes; of the part of the first, which has none, by odds. Beside a model that passes, by chance alone."""
+        """Sort key: votes; without votes (part of the first) the odds; beside a model that passes, chance alone."""
         if name in ballots:
             return name in lost, float(ballots[name].sum())
         if verdict == "adequate":

@@ -4,9 +4,9 @@ The logarithm of a reading carries, beside what the machine does,
 
     repeat noise      of every reading on its own,
     clamping          common to the readings of one clamping,
-    strut spread      six struts are never quite alike: a nuisance with one column a strut,
-    joint positions   never quite where the machine file has them: one column a coordinate,
-    the rest          frame, table, platform, tool are never quite as the model has them: one column an axis,
+    strut spread      six struts are never quite alike: a nuisance with one column per strut,
+    joint positions   never quite where the machine file has them: one column per coordinate,
+    the rest          frame, table, platform, tool are never quite as the model has them: one column per axis,
 
 the last three the same for all readings of a machine. Now and then a reading is wild. Who takes all of this for
 independent scatter finds effects that are not there: in dense data, in every second campaign.

@@ -147,7 +147,7 @@ class Predictor:
 
     @cached_property
     def full_path(self) -> LoadPath:
-        """Load path with a row a reading, as instruments see it."""
+        """Load path with a row per reading, as instruments see it."""
         data, missing = self.data, self.data.missing
         return replace(
             self._timeless.path.take(self._timeless.which),

@@ -51,7 +51,7 @@ class FixedFrame:
     origin: FloatArray
 
     def then(self, other: FixedFrame) -> FixedFrame:
-        """Placement of what is placed at `other` in this one."""
+        """Composition with `other`, a placement given in this one's frame."""
         return FixedFrame(self.axes @ other.axes, self.axes @ other.origin + self.origin)
 
     def longer(self, by: float) -> FixedFrame:

@@ -5,60 +5,46 @@ The rods keep the effector level; a tool does not turn.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.machine import parallel_file
 from toolpath_stiff.machine.elements import Element, Stance
 from toolpath_stiff.machine.parallel import Carriage, Legs, Parallel
-from toolpath_stiff.machine.parallel_file import (
-    GIVE,
-    HEIGHT,
-    LENGTH,
-    OPTIONAL,
-    PER_ROD,
-    SHARED,
-    TOP,
-    axial,
-    give_of,
-    shared_fields,
-    span,
-)
-from toolpath_stiff.machine.schema import Key, MachineToml, read_sections
+from toolpath_stiff.machine.schema import Key, MachineToml, Sections, read_sections
 from toolpath_stiff.machine.words import refuse_words
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import m_from_mm, m_from_nm
 
 UP = np.array([0.0, 0.0, 1.0])
 OUTWARDS = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in np.deg2rad([90.0, 210.0, 330.0])])
-
-
+RODS = {"effector_joint_radius_mm": parallel_file.LENGTH, "effector_joint_height_mm": parallel_file.HEIGHT,
+        **dict.fromkeys(("rod_length_mm", "rod_spacing_mm"), parallel_file.LENGTH)}  # fmt: skip
+ROD = {"compliance_nm_per_N": parallel_file.PER_ROD}
 SCHEMA = {
-    "": {
-        **TOP,
-        **dict.fromkeys(("carriage_joint_radius_mm", "effector_joint_radius_mm"), LENGTH),
-        **dict.fromkeys(("rod_length_mm", "rod_spacing_mm"), LENGTH),
-        "effector_joint_height_mm": HEIGHT,
-    },
+    "": {**parallel_file.TOP, **RODS, "carriage_joint_radius_mm": parallel_file.LENGTH},
     "limits": {"carriage_mm": Key(unit="mm", shape=(2,))},
-    "rod": {"compliance_nm_per_N": PER_ROD},
-    "carriage": {"rail_radius_mm": LENGTH, "centre_height_mm": HEIGHT, **GIVE},
-    **SHARED,
+    "rod": ROD,
+    "carriage": {
+        "rail_radius_mm": parallel_file.LENGTH,
+        "centre_height_mm": parallel_file.HEIGHT,
+        **parallel_file.GIVE,
+    },
+    **parallel_file.SHARED,
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class Level(Parallel):
-    """What deltas of either drive share: three parallelograms that keep the effector level.
+    """Common part of linear and rotary deltas: three parallelograms that keep the effector level.
 
     Attributes
     ----------
-    effector_radius
-        m, of the rods' joints about the effector's axis.
-    joint_height
-        m, of the effector's joints above the tip of the reference tool.
-    rod_length, spacing
+    effector_joint_radius, effector_joint_height
+        m, of the rods' joints about the effector's axis, and above the tip of the reference tool.
+    rod_length, rod_spacing
         m; of the two rods of a parallelogram.
     rod_compliance
         m/N of one rod with its joints.
@@ -67,10 +53,10 @@ class Level(Parallel):
     turns: ClassVar[int] = 0
     outwards: ClassVar[FloatArray] = OUTWARDS  # (3, 3), from the machine's axis to each tower
 
-    effector_radius: float
-    joint_height: float
+    effector_joint_radius: float
+    effector_joint_height: float
     rod_length: float
-    spacing: float
+    rod_spacing: float
     rod_compliance: float
 
     def rotation_of(self, abc: FloatArray) -> FloatArray:
@@ -79,27 +65,27 @@ class Level(Parallel):
         return rotation_matrices(abc)
 
     def level(self, axes: FloatArray) -> BoolArray:
-        """(n,) whether tool axes (n, 3, 3) are those that the rods keep."""
+        """(n,) True where tool axes (n, 3, 3) are those that the rods keep."""
         return np.asarray(np.abs(axes - np.eye(3)).max(axis=(1, 2)) < 1e-9)
 
     def effector_arms(self, extension: FloatArray) -> FloatArray:
         """(n, 6, 3) m from the tip to the rods' joints, of tools (n,) m longer than the reference tool."""
-        height = UP * (self.joint_height + extension)[:, None, None]
-        return rod_joints(self.outwards, self.effector_radius, self.spacing) + height
+        height = UP * (self.effector_joint_height + extension)[:, None, None]
+        return rod_joints(self.outwards, self.effector_joint_radius, self.rod_spacing) + height
 
 
 @dataclass(frozen=True, kw_only=True)
 class Delta(Level):
-    """A linear delta; `carriage_radius` m of the rods' joints about the machine's axis."""
+    """A linear delta; `carriage_joint_radius` m of the rods' joints about the machine's axis."""
 
     kind: ClassVar[str] = "delta"
 
-    carriage_radius: float
+    carriage_joint_radius: float
 
     def legs_at(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> Legs:
         """The six rods; nan where a carriage is too far away, or the tool is turned."""
         arms = self.effector_arms(extension)
-        towers = (self.carriage_radius - self.effector_radius) * OUTWARDS[:, :2]
+        towers = (self.carriage_joint_radius - self.effector_joint_radius) * OUTWARDS[:, :2]
         apart = ((towers - tip[:, None, :2]) ** 2).sum(axis=-1)
         height = np.sqrt(np.where(self.level(axes)[:, None], self.rod_length**2 - apart, np.nan))
         carriages = tip[:, 2:] + arms[:, :1, 2] + height
@@ -109,7 +95,7 @@ class Delta(Level):
     def _feet(self, carriages: FloatArray) -> FloatArray:
         """(n, 6, 3) m, the rods' joints on carriages at heights (n, 3) m."""
         height: FloatArray = np.repeat(carriages, 2, axis=1)[..., None] * UP
-        return rod_joints(self.outwards, self.carriage_radius, self.spacing) + height
+        return rod_joints(self.outwards, self.carriage_joint_radius, self.rod_spacing) + height
 
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
         """(n, 6, 3) m each: the rods' joints on the carriages and on the effector."""
@@ -117,40 +103,38 @@ class Delta(Level):
 
 
 def rod_joints(outwards: FloatArray, radius: float, spacing: float) -> FloatArray:
-    """(6, 3) m, joints of the rods on a circle, both of a tower together."""
+    """(6, 3) m, joints of the rods on a circle, the two of a tower together."""
     sides = 0.5 * spacing * np.cross(UP, outwards)
     return np.stack([radius * outwards - sides, radius * outwards + sides], axis=1).reshape(6, 3)
 
 
+def level_fields(toml: MachineToml, values: Sections) -> dict[str, Any]:
+    """Arguments of a delta of either drive that its own sections do not give."""
+    names = ("effector_joint_radius", "effector_joint_height", "rod_length", "rod_spacing")
+    rod = {"legs": parallel_file.axial("rod", 6), "rod_compliance": m_from_nm(values["rod"]["compliance_nm_per_N"])}
+    return {**parallel_file.shared_fields(toml, values), **parallel_file.lengths(values[""], *names), **rod}
+
+
 def read(toml: MachineToml) -> Delta:
     """A delta of a machine file. Raises `InputError`."""
-    values = read_sections(toml, SCHEMA, OPTIONAL, stated=False)
-    top, carriage = values[""], values["carriage"]
-    radius, effector, rod, spacing = (
-        m_from_mm(top[f"{key}_mm"])
-        for key in ("carriage_joint_radius", "effector_joint_radius", "rod_length", "rod_spacing")
-    )
-    if rod <= abs(radius - effector):
-        mistake, least = f" = {top['rod_length_mm']:g}: the rods do not reach the effector", abs(radius - effector)
+    values = read_sections(toml, SCHEMA, parallel_file.OPTIONAL, stated=False)
+    carriage, fields = values["carriage"], level_fields(toml, values)
+    radius = m_from_mm(values[""]["carriage_joint_radius_mm"])
+    least = abs(radius - fields["effector_joint_radius"])
+    if fields["rod_length"] <= least:
+        mistake = f" = {values['']['rod_length_mm']:g}: the rods do not reach the effector"
         raise toml.fault("", "rod_length_mm", mistake, expected=f"more than {1e3 * least:g} mm")
-    centre, height = m_from_mm(carriage["rail_radius_mm"]), m_from_mm(carriage["centre_height_mm"])
-    compliance = give_of(carriage)
+    rods = rod_joints(OUTWARDS, radius, fields["rod_spacing"])
     carriages = []
-    for i in range(3):
-        place = centre * OUTWARDS[i] + height * UP
-        axes = np.column_stack([OUTWARDS[i], np.cross(UP, OUTWARDS[i]), UP])
-        rods = (2 * i, 2 * i + 1)
-        joints = rod_joints(OUTWARDS, radius, spacing)[list(rods)] - place
-        carriages.append(Carriage(Element(f"carriage {i + 1}", "frame"), rods, axes, compliance, joints))
+    for i, outwards in enumerate(OUTWARDS):
+        place = m_from_mm(carriage["rail_radius_mm"]) * outwards + m_from_mm(carriage["centre_height_mm"]) * UP
+        axes, of_rods = np.column_stack([outwards, np.cross(UP, outwards), UP]), (2 * i, 2 * i + 1)
+        element, joints = Element(f"carriage {i + 1}", "frame"), rods[list(of_rods)] - place
+        carriages.append(Carriage(element, of_rods, axes, parallel_file.give_of(carriage), joints))
+    ends = values["limits"]["carriage_mm"]
     return Delta(
-        **shared_fields(toml, values),
-        joint_range=span(toml, "limits", ("carriage_mm", "carriage_mm"), *values["limits"]["carriage_mm"]),
-        legs=axial("rod", 6),
+        **fields,
+        joint_range=parallel_file.span(toml, "limits", ("carriage_mm", "carriage_mm"), *ends),
         carriages=tuple(carriages),
-        carriage_radius=radius,
-        effector_radius=effector,
-        joint_height=m_from_mm(top["effector_joint_height_mm"]),
-        rod_length=rod,
-        spacing=spacing,
-        rod_compliance=m_from_nm(values["rod"]["compliance_nm_per_N"]),
+        carriage_joint_radius=radius,
     )

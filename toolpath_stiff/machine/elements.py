@@ -138,6 +138,11 @@ class Stance(ArrayColumns):
     def __len__(self) -> int:
         return len(self.joints)
 
+    @property
+    def axes(self) -> FloatArray:
+        """(n, 3, 3) tool axes in base axes."""
+        return np.broadcast_to(np.eye(3) if self.rotation is None else self.rotation, (len(self), 3, 3))
+
     def take(self, rows: IntArray | BoolArray | slice) -> Stance:
         """Stance at some of the poses."""
         return replace(super().take(rows), loads=tuple(load.take(rows) for load in self.loads))

@@ -27,7 +27,7 @@ HalLine = tuple[str, int, str]  # file, line, text
 
 @dataclass(frozen=True)
 class ControlFiles:
-    """What HAL and ini files of one machine say.
+    """Content of the HAL and ini files of one machine.
 
     Attributes
     ----------
@@ -73,13 +73,13 @@ class ControlFiles:
         return self.pin(name, default) * self.scale
 
     def bounds(self, joint: int, linear: bool) -> FloatArray | None:
-        """M or rad; None: nobody says."""
+        """Limits of a joint, m or rad; None: not stated."""
         if joint not in self.limits:
             return None
         return m_from_mm(self.limits[joint] * self.scale) if linear else rad_from_deg(self.limits[joint])
 
     def limits_of(self, axes: str, letters: str) -> Document:
-        """Keys of [limits] by letter, None where nobody says; `letters` are the joints' unless the files name them."""
+        """Keys of [limits] by letter, None if not stated; `letters` are the joints' unless the files name them."""
         letters = self.coordinates or letters
         keys: dict[str, FloatArray | None] = {}
         for axis in axes:
@@ -91,7 +91,7 @@ class ControlFiles:
 
 
 def read_control(path: Path, modules: Collection[str], units: str | None = None) -> ControlFiles:
-    """From a HAL file with the ini files beside it that load it, or from an ini file with the HAL files that it loads.
+    """Content of a HAL file and the ini files beside it that load it, or of an ini file and the HAL files it loads.
 
     `modules` are the kinematics modules that are known; `units` are "mm" or "inch", else LINEAR_UNITS.
     Raises `InputError` for a pin that is no number, ini files that contradict each other, and no unit.

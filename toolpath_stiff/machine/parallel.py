@@ -149,7 +149,7 @@ class Parallel(MachineTool):
         return Stance(
             joints=legs.joints,
             position=tip,
-            rotation=None if rotation is None else axes,
+            rotation=axes,
             work_axes=None,
             configuration=np.zeros(len(tip), dtype=np.int64),
             loads=(*loads, *(body.spring(frames) for body in self.bodies)),
@@ -204,9 +204,8 @@ class Parallel(MachineTool):
             pose = np.array(self.limits.neutral_pose)
             return float(self._legs(pose[None, :3], rotation_matrices(pose[None, 3:]), np.nan).determinant[0])
 
-        axes = np.eye(3) if stance.rotation is None else stance.rotation
-        axes = np.broadcast_to(axes, (len(stance), 3, 3))
-        return self._legs(stance.position, axes, np.nan).determinant[:, None] / self.once("neutral legs", neutral)
+        legs = self._legs(stance.position, stance.axes, np.nan)
+        return legs.determinant[:, None] / self.once("neutral legs", neutral)
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
         """Lines of a picture: names and polylines (n, p, 3) m, base axes."""

@@ -103,9 +103,7 @@ class Pentapod(Parallel):
 
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
         """(n, 5, 3) m each: base joints, and points where the struts meet their rings."""
-        n = len(stance)
-        axes = np.broadcast_to(np.eye(3) if stance.rotation is None else stance.rotation, (n, 3, 3))
-        to_base, rings = self._rings(stance.position, axes, np.zeros(n))
+        to_base, rings = self._rings(stance.position, stance.axes, np.zeros(len(stance)))
         return stance.position[:, None] + to_base, stance.position[:, None] + rings
 
 

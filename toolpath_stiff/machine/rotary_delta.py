@@ -11,41 +11,26 @@ from typing import ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.machine.delta import OUTWARDS, UP, Level, rod_joints
+from toolpath_stiff.machine import parallel_file
+from toolpath_stiff.machine.delta import OUTWARDS, ROD, RODS, UP, Level, level_fields, rod_joints
 from toolpath_stiff.machine.elements import Element, Stance
 from toolpath_stiff.machine.parallel import Carriage, Legs
-from toolpath_stiff.machine.parallel_file import (
-    GIVE,
-    HEIGHT,
-    LENGTH,
-    OPTIONAL,
-    PER_ROD,
-    SHARED,
-    TOP,
-    axial,
-    give_of,
-    shared_fields,
-)
 from toolpath_stiff.machine.schema import Key, MachineToml, read_sections
-from toolpath_stiff.units import m_from_mm, m_from_nm, rad_from_deg
+from toolpath_stiff.units import m_from_mm, rad_from_deg
 
 SCHEMA = {
-    "": {
-        **TOP,
-        **dict.fromkeys(("hip_radius_mm", "effector_joint_radius_mm", "rod_length_mm", "rod_spacing_mm"), LENGTH),
-        "effector_joint_height_mm": HEIGHT,
-    },
+    "": {**parallel_file.TOP, **RODS, "hip_radius_mm": parallel_file.LENGTH},
     "limits": {"arm_deg": Key(unit="deg", shape=(2,), low=-180.0, high=180.0)},
-    "rod": {"compliance_nm_per_N": PER_ROD},
-    "arm": {"length_mm": LENGTH, **GIVE},
-    **SHARED,
+    "rod": ROD,
+    "arm": {"length_mm": parallel_file.LENGTH, **parallel_file.GIVE},
+    **parallel_file.SHARED,
 }
 ARMS = -OUTWARDS
 
 
 @dataclass(frozen=True, kw_only=True)
 class RotaryDelta(Level):
-    """A rotary delta; the hips stand in the plane z = 0.
+    """A rotary delta; the hips lie in the plane z = 0.
 
     Attributes
     ----------
@@ -61,7 +46,7 @@ class RotaryDelta(Level):
 
     @property
     def joint_kinds(self) -> tuple[str, ...]:
-        """Of each arm "rotary"."""
+        """Kind of each arm's joint: "rotary"."""
         return ("rotary",) * 3
 
     def legs_at(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> Legs:
@@ -87,10 +72,12 @@ class RotaryDelta(Level):
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
         """(n, 6, 3) m each: the rods' joints on the arms and on the effector."""
         knees = np.repeat(self._knees(stance.joints)[0], 2, axis=1)
-        return knees + rod_joints(ARMS, 0.0, self.spacing), stance.position[:, None] + self.effector_arms(np.zeros(1))
+        return knees + rod_joints(ARMS, 0.0, self.rod_spacing), stance.position[:, None] + self.effector_arms(
+            np.zeros(1)
+        )
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
-        """The arms, and what other machines of rods have."""
+        """The arms, and the lines that other machines with rods have."""
         knees, hips = self._knees(stance.joints)[0], self.hip_radius * ARMS
         arms = [
             (f"arm {i + 1}", np.stack([np.broadcast_to(hips[i], knees[:, i].shape), knees[:, i]], 1)) for i in range(3)
@@ -100,26 +87,19 @@ class RotaryDelta(Level):
 
 def read(toml: MachineToml) -> RotaryDelta:
     """A rotary delta of a machine file. Raises `InputError`."""
-    values = read_sections(toml, SCHEMA, OPTIONAL, stated=False)
-    top, arm = values[""], values["arm"]
-    low, high = values["limits"]["arm_deg"]
+    values = read_sections(toml, SCHEMA, parallel_file.OPTIONAL, stated=False)
+    arm, fields = values["arm"], level_fields(toml, values)
+    low, high = values["limits"]["arm_deg"].tolist()
     if not low < high:
         raise toml.fault("limits", "arm_deg", f": {high:g} is not above {low:g}", expected="min below max, in deg")
-    spacing, length = m_from_mm(top["rod_spacing_mm"]), m_from_mm(arm["length_mm"])
-    joints = np.array([[length, side * spacing, 0.0] for side in (-0.5, 0.5)])  # from the hip, in the arm's axes
+    length, aside = m_from_mm(arm["length_mm"]), 0.5 * fields["rod_spacing"]
+    joints, give = np.array([[length, -aside, 0.0], [length, aside, 0.0]]), parallel_file.give_of(arm)
     return RotaryDelta(
-        **shared_fields(toml, values),
-        joint_range=(rad_from_deg(float(low)), rad_from_deg(float(high))),
-        legs=axial("rod", 6),
+        **fields,
+        **parallel_file.lengths(values[""], "hip_radius"),
+        joint_range=(rad_from_deg(low), rad_from_deg(high)),
         carriages=tuple(
-            Carriage(Element(f"arm {i + 1}", "frame"), (2 * i, 2 * i + 1), np.eye(3), give_of(arm), joints)
-            for i in range(3)
+            Carriage(Element(f"arm {i + 1}", "frame"), (2 * i, 2 * i + 1), np.eye(3), give, joints) for i in range(3)
         ),
-        effector_radius=m_from_mm(top["effector_joint_radius_mm"]),
-        joint_height=m_from_mm(top["effector_joint_height_mm"]),
-        rod_length=m_from_mm(top["rod_length_mm"]),
-        spacing=spacing,
-        rod_compliance=m_from_nm(values["rod"]["compliance_nm_per_N"]),
-        hip_radius=m_from_mm(top["hip_radius_mm"]),
         arm_length=length,
     )

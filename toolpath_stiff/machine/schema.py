@@ -38,8 +38,8 @@ class MachineToml(TomlReader):
 class Key:
     """Values that a key of a machine file may have.
 
-    `shape` () for a number, (3,) or (6, 3) for lists; `also_length` admits a second length, `many` any greater one,
-    `or_one` a single number instead of a list.
+    `shape` () for a number, (3,) or (6, 3) for lists, (1, 0) for rows of any length; `also_length` admits a second
+    length, `many` any greater one, `or_one` a single number instead of a list. Texts are `shape[0]` or more.
     Bounds are inclusive unless `open_low`.
     """
 
@@ -72,8 +72,10 @@ class Key:
 
     def fits(self, shape: tuple[int, ...]) -> bool:
         """True if numbers of this shape are allowed."""
-        if self.many and len(shape) == 1:
-            return shape[0] >= self.shape[0]
+        if self.many and len(shape) == len(self.shape):
+            return shape[0] >= self.shape[0] and all(
+                n in (0, m) for m, n in zip(shape[1:], self.shape[1:], strict=True)
+            )
         return shape in (self.shape, (self.also_length,)) or (self.or_one and not shape)
 
 
@@ -154,10 +156,13 @@ def read_sections(toml: MachineToml, schema: Schema, optional: Collection[str], 
         if name not in sections and name not in optional and name[-2:] != "[]":
             hint = "`tps machine new template.toml` writes a template with every section"
             raise InputError(f"section [{name}] is missing", hint=hint, file=toml.file)
-    return {name: _section(toml, name, content, schema[name], stated) for name, content in sections.items()}
+    return {name: read_section(toml, name, content, schema[name], stated) for name, content in sections.items()}
 
 
-def _section(toml: MachineToml, name: str, content: Document, keys: Mapping[str, Key], stated: bool) -> Document:
+def read_section(
+    toml: MachineToml, name: str, content: Document, keys: Mapping[str, Key], stated: bool = False
+) -> Document:
+    """One section, as of `read_sections`."""
     allowed = [*keys, *(("origin", "remark") if name else ())]
     for key in content:
         if key not in allowed:
@@ -174,13 +179,14 @@ def _section(toml: MachineToml, name: str, content: Document, keys: Mapping[str,
 
 def read_rows(toml: MachineToml, name: str, keys: Mapping[str, Key]) -> list[Document]:
     """Tables `[[name]]` of a file, each key checked as in a section; errors name the row."""
-    return [_section(toml, f"{name}[{nth}]", row, keys, stated=False) for nth, row in enumerate(toml.rows(name), 1)]
+    return [read_section(toml, f"{name}[{nth}]", row, keys) for nth, row in enumerate(toml.rows(name), 1)]
 
 
 def _value(toml: MachineToml, section: str, key: str, raw: Any, rule: Key) -> Any:
     if rule.text:
         names = raw if rule.shape else [raw]
-        if not isinstance(names, list) or not all(map(is_text, names)) or len(set(names)) < len(names):
+        fits = isinstance(names, list) and all(map(is_text, names)) and len(names) >= sum(rule.shape)
+        if not fits or len(set(names)) < len(names):
             expected = "a list of names, each once" if rule.shape else "a text that is not empty"
             raise toml.fault(section, key, f" = {shortened(raw)}", expected)
         return tuple(names) if rule.shape else raw

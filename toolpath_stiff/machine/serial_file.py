@@ -196,7 +196,7 @@ def _travel(toml: MachineToml, section: str, row: Document, linear: bool) -> dic
 
 
 def _check_units(toml: MachineToml, joints: Sequence[ChainJoint]) -> None:
-    """Refuse values most likely written in radians, and linear axes X, Y, Z that are left-handed."""
+    """Refuse limits most likely written in radians."""
     ends = [abs(np.rad2deg(end)) for joint in joints if not joint.linear for end in (joint.low, joint.high)]
     if ends and max(ends) < RADIANS and max(ends) > 0.0:
         mistake = f": no rotary axis turns by more than {max(ends):.4g} deg; are these radians?"

@@ -170,7 +170,7 @@ class Controller:
 
     @property
     def label(self) -> str:
-        """Name of the dialect, and whether a controller file changes it."""
+        """Name of the dialect, with a note if a controller file changes it."""
         name = self.dialect.name
         return name if self.dialect == DIALECTS[name] else f"{name}, changed by the controller file"
 

@@ -1,4 +1,4 @@
-"""The moves of an NC program, one row a move, in SI units; and the recorder that collects them while reading.
+"""The moves of an NC program, one row per move, in SI units; and the recorder that collects them while reading.
 
 This is what the reader hands on: geometry with its line, feed and tool; no machine, no sampling.
 """

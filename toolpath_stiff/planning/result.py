@@ -70,7 +70,7 @@ class Plan(FolderResult):
 
     @property
     def visits(self) -> list[Document]:
-        """One entry a clamping: pose, set-up, readings, purpose."""
+        """One entry per clamping: pose, set-up, readings, purpose."""
         choice, first = self.choice, {row["clamp"]: row for row in reversed(self.rows)}
         visits, entries = choice.visits, list[Document]()
         for clamp, (visit, kind, why) in enumerate(zip(choice.chosen, choice.kinds, choice.why, strict=True), 1):
@@ -106,7 +106,7 @@ class Plan(FolderResult):
         return dict(certain(document))
 
     def to_frame(self) -> DataFrame:
-        """One row a reading, as in `plan.csv`: a measurement file with the stiffness left empty."""
+        """One row per reading, as in `plan.csv`: a measurement file with the stiffness left empty."""
         return frame_of(self.rows)
 
     def _short(self) -> str:

@@ -1,6 +1,6 @@
 """Dynamometer records of slots: mean force over whole turns, without drift, and harmonics of the turn.
 
-A file with neither a time nor a rate of sampling holds mean forces, a row a slot.
+A file with neither a time nor a rate of sampling holds mean forces, a row per slot.
 
 A turn cuts where its mean force is half of the strongest turns' or more, and is air where the force swings hardly more
 than in the quietest. (Not where it swings: many teeth in a full slot make it swing less than its entry does.) Over a

@@ -97,7 +97,7 @@ class CoefficientFit(FolderResult):
         return sentences
 
     def to_dict(self) -> Document:
-        """Coefficients in the form of a setup file, with intervals; one entry a record; what is not determined."""
+        """Coefficients in the form of a setup file, with intervals; one entry per record; what is not determined."""
         columns, values = self.columns(), self.coefficients.values * SHOWN
         deviation = self.coefficients.deviation * SHOWN * self.reach
         document = {
@@ -114,11 +114,11 @@ class CoefficientFit(FolderResult):
         return dict(without_nan(document))
 
     def to_frame(self) -> DataFrame:
-        """One row a record, with the columns of `columns`."""
+        """One row per record, with the columns of `columns`."""
         return frame_of(self.columns())
 
     def columns(self) -> dict[str, list[object]]:
-        """One row a record: feed, depth, force measured, fitted, and less the prediction from other feeds."""
+        """One row per record: feed, depth, force measured, fitted, and less the prediction from other feeds."""
         columns: dict[str, list[object]] = {
             "record": list(self.records),
             "feed_per_tooth_um": um_from_m(self.feed).round(6).tolist(),
@@ -146,7 +146,7 @@ def fit_coefficients(
     cutter
         That cut them.
     columns
-        Which columns the files call otherwise.
+        Columns that the files name differently.
     axes
         Directions of the dynamometer's axes: those that point along the feed, to its left and up.
     material

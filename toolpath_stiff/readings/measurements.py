@@ -60,7 +60,7 @@ class Readings(ArrayColumns):
         (n, 3) unit vectors of force and displacement.
     stiffness
         (n,) N/m; nan where a plan leaves it empty. Of a loop beside the tip that of the loop in series with its offset
-        (`updating.loops`): what is compared.
+        (`readings.loops`): what is compared.
     force
         (n,) N, `defaults.FORCE` where not given.
     sd
@@ -182,7 +182,7 @@ def read_measurements(
     planned
         Whether the stiffness may be left empty.
     columns
-        Which columns the files call otherwise, as `mapping` says.
+        Columns that the files name differently, as `mapping` says.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def read_measurements(
 
 
 def _table_1() -> Table:
-    """The paper's Table 1, printed one row a point."""
+    """The paper's Table 1, printed one row per point."""
     text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
     printed = parse_table(text, NIST_TABLE_1, Columns(POSITION))
     rows = tuple(

@@ -298,7 +298,7 @@ def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) 
     """Pulls from rows, the machine at each row's pose or joints; one reading for each component read."""
     pose, joints = np.array([row.pose for row in rows]), np.array([row.joints for row in rows])
     stance, assumed = standing(machine, pose, joints, [(row.file, row.line) for row in rows])
-    turn = np.broadcast_to(np.eye(3) if stance.rotation is None else stance.rotation, (len(rows), 3, 3))
+    turn = stance.axes
     pull, target = (np.einsum("nij,nj->ni", turn, [getattr(row, name) for row in rows]) for name in ("pull", "target"))
     cable = np.array([row.pulley for row in rows]) - stance.position - pull
     by_cable = np.array([[row.tension] for row in rows]) * cable / np.linalg.norm(cable, axis=1, keepdims=True)

@@ -44,7 +44,7 @@ class Reduction(Result):
     notes
         What was assumed in reading them.
     read_as
-        One line a file: which columns were read as what.
+        One line per file: which columns were read as what.
     history
         Of struts measured alone, over their dates.
 
@@ -90,11 +90,11 @@ class Reduction(Result):
         return f"{name} and {others} more" if others else name
 
     def to_dict(self) -> dict[str, Any]:
-        """One entry a loop, under "loops"; struts measured alone over their dates, under "history"."""
+        """One entry per loop, under "loops"; struts measured alone over their dates, under "history"."""
         return {"loops": [loop_entry(figures) for figures in self.figures], "history": to_dict(self.history)}
 
     def to_frame(self) -> DataFrame:
-        """One row a loop."""
+        """One row per loop."""
         return frame_of(self.to_dict()["loops"])
 
     def _short(self) -> str:
@@ -119,7 +119,7 @@ def reduce(*raw: str | Path, columns: Mapped = None, compression_positive: bool 
     raw
         Files and folders of them: CSV, or FILE.xlsx[#SHEET]. Of struts on a bench also tables of their stiffnesses.
     columns
-        Which columns the files call otherwise: "strut=hp, date=day_ms:ms, force=Kraft:kN", or such a dict; unless
+        Columns that the files name differently: "strut=hp, date=day_ms:ms, force=Kraft:kN", or such a dict; unless
         given, as FILE.columns.toml beside a file says.
     compression_positive
         Whether the forces of struts on a bench count compression positive.

@@ -90,7 +90,7 @@ def loop_entry(figures: LoopFigures) -> Document:
 
 
 def measurement_csv(reduced: Sequence[LoopFigures], over_time: StrutHistory) -> str:
-    """A measurement file with one row a loop, or one for each side of a strut that differs in tension and compression.
+    """A measurement file with one row per loop, or per side of a strut that differs in tension and compression.
 
     A figure that some loop lacks is left out as a column.
     """

@@ -1,4 +1,4 @@
-"""How a machine stood at each pull: by its joints, by the pose of its tip, or by both, held against each other."""
+"""Stance of a machine at each pull: from its joints, from the pose of its tip, or from both, compared."""
 
 from collections.abc import Sequence
 
@@ -14,17 +14,17 @@ from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_de
 
 ROLL_FIRST = 'angles turn about X, then Y, then Z of the base; where a, b, c begin with Z: --columns "a=c_deg, c=a_deg"'
 ELSEWHERE = "are they in other axes than the base's? [work] of the machine file says where those stand"
-SMALL_TURNS, SEVERAL = rad_from_deg(6.29), 3  # poses of which no joint turns by more are hardly in degrees
+SMALL_TURNS, SEVERAL = rad_from_deg(6.29), 3  # at least so many poses without a larger turn are hardly in degrees
 # By which a pose and the joints beside it may differ: rounded; or of a robot that sags and is not calibrated (some mm:
 # ISO 9283 counts its accuracy apart from its repeatability). Then the joints count, with a note.
 SAME_PLACE, NEAR_PLACE, NEAR_TURN = m_from_mm(1.0), m_from_mm(10.0), rad_from_deg(3.0)
-COMMON = 0.5  # of what poses and joints are apart, what other axes leave of it where they are the reason
+COMMON = 0.5  # share of the distance of poses and joints that remains if other axes are the reason
 
 
 def standing(
     machine: MachineTool, pose: FloatArray, joints: FloatArray, places: Sequence[tuple[str, int]]
 ) -> tuple[Stance, list[str]]:
-    """At the joints (n, j) where they are given, else at the pose (n, 6), nan where there is none; what was assumed.
+    """Stance at the joints (n, j) if given, else at the pose (n, 6), nan where not given; and the assumptions made.
 
     `places` are file and line of each. Raises `InputErrors` for rows that cannot be.
     """
@@ -86,7 +86,7 @@ def standing(
 
 
 def _other_axes(position: FloatArray, tip: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Axes (3, 3) and (3,) m in which poses (n, 3) m are the tips that joints say, by least squares; None: in none.
+    """Axes (3, 3) and (3,) m in which poses (n, 3) m are the joints' tips (n, 3), by least squares; None: no such axes.
 
     Kabsch 1976, Acta Crystallographica A32, 922.
     """

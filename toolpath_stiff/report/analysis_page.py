@@ -6,11 +6,8 @@ the templates, in the script's data as JSON without `<`, `>`, `&`; the script wr
 content security policy lets only our own script run.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
@@ -30,15 +27,13 @@ from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
-if TYPE_CHECKING:
-    from toolpath_stiff.cutting.cut import Cut
-
 SCRIPTS = ("stage.js", "viewer.js", "solids.js", "machine.js", "profile.js", "listing.js", "analysis.js")
 
 
 def page(analysis: Analysis, drawn: Mapping[str, bytes]) -> Iterator[str]:
     """The page in pieces of text."""
-    summary, data = analysis.to_dict(), page_data(analysis)
+    summary, rows = analysis.to_dict(), page_rows(analysis)
+    data = _data(analysis, rows)
     machine, load = f"machine {summary['machine']}", f"load {summary['load']}, {summary['force_N']:g} N"
     return render(
         "analysis.html",
@@ -54,7 +49,7 @@ def page(analysis: Analysis, drawn: Mapping[str, bytes]) -> Iterator[str]:
         heading=" · ".join([machine, load, words.headline_text(summary, " · ")]),
         warnings=summary["warnings"],
         note=_thinned_note(data["count"], len(analysis.samples)),
-        tables=_tables(analysis, data["weakest"], page_rows(analysis)),
+        tables=_tables(analysis, data["weakest"], rows),
     )
 
 
@@ -118,14 +113,15 @@ NONE = 65535  # stands for a missing value
 OUT_OF_REACH, PLUNGE = 8, 16  # flags beside the motion
 
 
-def page_data(analysis: Analysis) -> Document:
-    """Data for the page's script: lengths in mm, angles in degrees, stiffness in N/mm.
+def _data(analysis: Analysis, rows: IntArray) -> Document:
+    """What the page's script reads of some samples: lengths in mm, angles in degrees, stiffness in N/mm.
 
     Positions are 16-bit fractions of the path's own box (`frame`: a 1 m box gives 0.015 mm), stiffness and margin of
     their own ranges, NONE where there is none.
     """
-    rows = page_rows(analysis)
     samples, evaluation = analysis.samples.take(rows), analysis.at
+    plunges, limits = stiffness_figures(analysis, analysis.set_aside), scale_limits(analysis)
+    below, above = beyond_scale(analysis, limits)
     points = mm_from_m(samples.position)
     frame = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
     stiffness, stiffness_range = _fractions(n_per_mm_from_n_per_m(evaluation.stiffness[rows]))
@@ -152,20 +148,21 @@ def page_data(analysis: Analysis) -> Document:
         "tools": [[int(i), int(samples.tool[i])] for i in np.flatnonzero(np.diff(samples.tool, prepend=-1))],
         "operations": _operation_starts(analysis, samples.move),
         "weakest": [int(np.searchsorted(rows, row)) for row in analysis.weakest_rows],
-        "scale": _scale(analysis),
-        "plunges": [stiffness_figures(analysis, analysis.set_aside)[f"{end}_N_per_mm"] for end in ("min", "max")],
+        "scale": {"ends": limits, "beyond_low": below, "beyond_high": above},
+        "plunges": [plunges["min_N_per_mm"], plunges["max_N_per_mm"]],
         "mean": stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"],
         "required": None if analysis.required is None else n_per_mm_from_n_per_m(analysis.required),
         "other": None if analysis.on_other is None else _other_curve(analysis.on_other),
-        **({} if analysis.cut is None else {"part": _part(analysis, analysis.cut, rows)}),
+        **({} if analysis.cut is None else {"part": _part(analysis, rows)}),
     }
 
 
-def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
-    """Finished part in machine coordinates, its error in um, and the page's row of the sample that made each place."""
+def _part(analysis: Analysis, rows: IntArray) -> Document:
+    """The finished part in machine coordinates, its error in um, the page's row of the sample that made each place."""
     from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
 
-    quads, error, sample = surface_of(cut, MOST_QUADS)
+    assert analysis.cut is not None
+    quads, error, sample = surface_of(analysis.cut, MOST_QUADS)
     corners = mm_from_m(in_machine(quads.reshape(-1, 3), analysis.origin))
     frame = np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)
     fractions, ends = _fractions(um_from_m(error))
@@ -175,16 +172,9 @@ def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
         "frame": frame.tolist(),
         "error": fractions,
         "error_range": ends,
-        "limit": um_from_m(error_limit(cut)),
+        "limit": um_from_m(error_limit(analysis.cut)),
         "sample": _base64(np.where(sample < 0, -1, nearest).astype("<i4")),
     }
-
-
-def _scale(analysis: Analysis) -> Document:
-    """Ends of the colour scale, N/mm, and whether values lie beyond them."""
-    limits = scale_limits(analysis)
-    below, above = beyond_scale(analysis, limits)
-    return {"ends": limits, "beyond_low": below, "beyond_high": above}
 
 
 def page_rows(analysis: Analysis) -> IntArray:

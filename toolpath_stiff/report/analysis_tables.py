@@ -131,7 +131,7 @@ PART_TITLES = (">cutting mm", ">time", *(f">{title}" for title in (*TITLES, PLUN
 
 
 def tool_table(per_tool: Sequence[Document]) -> ShownTable:
-    """Table with one row a tool."""
+    """Table with one row per tool."""
     rows = [
         (
             f"T{row['tool']}",
@@ -145,7 +145,7 @@ def tool_table(per_tool: Sequence[Document]) -> ShownTable:
 
 
 def operation_table(per_operation: Sequence[Document], most: int = MOST_ROWS) -> ShownTable:
-    """Table with one row an operation."""
+    """Table with one row per operation."""
     digits = len(str(min(len(per_operation), most)))
     rows = [
         (

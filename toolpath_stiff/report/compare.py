@@ -220,7 +220,7 @@ def _with_unit(variable: Variable) -> str:
 
 
 def residuals_csv(comparison: Comparison) -> str:
-    """One row a reading: measured, modelled, deviation, scatter, and every variable tested against the residuals."""
+    """One row per reading: measured, modelled, deviation, scatter, and every variable tested against the residuals."""
     data = comparison.data
     further = [variable for variable in comparison.numbers if variable.name not in ("x", "y", "height", "order")]
     names = {"setup": data.setup, "clamp": data.clamp, "plane": planes(data), "direction": directions(data)}

@@ -22,7 +22,7 @@ def _decimals(name: str) -> int | None:
 
 
 def stations_csv(analysis: Analysis) -> Iterator[bytes]:
-    """`cut.csv` in pieces: one row a sample; an empty cell where there is no such surface."""
+    """`cut.csv` in pieces: one row per sample; an empty cell where there is no such surface."""
     assert analysis.cut is not None
     columns = partial(cut_columns, analysis, analysis.cut)
     return csv_pieces(columns, len(analysis.samples), {name: _decimals(name) for name in columns(slice(0, 1))})

@@ -211,7 +211,7 @@ def _noise(diagnosis: Diagnosis) -> list[Part]:
 
 
 def residuals_csv(diagnosis: Diagnosis) -> str:
-    """One row a reading: measured, modelled as given, with the law refitted, with the best explanation."""
+    """One row per reading: measured, modelled as given, with the law refitted, with the best explanation."""
     measured = n_per_mm_from_n_per_m(diagnosis.data.stiffness)
     steps = (diagnosis.as_given.residual, diagnosis.base.residual, diagnosis.after)
     residuals = dict(zip(("as_given", "law_refitted", "after"), steps, strict=True))

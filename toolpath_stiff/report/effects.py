@@ -39,7 +39,7 @@ def _plain(value: object) -> object:
 
 
 def text(catalogue: EffectCatalogue) -> str:
-    """One line an effect: link, name, title, parameters with their units."""
+    """One line per effect: link, name, title, parameters with their units."""
     rows = []
     for effect in catalogue.effects:
         parameters = ", ".join(f"{p.name} ({p.unit})" if p.unit else p.name for p in effect.parameters)

@@ -159,7 +159,7 @@ def text(diagnosis: Diagnosis) -> str:
 
 
 def _listed(label: str, sentences: Sequence[str]) -> list[str]:
-    """One entry a sentence, with the label before the first."""
+    """One entry per sentence, with the label before the first."""
     texts = filter(None, sentences)
     return [line for place, text in enumerate(texts) for line in labelled("" if place else label, text, LABEL)]
 
@@ -185,7 +185,7 @@ def _error(diagnosis: Diagnosis) -> str:
 
 
 def leading_rows(diagnosis: Diagnosis) -> tuple[list[HypothesisRow], int]:
-    """As given, strut law refitted, pairs and best candidates, and all that stand; number of the others."""
+    """Rows to show: as given, strut law refitted, pairs and best candidates, all that stand; number of the others."""
     every = diagnosis.rows
     shown = [every.as_given, every.refitted, *every.pairs[:MOST_PAIRS], *every.candidates[:MOST_CANDIDATES]]
     shown += [row for row in every.candidates[MOST_CANDIDATES:] if row.standing]

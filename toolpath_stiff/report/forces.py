@@ -41,7 +41,7 @@ def _largest(forces: FloatArray) -> str:
 
 
 def forces_csv(fit: CoefficientFit) -> str:
-    """One row a record."""
+    """One row per record."""
     columns = fit.columns()
     return csv_text(columns, zip(*columns.values(), strict=True))
 

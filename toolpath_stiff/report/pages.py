@@ -141,7 +141,7 @@ def render(
     data
         What they read, as JSON.
     values
-        What the template names.
+        What the template names; `connect`: what the policy says of servers that scripts may ask, where they may.
     """
     script = '\n"use strict";\n(() => {\n' + "".join(asset(file) for file in scripts) + "})();\n" if scripts else ""
     text = _templates().get_template(template).render(
@@ -180,8 +180,9 @@ def _macro(name: str, *values: object) -> Markup:
 
 
 def asset(name: str) -> str:
-    """Text of a file in `assets/`."""
-    return Path(__file__).with_name("assets").joinpath(name).read_text(encoding="utf-8")
+    """Text of a file in `assets/`, or, as "studio/NAME", in those of another room."""
+    room, _, file = name.rpartition("/")
+    return Path(__file__).parents[1].joinpath(room or "report", "assets", file).read_text(encoding="utf-8")
 
 
 def script_hash(script: str) -> str:

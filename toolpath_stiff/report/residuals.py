@@ -1,4 +1,4 @@
-"""`residuals.csv`: one row a reading, its pose and the values it is compared with."""
+"""`residuals.csv`: one row per reading, its pose and the values it is compared with."""
 
 from collections.abc import Iterable, Mapping
 

@@ -53,7 +53,7 @@ def _standing(machine: MachineTool, stance: Stance) -> list[tuple[str, FloatArra
     names, size = [*bodies], 0.2 * float((high - low).max())
     tool, before = bodies["tool"], bodies[names[names.index("tool") - 1]]
     if np.allclose(tool[:, 0], tool[:, 1]):
-        tool[:, 0] += size * (np.array([0.0, 0.0, 1.0]) if stance.rotation is None else stance.rotation[:, :, 2])
+        tool[:, 0] += size * stance.axes[:, :, 2]
         before[:, -1] = tool[:, 0]
     if names[0] in machine.joint_names or "platform" in bodies:
         return [*bodies.items()]

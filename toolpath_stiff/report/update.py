@@ -143,7 +143,7 @@ def support_table(update: Update) -> ShownTable:
 
 
 def residuals_csv(update: Update) -> str:
-    """One row a reading of the tip: measured, modelled as given and after, deviations, also with its point left out."""
+    """One row per tip reading: measured, modelled as given and after, deviations, also with its point left out."""
     data, given, last = update.task.data.of_tip, update.steps[0].residual, update.last
     measured = n_per_mm_from_n_per_m(data.stiffness)
     wild = np.isin(np.flatnonzero(update.task.data.tip), last.fit.scatter.wild)

@@ -22,7 +22,7 @@ LINEARISE = "give --linearise MM to have straight moves within MM of it, or plac
 
 
 def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str], bool]:
-    """Lines that replace a block, and whether the program goes on after it."""
+    """Lines that replace a block, and True if the program continues after it."""
     if not block.words:
         return [text], True
     source, out = controls.source, controls.out

@@ -170,7 +170,7 @@ class EffectCatalogue(Result):
         return {"effects": [self.view.describe_effect(effect) for effect in self.effects]}
 
     def to_frame(self) -> DataFrame:
-        """One row an effect: link of the load path, name, title, equation, source."""
+        """One row per effect: link of the load path, name, title, equation, source."""
         return frame_of(self.to_dict()["effects"])[["link", "name", "title", "equation", "source", "load_dependent"]]
 
     def _short(self) -> str:

@@ -246,7 +246,7 @@ class EffectCheck(Result):
         return {"file": self.file, "machine": self.machine, "passed": self.passed, "effects": rows}
 
     def to_frame(self) -> DataFrame:
-        """One row a check."""
+        """One row per check."""
         trials = self.trials.items()
         return frame_of([{"effect": name, **check} for name, made in trials for check in to_dict(made)])
 

@@ -66,7 +66,7 @@ class Code:
 
 @dataclass(frozen=True)
 class Refused:
-    """An unsupported code that changes the path, or what a force does to it: what it is, and a hint."""
+    """An unsupported code that changes the path, or the effect of a force on it: its meaning, and a hint."""
 
     name: str
     what: str
@@ -106,7 +106,7 @@ def table(rows: Rows, controls: tuple[str, ...], between: str | None = None) -> 
 
 
 def refused(rows: Iterable[tuple[str, str, str, str]], between: str | None = None) -> dict[str, Refused]:
-    """Refused codes by name: names separated by blanks or by `between`, what they are, a hint, the source."""
+    """Refused codes by name: names separated by blanks or by `between`, their meaning, a hint, the source."""
     return {name: Refused(name, what, hint, at) for names, what, hint, at in rows for name in names.split(between)}
 
 

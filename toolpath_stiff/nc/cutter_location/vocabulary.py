@@ -62,7 +62,7 @@ class MajorWord:
 
 
 def listed(meaning: str, written_by: str, source: str, names: str, kind: str = LISTED) -> list[MajorWord]:
-    """Words that change nothing of the path or (DOUBTFUL) change what the machine makes of them."""
+    """Words that do not change the path or (DOUBTFUL) change how the machine follows it."""
 
     def act(state: CutterLocationState, statement: MajorStatement) -> None:
         state.note(meaning, doubtful=kind == DOUBTFUL)

@@ -94,7 +94,7 @@ def figures_of(summary: Document) -> Document:
 
 
 def summary_csv(outcomes: Sequence[ProgramOutcome]) -> str:
-    """`summary.csv`: one row a program, failures too; a missing figure is an empty cell."""
+    """`summary.csv`: one row per program, failures too; a missing figure is an empty cell."""
 
     def cell(name: str, value: object) -> str:
         if not isinstance(value, float):
@@ -113,7 +113,7 @@ def columns_of(outcomes: Sequence[ProgramOutcome]) -> dict[str, list[Any]]:
 
 
 def terminal_summary(outcomes: Sequence[ProgramOutcome]) -> str:
-    """One line a program analyzed, then the failures with reasons; at most 100 columns except for these."""
+    """One line per program analyzed, then the failures with reasons; at most 100 columns except for these."""
     good, failed = good_and_failed(outcomes)
     lines = _program_table(good).lines() if good else []
     plunging = [plain(outcome.name) for outcome in good if outcome.plunges_only]

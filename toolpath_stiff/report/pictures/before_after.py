@@ -67,7 +67,7 @@ def panels(data: Readings) -> tuple[list[str], list[str]]:
 def maps(
     figure: Figure, data: Readings, residual: FloatArray, place: tuple[float, float, float], limit: float = 0.0
 ) -> None:
-    """Residuals seen from above, a row a plane, a column a direction, with their scale.
+    """Residuals seen from above, a row per plane, a column per direction, with their scale.
 
     `place`: left and upper edge of the maps, and the side of one, in inches. `limit`: end of the scale, %; else
     as the residuals need it.

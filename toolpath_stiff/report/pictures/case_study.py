@@ -18,7 +18,7 @@ BESIDE, PANEL = 1.3, 5.9  # inches: the scale of colours, the width of a panel
 
 
 def regions(study: CaseStudy) -> Figure:
-    """The regions, one panel a height, each path coloured by its stiffness, mean (range) beside it."""
+    """The regions, one panel per height, each path coloured by its stiffness, mean (range) beside it."""
     shown_heights = _drawn_heights(study)
     # Without plunges, which would stretch the colour scale; the packaged square has none.
     shown = [a.headline if study.is_own else a.counted for a in study.regions.values()]

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import ReadingNames, Variable, directions
-from toolpath_stiff.comparison.structure import SIGNIFICANT, FoundPattern
+from toolpath_stiff.comparison.structure import SIGNIFICANT
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.colours import DIRECTIONS, MUTED, RED
 from toolpath_stiff.report.pictures.before_after import MAPS, maps, one_to_one, panels
@@ -75,10 +75,10 @@ def variables(comparison: Comparison) -> Figure:
     limits = _limits(comparison)
     panels: list[tuple[float, float, Variable | ReadingNames]] = []
     held_against: list[Variable | ReadingNames] = [*comparison.numbers, *comparison.names]
-    about = [(test, _variables_of(test)) for test in comparison.tests]
+    # What a pattern is about: its own variable, and those of patterns that are the same; or a level of this label.
+    about = [(t, [t.pattern.variable, *(s.partition(": ")[2] for s in t.pattern.same)]) for t in comparison.tests]
     for variable in held_against:
-        own = (variable.name, f"{variable.name} ")  # the variable itself, or a level of this label
-        tests = [test for test, names in about if any(name == own[0] or name.startswith(own[1]) for name in names)]
+        tests = [t for t, names in about if any(f"{name} ".startswith(f"{variable.name} ") for name in names)]
         strongest = max((abs(test.statistic) for test in tests), default=0.0)
         panels.append((-strongest, min((test.p_adjusted for test in tests), default=1.0), variable))
     panels.sort(key=lambda panel: panel[0])
@@ -114,11 +114,6 @@ def _key(figure: Figure, comparison: Comparison) -> None:
     for i, axis in enumerate(reversed(present)):
         left, low = 1.0 - (0.4 + 0.5 * i) / width, 1.0 - 0.4 / height
         figure.text(left, low, f"\u25cf {axis}", color=DIRECTIONS[axis], **style)
-
-
-def _variables_of(test: FoundPattern) -> list[str]:
-    """Variables of a pattern: its own, and those of patterns equal to it."""
-    return [test.pattern.variable, *(same.partition(": ")[2] for same in test.pattern.same)]
 
 
 def _limits(comparison: Comparison) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Picture of a plan: its poses, one panel a height."""
+"""Picture of a plan: its poses, one panel per height."""
 
 from collections.abc import Sequence
 
@@ -36,7 +36,7 @@ ARROW = 0.16  # of the panel's half width, for a tilt of 25 degrees
 
 
 def plan(of: Plan) -> Figure:
-    """The visits, one panel a height."""
+    """The visits, one panel per height."""
     choice, name = of.choice, of.machine.name
     if isinstance(choice, RivalPlan):
         first, second = (rival.name for rival in choice.rivals[:2])
@@ -48,7 +48,7 @@ def plan(of: Plan) -> Figure:
 
 
 def visits_drawn(visits: Visits, chosen: Sequence[int], kinds: Sequence[str], heading: tuple[str, str]) -> Figure:
-    """Visits, one panel a height.
+    """Visits, one panel per height.
 
     Parameters
     ----------
