@@ -183,25 +183,29 @@ def answer_of(diagnosis: tps.Diagnosis) -> Record:
 
 
 def along_path(update: tps.Update | None, path: Mapping[str, Any]) -> Record:
-    """Mean error (%) along the path before and after an update, if there is one, and how often bands hold."""
+    """Mean error (%) along the path before and after an update, if there is one, and how often bands hold.
+
+    Both at the poses that the updated machine reaches; `unreached`: how many it does not.
+    """
     near = np.array(path["measured_near"])
     true = np.column_stack([path[f"{axis}_N_per_mm"] for axis in "xyz"])
-    given = tps.Machine.load("nist")
-    before = stiffness_along(given, path)[0]
-    error = {"before": _percent(before, true, near)}
+    before = stiffness_along(tps.Machine.load("nist"), path)[0]
     if update is None or not update.accepted:
-        return {**error, "after": error["before"], "updated": ""}
+        error = _percent(before, true, near)
+        return {"before": error, "after": error, "updated": ""}
     there, sd = stiffness_along(update.machine.under(setup=DEFAULT_SETUP), path)
-    held = {}
+    reached = np.isfinite(there).all(axis=1)
+    near, true, before, there, sd = (values[reached] for values in (near, true, before, there, sd))
+    held = {"unreached": int((~reached).sum())}
     if np.isfinite(sd).all():
         off = np.abs(true - there) / sd
         weakest = np.argmin(np.where(near[:, None], there, np.inf))
-        held = {
+        held |= {
             "band_near": float((off < 1.96)[near].mean()), "band_weakest": bool(off.ravel()[weakest] < 1.96),
             "band_beyond": float((off < 1.645)[~near].mean()) if not near.all() else None,
         }  # fmt: skip
-    added = [step["name"] for step in update.to_dict()["steps"]]
-    return {**error, "after": _percent(there, true, near), "updated": ", ".join(added), **held}
+    added = ", ".join(step["name"] for step in update.to_dict()["steps"])
+    return {"before": _percent(before, true, near), "after": _percent(there, true, near), "updated": added, **held}
 
 
 def _percent(model: FloatArray, true: FloatArray, rows: FloatArray) -> float:
@@ -229,14 +233,17 @@ def updated(
 
 
 def stiffness_along(machine: tps.Machine, path: Mapping[str, Any]) -> tuple[FloatArray, FloatArray]:
-    """(p, 3) N/mm along X, Y, Z at the poses of a path, and standard deviations there, nan where none is stated."""
+    """(p, 3) N/mm along X, Y, Z at the poses of a path, and standard deviations there, nan where none is stated.
+
+    Stiffness is nan where the machine does not reach.
+    """
     poses = np.column_stack([path[name] for name in ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")])
     words = [" ".join(f"{axis}{value:.6f}" for axis, value in zip("XYZABC", pose, strict=True)) for pose in poses]
     blocks = ["G21 G90 G94", f"G0 {words[0]}", *(f"G1 {word} F1000" for word in words), "M30"]
     program = tps.Program.from_text("\n".join(blocks), name="path.nc")
     columns: list[tuple[FloatArray, FloatArray]] = []
     for axis in "xyz":
-        analysis = tps.analyze(program, machine, origin_mm_deg=(0, 0, 0, 0, 0, 0), step_mm=1000, load=axis)
+        analysis = tps.analyze(program, machine, origin_mm_deg=(0,) * 6, step_mm=1000, load=axis, partial=True)
         line = np.asarray(analysis.to_frame()["line"])
         last = np.searchsorted(line, np.arange(len(poses)) + 3, side="right") - 1
         stiffness = np.asarray(analysis.to_frame()["stiffness_N_per_mm"], dtype=float)

@@ -26,7 +26,7 @@ from types import FrameType
 
 from benchmarks.pages import page_parser, table, tell
 from toolpath_stiff.api.effects import effect_template
-from toolpath_stiff.api.machines import machine_from_linuxcnc, machine_template
+from toolpath_stiff.api.machine_files import machine_from_linuxcnc, machine_template
 from toolpath_stiff.api.poses import read_poses
 from toolpath_stiff.cli.main import main as tps
 from toolpath_stiff.errors import EffectFault, InputError, InputErrors

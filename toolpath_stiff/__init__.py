@@ -1,4 +1,4 @@
-r"""Stiffness of a hexapod (Stewart-platform) mill along a real NC program.
+r"""Stiffness of a machine tool along an NC program: hexapods, mills, deltas, milling robots.
 
 Everything that the commands of `tps` do is one function here, which returns one result. Lengths are in mm, angles in
 degrees, forces in N, stiffnesses in N/mm; the names of arguments and columns say so.

@@ -15,12 +15,12 @@ from toolpath_stiff.api.effects import check_effects as check_effects
 from toolpath_stiff.api.effects import effect_template as effect_template
 from toolpath_stiff.api.effects import effects as effects
 from toolpath_stiff.api.forces import forces as forces
+from toolpath_stiff.api.machine_files import machine_from_dh as machine_from_dh
+from toolpath_stiff.api.machine_files import machine_from_freecad as machine_from_freecad
+from toolpath_stiff.api.machine_files import machine_from_linuxcnc as machine_from_linuxcnc
+from toolpath_stiff.api.machine_files import machine_from_urdf as machine_from_urdf
+from toolpath_stiff.api.machine_files import machine_template as machine_template
 from toolpath_stiff.api.machines import Machine as Machine
-from toolpath_stiff.api.machines import machine_from_dh as machine_from_dh
-from toolpath_stiff.api.machines import machine_from_freecad as machine_from_freecad
-from toolpath_stiff.api.machines import machine_from_linuxcnc as machine_from_linuxcnc
-from toolpath_stiff.api.machines import machine_from_urdf as machine_from_urdf
-from toolpath_stiff.api.machines import machine_template as machine_template
 from toolpath_stiff.api.many import ManyAnalyses as ManyAnalyses
 from toolpath_stiff.api.many import analyze_many as analyze_many
 from toolpath_stiff.api.measurements import Measurements as Measurements

@@ -1,4 +1,4 @@
-"""Types of arrays, each once. They say the kind of number; the shapes stand in the docstrings."""
+"""Array types, each defined once by its kind of number; shapes are given in the docstrings."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
@@ -15,7 +15,7 @@ AnyArray = NDArray[Any]
 
 
 def product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """(..., m, n) matrix product of (..., m, j) and (..., j, n), the same to the last bit on every processor.
+    """(..., m, n) matrix product of (..., m, j) and (..., j, n), identical to the last bit on every processor.
 
     BLAS adds in another order on another one, and a search amplifies the last bit. For a small j it costs little.
     """
@@ -26,19 +26,19 @@ def product(left: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def norms(vectors: FloatArray) -> FloatArray:
-    """(n,) lengths of vectors (n, 3), to the last bit as numpy's norm has them, which takes five times as long."""
+    """(n,) lengths of vectors (n, 3), equal to those of numpy's norm to the last bit and five times as fast."""
     x, y, z = vectors.T
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
 def numbered(counts: IntArray) -> tuple[IntArray, IntArray]:
-    """(k,) each row as many times as it counts, and (k,) 0, 1 ... within it."""
+    """(k,) row numbers, each repeated as often as its count says, and (k,) positions 0, 1 ... within each row."""
     row = np.repeat(np.arange(len(counts)), counts)
     return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def portions(counts: IntArray, most: int) -> Iterator[slice]:
-    """Slices of rows with so many entries each: at least a row, and no more entries than `most`."""
+    """Slices of rows whose `counts` add up to at most `most`; each slice has at least one row."""
     ends = np.cumsum(counts)
     first, before = 0, 0
     while first < len(ends):
@@ -49,10 +49,10 @@ def portions(counts: IntArray, most: int) -> Iterator[slice]:
 
 @dataclass(frozen=True)
 class ArrayColumns:
-    """Arrays with a row each for the same things; a field that is no array holds for all of them."""
+    """Columns of arrays with one row for each thing described; a field that is not an array holds for all rows."""
 
     def take(self, rows: IntArray | BoolArray | slice) -> Self:
-        """Some of the rows."""
+        """The chosen rows of every column."""
         return replace(self, **{name: values[rows] for name, values in self._arrays().items()})
 
     def _arrays(self) -> dict[str, AnyArray]:
@@ -61,6 +61,6 @@ class ArrayColumns:
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """The rows of one after those of the other."""
+        """Rows of all parts, one part after the other."""
         names = parts[0]._arrays()
         return replace(parts[0], **{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})

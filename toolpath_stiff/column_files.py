@@ -24,11 +24,11 @@ Cells = NDArray[np.uint8]
 BLOCK = 8_192  # rows of CSV: their bytes fit into a processor's cache
 ROW_GROUP = 131_072  # rows of Parquet
 LARGEST = 2.0**53  # beyond, a double does not hold every whole number
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet takes for a formula when a cell begins with it
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a cell that begins with one of these is a formula to a spreadsheet
 
 
 def csv_text(heading: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
-    """A short table with words in it as CSV: None is an empty cell, quotes stand where they are needed.
+    """A short table with words as CSV text: None is an empty cell, and cells are quoted where needed.
 
     A word that a spreadsheet would run as a formula ("=cmd()", a point called "-A1") gets an apostrophe before it,
     which spreadsheets take for "this is text"; numbers, with their signs, stay as they are. OWASP, "CSV Injection".
@@ -85,7 +85,7 @@ def csv_rows(columns: Columns, decimals: Decimals) -> str:
 
 
 def check_parquet() -> None:
-    """Raise `InputError` where Parquet cannot be written, for want of pyarrow; does not import it."""
+    """Raise `InputError` if Parquet cannot be written because pyarrow is missing; does not import it."""
     if find_spec("pyarrow") is None:
         raise InputError("Parquet needs the package pyarrow", hint="run `pip install 'toolpath-stiff[parquet]'`")
 
@@ -108,7 +108,7 @@ def parquet_pieces(columns_of: Callable[[slice], Columns], rows: int) -> Iterato
 
 
 def _arrow(column: AnyArray) -> Any:
-    """A column of a Parquet file; words, which cost a microsecond each to convert, once each."""
+    """A column of a Parquet file; each distinct word, which costs a microsecond to convert, is converted once."""
     import pyarrow as pa
 
     if column.dtype.kind != "U":
@@ -123,7 +123,7 @@ def _blocks(rows: int, size: int) -> Iterator[slice]:
 
 
 def _by_digits(columns: Columns, decimals: Decimals) -> bytes | None:
-    """Rows as `csv_rows` has them; None where a number is infinite or too large, or a word is not plain ASCII."""
+    """Rows as `csv_rows` gives them; None if a number is infinite or too large, or a word is not plain ASCII."""
     cells = [_cell(np.asarray(column), decimals[name]) for name, column in columns.items()]
     known = [cell for cell in cells if cell is not None]
     if len(known) < len(cells):
@@ -146,7 +146,7 @@ def _cell(column: AnyArray, digits: int | None) -> Cells | None:
         return letters[:, :longest].astype(np.uint8) if letters.max() < 128 else None
     if digits is None and column.dtype.kind not in "iu":
         return None
-    # As numpy's round counts them, so that both ways print the same digits.
+    # Rounded as numpy's round does, so that both ways print the same digits.
     units = column if digits is None else np.rint(column * 10.0**digits)
     missing = np.isnan(units) if np.isnan(units.min()) else None
     if missing is not None:
@@ -164,7 +164,7 @@ def _number(units: AnyArray, digits: int, low: int, high: int) -> Cells:
         text = f"{'-' * (low < 0)}{abs(low) // 10**digits}" + (f".{abs(low) % 10**digits:0{digits}d}" if digits else "")
         return np.broadcast_to(np.frombuffer(text.encode(), dtype=np.uint8), (len(units), len(text)))
     largest = max(-low, high)
-    # Half as wide numbers are divided four times as fast.
+    # Numbers of half the width divide four times as fast.
     size = np.abs(units).astype(np.uint32 if largest < 2**32 else np.int64)
     least, width = max(low, -high, 0), max(len(str(largest)), digits + 1)
     fours = np.empty((len(units), -(-width // 4)), dtype=np.uint32)

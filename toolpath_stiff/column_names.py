@@ -1,4 +1,4 @@
-"""Names of columns: however a heading is spelled, which column it means, and in which unit."""
+"""Names of columns: which column and which unit a heading means, however it is spelled."""
 
 import re
 import unicodedata
@@ -8,7 +8,7 @@ from typing import Annotated
 
 from toolpath_stiff.options import Option
 
-# What --columns says, or column -> theirs; of every function that reads measurements or raw records.
+# The text of --columns, or column -> the file's heading; an argument of every reader of measurements or raw records.
 Mapped = Annotated[
     str | Mapping[str, str] | None,
     Option(
@@ -35,7 +35,7 @@ SIZES: tuple[Mapping[str, str], ...] = (
 
 
 def heading_key(name: str) -> str:
-    """A heading without case, brackets, spaces and signs: `Stiffness [N/mm]` and `stiffness_N_per_mm` are one."""
+    """A heading without case, brackets, spaces and signs, so `Stiffness [N/mm]` equals `stiffness_N_per_mm`."""
     text = unicodedata.normalize("NFKC", name).casefold().replace("μ", "u").replace("°", "deg").replace("/", " per ")
     return "_".join(re.findall(r"[^\W_]+", text))
 
@@ -44,19 +44,19 @@ UNITS = {heading_key(unit): unit for sizes in SIZES for unit in sizes} | {"inch"
 
 
 def parted(name: str) -> tuple[str, str]:
-    """Quantity of a heading, as a key, and its unit as it is written; "" where it has none."""
+    """Quantity (as a key) and unit (as written) of a heading; the unit is "" if it has none."""
     key = heading_key(name)
     unit = max((unit for unit in UNITS if key.endswith(f"_{unit}")), key=len, default="")
     return (key[: -len(unit) - 1], UNITS[unit]) if unit else (key, "")
 
 
 def same_quantity(unit: str, other: str) -> bool:
-    """Whether numbers in one unit can be converted to the other."""
+    """True if numbers in one unit can be converted to the other."""
     return any(unit in sizes and other in sizes for sizes in SIZES)
 
 
 def converted(cell: str, unit: str, wanted: str) -> str:
-    """A number in another unit, without a rounding where the ratio is decimal; other cells as they are."""
+    """A cell's number converted to another unit, exactly where the ratio is decimal; other cells unchanged."""
     sizes = next(sizes for sizes in SIZES if unit in sizes)
     try:
         return str(Decimal(cell) * Decimal(sizes[unit]) / Decimal(sizes[wanted]))
@@ -65,7 +65,7 @@ def converted(cell: str, unit: str, wanted: str) -> str:
 
 
 def columns_option(entries: Sequence[str]) -> str:
-    """A mapping as an option to paste."""
+    """A mapping of columns as a command-line option to paste."""
     text = ", ".join(entries)
     quote = "'" if '"' in text else '"'
     return f"--columns {quote}{text}{quote} (columns=)"

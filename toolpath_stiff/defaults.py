@@ -1,4 +1,4 @@
-"""What holds unless the user says otherwise, each once, with its unit; and constants that several rooms share."""
+"""Defaults that hold unless the user says otherwise, with units, and constants shared by several rooms."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""Results as plain data: dataclasses as JSON has them; numbers as they are written."""
+"""Results as plain data: dataclasses in the form that JSON takes, numbers in the form that is written."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ Document = Mapping[str, Any]  # what a JSON file holds, or a part of it, by the 
 
 
 def to_dict(value: Any) -> Any:
-    """Plain data: dataclasses as dictionaries, their fields in order; None is kept, numpy becomes Python."""
+    """Plain data of a result: dataclasses become dictionaries, fields in order; numpy becomes Python; None is kept."""
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: to_dict(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, Mapping):
@@ -25,13 +25,13 @@ def to_dict(value: Any) -> Any:
 
 
 def records(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Rows of columns (arrays or lists of one length), each by their names."""
+    """Rows of columns (arrays or lists of equal length), each a dictionary by column name."""
     values = (to_dict(column) for column in columns.values())
     return [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
 
 
 def without_nan(value: Any) -> Any:
-    """The same with None for every float that JSON cannot hold."""
+    """Plain data with None in place of every float that JSON cannot hold."""
     if isinstance(value, dict):
         return {key: without_nan(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
@@ -40,7 +40,7 @@ def without_nan(value: Any) -> Any:
 
 
 def certain(value: Any) -> Any:
-    """The same, its floats rounded to `CERTAIN` digits and `DECIMALS` decimals, in percent, mm, N, degrees."""
+    """Plain data with floats rounded to `CERTAIN` digits and `DECIMALS` decimals, in percent, mm, N, degrees."""
     if isinstance(value, float):
         return float(f"{round(value, DECIMALS):.{CERTAIN}g}") + 0.0
     if isinstance(value, dict):
@@ -51,7 +51,7 @@ def certain(value: Any) -> Any:
 
 
 def number(value: float | None, digits: int = 0) -> str:
-    """A figure with thin groups of thousands ("45 123"), "-" where there is none."""
+    """A figure with thin spaces between thousands ("45 123"); "-" if there is none."""
     if value is None or not math.isfinite(value):
         return "-"
     text = f"{value:,.{digits}f}".replace(",", " ")
@@ -59,5 +59,5 @@ def number(value: float | None, digits: int = 0) -> str:
 
 
 def json_number(value: float, digits: int = DIGITS) -> float | None:
-    """A float of some significant digits; None for what JSON cannot hold."""
+    """A float rounded to significant digits; None if JSON cannot hold it."""
     return float(f"{value:.{digits}g}") if math.isfinite(value) else None

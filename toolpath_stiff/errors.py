@@ -1,4 +1,4 @@
-"""Errors that a user can act on: where it is, what was found, what was expected, what to do.
+"""Errors that a user can act on: where the problem is, what was found, what was expected, what to do.
 
 A tree, so that a caller can catch as much as it can handle::
 
@@ -23,15 +23,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-# What steers a terminal or turns the order of letters: the control characters but tab and line feed, and Unicode's
-# bidirectional ones (standard annex 9); half of a surrogate pair, which no encoding has.
+# Characters that steer a terminal or reverse the order of letters: all control characters but tab and line feed, and
+# Unicode's bidirectional ones (standard annex 9); halves of surrogate pairs, which no encoding has.
 STEERING = (*range(9), *range(11, 32), *range(127, 160), 0x61C, 0x200E, 0x200F, *range(0x202A, 0x202F),
             *range(0x2066, 0x206A), *range(0xD800, 0xE000))  # fmt: skip
 _HARMLESS = dict.fromkeys(STEERING, "?")
 
 
 def harmless(text: str) -> str:
-    """Text as it may go to a terminal."""
+    """Text that is safe to print on a terminal."""
     return text.translate(_HARMLESS)
 
 
@@ -97,7 +97,7 @@ class InputError(TpsError):
         super().__init__(f"{text}. {hint[0].upper()}{hint[1:]}" if hint else text)
 
     def in_line(self, file: str, line: int) -> InputError:
-        """The same error, of a line of a file.
+        """The same error, located at a line of a file.
 
         Examples
         --------

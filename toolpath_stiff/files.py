@@ -1,4 +1,4 @@
-"""Files that are whole or not there: written beside their place and flushed to the disk, then renamed."""
+"""Files that are either complete or absent: written beside their place, flushed to the disk, then renamed."""
 
 import errno
 import filecmp
@@ -19,7 +19,7 @@ Content = str | bytes | Iterable[str | bytes]
 
 @contextmanager
 def writing_errors(path: str | Path, what: str = "write") -> Iterator[None]:
-    """An error of the system becomes an `InputError`."""
+    """Turn an error of the operating system into an `InputError`."""
     try:
         yield
     except OSError as error:
@@ -27,7 +27,7 @@ def writing_errors(path: str | Path, what: str = "write") -> Iterator[None]:
 
 
 def write_atomically(path: str | Path, content: Content, keep: bool = False) -> Path:
-    """Write text (UTF-8, line feeds as they are), bytes or pieces of text; folders are made as needed.
+    """Write text (UTF-8, line feeds unchanged), bytes or pieces of text; missing folders are made.
 
     A symbolic link is followed. A device or pipe (`/dev/stdout`) is written to, never replaced by a file. With `keep`
     an old file of other content is kept beside the new one, by its `old_name`.
@@ -59,7 +59,7 @@ def write_atomically(path: str | Path, content: Content, keep: bool = False) -> 
 
 
 def write_new(path: Path, content: Content) -> None:
-    """Write a new file where nobody else looks, and flush it to the disk. Raises `OSError`."""
+    """Write a new file in a place that no other process reads, and flush it to the disk. Raises `OSError`."""
     with path.open("xb", buffering=BLOCK) as stream:
         stream.writelines(encoded(content))
         stream.flush()
@@ -73,7 +73,7 @@ def encoded(content: Content) -> Iterator[bytes]:
 
 
 def is_file(path: str | Path) -> bool:
-    """Whether there is such a file; False as well for a name that none can have (too long, a circle of links)."""
+    """True if the path is a file; False also for a name that cannot exist (too long, a loop of links)."""
     try:
         return Path(path).is_file()
     except OSError:
@@ -81,7 +81,7 @@ def is_file(path: str | Path) -> bool:
 
 
 def read_bytes(path: str | Path, what: str, most: int = LARGEST_BYTES) -> bytes:
-    """Content of a file; `what` names it in messages, `most` are the bytes that it may have. Raises `InputError`."""
+    """Content of a file of at most `most` bytes; `what` names it in messages. Raises `InputError`."""
     try:
         check_regular(Path(path), pipes=True)
         with Path(path).open("rb") as stream:
@@ -94,7 +94,7 @@ def read_bytes(path: str | Path, what: str, most: int = LARGEST_BYTES) -> bytes:
 
 
 def check_regular(path: Path, pipes: bool = False) -> None:
-    """Refuse what reading may never come to the end of: a device, or a named pipe that waits for its writer.
+    """Refuse files that may never end when read: a device, or a named pipe waiting for its writer.
 
     With `pipes`, those of the shell (`/dev/stdin`, `<(command)`) pass, as their writer is there. A folder passes: the
     system's own error says that it is one. Raises `OSError`.
@@ -106,7 +106,7 @@ def check_regular(path: Path, pipes: bool = False) -> None:
 
 
 def decoded(content: bytes) -> str:
-    """Text of bytes: UTF-16 with its byte-order mark, UTF-8 or, failing that, Windows' Latin-1."""
+    """Text of bytes: UTF-16 if they have its byte-order mark, otherwise UTF-8 or, failing that, Windows' Latin-1."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content.decode("utf-16", "replace")
     try:
@@ -116,12 +116,12 @@ def decoded(content: bytes) -> str:
 
 
 def read_text(path: str | Path, what: str) -> str:
-    """Text of a file in any of these encodings; `what` names it in messages. Raises `InputError`."""
+    """Text of a file in any encoding that `decoded` knows; `what` names it in messages. Raises `InputError`."""
     return decoded(read_bytes(path, what))
 
 
 def check_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path], replace: bool = False) -> list[Path]:
-    """The outputs that are an input as well: the same file, by another name or through a link.
+    """Outputs that are also inputs: the same file, under whatever name or link.
 
     Raises `InputError` for the first of them unless `replace`.
     """

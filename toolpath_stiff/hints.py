@@ -19,7 +19,7 @@ def command_line(*words: object) -> str:
 
 
 def hint(sentence: str, line: str) -> str:
-    """A sentence and the command that it asks for."""
+    """A sentence followed by the command that it asks for."""
     return f"{sentence}:\n{line}"
 
 
@@ -30,7 +30,7 @@ def parted(text: str) -> tuple[str, str]:
 
 
 def options(**given: object) -> list[str]:
-    """`--name value` of everything that is given: not None, not False; lists once an entry, True without a value."""
+    """`--name value` of every argument given (neither None nor False); lists repeat it, True has no value."""
     line: list[str] = []
     for name, value in given.items():
         option = "--" + name.replace("_", "-")
@@ -41,7 +41,7 @@ def options(**given: object) -> list[str]:
 
 @dataclass(frozen=True)
 class Asked:
-    """What a command on measurements was asked, for the commands that go on from there.
+    """Data and options that a command on measurements was run with, for the commands suggested next.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Asked:
     effects
         Files with the user's own effects.
     columns
-        Which columns the files call otherwise, as --columns has it.
+        Columns that the files name differently, as --columns has it.
     stated
         What is stated of the noise, as words of the command line.
     """
@@ -64,7 +64,7 @@ class Asked:
     stated: tuple[str, ...] = ()
 
     def command(self, name: str, *further: str, machine: str | None = None, effects: Sequence[str] = ()) -> str:
-        """`tps name` on the same data with the same options; `further` words of that command come after the machine.
+        """`tps name` on the same data with the same options; `further` words of that command follow the machine.
 
         `name` may be two words, "effects draft". `machine` is another one, `effects` are further files.
         """
@@ -80,13 +80,13 @@ class Asked:
 
     @property
     def updated_machine(self) -> str:
-        """A name for the machine file that an update of this one writes: beside it, and never its own."""
+        """File name for the machine that an update writes: beside the present machine file, never the same."""
         path = PurePath(self.machine)
         stem = path.stem if path.suffix == ".toml" else path.name
         return str(path.with_name(f"{stem}-updated.toml"))
 
     def new_effect(self, stem: str = "my_effect", ending: str = ".py") -> str:
-        """A name for a file with an effect of the user's own that is not among the given ones."""
+        """File name for a new effect of the user's own, not among those given."""
         taken = {PurePath(file).name for file in self.effects}
         names = (f"{stem}{f'_{number}' if number > 1 else ''}{ending}" for number in count(1))
         return next(name for name in names if name not in taken)

@@ -1,4 +1,4 @@
-"""Options, said once: the annotation and the docstring of a public function's argument.
+"""Options, each defined once: by the annotation and the docstring of a public function's argument.
 
 From there come the option of the commands, its help, the check for whoever calls from Python, and the sentence that
 says what is wrong, the same for both.
@@ -21,7 +21,7 @@ SWITCHES = re.compile(r"[1-9](?:,[1-9])*")  # of block delete
 
 @dataclass(frozen=True)
 class Option:
-    """What commands call an argument, and the values that it may have.
+    """Name of an argument on the command line, and the values it may have.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Option:
 
     @property
     def expected(self) -> str:
-        """The numbers that it may be, in words."""
+        """Numbers allowed, in words."""
         bounds = {"more than": self.above, "at least": self.at_least, "less than": self.below, "at most": self.at_most}
         words = [f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None]
         return f"{' and '.join(words) or 'a finite number'} {self.unit}".strip()
@@ -80,7 +80,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument of a function that is an option of commands; `kind` is bool, int, float or, of all else, str."""
+    """An argument of a function that is an option of commands; `kind` is bool, int, float or, for all else, str."""
 
     name: str
     option: Option
@@ -90,7 +90,7 @@ class Argument:
     required: bool = False
 
     def value(self, word: str) -> Any:
-        """The value of a word of the command line. Raises `InputError`."""
+        """Value of a command-line word. Raises `InputError`."""
         try:
             value = self.option.read(word) if self.option.read else word
         except ValueError as error:
@@ -99,7 +99,7 @@ class Argument:
         return value if number is None else number
 
     def check(self, value: Any) -> float | None:
-        """A number as one of its kind; None for what is none. Raises `InputError` for what it may not be."""
+        """A number converted to the argument's kind; None for other values. Raises `InputError` if not allowed."""
         if self.option.choices and value not in self.option.choices:
             raise self._wrong(value, f"one of {', '.join(self.option.choices)}")
         if self.kind not in (int, float):
@@ -112,7 +112,7 @@ class Argument:
         return int(number) if self.kind is int else number
 
     def words(self, value: Any) -> list[str]:
-        """A value as the command takes it: several words of an option that is given several times."""
+        """A value as command-line words: several for an option that may be given several times."""
         if isinstance(value, Mapping):
             value = [f"{key}={part:.10g}" for key, part in value.items()]
         parts = value if isinstance(value, list | tuple | frozenset | set) else [value]
@@ -125,7 +125,7 @@ class Argument:
 
 
 def number_in(value: Any) -> float:
-    """A number; nan for what is none, as `1_000`, which Python reads."""
+    """Number that a text holds; nan if none, or if only Python would read it (`1_000`)."""
     try:
         return math.nan if "_" in str(value) else float(value)
     except (TypeError, ValueError, OverflowError):
@@ -153,7 +153,7 @@ def arguments_of(function: Callable[..., Any]) -> dict[str, Argument]:
 
 
 def words_of(function: Callable[..., Any], given: Mapping[str, Any]) -> list[str]:
-    """Arguments of a function as the command takes them; those that are the function's own values go without saying.
+    """Arguments of a function as command-line words; those equal to the function's defaults are left out.
 
     Examples
     --------
@@ -170,14 +170,14 @@ def words_of(function: Callable[..., Any], given: Mapping[str, Any]) -> list[str
 
 
 def parameter_texts(function: Callable[..., Any]) -> dict[str, str]:
-    """What a docstring says of each argument."""
+    """Description of each argument in a docstring."""
     section = (inspect.getdoc(function) or "").partition(PARAMETERS)[2].partition("\n\n")[0]
     entries = re.findall(r"^(\S.*)\n((?: .*\n?)+)", section, re.M)
     return {name: " ".join(text.split()) for names, text in entries for name in names.split(", ")}
 
 
 def finite_number(text: str) -> float:
-    """A finite number in plain digits."""
+    """A finite number, in plain digits."""
     if "," in text:
         raise ValueError("numbers with decimal points, several with spaces between them: 0 0 900")
     number = number_in(text)
@@ -187,12 +187,12 @@ def finite_number(text: str) -> float:
 
 
 def numbers(text: str) -> tuple[float, ...]:
-    """`1,2,3`."""
+    """Numbers of `1,2,3`."""
     return tuple(map(finite_number, text.split(",")))
 
 
 def low_high(text: str) -> tuple[float, float]:
-    """`LO:HI`, or one number for both ends."""
+    """Low and high end of `LO:HI`; a single number is both."""
     parts = text.split(":")
     if len(parts) not in (1, 2):
         raise ValueError("LO:HI or one number")
@@ -203,7 +203,7 @@ def low_high(text: str) -> tuple[float, float]:
 
 
 def switches(text: str) -> frozenset[int] | bool:
-    """Block-delete switches, `2,3`; nothing, what the option means alone."""
+    """Block-delete switches of `2,3`; for an empty text, the meaning of the option alone."""
     if not text:
         return True
     if not SWITCHES.fullmatch(text):
@@ -212,12 +212,12 @@ def switches(text: str) -> frozenset[int] | bool:
 
 
 def names(text: str) -> tuple[str, ...]:
-    """`first,second`."""
+    """Names of `first,second`."""
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
 def checked(function: F) -> F:
-    """The function; what it is given is held against its options first."""
+    """Decorate a function so that its arguments are checked against its options first."""
     positions = list(inspect.signature(function).parameters)
 
     @wraps(function)

@@ -59,18 +59,18 @@ class ProcessPool(Executor):
     def submit(
         self, fn: Callable[Arguments, Answer], /, *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> Future[Answer]:
-        """The future of a call: of a function at the top of a module, with arguments that can be pickled."""
+        """Future of a call; the function must be at the top level of a module, and its arguments picklable."""
         call: Future[Answer] = self._pool.schedule(_answer, (fn, args, kwargs))
         self._calls.append(call)
         return call
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Take no more calls, let those that are left be answered (or cancel them), then end the processes."""
+        """Take no more calls, let the remaining ones finish (or cancel them), then end the processes."""
         self._pool.close()
         self._leave([call for call in self._calls if cancel_futures and not call.running()])
 
     def stop(self) -> None:
-        """End the processes at once, whatever they do; calls that are left are cancelled."""
+        """End the processes at once, whatever they are doing; remaining calls are cancelled."""
         self._pool.stop()
         self._leave(self._calls)
 
@@ -89,7 +89,7 @@ class ProcessPool(Executor):
 
 
 def death(error: pebble.ProcessExpired) -> str:
-    """How the process of a call ended, for a message."""
+    """Reason why the process of a call ended, for a message."""
     if error.exitcode >= 0:
         return f"its process ended by itself, exit code {error.exitcode}"
     name = signal.Signals(-error.exitcode).name
@@ -97,7 +97,7 @@ def death(error: pebble.ProcessExpired) -> str:
 
 
 def _prepare() -> None:
-    """Of a new process: which signals end it, and that it ends with the first one."""
+    """Set up a new process: the signals that end it, and that it ends with the process that started it."""
     # Ctrl-C reaches all processes of a terminal, and so does its end; the first one tells the others, once.
     for ignored in BLOCKED[:-1]:  # all but SIGTERM
         signal.signal(ignored, signal.SIG_IGN)
@@ -108,7 +108,7 @@ def _prepare() -> None:
 
 
 def _answer(function: Callable[..., Answer], arguments: Sequence[Any], keywords: Mapping[str, Any]) -> Answer:
-    """What a call gives, or raises where that can travel; a call that wants to end the process does."""
+    """Result of a call, or its exception if that can be pickled; a call that exits ends its process."""
     try:
         return function(*arguments, **keywords)
     except (SystemExit, KeyboardInterrupt) as end:
@@ -122,18 +122,18 @@ def _answer(function: Callable[..., Answer], arguments: Sequence[Any], keywords:
 
 
 def _end_with_the_first() -> None:
-    """Stop when the process that hands out the calls is gone, however it ended: nobody wants the answer."""
+    """Stop when the process that hands out the calls is gone, however it ended: nobody wants the result."""
     first = parent_process()
     if first is not None:
         connection.wait([first.sentinel])
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(LEAVE_SECONDS)
-        os._exit(1)  # a long call in a library sees no signal
+        os._exit(1)  # a long call in a library would not notice a signal
 
 
 @contextmanager
 def _signals_blocked() -> Iterator[None]:
-    """Signals wait: a process that is started takes that over, until it has its own handlers."""
+    """Hold signals back, also in a process started meanwhile, until that has installed its own handlers."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -1,4 +1,4 @@
-"""What every result can do: print itself, show itself in a notebook, become a table, a document, a picture, files."""
+"""Methods of every result: print, show in a notebook, and convert to table, document, picture, files."""
 
 import html
 import json
@@ -21,7 +21,7 @@ else:  # both libraries are loaded when the first table or picture is asked for
 
 
 def frame_of(rows: Any, columns: list[str] | None = None) -> DataFrame:
-    """Rows or columns as a DataFrame: pandas is loaded when the first one is asked for."""
+    """Rows or columns as a DataFrame; pandas is loaded with the first one."""
     import pandas as pd
 
     return pd.DataFrame(rows, columns=columns)
@@ -32,12 +32,12 @@ Progress = Callable[[str, int, int], None]
 
 
 def _door() -> Any:
-    """The door to views and pictures, which stands far above this module."""
+    """Entry to views and pictures, which are far above this module in the layers."""
     return import_module("toolpath_stiff.report.folder")
 
 
 class Result(ABC):
-    """A result: what a function of this package found.
+    """Result of a function of this package.
 
     `print(result)` shows what the command line shows. Figures are in the shop's units, which every name carries.
     """
@@ -47,7 +47,7 @@ class Result(ABC):
 
     @property
     def view(self) -> Any:
-        """The module that makes text, figures and files of it, imported when first asked for.
+        """Module that makes text, figures and files of the result, imported on first use.
 
         Examples
         --------
@@ -74,13 +74,13 @@ class Result(ABC):
 
     @abstractmethod
     def _short(self) -> str:
-        """The result in some words, for `repr`."""
+        """The result in a few words, for `repr`."""
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self._short()}>"
 
     def _repr_html_(self) -> str:
-        """For notebooks."""
+        """HTML shown by notebooks."""
         return f"<pre>{html.escape(str(self))}</pre>"
 
     def to_json(self) -> str:
@@ -127,7 +127,7 @@ class Result(ABC):
         return figure
 
     def _picture(self, **look: Any) -> bytes:
-        """The same as a PNG."""
+        """A picture of the result as PNG."""
         return bytes(_door().picture(self, **look))
 
     def _cannot(self, what: str, hint: str) -> InputError:
@@ -140,7 +140,7 @@ class FolderResult(Result):
     inputs: tuple[str, ...] = ()  # files that were read, which must not be written over
 
     def files(self, *, plots: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """Name -> content, or what makes it, of every file that `save` writes; pictures and pages with `plots`.
+        """Name -> content (or a function that makes it) of each file that `save` writes; pictures, pages with `plots`.
 
         Examples
         --------
@@ -153,7 +153,7 @@ class FolderResult(Result):
     def _files(
         self, plots: bool, omit: Collection[str] = (), **look: Any
     ) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of the result but for `omit`."""
+        """Files of the result, except `omit`."""
         return dict(_door().files(self, plots=plots, omit=omit, **look))
 
     def save(
@@ -257,17 +257,17 @@ def json_text(document: Any) -> str:
 
 
 def counter(progress: Progress | None, text: str) -> Callable[[int, int], None] | None:
-    """What a loop calls with (done, in all), from what the caller gave."""
+    """Callback for a loop, called with (done, total), that reports to the caller's `progress`."""
     return None if progress is None else lambda done, total: progress(text, done, total)
 
 
 def teller(progress: Progress | None) -> Callable[[str], None]:
-    """What work of unknown length calls with what it is doing, from what the caller gave."""
+    """Callback for work of unknown length, called with what it is doing, that reports to the caller's `progress`."""
     return (lambda text: None) if progress is None else lambda text: progress(text, 0, 0)
 
 
 def one_of(name: str, value: str, known: Sequence[str]) -> str:
-    """The value, if it is known. Raises `InputError`."""
+    """The value, if it is a known one. Raises `InputError`."""
     if value not in known:
         raise InputError(f"{name} {value!r}", expected=f"one of {', '.join(known)}")
     return value

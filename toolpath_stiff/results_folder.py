@@ -1,4 +1,4 @@
-"""A folder of results: the files of one run, and nothing of another.
+"""A results folder: it holds the files of one run and of no other.
 
 A small manifest (`.tps-files.json`) names the files that a run wrote, with their checksums. The next run clears
 those, and nothing else: a file that the tool did not write, or that was changed since, is somebody's own. It stays
@@ -35,7 +35,7 @@ REPLACE = f"{ELSEWHERE}, or say --replace (replace=True): the old file is kept b
 
 @dataclass(frozen=True)
 class Rules:
-    """What a run must not replace or clear beside what is not the tool's.
+    """Files that a run must not replace or clear, besides those that the tool did not write.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ def write_folder(
 
 @contextmanager
 def _stage(folder: Path) -> Iterator[Path]:
-    """An empty folder within, of one run at a time: the next one waits, where the file system has locks."""
+    """An empty folder inside, held by one run at a time: the next one waits, if the file system has locks."""
     folder.mkdir(parents=True, exist_ok=True)
     lock = os.open(folder, os.O_RDONLY) if fcntl else -1
     stage = folder / STAGE
@@ -139,7 +139,7 @@ def _stage(folder: Path) -> Iterator[Path]:
 
 
 def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules()) -> list[Path]:
-    """What `write_folder` would refuse, before anything is computed; the files that it will keep with `rules.replace`.
+    """Check before computing that `write_folder` will not refuse; returns the files that `rules.replace` will keep.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def check_folder(folder: str | Path, names: Iterable[str], rules: Rules = Rules(
 
 
 def _objection(file: Path, sums: Mapping[str, str], rules: Rules) -> str:
-    """Why a file that is there must not be replaced; nothing where it may."""
+    """Reason why an existing file must not be replaced; "" if it may be."""
     if rules.fresh:
         return "is there already"
     if file.name not in sums:
@@ -170,7 +170,7 @@ def _objection(file: Path, sums: Mapping[str, str], rules: Rules) -> str:
 
 
 def read_manifest(folder: Path) -> tuple[tuple[str, ...], dict[str, str]]:
-    """What the results in a folder are of, seen from there ((): not said), and file -> `checksum`.
+    """Sources of the results in a folder, relative to it (() if not recorded), and file -> `checksum`.
 
     Both empty where there is no record. Raises `InputError` where it is not to be understood.
     """
@@ -189,13 +189,13 @@ def read_manifest(folder: Path) -> tuple[tuple[str, ...], dict[str, str]]:
 
 
 def _is_ours(file: Path, sums: Mapping[str, str]) -> bool:
-    """Whether the file is as the tool wrote it."""
+    """True if the file is unchanged since the tool wrote it."""
     with writing_errors(file, "read"):
         return not file.is_symlink() and file.is_file() and checksum(file) == sums[file.name]
 
 
 def checksum(path: Path) -> str:
-    """CRC-32 and length of a file's content, by which an edit is seen. Raises `OSError`.
+    """CRC-32 and length of a file's content, which reveal an edit. Raises `OSError`.
 
     A file that grew or shrank has another length, and CRC-32 misses one in 4e9 of the other changes (none within 32
     bits; Peterson and Brown, "Cyclic codes for error detection", Proc. IRE 49 (1961) 228). Against somebody who forges
@@ -209,5 +209,5 @@ def checksum(path: Path) -> str:
 
 
 def _relative(folder: Path, of: Sequence[str]) -> tuple[str, ...]:
-    """Files as seen from the folder, names that are no files as they are."""
+    """Files relative to the folder; names that are not files stay unchanged."""
     return tuple(Path(os.path.relpath(name, folder)).as_posix() if Path(name).exists() else name for name in of)

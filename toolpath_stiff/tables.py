@@ -1,4 +1,4 @@
-"""Tables that users give, one heading and a row a line: known columns by their names, numbers with a decimal point.
+"""Tables that users supply: one heading, then one row per line; known columns by name, numbers with a decimal point.
 
 Text with commas, semicolons or tabs between the cells, or a sheet of an Excel workbook. The heading is the first line
 that is neither empty nor a comment; where a mapping names columns, the first that has them all: what instruments write
@@ -21,7 +21,7 @@ from toolpath_stiff.files import decoded, read_bytes
 from toolpath_stiff.workbooks import Rows, is_workbook, sheet_rows, split_name
 
 SEPARATORS = ",;\t"
-ALIKE = 0.75  # of two names: from there one may be a slip of the other
+ALIKE = 0.75  # similarity of two names from which one may be a typing slip of the other
 SPREADSHEET_ERROR = re.compile(r"#[A-ZÄÖÜ][A-ZÄÖÜ0-9/_]*[!?]|#N/?[AV]")
 MARKED = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
 NUMBER = re.compile(r"[+-]?[\d.,]+(?:e[+-]?\d+)?", re.IGNORECASE)
@@ -29,7 +29,7 @@ LIKE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 
 
 class Source(NamedTuple):
-    """Where a column's cells come from, as a mapping says: a heading of the file, or one text for all rows."""
+    """Origin of a column's cells as a mapping states it: a heading of the file, or one text for all rows."""
 
     heading: str = ""
     unit: str = ""  # or form, of dates; "" where the mapping leaves it to the heading
@@ -38,7 +38,7 @@ class Source(NamedTuple):
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns that a kind of table may have: those of numbers, named with their units, and those of text.
+    """Columns that a kind of table may have: number columns, named with their units, and text columns.
 
     `sources`: of those that the file calls otherwise; None of a kind of table that takes no mapping.
     """
@@ -75,11 +75,11 @@ class Table:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """One line on what was read differently from how it is written; none where nothing was."""
+        """One line on cells read differently from how they are written; empty if there are none."""
         return (f"{self.file}: {'; '.join(self.remarks)}",) if self.remarks else ()
 
     def record(self, cells: Sequence[str], line: int | None = None) -> dict[str, str]:
-        """Column -> cell of one row, on that line. Raises `InputError` where a row has too few or too many."""
+        """Column -> cell of one row, at that line. Raises `InputError` if the row has too few or too many cells."""
         written = len(self.heading) - len(self.constants)
         if len(cells) != written:
             hint = "a decimal comma between commas? Write semicolons between the cells" if len(cells) > written else ""
@@ -116,7 +116,7 @@ def read_table(path: str, what: str, columns: Columns) -> Table:
 
 
 def parse_table(text: str, file: str, columns: Columns) -> Table:
-    """The same from the text of a file."""
+    """Parse a table from the text of a file; as `read_table`."""
     if "\0" in text:
         raise InputError("neither text nor an Excel workbook", hint="export it as CSV", file=file)
     lines = (re.sub('"[^"]*"', "quoted", line) for line in io.StringIO(text, newline=None))
@@ -180,7 +180,7 @@ def _table(rows: Rows, file: str, columns: Columns, separator: str, remarks: lis
 
 
 def _stripped(cell: str) -> str:
-    """A cell without space around it; the printer's minus as a keyboard's.
+    """A cell without surrounding space, and with a typographic minus replaced by the keyboard's.
 
     The apostrophe that keeps spreadsheets from running a word (`column_files.csv_text`) is no part of the word.
     """
@@ -189,24 +189,24 @@ def _stripped(cell: str) -> str:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Whether cells below a heading are units: one is known, none is a number."""
+    """True if the cells below a heading are units: at least one is known, and none is a number."""
     return not any(map(NUMBER.fullmatch, cells)) and any(heading_key(cell) in UNITS for cell in cells)
 
 
 def _fitted(cells: list[str], width: int, pad: bool) -> list[str]:
-    """Without empty cells beyond the heading; those of a sheet are as long as the heading."""
+    """A row without empty cells beyond the heading; with `pad`, filled up to the heading's length."""
     while len(cells) > width and not cells[-1]:
         cells = cells[:-1]
     return cells + [""] * (width - len(cells)) if pad else cells
 
 
 def _mapped(columns: Columns) -> dict[str, str]:
-    """Heading -> column that a mapping says it is."""
+    """Heading -> the column that the mapping assigns to it."""
     return {source.heading: name for name, source in (columns.sources or {}).items() if source.heading}
 
 
 def _named(written: Sequence[str], full: Sequence[str], columns: Columns, file: str, line: int) -> list[str]:
-    """Names of the headings (`full`: with their units); those that are not known stay as they are.
+    """Names of the headings (`full`: with their units); unknown ones stay unchanged.
 
     Raises `InputError`.
     """
@@ -234,7 +234,7 @@ def _named(written: Sequence[str], full: Sequence[str], columns: Columns, file: 
 
 
 def _units(written: str, full: str, name: str, columns: Columns) -> tuple[str, str] | None:
-    """Unit of a column that is mapped (`full`: heading and unit) and the one that it is to have; None: the same."""
+    """Unit of a mapped column (`full`: heading and unit), and the unit it needs; None if they are equal."""
     source, unit = (columns.sources or {}).get(name), parted(name)[1]
     if source is None or source.heading != written:
         return None
@@ -243,7 +243,7 @@ def _units(written: str, full: str, name: str, columns: Columns) -> tuple[str, s
 
 
 def _meant(cell: str, absent: Sequence[str]) -> str:
-    """The absent column that a heading seems to mean: in another unit, in none, or with a slip; "" where none."""
+    """Absent column that a heading seems to mean (in another unit, in none, or misspelt); "" if none."""
     near = difflib.get_close_matches(heading_key(cell), [heading_key(n) for n in absent if len(n) > 2], 1, ALIKE)
     quantity = parted(cell)[0]
     alike = [name for name in absent if parted(name)[1] and parted(name)[0] == quantity]
@@ -251,7 +251,7 @@ def _meant(cell: str, absent: Sequence[str]) -> str:
 
 
 def _has_commas(heading: Sequence[str], rows: Rows, numbers: Sequence[int], file: str) -> bool:
-    """Whether numbers have decimal commas. Raises `InputError` where that can be read in two ways."""
+    """True if numbers have decimal commas. Raises `InputError` if they can be read in two ways."""
     cells = [(line, heading[i], row[i]) for line, row in rows for i in numbers if i < len(row)]
     marked = [cell for cell in cells if MARKED.fullmatch(cell[2])]
     commas = ["," in text for _, _, text in marked]

@@ -22,7 +22,7 @@ KEY = re.compile(r"""([\w.'" \t-]+)=""")
 
 
 class TomlReader:
-    """The tables of one file, and the lines of its keys, so that messages can name them.
+    """Tables of one file, with the line of each key, so that messages can give it.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class TomlReader:
             raise kind(f"more than {LARGEST_BYTES / 1e6:.0f} MB", hint="is it the right file?", file=file)
         try:
             self.data: dict[str, Any] = tomllib.loads(text)
-        except (ValueError, RecursionError) as error:  # or thousands of digits, or of brackets
+        except (ValueError, RecursionError) as error:  # also from thousands of digits or nested brackets
             place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
             line, column = (int(place[1]), int(place[2])) if place else (len(lines), None)  # at its end
             reason = str(error).split(" (at ")[0]
@@ -59,22 +59,22 @@ class TomlReader:
             raise kind(f"{what} is not a text file", file=str(path)) from None
 
     def line_of(self, section: str, key: str = "", nth: int = 0) -> int | None:
-        """Line of a key of a section (the nth of its name), or of its heading; None if it is not found."""
+        """Line of a key in a section (the nth of that name), or of the section's heading; None if not found."""
         numbered = f"{section}[{nth + 1}]"
         return self._places.get(f"{numbered if numbered in self._places else section}.{key}".strip("."))
 
     def line_at(self, where: str) -> int | None:
-        """Line of a dotted name such as `kinematics.head.letter` or `tools[2].number`; else of what it stands in."""
+        """Line of a dotted name such as `kinematics.head.letter` or `tools[2].number`, or of what contains it."""
         while where and where not in self._places:
             where = where.rpartition(".")[0]
         return self._places.get(where)
 
     def error(self, mistake: str, expected: str = "", hint: str = "", where: str = "") -> InputError:
-        """An error at the line of the dotted name `where`."""
+        """Error located at the line of the dotted name `where`."""
         return self.kind(mistake, expected=expected, hint=hint, file=self.file, line=self.line_at(where))
 
     def only(self, where: str, table: Document, known: Iterable[str], of: str = "") -> None:
-        """Refuse a key of a table that is not known; `of` ends the sentence."""
+        """Refuse keys of a table that are not known; `of` ends the sentence."""
         known = list(known)
         for key in table:
             if key not in known:
@@ -82,7 +82,7 @@ class TomlReader:
                 raise self.error(f"{name} is not known{of}", ", ".join(known), where=f"{where}.{key}".lstrip("."))
 
     def needed(self, where: str, table: Document, key: str, expected: str) -> Any:
-        """The value of a key that must be there."""
+        """Value of a required key."""
         if key not in table:
             raise self.error(f"{where}.{key} is missing", expected, where=where)
         return table[key]
@@ -94,26 +94,26 @@ class TomlReader:
         return float(value)
 
     def flag(self, where: str, value: object) -> bool:
-        """True or false."""
+        """True or false, checked."""
         if not isinstance(value, bool):
             raise self.error(f"{where} = {value!r}", "true or false", where=where)
         return value
 
     def choice(self, where: str, value: object, choices: Iterable[str], expected: str) -> str:
-        """One of some texts."""
+        """A text that must be one of `choices`."""
         if not isinstance(value, str) or value not in choices:
             raise self.error(f"{where} = {value!r}", expected, where=where)
         return value
 
     def table(self, where: str, value: object, expected: str) -> Document:
-        """A table."""
+        """A table, checked."""
         if not isinstance(value, dict):
             raise self.error(f"{where} = {value!r}", expected, where=where)
         return value
 
 
 def _places(lines: Sequence[str], data: Document) -> dict[str, int]:
-    """Line of each dotted name, first of its name: keys, tables, what holds them; `tools[2]` is of a list of tables."""
+    """Line of the first mention of each dotted name: keys, tables, their parents; `tools[2]` is in a list of tables."""
     places: dict[str, int] = {}
     above: dict[str, int] = {}
     counts: Counter[str] = Counter()
@@ -134,16 +134,16 @@ def _places(lines: Sequence[str], data: Document) -> dict[str, int]:
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
-    """Whether a value is a TOML number; true and false are none."""
+    """True if a value is a TOML number; true and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def is_text(value: object) -> TypeGuard[str]:
-    """Whether a value is a text that is not empty."""
+    """True if a value is a non-empty text."""
     return isinstance(value, str) and bool(value.strip())
 
 
 def shortened(value: object) -> str:
-    """A value as it stands, cut for a message."""
+    """A value as text, cut short for a message."""
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

@@ -1,4 +1,4 @@
-"""The one place where boundary units (mm, degrees, N/mm, inch) meet SI (m, rad, N/m).
+"""Conversions between boundary units (mm, degrees, N/mm, inch) and SI (m, rad, N/m), the only ones in the package.
 
 Everything inside the package is SI; everything that a user reads or writes is in the shop's units.
 The functions take and return scalars or numpy arrays alike; they only multiply, so this module
@@ -45,12 +45,12 @@ def m_from_um(um: T) -> T:
 
 
 def m_from_nm(nm: T) -> T:
-    """Metres from nanometres, as of nm/N."""
+    """Metres from nanometres, as in nm/N."""
     return nm / 1e9
 
 
 def nm_from_m(m: T) -> T:
-    """Nanometres from metres, as of nm/N."""
+    """Nanometres from metres, as in nm/N."""
     return m * 1e9
 
 
@@ -100,7 +100,7 @@ def min_from_s(seconds: T) -> T:
 
 
 def per_s_from_per_min(rate: T) -> T:
-    """A rate a second from one a minute."""
+    """Rate per second from rate per minute."""
     return rate / 60.0
 
 

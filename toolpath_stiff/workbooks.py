@@ -1,4 +1,4 @@
-"""Sheets of Excel workbooks as cells; openpyxl reads them, and is imported only for that."""
+"""Sheets of Excel workbooks as cells, read by openpyxl, which is imported only then."""
 
 import io
 import os
@@ -18,18 +18,18 @@ Rows = list[tuple[int, list[str]]]  # line (row of a sheet) and cells
 
 
 def split_name(path: str) -> tuple[str, str]:
-    """File and sheet of `FILE.xlsx#SHEET`; a file that has the whole name comes first."""
+    """File and sheet of `FILE.xlsx#SHEET`; a file whose own name is the whole text comes first."""
     parts = re.fullmatch(r"(.+\.xls[xm])#(.+)", path, re.IGNORECASE)
     return (path, "") if parts is None or os.path.lexists(path) else (parts[1], parts[2])
 
 
 def is_workbook(content: bytes) -> bool:
-    """Whether the bytes are a workbook's rather than text."""
+    """True if the bytes are a workbook rather than text."""
     return content.startswith((ZIP, OLD_EXCEL))
 
 
 def sheet_rows(content: bytes, file: str, sheet: str = "") -> tuple[Rows, str]:
-    """Cells of a sheet, the stored values of formulas; and a remark where there are others.
+    """Cells of a sheet, with the stored values of formulas; and a remark if there are other sheets.
 
     Parameters
     ----------
@@ -75,15 +75,15 @@ def _open(content: bytes, file: str, values: bool) -> Any:
             if sum(part.file_size for part in archive.infolist()) > LARGEST_BYTES:
                 raise ValueError(f"more than {LARGEST_BYTES / 1e6:.0f} MB unpacked")
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what it leaves out (validations, pictures) is nothing of ours
+            warnings.simplefilter("ignore")  # it warns of what it drops (validations, pictures), which we do not need
             return openpyxl.load_workbook(io.BytesIO(content), data_only=values)
-    except Exception as error:  # whatever a damaged file makes of the library
+    except Exception as error:  # a damaged file may raise anything in the library
         reason = str(error.__cause__ or error).partition("\n")[0] or type(error).__name__  # the library's: three lines
         raise InputError(f"a workbook that cannot be read: {reason}", hint=SAVE_AS, file=file) from None
 
 
 def _shown(value: Any) -> str:
-    """A cell as text; dates as ISO writes them."""
+    """A cell as text; dates in ISO form."""
     if value is None:
         return ""
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:

@@ -63,8 +63,8 @@ def cut_by(error, side=1, width=2.0):
         return SimpleNamespace(
             samples=samples,
             wall_mean=walls,
-            wall_low=walls * 0.8,
-            wall_high=walls * 1.1,
+            lowest=walls * 0.8,
+            highest=walls * 1.1,
             ae=wide,
             made=made,
             off=off,
@@ -151,7 +151,7 @@ def test_two_walls_of_a_slot_share_what_a_shift_can_do():
             samples = sample_moves(program.moves, 1e-3)
             made = (samples.motion == 1) & (np.abs(samples.tangent[:, 0]) > 0.9)
             walls = np.where(made[:, None], np.array([[left, right]]) * 1e-6, np.nan)
-            sides = dict.fromkeys(("wall_mean", "wall_low", "wall_high"), walls)
+            sides = dict.fromkeys(("wall_mean", "lowest", "highest"), walls)
             return SimpleNamespace(samples=samples, ae=made * 0.01, **sides, **STILL)
 
         return cut

@@ -88,7 +88,7 @@ def test_a_wall_has_the_published_forces_and_the_error_of_all_that_gives_way(tmp
         if wall in (k, None):
             expected = outward * (tensor @ cut.wall_force[row, k])[1]
             assert cut.wall_mean[row, k] == pytest.approx(expected, rel=1e-6)
-            assert cut.wall_low[row, k] < cut.wall_mean[row, k] < cut.wall_high[row, k]
+            assert cut.lowest[row, k] < cut.wall_mean[row, k] < cut.highest[row, k]
             assert cut.deviation[row, k] == pytest.approx(0.3 * abs(cut.wall_mean[row, k]), rel=0.05)
         else:
             assert np.isnan(cut.wall_mean[row, k])
@@ -108,9 +108,9 @@ def test_of_two_levels_the_deeper_cut_stays(tmp_path):
     row = max(i for i in np.flatnonzero(both.ap > 0) if abs(both.samples.position[i, 0] - 0.05) < 1e-3)
     assert both.wall_heights[row] == pytest.approx(np.array([[0.0, 6e-3]] * 2), abs=1e-6)
     assert np.isnan(both.wall_mean[first]).all()  # the last pass owns the walls
-    parts = [(cut.wall_mean[at], cut.wall_low[at]) for cut, at in zip(alone, (first, second), strict=True)]
+    parts = [(cut.wall_mean[at], cut.lowest[at, :2]) for cut, at in zip(alone, (first, second), strict=True)]
     means, lows = np.transpose(parts, (1, 0, 2)).min(axis=1)
-    np.testing.assert_allclose(both.wall_low[row], lows, rtol=0.01)  # a profile is known at nine heights
+    np.testing.assert_allclose(both.lowest[row, :2], lows, rtol=0.01)  # a profile is known at nine heights
     assert (both.wall_mean[row] <= means + 2e-8).all()
 
 
@@ -348,7 +348,7 @@ def test_without_a_stock_it_is_the_blank_that_the_program_states(tmp_path, name)
     read = parse_program(BLANKS[name], name)
     old, new, *_ = MISSING["stock"]
     stated, given = cut_of(read, tmp_path, SETUP.replace(old, new)), cut_of(read, tmp_path)
-    assert stated.removed.sum() > 1e-9 and "BLK FORM, WORKPIECE" in stated.stock.origin
+    assert stated.removed.sum() > 1e-9 and "BLK FORM, WORKPIECE" in stated.work.stock.origin
     np.testing.assert_allclose(stated.wall_mean, given.wall_mean, rtol=1e-9)
     np.testing.assert_allclose(stated.removed, given.removed, rtol=1e-9, atol=1e-18)
 

@@ -122,9 +122,12 @@ def test_any_cutter_is_the_sum_of_its_slices(cutter, flutes, helix, hand, run_ou
 ECCENTRIC = replace(FLAT, run_out=6e-6, run_out_angle=0.4)
 
 
-@pytest.mark.parametrize("cutter", [FLAT, BULL, ECCENTRIC, replace(BALL, helix=0.0)])
-def test_mean_and_peak_are_those_of_the_turn(cutter):
-    contact = patch(0.0035, 0.3, 2.4)
+LIGHT = patch(0.001, 0.0, 0.3)  # the force of one tooth is there for a twentieth of a turn
+
+
+@pytest.mark.parametrize("contact", [patch(0.0035, 0.3, 2.4), LIGHT, patch(0.002, PI - 0.45, PI)])
+@pytest.mark.parametrize("cutter", [FLAT, BULL, ECCENTRIC, replace(BALL, helix=0.0), replace(FLAT, flutes=1, hand=-1)])
+def test_mean_and_peak_are_those_of_the_turn(cutter, contact):
     angles = np.linspace(0.0, 2 * PI, 2880, endpoint=False)[None]
     force = force_at(Contact(contact, cutter, TAPERED, FEED, ON), angles)[0]
     mean = mean_force(Contact(contact, cutter, TAPERED, FEED, ON))[0]

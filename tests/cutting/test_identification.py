@@ -23,6 +23,7 @@ from toolpath_stiff.cutting.coefficients import (
 from toolpath_stiff.cutting.cutters import Cutter
 from toolpath_stiff.cutting.identification import least_squares, left_out, slot_responses
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.readings.force_records import mean_force
 
 FLAT = Cutter(1, 0.010, 0.0, 3, np.radians(30.0))
 BULL = Cutter(1, 0.010, 0.001, 3, np.radians(30.0))
@@ -134,6 +135,22 @@ def test_records_give_coefficients_and_run_out(tmp_path, capsys):
     assert (tmp_path / "out" / "forces.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.parametrize("entry", [0, 45])
+@pytest.mark.parametrize("swing", [10.0, 60.0])
+def test_a_slot_may_swing_less_than_its_entry(entry, swing):
+    """Many teeth even the force of a slot out, which a single tooth of the entry is not; nor need there be an entry."""
+    turns = np.arange(20 + entry + 60 + 20)
+    level = np.clip((turns - 20.0 + 0.5) / max(entry, 0.5), 0.0, 1.0) * (turns < len(turns) - 20)
+    amplitude = np.where(level <= 0.0, 0.0, np.where(level < 1.0, 60.0, swing))
+    time = np.arange(0.0, len(turns) / 100.0, 1 / 5000.0)
+    turn = (time * 100.0).astype(int)
+    force = level[turn] * 80.0 + amplitude[turn] * np.sin(2 * np.pi * 300.0 * time) + 5.0 * time
+    noise = np.random.default_rng(2).normal(0.0, 1.0, (2, len(time)))
+    signal = np.stack([time, noise[0], force + noise[1], 0.5 * force], axis=1)
+    mean, _, remarks = mean_force("slot", signal, 100.0, FLAT, 4e-5, 1)
+    assert mean == pytest.approx([0.0, 80.0, 40.0], abs=0.5) and not remarks
+
+
 BROKEN = {
     "an axis points the other way": ({}, {"axes": "x,-y,z"}, "Ktc = -"),
     "two axes are exchanged": ({}, {"axes": "-y,x,z"}, "Ktc = -"),
@@ -169,6 +186,24 @@ def test_feed_in_mm_a_minute_is_that_of_the_teeth(tmp_path):
     assert tps.forces(files, cut).coefficients.values == pytest.approx(first.coefficients.values, rel=1e-9)
 
 
+def test_a_table_of_mean_forces(tmp_path):
+    """As papers print them, forces on the tool: the textbook's straight lines give the known coefficients back."""
+    _, cut = write_records(tmp_path, ())
+    rows = [f"{fed * 1e3},{x},{y},{z}" for fed, (x, y, z) in zip(FEEDS, slot_means(FEEDS), strict=True)]
+    file = tmp_path / "means.csv"
+    file.write_text("\n".join(["fz per tooth,Fx,Fy,Fz", "mm,N,N,N", *rows]))
+    mapping = {"feed_per_tooth": "fz per tooth", "fx": "Fx", "fy": "Fy", "fz": "Fz", "depth": "=3"}
+    fit = tps.forces(file, cut, columns=mapping, axes="-x,-y,-z")
+    assert fit.coefficients.values == pytest.approx(KNOWN, rel=1e-9)
+    assert np.isnan(fit.run_out).all() and "mean forces" in fit.silent[-1] and "run-out, by" not in str(fit)
+    assert "does the third axis point down?" in str(tps.forces(file, cut, columns=mapping, axes="-x,-y,z"))
+    with pytest.raises(InputError, match="of forces on the tool --axes=-x,-y,-z"):
+        tps.forces(file, cut, columns=mapping)
+    file.write_text("\n".join(["fz per tooth,Fx,Fy,Fz", *rows * 100]))
+    with pytest.raises(InputError, match="column time_s is missing"):
+        tps.forces(file, cut, columns=mapping)
+
+
 def test_materials_have_origins_and_bands():
     assert {"Al7075", "Al6082", "C45", "Ti6Al4V"} <= set(materials())
     for coefficients in materials().values():
@@ -194,6 +229,7 @@ def test_materials_have_origins_and_bands():
         ({"covariance": [[1, 2], [3, 4]]}, "covariance"),
         ({"covariance": (-np.eye(6)).tolist()}, "covariance"),
         ({"Ktc": 3}, "Ktc is not known"),
+        ({"edge_sets_in_um": 0}, "edge_sets_in_um = 0"),
     ],
 )
 def test_numbers_that_are_no_coefficients(tmp_path, change, message):
@@ -220,7 +256,12 @@ def test_a_stated_spread_is_the_same_for_all():
     }
     coefficients = coefficients_from(table, lambda key, mistake, expected: InputError(mistake))
     assert coefficients.deviation * SHOWN == pytest.approx([80, 20, 240, 2, 2, 0.1])
-    assert coefficients.origin == "a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed"
+    assert coefficients.origin.startswith(
+        "a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed; the force at the edge"
+    )
+    given = coefficients_from({**table, "edge_sets_in_um": 0.01}, lambda key, mistake, expected: InputError(mistake))
+    assert (given.taper, given.document()["edge_sets_in_um"]) == (1e-8, 0.01)
+    assert given.origin == "a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed"
 
 
 DYNOWARE = """DynoWare,Version 2.5.1.2

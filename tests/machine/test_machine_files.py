@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import toolpath_stiff as tps
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import load_machine, packaged_machines, parse_machine
 from toolpath_stiff.machine.kinematics import singularity_index, solve_struts
 from toolpath_stiff.machine.limits import reach
-from toolpath_stiff.machine.linuxcnc import machine_from_hal
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.machine.writer import machine_toml
 
@@ -175,14 +175,20 @@ HAL = "".join(
 )
 
 
-def test_from_linuxcnc_reads_pins_and_says_what_it_assumed():
-    machine, notes = machine_from_hal(HAL + "setp genhexkins.tool-offset 50\n# setp genhexkins.bogus 1\n", "mm")
+def machine_from_hal(folder, text: str, units: str = "mm"):
+    (folder / "my.hal").write_text(text)
+    made = tps.machine_from_linuxcnc(folder / "my.hal", units)
+    return parse_machine(made.text), made.notes
+
+
+def test_from_linuxcnc_reads_pins_and_says_what_it_assumed(tmp_path):
+    machine, notes = machine_from_hal(tmp_path, HAL + "setp genhexkins.tool-offset 50\n# setp genhexkins.bogus 1\n")
     assert np.hypot(*machine.frame_joints[:, :2].T) == pytest.approx(0.5)
     # genhexkins.c adds the offset to Z of base and platform joints alike.
     assert machine.platform_joints[:, 2] == pytest.approx(0.05)
     assert machine.frame_joints[:, 2] == pytest.approx(0.05)
     assert any("tool-offset" in note for note in notes) and any("assumed" in note for note in notes)
-    inch, _ = machine_from_hal(HAL, "inch")
+    inch, _ = machine_from_hal(tmp_path, HAL, "inch")
     assert np.hypot(*inch.frame_joints[:, :2].T) == pytest.approx(0.5 * 25.4)
     same_machine(parse_machine(machine_toml(machine)), machine)
 
@@ -190,17 +196,17 @@ def test_from_linuxcnc_reads_pins_and_says_what_it_assumed():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("loadrt trivkins\n", "36 joint pins are not set"),
+        ("loadrt genhexkins\n", "36 joint pins are not set"),
         (HAL.replace("setp genhexkins.base.3.y", "# "), "genhexkins.base.3.y"),
         (HAL + "setp genhexkins.base.0.x 1\n", "set twice"),
-        (HAL.replace("base.0.x ", "base.0.x [KIN]X #"), "a number"),
+        (HAL.replace("base.0.x ", "base.0.x [KIN]X #"), "a number, or the ini file"),
         (HAL + "setp genhexkins.base.7.x 1\n", "no pin"),
         (HAL.replace("base.0.z 0.0", "base.0.z nan"), "finite"),
     ],
 )
-def test_bad_hal_files(text, words):
+def test_bad_hal_files(tmp_path, text, words):
     with pytest.raises(InputError) as caught:
-        machine_from_hal(text, "mm", "my.hal")
+        machine_from_hal(tmp_path, text)
     assert words in str(caught.value) and str(caught.value).startswith("my.hal")
 
 

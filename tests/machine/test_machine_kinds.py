@@ -17,6 +17,7 @@ from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.chain import STILL
 from toolpath_stiff.machine.chain_search import all_solutions
 from toolpath_stiff.machine.file import load_machine, parse_machine
+from toolpath_stiff.machine.limits import machine_limits
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 
 DATA = Path(__file__).parent / "data"
@@ -205,6 +206,19 @@ def test_the_delta_is_lineardeltakins(folder):
     near(1e3 * position, [(module.forward(j) - height)[:3] for j in 1e3 * joints])
 
 
+def test_rotarydeltakins(folder):
+    machine = KINDS["arms"]
+    sizes = {"platformradius": 180, "thighlength": 320, "shinlength": 830, "footradius": 120}
+    module = Module("rotarydeltakins", {f"rotarydeltakins.{pin}": value for pin, value in sizes.items()}, folder)
+    pose = np.random.default_rng(9).uniform(-1.0, 1.0, (200, 6)) * [250, 250, 100, 0, 0, 0]
+    pose[:, 2] += 1e3 * machine.default_origin[2]
+    joints = machine.solve(pose[:, :3] / 1e3).joints
+    height = np.array([0.0, 0.0, 95.0, 0.0, 0.0, 0.0])  # LinuxCNC's z is the joints' height
+    near(np.rad2deg(joints), [module.inverse(p + height, 3) for p in pose])
+    position, _ = machine.forward(joints)
+    near(1e3 * position, [(module.forward(j) - height)[:3] for j in np.rad2deg(joints)])
+
+
 def test_a_cantilever_with_an_arm_is_the_closed_form():
     beam = """
 name = "cantilever"
@@ -266,6 +280,7 @@ RAIL = (DATA / "robot200.toml").read_text().split("[[pose]]")[0].replace(
     "[[axis]]                       # modified",
     axis("E1", "linear", axis=[0, 1, 0], low=0, high=4000) + "[[axis]] # modified",
 ).replace('at = "base"', 'frame = "E1"\ncentre_mm = [0, 0, 0]')  # fmt: skip
+UR_ON_RAIL = UR.replace("[[axis]]", axis("E1", "linear", axis=[0, 1, 0], low=0, high=4000) + "[[axis]]", 1)
 GLIDE = """
 name = "glide"
 kind = "hexaglide"
@@ -286,11 +301,20 @@ compliance_nm_per_N = 12.0
 default_origin_mm = [0.0, 0.0, -850.0]
 rapid_mm_per_min = 20000
 """
+ARMS = (DATA / "delta.toml").read_text().split("[[pose]]")[0].replace('kind = "linear_delta"', 'kind = "rotary_delta"')
+for _old, _new in (
+    (r"carriage_joint_radius_mm = \S+", "hip_radius_mm = 180.0"),
+    (r"carriage_mm = .*", "arm_deg = [-50.0, 85.0]"),
+    (r"\[carriage\]", "[arm]"),
+    (r"rail_radius_mm = .*", "length_mm = 320.0"),
+    (r"centre_height_mm = .*", ""),
+):
+    ARMS = re.sub(_old, _new, ARMS)
 KINDS = {
     **MACHINES,
     **{
         name: parse_machine(text)
-        for name, text in (("head", HEAD), ("table", HEAD_TABLE), ("rail", RAIL), ("glide", GLIDE))
+        for name, text in (("head", HEAD), ("table", HEAD_TABLE), ("rail", RAIL), ("glide", GLIDE), ("arms", ARMS))
     },
     "offset wrist": parse_machine(UR),
 }
@@ -303,7 +327,8 @@ def poses(name: str, share: np.ndarray, joints: np.ndarray):
         low, high = np.clip(machine.joint_limits, -3.0, 3.0).T
         joints = low + (high - low) * 0.5 * (joints[:, : len(low)] + 1.0)
         return machine.forward(np.where(np.array(machine.joint_names) == "E1", 0.0, joints))  # a rail stands still
-    size = {"delta": [0.2, 0.2, 0.1, 0, 0, 0], "pentapod": [0.2, 0.2, 0.1, 0.3, 0.3, 0]}.get(name, [0.1] * 6)
+    flat = [0.2, 0.2, 0.1, 0, 0, 0]
+    size = {"delta": flat, "arms": flat, "pentapod": [0.2, 0.2, 0.1, 0.3, 0.3, 0]}.get(name, [0.1] * 6)
     pose = share * size + machine.default_origin
     return pose[:, :3], machine.rotation_of(pose[:, 3:])
 
@@ -328,7 +353,13 @@ def test_forward_undoes_inverse_with_any_tool(name, seed):
     np.testing.assert_allclose(again[1], rotation[reached], atol=1e-9)
 
 
-MOVED = {"joint ": 5, "carriage ": 2, "foot ": 0, "strut ": 0}  # the load of an element that its joint works against
+MOVED = {
+    "joint ": 5,
+    "carriage ": 2,
+    "foot ": 0,
+    "strut ": 0,
+    "arm ": 4,
+}  # the load of an element that its joint works against
 
 
 @pytest.mark.parametrize("name", [name for name in KINDS if name not in ("mill5", "mill3", "head")])
@@ -355,17 +386,29 @@ def test_elements_carry_what_virtual_work_says(name):
         force = load.rows(stance.position)[0, row, :3]
         np.testing.assert_allclose(force * np.sign(force @ slope), slope, atol=1e-8)
         tried += 1
-    assert tried == {"table": 2, "pentapod": 5, "delta": 3}.get(name, 6)
+    assert tried == {"table": 2, "pentapod": 5, "delta": 3, "arms": 3}.get(name, 6)
 
 
-def test_a_rail_stays_where_it_is_put():
-    machine, bare = KINDS["rail"], MACHINES["robot200"]
-    position, rotation = bare.forward(np.deg2rad([[5.0, 12.0, 45.0, -30.0, -60.0, -165.0]]))
-    start = np.array([1.5, 0, 0, 0, 0, 0, 0])
-    stance = machine.solve(position + np.array([0.0, 1.5, 0.0]), rotation, configuration=0, start=start)
-    expected = bare.solve(position, rotation, configuration=0, start=start[1:])
-    np.testing.assert_allclose(stance.joints[0], [1.5, *expected.joints[0]], atol=1e-12)
-    np.testing.assert_allclose(stance.tip_compliance(), expected.tip_compliance(), rtol=1e-12, atol=1e-18)
+@pytest.mark.parametrize(("arm", "text"), [("robot200", RAIL), ("offset wrist", UR_ON_RAIL)])
+def test_a_rail_stays_where_it_is_put(arm, text):
+    """At 0, where the file says or where it starts; its own limits bound nothing."""
+    bare, q = KINDS[arm], np.deg2rad([[5.0, 12.0, 45.0, -30.0, -60.0, -165.0]])
+    position, rotation = bare.forward(q)
+    expected = bare.solve(position, rotation, configuration=0, start=q[0])
+    for place, stands, start in ((0.0, "", None), (1.5, "stands_mm = 1500.0", None), (0.7, "", 0.7)):
+        machine = parse_machine(text.replace("max_mm = 4000", f"max_mm = 4000\n{stands}"))
+        assert machine.standing_joints == {"E1": place if start is None else 0.0}
+        first = None if start is None else np.array([start, *q[0]])
+        there = position + np.array([0.0, place, 0.0])
+        stance = machine.solve(there, rotation, configuration=0, start=first)
+        assert stance.joints[0, 0] == place
+        assert not any("E1" in limit.name for limit in machine_limits(machine))
+        np.testing.assert_allclose(machine.forward(stance.joints)[0], there, atol=1e-9)
+        if start is not None:
+            np.testing.assert_allclose(stance.joints[0, 1:], expected.joints[0], atol=1e-9)
+            np.testing.assert_allclose(stance.tip_compliance(), expected.tip_compliance(), rtol=1e-8, atol=1e-16)
+    with pytest.raises(InputError, match=r"stands_mm = 9000; expected 0 to 4000"):
+        parse_machine(text.replace("max_mm = 4000", "max_mm = 4000\nstands_mm = 9000"))
 
 
 def test_joints_wind_on_along_a_path():
@@ -463,6 +506,11 @@ def test_a_word_of_a_missing_axis_is_refused(name, letter):
     words[1, "ABC".index(letter)] = 0.1
     with pytest.raises(InputError, match=f"machine {name} has no axis {letter}"):
         MACHINES[name].rotation_of(words)
+
+
+def test_a_mill_without_an_axis_does_not_tilt_its_tool():
+    stance = MACHINES["mill3"].solve([[0.0, 0.0, 0.2]] * 2, rotation_matrices([[0, 0, 0], [0.3, 0, 0]]))
+    assert np.isfinite(stance.joints).all(axis=1).tolist() == [True, False]
 
 
 MASSES = (("J2", 160.0, [560.0, 0.0, 0.0]), ("J3", 120.0, [95.0, 630.0, 0.0]), ("J6", 45.0, [0.0, 0.0, 90.0]))

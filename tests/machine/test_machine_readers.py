@@ -63,6 +63,8 @@ def test_urdf_is_the_robot_with_its_tool_and_limits():
         np.testing.assert_allclose(ours, theirs, atol=1e-12)
     np.testing.assert_allclose(machine.joint_limits, ROBOT.joint_limits, rtol=1e-12)
     assert machine.wrist is not None  # right angles survive the way through rpy
+    assert not any("turn it" in note for note in made.notes)
+    assert "z of link6 does not run back" in " ".join(tps.machine_from_urdf(DATA / "robot200.urdf", "link6").notes)
     assert [element.name for element in machine.elements][:2] == ["joint 1", "joint 2"]
 
 
@@ -133,6 +135,33 @@ def test_linuxcncs_files_are_the_machines(tmp_path):
     np.testing.assert_allclose(mill.joint_limits, [[-0.005, 0.3], [-0.4, 0.4], [-0.09, 0.0005]])
 
 
+SAMPLES = Path("/usr/share/doc/linuxcnc/examples/sample-configs/sim/axis")
+
+
+@pytest.mark.skipif(not SAMPLES.exists(), reason="needs linuxcnc-uspace")
+def test_linuxcncs_own_samples_are_read(tmp_path):
+    """HALCMD, nets and signals, small letters: as its files have them. Machines in one folder are not mixed."""
+    library = Path("/usr/share/linuxcnc/hallib")
+    for delta in ("rdelta", "ldelta"):
+        for file in (SAMPLES / f"{delta}.ini", library / f"sim_{delta}.hal"):
+            (tmp_path / file.name).write_text(file.read_text())
+        made = tps.machine_from_linuxcnc(tmp_path / f"{delta}.ini").text
+        assert {"rdelta": "length_mm = 254.0", "ldelta": "rod_length_mm = 269.0"}[delta] in made
+    trunnions = SAMPLES / "vismach/5axis/table-rotary-tilting"
+    made = tps.machine_from_linuxcnc(trunnions / "xyzac-trt.ini").text
+    assert "y_offset_mm = 20.0\nz_offset_mm = 10.0" in made and "A_deg = [-100.0, 50.0]" in made
+    with pytest.raises(InputError, match=r"KINEMATICS = xyzac.* and xyzbc.*Give the ini file"):
+        tps.machine_from_linuxcnc(trunnions / "switchkins_postgui.hal")
+    robot = filled(tps.machine_from_linuxcnc(SAMPLES / "vismach/puma/puma560.ini").text)
+    assert robot.joint_names == ("J1", "J2", "J3", "J4", "J5", "J6")
+    bare = tps.machine_from_linuxcnc(trunnions / "xyzbc-trt.ini", "inch")
+    assert "x_offset_mm = -508.0" in bare.text
+    (tmp_path / "a.hal").write_text("setp xyzac-trt-kins.y-offset [OFF](Y)\n")
+    (tmp_path / "a.ini").write_text("[HAL]\nHALFILE = a.hal\n[TRAJ]\nLINEAR_UNITS = mm\n[OFF]\nY = 12.5\n")
+    made = tps.machine_from_linuxcnc(tmp_path / "a.hal")
+    assert "y_offset_mm = 12.5" in made.text and "z-offset is not set: 0" in " ".join(made.notes)
+
+
 def axis(role: str, kind: str, direction: list[float], origin=(0, 0, 0), parent=None, low=-400, high=400) -> dict:
     return {"type": kind, "role": role, "parent": parent, "sequence": 0, "joint": [list(origin), direction],
             "limits": {"min": low, "max": high}}  # fmt: skip
@@ -165,6 +194,12 @@ def test_freecads_machine_is_read_in_the_order_of_its_parents(tmp_path):
     expected = about[1] @ (about[0] @ (tip - a) + a - c) + c
     in_work = position[0] + [0.0, 0.0, -0.08]  # work axes begin at the last joint
     np.testing.assert_allclose(in_work, expected, atol=1e-12)
+    old = json.loads(freecad())
+    old["machine"]["axes"]["X"]["joint"] = [[1, 0, 0], [0, 0, 0]]  # as files of linear axes had it
+    file.write_text(json.dumps(old))
+    again = filled(tps.machine_from_freecad(file).text)
+    in_order = np.array([[values[name] for name in again.joint_names]])
+    np.testing.assert_array_equal(again.forward(in_order)[0], position)
     orphans = {name: axis("table_rotary", "rotary", [1, 0, 0]) for name in "AC"}
     file.write_text(freecad(**orphans))
     with pytest.raises(InputError, match=r"which of X, A, C carries which. Give them from the base outwards: --order"):
@@ -182,6 +217,7 @@ BAD_URDF = [
     (URDF.replace('xyz="1.1200000000000001 0 0"', 'xyz="1120 0 0"'), "tip", "These look like mm or degrees"),
     (URDF.replace('type="revolute"', 'type="planar"', 1), "tip", "joint J1 is planar"),
     (URDF.replace("<robot", "<robot xmlns:xacro='x'").replace("<link", "<xacro:link", 1), "tip", "Run xacro"),
+    (URDF.replace('link name="link4"', 'link name="${p}link4"'), "tip", "Run xacro"),
     (URDF[:300], "tip", "not XML"),
     (URDF.replace('axis xyz="0 0 1"', 'axis xyz="0 0 0"', 1), "tip", "axis 0 0 0"),
     (URDF.replace('axis xyz="0 0 1"', 'axis xyz="0 0"', 1), "tip", "three numbers"),
@@ -207,13 +243,18 @@ def test_a_bad_urdf_is_one_line(tmp_path, text, tip, words):
         ("freecad", "m.fcm", freecad(Y=axis("head_linear", "linear", [0, -1, 0])), "mirrored"),
         ("freecad", "m.fcm", freecad(A=axis("spindle", "rotary", [1, 0, 0])), "table_... or head_..."),
         ("freecad", "m.fcm", freecad(A=axis("table_rotary", "rotary", [1, 0, 0], low=5, high=5)), "min below max"),
+        ("freecad", "m.fcm", freecad(A=axis("table_rotary", "prismatic", [1, 0, 0])), "has the type 'prismatic'"),
+        ("freecad", "m.fcm", freecad(A=axis("table_rotary", "rotary", [0, 0, 0])), "axis A: joint"),
+        ("freecad", "m.fcm", freecad(A=axis("table_rotary", "rotary", [1, 0])), "three numbers each"),
         ("freecad", "m.fcm", "{}", "not a FreeCAD machine"),
         ("linuxcnc", "m.hal", "setp genserkins.ALPHA-0 0\nsetp genserkins.A-0 0\n", "genserkins.D-0 is not set"),
         ("linuxcnc", "m.hal", "".join(f"setp genserkins.{n}-{i} -90\n" for i in range(6) for n in ("ALPHA", "A", "D")),
          "ALPHA-0 = -90; expected rad, not degrees"),
         ("linuxcnc", "m.hal", "setp lineardeltakins.L many\n", "expected a number"),
-        ("linuxcnc", "m.hal", "setp rotarydeltakins.footradius 3\n", "no machine of rotarydeltakins"),
+        ("linuxcnc", "m.hal", "loadrt [KINS]KINEMATICS\n", "36 joint pins are not set"),
         ("linuxcnc", "m.hal", "setp xyzac-trt-kins.tool-offset 3\n", "tool-offset is not 0"),
+        ("linuxcnc", "m.ini", "[KINS]\nKINEMATICS = maxkins\n", "no machine of maxkins; expected genhexkins, trivkins"),
+        ("linuxcnc", "m.ini", "[KINS]\nKINEMATICS = rotarydeltakins\n", "rotarydeltakins.platformradius is not set"),
     ],
 )  # fmt: skip
 def test_other_bad_descriptions_are_one_line(tmp_path, reader, name, text, words):

@@ -45,7 +45,7 @@ class Reader:
         self.run(0, len(self.lines))
 
     def value(self, text: str) -> float:
-        text = re.sub(r"R\[(\d+)\]", r"R\1", text)
+        text = re.sub(r"R\[(\w+)\]", lambda m: f"R{m[1] if m[1].isdigit() else int(self.names[m[1]])}", text)
         return float(eval(text.replace("<>", "!="), {"__builtins__": {}}, SCOPE | self.names))
 
     def run(self, row: int, stop: int) -> None:
@@ -341,7 +341,7 @@ def random_program(seed: int) -> str:
         return f"G90 G0 X{n()} Y{n()} Z{n()}"
 
     def value() -> str:
-        number = chance.choice(("R1", "R2", n(), f"SIN({n(0, 90)})*20", "R[1]/2+3", "SQRT(POT(R1)+4)"))
+        number = chance.choice(("R1", "R2", n(), f"SIN({n(0, 90)})*20", "R[1]/2+3", "R[R9]+R[R8]", "SQRT(POT(R1)+4)"))
         return f"{number}{chance.choice('+-*')}{n(1, 3)}"
 
     def arc() -> str:
@@ -440,7 +440,7 @@ def random_program(seed: int) -> str:
         subs.append([f"%_N_SUB{name}_SPF", f"PROC SUB{name}(REAL P_A, REAL P_B)", "G1 X=P_A Y=P_B*2", *inner, "M17"])
         return [f"SUB{name}({n()},{value()})"]
 
-    lines += ["R1=3.5", "R2=-2"]
+    lines += ["R1=3.5", "R2=-2", "R8=2", "R9=1"]
     for _ in range(chance.randrange(3, 9)):
         lines += statements()
     lines += ["M30", *(line for sub in subs for line in sub)]

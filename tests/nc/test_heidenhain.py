@@ -262,13 +262,13 @@ def test_inch_programs_count_feeds_in_tenths():
 
 
 def test_blank_tools_and_what_is_said():
-    text = "BLK FORM 0.1 Z X-5 Y+0 Z-20\nBLK FORM 0.2 X+100 IY+80 Z+0\nCYCL DEF 247 D Q339=+1\n"
+    text = "BLK FORM 0.1 Z X-5 Y+0 Z-20\nBLK FORM 0.2 X+100 IY+80 Z+0\nL Z+0 FMAX M91\nCYCL DEF 247 D Q339=+1\n"
     text += 'CYCL DEF 240 Z Q200=2 Q343=0 Q201=-1 Q206=9 Q203=0\nTOOL CALL "MILL 10" Z S500\nSTOP M0\nL X+1 M8\n'
     text += "CYCL CALL POS X+5 Y+5 F MAX\nTOOL CALL 2 Z\nFUNCTION TCPM F TCP AXIS POS\nL X+7\nFUNCTION RESET TCPM"
     program = read(text)
     assert program.stock == ((-0.005, 0.0, -0.02), (0.1, 0.08, 0.0))
     assert program.dialect == "heidenhain" and [tool.number for tool in program.tools] == [1, 2]
-    assert program.moves.tool_length[-1] == 0.05 and ("M8", 9) in [(u.word, u.line) for u in program.unsupported]
+    assert program.moves.tool_length[-1] == 0.05 and ("M8", 10) in [(u.word, u.line) for u in program.unsupported]
     assert program.moves.end[-1, 2] == pytest.approx(0.002 - 0.05)  # the numbers of the tip change with the length
     assert any("cycle 247" in text for text in program.assumptions)
     left_out = read("CYCL DEF 392 ATC ~\n Q240=2\nBLK FORM 0.1 Z X+Q7 Y+0 Z-20\nL X+1")

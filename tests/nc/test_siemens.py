@@ -192,6 +192,9 @@ def test_check_says_the_language_and_why(capsys, tmp_path):
     (tmp_path / "part.mpf").write_text("G1 X5 F100\n")
     assert main(["check", str(tmp_path / "part.mpf")]) == 0
     assert "(its ending)" in capsys.readouterr().out
+    (tmp_path / "iso.mpf").write_text("G21 G90\nT1 M6 (D 10)\nG81 X5 Z-3 R2 F100\nG80\nM30\n")
+    assert main(["check", str(tmp_path / "iso.mpf")]) == 0
+    assert "G code (the ISO dialect in spite of its ending: 'G21 G90')" in capsys.readouterr().out
 
 
 WRITTEN = """%_N_P_MPF

@@ -378,6 +378,30 @@ def settled(running) -> dict[str, object]:
     return running.idle()
 
 
+def test_a_page_asks_again_where_an_answer_was_overtaken(tmp_path, browser):
+    """All is done, and told, between the moment when the state is answered and that when the page has the answer."""
+    studio = Running(tmp_path / "case")
+    tab = Tab(browser, studio.address)
+    late: list[int] = []
+
+    def overtake(route) -> None:
+        answer = route.fetch()
+        if not late:
+            late.append(answer.status)
+            studio.ask("POST", "/file?name=slot.nc", SLOT.encode())
+            settled(studio)
+        route.fulfill(response=answer)
+
+    try:
+        tab.page.route("**/state", overtake)
+        tab.page.reload()
+        tab.page.wait_for_selector("#which-now")
+        assert late == [200]
+    finally:
+        tab.close()
+        studio.end()
+
+
 def test_the_journey_by_mouse(running, browser, tmp_path):
     tab = Tab(browser, running.address)
     page = tab.page
@@ -879,7 +903,7 @@ def test_the_export_is_read_without_a_studio_and_has_the_figures_of_the_commands
     state = again.idle()
     again.end()
     assert again.token not in content
-    head, mark, tail = content.partition('id="state">')
+    head, mark, tail = content.partition('id="data">')
     document, end, rest = tail.partition("</script>")
     exported = json.loads(document)
     exported["verdict"]["portrait"] = PORTRAIT  # these data leave nothing to portray

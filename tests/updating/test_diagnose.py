@@ -15,7 +15,7 @@ from tests.stiffness.cases import nist
 from tests.updating import cases
 from tests.updating.cases import campaign, diagnosed, examined, readings_by_hand, table_1
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.judgement import TAKEN_UP
+from toolpath_stiff.inference.nuisances import TAKEN_UP
 from toolpath_stiff.inference.prediction import scaled_law
 from toolpath_stiff.rig.kinematics import commanded_lengths, rotations
 from toolpath_stiff.rig.nominal import load_nominal

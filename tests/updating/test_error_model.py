@@ -186,7 +186,7 @@ def test_regions_are_quarters_of_the_points():
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("struts_percent = ", "strutz_percent = ", "each once"),
+        ("struts_percent = ", "strutz_percent = ", "strutz_percent: unknown key"),
         ("struts_percent = ", "struts_percent = -", "struts_percent"),
         ("form_percent = [", "form_percent = [99.0, ", "form_percent"),
         ("places_mm_deg = [\n    [", "places_mm_deg = [\n    [0.0, 0.0],\n    [", "places_mm_deg"),

@@ -151,7 +151,8 @@ def test_components_in_turned_axes_and_poses_without_joints(tmp_path: Path) -> N
     write("asked.csv", head, [row[:-1] for row in turned])
     asked = tps.diagnose(str(tmp_path / "asked.csv"), ROBOT)
     assert asked.verdict == "unexplained" and "is the sensor in other axes?" in str(asked)
-    write("gaps.csv", head, [[*row[:10], "NaN" if i % 4 else row[10], *row[11:]] for i, row in enumerate(rows)])
+    gaps = [[*row[:10], "NaN" if i % 4 else row[10], *row[11:]] for i, row in enumerate(rows)]
+    write("gaps.csv", head, [*gaps, [*rows[0][:9], "", "n/a", "", rows[0][-1]]])
     as_read, other = (tps.diagnose(str(tmp_path / name), ROBOT) for name in ("a.csv", "turned.csv"))
     assert other.labels == as_read.labels == ["joint_torsion, joint 2"]
     assert other.error_as_given == pytest.approx(as_read.error_as_given, rel=1e-9)
@@ -198,7 +199,7 @@ def test_a_cable_off_the_tip_is_the_wrench_that_it_makes(tmp_path: Path) -> None
         ),
         ("x_mm,y_mm,z_mm,tension_N,ux_um", "1800,0,900,100,5", "column cable_x_mm is missing"),
         ("x_mm,y_mm,z_mm,load_kg,fz_N", "1800,0,900,100,5", "column ux_um is missing"),
-        ("x_mm,y_mm,z_mm,fz_N,ux_um,force_axes", "1800,0,900,100,5,tcp", "axes tcp; expected base or tip"),
+        ("x_mm,y_mm,z_mm,fz_N,ux_um,force_axes", "1800,0,900,100,5,tcp", "axes tcp; expected one of base, tip, work"),
         ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um", "1800,0,900,0,0,0,5", "no force"),
         ("x_mm,y_mm,z_mm,fx_N,fy_N,fz_N,ux_um,uy_um", "1800,0,900,1,2,3,0,nan", "nothing read"),
     ],
@@ -357,7 +358,7 @@ def test_a_pull_far_off_is_named_and_not_counted(tmp_path: Path) -> None:
     none[0, :6], none[0, 12] = rows[0, :6], SD_UM
     found = tps.diagnose(written(tmp_path / "w.csv", head, np.vstack([rows, none])), off)
     assert found.verdict == "unexplained" and f"{tmp_path / 'w.csv'}:6 x" in found.wild and len(found.wild) == 3
-    assert found.error_as_given < 40.0 and "1 rows of no force" in str(found)
+    assert found.error_as_given < 40.0 and "1 rows of no force, or of which nothing" in str(found)
 
 
 def test_tables_of_pulls_are_refused_where_stiffnesses_are_read(tmp_path: Path) -> None:
@@ -376,3 +377,41 @@ def test_tables_of_pulls_are_refused_where_stiffnesses_are_read(tmp_path: Path) 
     with pytest.raises(tps.TpsError, match=r"degrees apart.*a=c_deg"):
         tps.diagnose(both, ROBOT)
     assert tps.diagnose(both, ROBOT, columns="a=c_deg, c=a_deg").verdict == "adequate"
+
+
+def test_poses_in_other_axes_than_the_joints(tmp_path: Path) -> None:
+    """A tracker's axes, near the base's or not: noted, or refused with the [work] that reads all of it as it stands."""
+    head, rows = rows_of(campaign(tmp_path / "a.csv", 9, "none", 0, 20))
+    places = ["x_mm", "y_mm", "z_mm"]
+    for angle, shift in ((0.3, [3.0, -8.0, 2.0]), (90.0, [250.0, -180.0, 900.0])):
+        turn = np.array([[np.cos(np.radians(angle)), -np.sin(np.radians(angle)), 0.0],
+                         [np.sin(np.radians(angle)), np.cos(np.radians(angle)), 0.0], [0.0, 0.0, 1.0]])  # fmt: skip
+        pose = 1e3 * MACHINE.forward(np.radians(rows[:, :6]))[0] @ turn.T + shift
+        both = np.hstack([pose, rows[:, :6], rows[:, 6:9] @ turn.T, rows[:, 9:12] @ turn.T, rows[:, 12:]])
+        data = written(tmp_path / f"{angle:g}.csv", [*places, *head], both)
+        if angle < 1.0:
+            assert f"other axes, xyz_mm = {(-turn.T @ shift).round(1).tolist()}" in str(tps.diagnose(data, ROBOT))
+            continue
+        with pytest.raises(tps.TpsError, match=r"90.csv:2: .*so in 19 more rows\); expected .*\[work\] (.*)") as error:
+            tps.diagnose(data, ROBOT)
+        keys = str(error.value).split("[work] ")[1].split(". ")[0].replace(", rpy", "\nrpy")
+        work = tmp_path / "work.toml"
+        work.write_text(f"{ROBOT.read_text('utf-8')}\n[work]\n{keys}\n", "utf-8")
+        found = tps.diagnose(data, work, columns="force_axes==work, sensor_axes==work")
+        plain = tps.diagnose(str(tmp_path / "a.csv"), ROBOT)
+        assert found.error_as_given == pytest.approx(plain.error_as_given, rel=1e-3) and found.verdict == "adequate"
+
+
+def test_a_dial_that_hardly_moves_does_not_judge_the_joints(tmp_path: Path) -> None:
+    """Dials across the force read next to nothing at some pulls, where any error is many times the reading."""
+    off = tmp_path / "off.toml"
+    off.write_text(ROBOT.read_text("utf-8").replace("[620.0, 340.0, 460.0,", "[900.0, 500.0, 300.0,"), "utf-8")
+    head, rows = rows_of(campaign(tmp_path / "a.csv", 9, "none", 0, 43))
+    dial = np.cross(rows[:, 6:9], rows[:, 9:12])  # square to what moves and to the force
+    dial[::2] = np.eye(3)[np.arange(22) % 3]
+    dial /= np.linalg.norm(dial, axis=1, keepdims=True)
+    read = (dial * rows[:, 9:12]).sum(axis=1, keepdims=True) + 3.0
+    names = [*head[:9], "dial_x", "dial_y", "dial_z", "displacement_um", "sd_um"]
+    data = written(tmp_path / "d.csv", names, np.hstack([rows[:, :9], dial, read, rows[:, 12:]]))
+    update = tps.update(data, off, joints=True)
+    assert update.verdict == "updated" and update.steps[-1].error < 0.1

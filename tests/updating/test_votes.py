@@ -98,13 +98,13 @@ def test_a_name_has_outvoted_every_rival_and_says_by_how_much():
     assert found.verdict == "identified" and all(outvoted(each) for each in found.main.votes.values())
     document = found.to_dict()
     assert document["votes"][0]["rival"] == next(iter(found.main.votes)) and document["votes"][0]["outvoted"]
-    assert f"{document['votes'][0]['rival']} foretells pose after pose worse by" in document["text"]
+    assert f"{document['votes'][0]['rival']} predicts pose after pose worse by" in document["text"]
     rivals = {entry["effect"]: entry["vote"] for entry in document["candidates"]}
     assert rivals["weak_strut"] is None and rivals["table_compliance"]["gain"] > SMALL
 
 
 def test_untilted_a_table_is_a_tool_whose_axes_differ():
-    """The same readings to the last digit: the form that is fair to the tool foretells as well as the table."""
+    """The same readings to the last digit: the form that is fair to the tool predicts as well as the table."""
     judgement = judged(7, "paper", "table_compliance", STRONG)
     rivals = fair_rivals(judgement.problem, judgement.fits["table_compliance"], judgement.base)
     against = votes(judgement.problem, judgement.fits["table_compliance"], rivals)
@@ -116,9 +116,9 @@ def test_votes_against_a_rival_are_those_of_its_strongest_form():
     assert list(closest({"x": np.ones(3)}, {"x": np.zeros(3), "w": np.full(3, 2.0)})) == ["x", "w"]
 
 
-def displaced(millimetres: float):
-    """A sound tilted campaign, as machine file `nist` reads it if a joint of the platform stands off its place."""
-    data = campaign(100, "tilted", "none")[0]
+def displaced(millimetres: float, hidden: str = "none"):
+    """A tilted campaign, as machine file `nist` reads it if a joint of the platform stands off its place, too."""
+    data = campaign(100, "tilted", hidden, size=0.1)[0]
     problem = judged(100).problem
     off = ActiveEffect(find_effect("joint_offset"), {"joint": 9, "x": 0.0, "y": 0.0, "z": millimetres / 1e3})
     change = problem.predictor.log_stiffness((0.0, 0.0), [off]) - problem.predictor.log_stiffness()
@@ -135,6 +135,14 @@ def test_a_joint_off_its_place_is_told():
     assert abs(fit.sizes[0][2] - 0.011) < 3.3 * fit.deviation(2)
     if found.verdict == "identified":
         assert found.to_dict()["text"].startswith("The joint of strut 3 on the platform stands off its place by about")
+
+
+def test_a_joint_off_its_place_is_told_beside_another_effect():
+    """Of another joint than the one that would do best alone, and as far as it stands out beside the effect alone."""
+    found = displaced(8.0, "spindle_compliance")
+    assert "joint_offset + spindle_compliance" in found.explanations
+    fit = found.fits["joint_offset + spindle_compliance"]
+    assert {"joint": 9} in [dict(candidate.choice) for candidate in fit.candidates]
 
 
 def test_sound_joints_are_no_finding():

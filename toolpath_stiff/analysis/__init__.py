@@ -1,1 +1,1 @@
-"""A sampled path on a machine: loads, reach, stiffness, statistics."""
+"""Analysis of a sampled path on a machine: loads, reach, stiffness, statistics."""

@@ -1,4 +1,4 @@
-"""What an analysis assumed or recovered rather than read: the sentences of `summary.json`."""
+"""Assumptions of an analysis and values it recovered: the sentences of `summary.json`."""
 
 from collections.abc import Sequence
 
@@ -9,11 +9,11 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.stiffness.model import acting_effects, conditions_stated
-from toolpath_stiff.units import mm_from_m, mm_per_min_from_m_per_s
+from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s
 
 
 def assumptions_of(analysis: EvaluatedPath, turned: str = "") -> list[str]:
-    """Everything that was assumed or recovered rather than published or given; `turned`: how the tool was turned."""
+    """Everything assumed or recovered rather than published or given; `turned`: how the tool was turned."""
     machine, model = analysis.machine, analysis.model
     sentences = list(analysis.program.assumptions)
     if words_turn_the_platform(analysis.program) and isinstance(machine, Hexapod):
@@ -56,12 +56,16 @@ def assumptions_of(analysis: EvaluatedPath, turned: str = "") -> list[str]:
 
 
 def _of_elements(analysis: EvaluatedPath, turned: str) -> list[str]:
-    """What is assumed of a machine of elements on a path."""
+    """Assumptions about a machine of elements on a path."""
     machine = analysis.machine
     names = ", ".join(dict.fromkeys(element.name for element in machine.elements))
     sentences = [f"what gives way is {names}; everything else is rigid"]
     if analysis.at.configuration:
         sentences.append(f"the configuration of the joints is kept over the program: {analysis.at.configuration}")
+    for name, value in machine.standing_joints.items():
+        linear = machine.joint_kinds[machine.joint_names.index(name)] == "linear"
+        where = f"{mm_from_m(value):g} mm (stands_mm)" if linear else f"{deg_from_rad(value):g} deg (stands_deg)"
+        sentences.append(f"{name} stands at {where}")
     if turned:
         sentences.append(turned)
     elif len(machine.joint_names) > 5:
@@ -72,11 +76,11 @@ def _of_elements(analysis: EvaluatedPath, turned: str) -> list[str]:
 
 
 def words_turn_the_platform(program: ReadProgram) -> bool:
-    """Whether rotary words were taken for the platform's own angles."""
+    """True if rotary words were taken to be the platform's own angles."""
     return program.native and bool(program.moves.start[:, 3:].any() or program.moves.end[:, 3:].any())
 
 
 def pose_words(pose: Sequence[float], digits: str) -> str:
-    """A pose as a control shows it, angles only where there are some."""
+    """A pose as a control shows it, with angles only if there are any."""
     words = [f"{axis}{value:{digits}}" for axis, value in zip("XYZABC", pose_in_mm(pose), strict=True)]
     return " ".join(words if any(pose[3:]) else words[:3])

@@ -1,23 +1,29 @@
-"""The cut of an analysis in figures: errors of walls and floors by part and by line, the worst places, a tolerance."""
+"""Figures of an analysis's cut: errors of walls and floors by part and by line, the worst places, a tolerance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolpath_stiff.analysis.statistics import EvaluatedPath, parts_of_path
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
-from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document
 from toolpath_stiff.units import deg_from_rad, mm3_from_m3, mm_from_m, nm_from_m, um_from_m
 
+if TYPE_CHECKING:
+    from toolpath_stiff.cutting.cut import Cut
+
 SURFACES = ("left", "right", "floor")  # of the path, seen along the feed
-PLACES = 5  # worst ones that are named
+PLACES = 5  # worst places that are named
 
 
 def cut_document(path: EvaluatedPath, cut: Cut, tolerance: float | None) -> Document:
-    """The entry `cut` of `summary.json`, in the shop's units; `tolerance` in m."""
+    """Entry `cut` of `summary.json`, in the shop's units; `tolerance` in m."""
     everything = np.arange(len(cut.samples))
     operations, tools = parts_of_path(path)
     document: dict[str, object] = {
-        "stock": cut.stock.origin,
+        "stock": cut.work.stock.origin,
         "coefficients": cut.coefficients.document(),
         "tools": [_tool(cut, number) for number in cut.cutters],
         "machine_only": cut.machine_only,
@@ -67,7 +73,7 @@ def _figures(cut: Cut, rows: IntArray) -> Document:
 
 
 def _errors(mean: FloatArray, low: FloatArray, high: FloatArray, weight: FloatArray) -> Document | None:
-    """Mean by length, what 95 % of the surface keep within, and the extremes, um; None without a surface."""
+    """Mean by length, limits that 95 % of the surface keep, and extremes, um; None without a surface."""
     made = np.isfinite(mean) & (weight[:, None] > 0.0)
     if not made.any():
         return None
@@ -85,7 +91,7 @@ def _errors(mean: FloatArray, low: FloatArray, high: FloatArray, weight: FloatAr
 
 
 def _worst(path: EvaluatedPath, cut: Cut, sign: float) -> list[Document]:
-    """The surfaces that stand out farthest (sign 1) or are cut deepest (-1), each of another line."""
+    """Surfaces that stand out farthest (sign 1) or are cut deepest (-1), each of another line."""
     size = np.where(np.isfinite(cut.errors), cut.highest if sign > 0.0 else -cut.lowest, -np.inf)
     size[cut.samples.weight <= 0.0] = -np.inf
     rows, worst = largest_of(cut.samples.line, size)
@@ -98,7 +104,7 @@ def _worst(path: EvaluatedPath, cut: Cut, sign: float) -> list[Document]:
 
 
 def largest_of(group: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
-    """For each group (n,) of rows the flat place in values (n, k) of its largest, and that; in order of the groups."""
+    """Flat index of the largest of values (n, k) in each group (n,) of rows, and that value; in order of the groups."""
     column = values.argmax(axis=1)
     best = np.take_along_axis(values, column[:, None], axis=1)[:, 0]
     order = np.lexsort((-best, group))
@@ -107,7 +113,7 @@ def largest_of(group: IntArray, values: FloatArray) -> tuple[IntArray, FloatArra
 
 
 def surface_at(path: EvaluatedPath, cut: Cut, row: int, surface: int) -> Document:
-    """One surface of one sample: where it is, what its error is."""
+    """One surface of one sample: its place and its error."""
     line, position = int(cut.samples.line[row]), mm_from_m(path.samples.position[row]).tolist()
     source = path.program.source
     return {
@@ -124,7 +130,7 @@ def surface_at(path: EvaluatedPath, cut: Cut, row: int, surface: int) -> Documen
 
 
 def lines_beyond(cut: Cut, tolerance: float) -> list[tuple[int, float]]:
-    """(line, error of the largest size in um) of lines whose surface leaves +-tolerance (m) anywhere, worst first."""
+    """(line, largest error in um) of lines whose surface leaves +-tolerance (m) anywhere, worst first."""
     error = np.where(-cut.lowest > cut.highest, cut.lowest, cut.highest)
     made = np.isfinite(error) & (cut.samples.weight > 0.0)[:, None]
     places, worst = largest_of(cut.samples.line, np.where(made, np.abs(error), -np.inf))
@@ -157,7 +163,7 @@ def cut_columns(path: EvaluatedPath, cut: Cut, rows: slice = slice(None)) -> dic
 
 
 def line_columns(cut: Cut) -> dict[str, AnyArray]:
-    """Column of `cut_lines.csv` -> values of each line that cuts; nan where it leaves no such surface."""
+    """Column of `cut_lines.csv` -> values of each line that cuts; nan if it leaves no such surface."""
     cuts = np.flatnonzero(cut.samples.cutting)
     cuts = cuts[np.argsort(cut.samples.line[cuts], kind="stable")]
     first = np.flatnonzero(np.diff(cut.samples.line[cuts], prepend=-1))

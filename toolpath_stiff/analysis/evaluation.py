@@ -1,4 +1,4 @@
-"""Stiffness along a load, strut lengths and reach at many poses, block by block, fast where that is safe."""
+"""Stiffness along a load, strut lengths and reach at many poses, block by block, by the fast way where it is safe."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ BLOCK = 16_384  # poses at a time: the work arrays stay in the processor's cache
 OF_THE_WORK = ("tangential", "axial", "normal", "radial")  # loads that turn with the work; others are of the machine
 TURNING_BACK = 1e-6  # of a limit's span
 MOST_TRIED = 60  # poses of a path at which every configuration is tried
-FEW_CORNERS = 0.2  # share of the rows; a second load of every pose costs more than these poses twice
+FEW_CORNERS = 0.2  # share of the rows; with fewer, a second load at every pose costs more than these poses twice
 Progress = Callable[[int, int], None]
 OF_POSES, OF_REACH = ("stiffness", "substituted", "joints", "extrapolated"), ("margin", "limit", "value")
 # Tool tips (n, 3), rotations (n, 3, 3) or None where all are upright, length of the tool (nan: the reference tool).
@@ -33,7 +33,7 @@ WorkPoses = tuple[FloatArray, FloatArray | None, FloatArray]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What the machine does at n poses. SI.
+    """Figures of the machine at n poses. SI.
 
     Attributes
     ----------
@@ -60,12 +60,12 @@ class Evaluation:
 
     @property
     def reachable(self) -> BoolArray:
-        """(n,) whether every limit is kept."""
+        """(n,) True where every limit is kept."""
         return self.reach.reachable
 
     @classmethod
     def joined(cls, parts: "Sequence[Evaluation]") -> "Evaluation":
-        """The parts of a path, one after the other."""
+        """Evaluation of a whole path from its consecutive parts."""
         if len(parts) == 1:
             return parts[0]
 
@@ -163,19 +163,19 @@ def _poses(position: FloatArray, abc: FloatArray, tool: float, rows: IntArray | 
 
 
 def corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolArray:
-    """(n,) where a move ends and the next one starts in the row after: one pose, two tangents. None where few are."""
+    """(n,) True where a move ends and the next starts in the next row: one pose, two tangents. All False if few."""
     corner = np.zeros(len(position), dtype=bool)
     corner[:-1] = True
     for values in (*position.T, *abc.T, np.nan_to_num(lengths, nan=-1.0)):
         corner[:-1] &= values[1:] == values[:-1]
-    corner[1:] &= ~corner[:-1]  # of more than two rows alike the others are poses of their own
+    corner[1:] &= ~corner[:-1]  # of more than two equal rows, only the first two are a corner
     return corner if np.count_nonzero(corner) > FEW_CORNERS * len(corner) else np.zeros_like(corner)
 
 
 def _by_closed_form(
     model: StiffnessModel, load: Load, tangents: list[FloatArray], poses: Poses
 ) -> Iterator[tuple[Evaluation, BoolArray]]:
-    """Struts on a rigid platform along loads that the geometry directs, for each of the tangents (n, 3) at the poses.
+    """Struts on a rigid platform under loads directed by geometry, for each of the tangents (n, 3) at the poses.
 
     With each (n,) where the figures hold: not for other directions, at poses near singular ones, and where an angle
     near zero decides.
@@ -196,7 +196,7 @@ def _by_closed_form(
 
 
 def _by_solution(model: StiffnessModel, load: Load, tangent: FloatArray, poses: Poses, force: float) -> Evaluation:
-    """Any poses under any load."""
+    """Evaluation of any poses under any load."""
     tip, rotation, _ = poses
     lengths, extrapolated, stand, compliance = tip_compliances(model, poses, force)
     direction, substituted = load_directions(load, compliance, tip, rotation, tangent)
@@ -208,7 +208,7 @@ def _by_solution(model: StiffnessModel, load: Load, tangent: FloatArray, poses: 
 def tip_compliances(
     model: StiffnessModel, poses: Poses, force: float
 ) -> tuple[FloatArray, BoolArray, Reach, FloatArray]:
-    """Joints (n, j) m or rad, whether a strut law is extrapolated (n,), reach, compliance (n, 3, 3) m/N.
+    """Joints (n, j) m or rad, (n,) True if the strut law is extrapolated, reach, compliance (n, 3, 3) m/N.
 
     The compliance is nan out of reach, and leaves load-dependent effects out.
     """
@@ -241,7 +241,7 @@ def _some(poses: Poses, rows: BoolArray) -> Poses:
 
 
 def _refuse_no_number(model: StiffnessModel, tip: FloatArray, bad: BoolArray) -> None:
-    """Raise `InputError` where the limits let poses pass (n,) that have no stiffness."""
+    """Raise `InputError` if poses within the limits (n,) have no stiffness."""
     if bad.any():
         x, y, z = (mm_from_m(float(v)) + 0.0 for v in tip[int(np.argmax(bad))])
         raise InputError(
@@ -269,7 +269,7 @@ def _by_elements(
     force: float,
     progress: Progress | None,
 ) -> Evaluation:
-    """A machine of elements at n samples (position, abc, tangent), as `evaluate`; those with a tangent are a path.
+    """Evaluation of a machine of elements at n samples (position, abc, tangent); those with a tangent are a path.
 
     Along a path the machine keeps one configuration, that with the largest smallest margin.
     """
@@ -301,14 +301,14 @@ def _by_elements(
 
 
 def tried_rows(count: int) -> IntArray:
-    """The poses of a path of so many at which configurations are tried."""
+    """Poses, of a path of `count`, at which all configurations are tried."""
     return np.unique(np.linspace(0, count - 1, MOST_TRIED).round().astype(np.int64))
 
 
 def kept_configurations(
     machine: MachineTool, position: FloatArray, rotation: FloatArray | None, lengths: FloatArray, paths: int = 1
 ) -> IntArray:
-    """(paths,) the configuration whose smallest margin is the largest; of poses of paths, one after the other.
+    """(paths,) configuration with the largest smallest margin on each path; poses of paths one after the other.
 
     Poses that no configuration reaches do not count; one in which a joint has to turn back on the way comes after all
     that keep the limits.
@@ -331,7 +331,7 @@ def kept_configurations(
 def evaluate_stance(
     model: StiffnessModel, stance: Stance, in_work: WorkPoses, load: Load, force: float = defaults.FORCE
 ) -> Evaluation:
-    """A machine of elements where it stands; tip, tool axes and tangent in work axes."""
+    """Evaluation of a machine of elements at a stance; tip, tool axes and tangent in work axes."""
     n, stand = len(stance), reach(model.machine, in_work[0], stance)
     stiffness, substituted = np.full(n, np.nan), np.zeros(n, dtype=bool)
     if len(rows := np.flatnonzero(stand.reachable)):
@@ -341,7 +341,7 @@ def evaluate_stance(
 
 
 def poses_taken(in_work: WorkPoses, rows: IntArray) -> WorkPoses:
-    """Some of the poses."""
+    """Poses of some rows."""
     position, rotation, tangent = in_work
     return position[rows], None if rotation is None else rotation[rows], tangent[rows]
 
@@ -349,7 +349,7 @@ def poses_taken(in_work: WorkPoses, rows: IntArray) -> WorkPoses:
 def stiffness_within(
     model: StiffnessModel, stance: Stance, in_work: WorkPoses, load: Load, force: float
 ) -> tuple[FloatArray, BoolArray]:
-    """(n,) N/m along the load and where the softest direction stands in, at poses within reach; as there."""
+    """(n,) N/m along the load at poses within reach, and (n,) True where the softest direction stands in."""
     position, _, tangent = in_work
     n = len(stance)
     along, substituted = np.empty(n), np.zeros(n, dtype=bool)
@@ -361,7 +361,7 @@ def stiffness_within(
             continue
         part = stance if len(rows) == n else stance.take(rows)
         path, towards = path_of_stance(model, part, force=force, **model.conditions.columns(len(rows))), direction[rows]
-        if not known[rows[0]]:  # the compliance directs the load
+        if not known[rows[0]]:  # the load's direction depends on the compliance
             compliance = element_sum.tip_compliance(model, path)
             some = (part.position, part.rotation, tangent[rows])
             towards, substituted[rows] = load_directions(load, compliance, *some)

@@ -91,7 +91,7 @@ class StiffnessMap(FolderResult):
         return {name: column.ravel() for name, column in zip(COLUMNS, values, strict=True)}
 
     def to_frame(self) -> DataFrame:
-        """One row a point of the grid: x_mm, y_mm, z_mm, stiffness_N_per_mm (nan out of reach), reachable."""
+        """One row per point of the grid: x_mm, y_mm, z_mm, stiffness_N_per_mm (nan out of reach), reachable."""
         return frame_of(self.columns())
 
     def _short(self) -> str:

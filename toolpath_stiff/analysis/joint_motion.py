@@ -1,4 +1,4 @@
-"""What a path asks of the joints: where they cannot go on as they stand, and where they are too slow."""
+"""Demands of a path on the joints: where they would have to turn back, and where they are too slow."""
 
 from collections.abc import Sequence
 
@@ -9,18 +9,18 @@ from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 MOST_NAMED = 5  # lines in a warning
-SHORTEST = 1e-9  # s between samples: less is the rounding of one time
+SHORTEST = 1e-9  # s between samples: less is rounding
 
 
 def lines_named(lines: IntArray) -> str:
-    """Lines in words, the first ones of many."""
+    """Line numbers in words; of many only the first."""
     each = np.unique(lines)
     more = f" and {len(each) - MOST_NAMED} more" if len(each) > MOST_NAMED else ""
     return f"lines {', '.join(map(str, each[:MOST_NAMED]))}{more}"
 
 
 def joint_warnings(path: EvaluatedPath, changes: IntArray | Sequence[int] = ()) -> list[str]:
-    """Lines of cuts in which a joint turns back, or is too slow; `changes`: samples before which the joints jump."""
+    """Warnings on lines of cuts in which a joint turns back or is too slow; `changes`: samples before joints jump."""
     samples, machine, warnings = path.samples, path.machine, []
     rotary = np.array(machine.joint_kinds) == "rotary"
     if not rotary.any() and not np.isfinite(machine.joint_speeds).any():

@@ -94,7 +94,7 @@ def load_directions(
 def geometric_directions(
     load: Load, position: FloatArray, rotation: FloatArray | None, tangent: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Unit vectors (n, 3) of the load, and where they are known (n,) without the compliance; as `load_directions`."""
+    """Unit vectors (n, 3) of the load, and (n,) True where they do not depend on the compliance."""
     n = len(position)
     everywhere = np.ones(n, dtype=bool)
     if load.vector is not None:
@@ -118,7 +118,7 @@ def geometric_directions(
 
 
 def principal_directions(compliance: FloatArray, softest: bool = True) -> FloatArray:
-    """(n, 3) unit vectors of the largest, else the smallest eigenvalue of C; their largest component is positive."""
+    """(n, 3) unit vectors of the largest eigenvalue of C, or the smallest; their largest component is positive."""
     finite = np.isfinite(compliance).all(axis=(1, 2))
     directions = np.full((len(compliance), 3), np.nan)
     vectors = np.linalg.eigh(compliance[finite])[1][:, :, -1 if softest else 0]
@@ -128,7 +128,7 @@ def principal_directions(compliance: FloatArray, softest: bool = True) -> FloatA
 
 
 def along_tool_axis(tangent: FloatArray, abc: FloatArray) -> BoolArray:
-    """Whether the tip moves along the tool axis, in either sense, within `defaults.PLUNGE_ANGLE`.
+    """(n,) True where the tip moves along the tool axis, either way, within `defaults.PLUNGE_ANGLE`.
 
     Parameters
     ----------
@@ -149,14 +149,14 @@ def along_tool_axis(tangent: FloatArray, abc: FloatArray) -> BoolArray:
 
 
 def plunging_rows(load: Load, tangent: FloatArray, abc: FloatArray, counted: BoolArray) -> BoolArray:
-    """(n,) the counted samples of plunges; none where the load does not follow the motion."""
+    """(n,) counted samples of plunges; none if the load does not follow the motion."""
     if load.kind != "tangential":
         return np.zeros(len(counted), dtype=bool)
     return np.asarray(counted & along_tool_axis(tangent, abc))
 
 
 def headline_rows(counted: BoolArray, plunging: BoolArray) -> BoolArray:
-    """(n,) the counted samples that mean, range and weakest place are about: of a path, or of a part of it.
+    """(n,) counted samples that mean, range and weakest place are about, of a path or a part of it.
 
     Those that do not plunge; all of them where every one does.
     """

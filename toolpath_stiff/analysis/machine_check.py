@@ -1,4 +1,4 @@
-"""Slips in a machine file: whether struts, neutral pose and joints are plausible."""
+"""Plausibility of a machine file: struts, neutral pose, joints."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -14,10 +14,10 @@ from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
-# N/um of a strut: screws, bearings and joints in series. Below, it is no machine's; above, no screw's.
+# N/um of a strut: screws, bearings and joints in series. Below, it is no machine tool; above, no screw.
 STRUT_SOFTEST, STRUT_STIFFEST = 1.0, 1000.0
 SOFTEST_ARM = 0.05  # N/um at the tool of a stretched arm; assumed
-ODD_STRUT, MOST_ODD = 0.005, 2  # of the usual length: no other strut is nearer to one that a slip has moved
+ODD_STRUT, MOST_ODD = 0.005, 2  # share of the usual length within which an odd strut has no other; most odd struts
 # N/um at the tool: "usually less than 1" for articulated robots, "very often greater than 50" for machining centres
 # (Pan, Zhang, Zhu, Wang 2006, J. Mater. Process. Technol. 173, 301).
 ROBOT, MACHINING_CENTRE, BEYOND = 1.0, 50.0, 1000.0
@@ -25,7 +25,7 @@ ROBOT, MACHINING_CENTRE, BEYOND = 1.0, 50.0, 1000.0
 
 @dataclass(frozen=True, repr=False, eq=False)
 class MachineCheck(Result):
-    """A machine file held against what is plausible.
+    """Result of a plausibility check of a machine file.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class MachineCheck(Result):
 
     @property
     def good(self) -> bool:
-        """Whether nothing is wrong."""
+        """True if nothing is wrong."""
         return not self.wrong
 
     @property
@@ -71,7 +71,7 @@ class MachineCheck(Result):
         return condition_warnings(self.model)
 
     def to_dict(self) -> Document:
-        """The JSON document of the command."""
+        """JSON document of the command."""
         return {
             "file": self.file,
             "machine": self.model.machine.name,
@@ -83,13 +83,13 @@ class MachineCheck(Result):
         }
 
     def to_frame(self) -> DataFrame:
-        """One row a finding: severity (wrong, doubtful, warning), text."""
+        """One row per finding: severity (wrong, doubtful, warning), text."""
         kinds = (("wrong", self.wrong), ("doubtful", self.doubtful), ("warning", self.warnings))
         rows = [(severity, text) for severity, texts in kinds for text in texts]
         return frame_of(rows, columns=["severity", "text"])
 
     def picture(self) -> bytes:
-        """The same as a PNG."""
+        """Drawing of the machine as PNG."""
         return self._picture()
 
     def _short(self) -> str:
@@ -130,7 +130,7 @@ def check_machine(model: StiffnessModel, file: str = "") -> MachineCheck:
 
 
 def _struts(machine: Hexapod) -> list[str]:
-    """Stiffnesses of a strut that no strut has, at the lengths that the file gives, else at the ends of the travel."""
+    """Findings on implausible strut stiffnesses, at the lengths in the file or else at the ends of the travel."""
     law = machine.strut_law
     ends = [(x, float(law.stiffness(np.array(x)))) for x in machine.limits.strut_length if np.isfinite(x)]
     return _implausible("[strut_law]", law.points) or _implausible("the strut law at an end of the travel", ends)
@@ -147,7 +147,7 @@ def _implausible(where: str, struts: list[tuple[float, float]]) -> list[str]:
 
 
 def _odd_struts(lengths: FloatArray) -> list[str]:
-    """Struts whose length m no other one comes near: machines have a few lengths, alike by threes or sixes."""
+    """Struts whose length (m) no other one is close to: machines have few lengths, shared by three or six struts."""
     apart = np.abs(lengths[:, None] - lengths) + np.diag(np.full(len(lengths), np.inf))
     usual = float(np.median(lengths))
     odd = np.flatnonzero(apart.min(axis=1) > ODD_STRUT * usual)

@@ -19,7 +19,7 @@ from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel, condition_warnings, effects_stated
 from toolpath_stiff.units import n_per_mm_from_n_per_m, nm_from_m
 
-AS_IT_IS = ("extrapolated", "margin_limit")  # a whole number, a word
+AS_IT_IS = ("extrapolated", "margin_limit")  # columns not converted: a whole number, a word
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
 
@@ -89,16 +89,16 @@ class PoseStiffness(Result):
 
     @property
     def reachable(self) -> BoolArray:
-        """(n,) whether the machine can take the pose."""
+        """(n,) True where the machine can take the pose."""
         return self.reach.reachable
 
     @property
     def warnings(self) -> list[str]:
-        """Effects that do not act here, for want of a set-up, a temperature or a tool."""
+        """Effects that do not act here, for lack of a set-up, a temperature or a tool."""
         return condition_warnings(self.model)
 
     def out_of_reach(self, most: int) -> list[str]:
-        """Which poses the machine cannot take and why: so many by name, how many more."""
+        """Reasons why poses are out of reach: at most `most` of them, then the number of the others."""
         rows = (~self.reachable).nonzero()[0]
         reasons = [f"row {i + 1}: out of reach: {self.reach.describe(i)}" for i in rows[:most]]
         return reasons + ([f"{len(rows) - most} more rows are out of reach"] if len(rows) > most else [])
@@ -121,14 +121,14 @@ class PoseStiffness(Result):
         }
 
     def to_frame(self) -> DataFrame:
-        """One row a pose, the columns of `tps pose --csv`."""
+        """One row per pose, with the columns of `tps pose --csv`."""
         return frame_of(self.columns)
 
     def to_dict(self) -> Document:
-        """Of a single pose its figures; of several, a list of them under "poses", null where out of reach."""
+        """Figures of a single pose; for several, a list of them under "poses", null where out of reach."""
         about = {"machine": self.model.machine.name, **effects_stated(self.model), "warnings": self.warnings}
         rows = [without_nan(row) for row in records(self.columns)]
-        tensors = (nm_from_m(self.tip_compliance).round(6) + 0.0).tolist()  # no digits of rounding
+        tensors = (nm_from_m(self.tip_compliance).round(6) + 0.0).tolist()  # without digits of rounding
         rows = [
             {**row, "extrapolated": bool(row["extrapolated"]), **without_nan({"tip_compliance_nm_per_N": tensor})}
             for row, tensor in zip(rows, tensors, strict=True)
@@ -178,7 +178,7 @@ def evaluate_poses(
 
 
 def _by_axes(model: StiffnessModel, compliance: FloatArray, poses: Poses, force: float) -> FloatArray:
-    """(n, 3, 3) m/N: each column with the load along that axis; `compliance` as of `tip_compliances`."""
+    """(n, 3, 3) m/N, each column with the load along that axis; `compliance` as from `tip_compliances`."""
     by_axes, within = compliance.copy(), ~np.isnan(compliance[:, 0, 0])
     if model.load_dependent and within.any():
         tip, rotation, tool = poses

@@ -25,7 +25,7 @@ MOST_NAMED = 20  # lines named for one kind of finding
 
 
 def machine_findings(program: ReadProgram, machine: MachineTool, step: float) -> tuple[list[Finding], dict[str, float]]:
-    """Moves beyond reach; the largest speed of a strut in a cut at the programmed feeds, with its line.
+    """Moves beyond reach; the largest strut speed in a cut at the programmed feeds, with its line.
 
     The program sits where it was read for; `step` is the distance of the samples, m.
     """
@@ -53,7 +53,7 @@ def machine_findings(program: ReadProgram, machine: MachineTool, step: float) ->
 
 @dataclass(frozen=True, repr=False)
 class ProgramCheck(Result):
-    r"""What a program uses, what is not understood, extents, times, and what a machine says to it.
+    r"""Check of a program: words used, words not understood, extents, times, and findings for a machine.
 
     Attributes
     ----------
@@ -104,13 +104,13 @@ class ProgramCheck(Result):
     fastest_strut: dict[str, float]
 
     def to_dict(self) -> Document:
-        """The JSON document of the command."""
+        """JSON document of the command."""
         document: Document = to_dict(self)
         return document
 
     @property
     def errors(self) -> list[Finding]:
-        """The findings that keep the program from running as it stands."""
+        """Findings that prevent the program from running as it stands."""
         return [finding for finding in self.findings if finding.severity == ERROR]
 
     def to_frame(self) -> DataFrame:
@@ -137,7 +137,7 @@ class ProgramCheck(Result):
 
 
 def check_program(request: Request, machine: MachineTool | None, step: float = defaults.STEP) -> ProgramCheck:
-    """Everything that is to be said of a program, in the shop's units.
+    """Check a program: all findings, in the shop's units.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def check_program(request: Request, machine: MachineTool | None, step: float = d
         more, speed = machine_findings(program, machine, step)
         findings += more
     figures = move_figures(program.moves, machine.rapid_feed if machine else defaults.RAPID_FEED)
-    if not checked.complete:  # the extents of a part of the path say nothing of the whole
+    if not checked.complete:  # extents of a part of the path say nothing about the whole
         figures |= {"extents_mm": {}, "extents_deg": {}}
     return ProgramCheck(
         program=program.name,

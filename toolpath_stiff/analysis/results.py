@@ -1,11 +1,11 @@
-"""A program on a machine: sample its path, evaluate every sample; its figures and what was assumed, `summary.json`."""
+"""A program on a machine: its path sampled, every sample evaluated; figures and assumptions, `summary.json`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -27,12 +27,10 @@ from toolpath_stiff.analysis.statistics import (
 from toolpath_stiff.analysis.turning import FIXED, TurnChoice, choose_turn
 from toolpath_stiff.analysis.uncertainty import band_figures
 from toolpath_stiff.arrays import BoolArray, FloatArray
-from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number, to_dict, without_nan
 from toolpath_stiff.errors import ProgramError, UnreachableError
 from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Hexapod, MachineTool
-from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.path.placing import place
 from toolpath_stiff.path.sampling import sample_moves
@@ -46,7 +44,10 @@ from toolpath_stiff.stiffness.model import (
 )
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
-STANDING = ("weakest", "out_of_reach_samples", "extrapolated_share")  # of a machine compared with
+if TYPE_CHECKING:
+    from toolpath_stiff.cutting.cut import Cut
+
+STANDING = ("weakest", "out_of_reach_samples", "extrapolated_share")  # copied from the machine compared with
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -97,37 +98,33 @@ class Analysis(EvaluatedPath, FolderResult):
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What deserves a look, the program's own warnings included."""
+        """Points to check, including the program's own warnings."""
         of_cut = () if self.cut is None else self.cut.warnings
         return [*map(str, self.program.warnings), *condition_warnings(self.model), *_warnings(self), *of_cut]
 
     @property
     def moves(self) -> Moves:
-        """The moves in machine coordinates; made anew each time, for a long program is a fifth of all memory."""
+        """Moves in machine coordinates; made anew each time, as a long program's take a fifth of all memory."""
         return place(self.program.moves, self.origin)
-
-    def _value(self, name: str) -> float:
-        value = self.figures[name]
-        return np.nan if value is None else float(value)
 
     @property
     def mean_N_per_mm(self) -> float:  # noqa: N802  (newton)
         """Mean stiffness over the length of the cuts, plunges along the tool axis left out; nan without any."""
-        return self._value("mean_N_per_mm")
+        return float(np.asarray(self.figures["mean_N_per_mm"], dtype=float))
 
     @property
     def min_N_per_mm(self) -> float:  # noqa: N802
-        """The smallest stiffness of these cuts."""
-        return self._value("min_N_per_mm")
+        """Smallest stiffness of these cuts."""
+        return float(np.asarray(self.figures["min_N_per_mm"], dtype=float))
 
     @property
     def range_N_per_mm(self) -> float:  # noqa: N802
-        """The largest less the smallest."""
-        return self._value("range_N_per_mm")
+        """Largest less smallest stiffness of these cuts."""
+        return float(np.asarray(self.figures["range_N_per_mm"], dtype=float))
 
     @property
     def complete(self) -> bool:
-        """Whether every sample of a cut is within reach."""
+        """True if every sample of a cut is within reach."""
         return not self.out_of_reach.any()
 
     @property
@@ -150,7 +147,7 @@ class Analysis(EvaluatedPath, FolderResult):
         return frame_of(sample_columns(self) | ({} if self.cut is None else cut_columns(self, self.cut)))
 
     def to_dict(self) -> Document:
-        """The document of `summary.json`."""
+        """Document of `summary.json`."""
         return self._document
 
     @cached_property
@@ -166,7 +163,7 @@ class Analysis(EvaluatedPath, FolderResult):
         if self.on_other is not None:
             other = self.on_other.to_dict()
             document["compare"] = compare_summaries(document, other)
-            option = f"--compare {other['machine']}"  # without these the two machines may look the same
+            option = f"--compare {other['machine']}"  # otherwise the machines may look the same without a reason
             idle = [f"{option}: {row['effect']} does not act: {row['reason']}" for row in other["effects_idle"]]
             document["warnings"] = [*self.warnings, *idle]
         return document
@@ -175,16 +172,12 @@ class Analysis(EvaluatedPath, FolderResult):
         mean, low = number(self.mean_N_per_mm), number(self.min_N_per_mm)
         return f"{self.program.name} on {self.machine.name}, mean {mean} N/mm, min {low} N/mm"
 
-    def plot(self) -> Figure:
-        """The path in three views, coloured by stiffness."""
-        return self._figure()
-
     def plot_profile(self) -> Figure:
         """Stiffness along the path."""
         return self._figure("profile.png")
 
     def files(self, *, plots: bool = True, table: str = "csv") -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps analyze`; samples as "csv" or "parquet"."""
+        """Files of `tps analyze`; samples as "csv" or "parquet"."""
         return self._files(plots, self.view.unwritten(table, self.cut is not None))
 
 
@@ -200,7 +193,7 @@ def analyze(
     turn: str | float = FIXED,
     progress: Progress | None = None,
 ) -> Analysis:
-    r"""Stiffness along the path of a program.
+    r"""Analyze the stiffness along the path of a program.
 
     Parameters
     ----------
@@ -267,7 +260,7 @@ def analyze(
 
 
 def _effective_origin(machine: MachineTool, program: ReadProgram, origin: Pose | None) -> tuple[Pose, str]:
-    """The option, else the program's own word, else the machine's default."""
+    """Origin and its source: the option, otherwise the program's own, otherwise the machine's default."""
     chosen, source = program.origin, program.origin_source
     if origin is not None:
         chosen, source = origin, "option"
@@ -283,7 +276,7 @@ def _effective_origin(machine: MachineTool, program: ReadProgram, origin: Pose |
 
 
 def _warnings(analysis: Analysis) -> list[str]:
-    """What the evaluation itself has to say."""
+    """Warnings of the evaluation itself."""
     warnings, samples, there = [], analysis.samples, analysis.at
     warnings += joint_warnings(analysis, () if analysis.turn is None else analysis.turn.changes)
     rapids, swapped = ~samples.cutting & ~there.reachable, samples.cutting & there.substituted
@@ -302,7 +295,7 @@ def _warnings(analysis: Analysis) -> list[str]:
 
 
 def _sample_words(analysis: Analysis, i: int) -> str:
-    """Where sample i is, as a control would show it, and which limit it breaks."""
+    """Pose of sample i, as a control would show it, and the limit that it breaks."""
     pose = [*analysis.samples.position[i], *analysis.samples.abc[i]]
     return f"at {pose_words(pose, '.3f')} (machine coordinates, mm): {analysis.at.reach.describe(i)}"
 
@@ -331,9 +324,9 @@ def _check_reach(analysis: Analysis, partial: bool) -> None:
 
 
 def _summary(analysis: Analysis) -> Document:
-    """The figures of `summary.json`, in the shop's units."""
+    """Figures of `summary.json`, in the shop's units."""
     samples, program, there, band = analysis.samples, analysis.program, analysis.at, analysis.parameter_band
-    cutting, length = samples.cutting & there.reachable, mm_from_m(move_lengths(program.moves))
+    cutting, length = samples.cutting & there.reachable, mm_from_m(analysis.move_lengths)
     rapid, weight = program.moves.motion == RAPID, np.where(analysis.headline, samples.weight, 0.0)
     nearest = int(np.argmin(np.where(cutting, there.reach.margin, np.inf)))
     return {
@@ -369,14 +362,14 @@ def _summary(analysis: Analysis) -> Document:
 
 
 def _of_kind(analysis: Analysis, cutting: BoolArray) -> Document:
-    """What belongs to one kind of machine: the range of a strut law, the configuration of joints that is kept."""
+    """Entries for one kind of machine: share of extrapolated struts, or configuration of the joints."""
     if isinstance(analysis.machine, Hexapod):
         return {"extrapolated_share": share(analysis.at.extrapolated, cutting)}
     return {"configuration": analysis.at.configuration or None}
 
 
 def compare_summaries(summary: Document, other: Document) -> Document:
-    """The entry `compare` of `summary.json`.
+    """Entry `compare` of `summary.json`.
 
     The other machine's figures, and `difference_percent`: how much higher each is than the first machine's
     (None where a figure is missing, or the first machine's is zero); the same for the mean of the plunges.
@@ -395,12 +388,12 @@ def compare_summaries(summary: Document, other: Document) -> Document:
 
 
 def _higher(first: float | None, second: float | None) -> float | None:
-    """By how much the second is higher, in percent of the first; None where that cannot be said."""
+    """Percentage by which the second exceeds the first; None if it cannot be computed."""
     return None if first is None or second is None or not first else (second - first) / first * 100.0
 
 
 def required_stiffness_missed(analysis: EvaluatedPath, required: float) -> list[tuple[int, float]]:
-    """(line, smallest stiffness in N/mm) of cutting moves that are not known to have `required` N/m, weakest first.
+    """(line, smallest stiffness in N/mm) of cutting moves not known to have `required` N/m, weakest first.
 
     What has no stiffness does not have the required one: nan, before all others, for lines that are out of reach in
     part (`partial`), and for all cutting lines where no sample counts at all.

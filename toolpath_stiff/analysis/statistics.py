@@ -9,7 +9,7 @@ from toolpath_stiff.analysis.evaluation import Evaluation, joint_columns
 from toolpath_stiff.analysis.loads import Load, along_tool_axis, headline_rows
 from toolpath_stiff.analysis.poses import POSE_COLUMNS
 from toolpath_stiff.analysis.uncertainty import ParameterBand, parameter_band
-from toolpath_stiff.arrays import AnyArray, BoolArray, IntArray
+from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.nc.courses import move_lengths
@@ -22,14 +22,14 @@ from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
 FIGURES = ("mean_N_per_mm", "min_N_per_mm", "max_N_per_mm", "range_N_per_mm", "mean_deflection_um")
-ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"  # what headline figures are about
+ACROSS, PLUNGES_ONLY, ALL_CUTS = "across the tool axis", "plunges only", "all cuts"  # samples of headline figures
 WEAKEST_PLACES = 3
-ROUNDED = 1e-9  # m: a move of half a step is not a shorter one, whatever rounding does
+ROUNDED = 1e-9  # m: a move of half a step must not count as shorter through rounding
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class EvaluatedPath:
-    """A program's samples and what the machine does at each: what statistics and tables are made from.
+    """Samples of a program with the machine's figures at each: the basis of statistics and tables.
 
     Attributes
     ----------
@@ -61,13 +61,18 @@ class EvaluatedPath:
 
     @property
     def machine(self) -> MachineTool:
-        """The machine, geometry effects included."""
+        """The machine, with effects of geometry."""
         return self.model.machine
 
     @cached_property
     def parameter_band(self) -> ParameterBand | None:
-        """What the uncertainty of the machine's fitted parameters does to the stiffness; None if none is known."""
+        """Uncertainty of the stiffness from the machine's fitted parameters; None if unknown."""
         return parameter_band(self.model, self.samples, self.load, self.force, self.at.stiffness)
+
+    @cached_property
+    def move_lengths(self) -> FloatArray:
+        """(m,) m, of every move."""
+        return move_lengths(self.program.moves)
 
     @cached_property
     def counted(self) -> BoolArray:
@@ -81,7 +86,7 @@ class EvaluatedPath:
 
     @cached_property
     def plunging(self) -> BoolArray:
-        """(n,) counted samples of plunges along the tool axis; none where the load does not follow the motion."""
+        """(n,) counted samples of plunges along the tool axis; none if the load does not follow the motion."""
         return np.asarray(self.counted & self.along_axis & (self.load.kind == "tangential"))
 
     @cached_property
@@ -91,7 +96,7 @@ class EvaluatedPath:
 
     @cached_property
     def set_aside(self) -> BoolArray:
-        """(n,) plunges beside the headline; none of a program that only plunges."""
+        """(n,) plunges left out of the headline figures; none if the program only plunges."""
         return np.asarray(self.counted & ~self.headline)
 
     @cached_property
@@ -101,7 +106,7 @@ class EvaluatedPath:
 
     @cached_property
     def weakest_rows(self) -> list[int]:
-        """The weakest headline samples, one a place: apart by at least a twentieth of the path, in other lines."""
+        """Weakest headline samples, one a place: at least a twentieth of the path apart, in different lines."""
         rows = np.flatnonzero(self.headline)
         chosen: list[int] = []
         s, line = self.samples.s, self.samples.line
@@ -139,12 +144,12 @@ def stiffness_figures(path: EvaluatedPath, rows: BoolArray | IntArray) -> Docume
 
 
 def share(condition: BoolArray, among: BoolArray) -> float:
-    """Share of the rows of `among` for which `condition` holds; 0 of none."""
+    """Share of the rows of `among` for which `condition` holds; 0 if there are none."""
     return float(condition[among].mean()) if among.any() else 0.0
 
 
 def class_figures(path: EvaluatedPath, rows: IntArray) -> Document:
-    """The headline figures of the samples `rows`, what they are about, their weakest place, and the plunges beside.
+    """Headline figures of the samples `rows`, what they are about, their weakest place, and the plunges.
 
     `rows` (m,) are rows of samples, in order; only those in the statistics count. `plunges` is None without any.
     """
@@ -172,7 +177,7 @@ def class_figures(path: EvaluatedPath, rows: IntArray) -> Document:
 
 
 def per_operation(path: EvaluatedPath) -> list[Document]:
-    """The figures of each operation, in the order of the run; their lengths, times and samples add up to the whole."""
+    """Figures of each operation, in order of the run; lengths, times and samples add up to the whole."""
     rows, names = path.operations.rows, ("name", "tool", "first_line", "last_line")
     headings = [{"operation": row.number, **{name: getattr(row, name) for name in names}} for row in rows]
     parts = _parts(path, path.operations.of_move, len(rows))
@@ -180,7 +185,7 @@ def per_operation(path: EvaluatedPath) -> list[Document]:
 
 
 def per_tool(path: EvaluatedPath) -> list[Document]:
-    """The figures of each tool that cuts, in order of use; its length is that of its first cut."""
+    """Figures of each tool that cuts, in order of use; its length is that of its first cut."""
     moves, remarks = path.program.moves, {tool.number: tool.remark for tool in path.program.tools}
     numbers, of_move = np.unique(moves.tool, return_inverse=True)
     parts, cuts = _parts(path, of_move, len(numbers)), np.flatnonzero(moves.motion != RAPID)
@@ -194,7 +199,7 @@ def per_tool(path: EvaluatedPath) -> list[Document]:
 
 
 def parts_of_path(path: EvaluatedPath) -> tuple[list[IntArray], dict[int, IntArray]]:
-    """Rows of the samples of each operation, in order; of each tool that cuts, by its number."""
+    """Rows of the samples of each operation, in order, and of each tool that cuts, by its number."""
     samples = path.samples
     operations = _rows_of(path.operations.of_move[samples.move], len(path.operations.rows))
     tools, of_sample = np.unique(samples.tool, return_inverse=True)
@@ -204,9 +209,9 @@ def parts_of_path(path: EvaluatedPath) -> tuple[list[IntArray], dict[int, IntArr
 
 
 def _parts(path: EvaluatedPath, of_move: IntArray, count: int) -> list[Document]:
-    """The figures of `count` parts of a program; `of_move` (n,) says to which each move belongs."""
+    """Figures of `count` parts of a program; `of_move` (n,) is the part of each move."""
     samples, moves = path.samples, path.program.moves
-    length, rapid = move_lengths(moves), moves.motion == RAPID
+    length, rapid = path.move_lengths, moves.motion == RAPID
     duration = move_durations(moves, length, path.machine.rapid_feed) + moves.dwell
     margin = np.where(samples.cutting & path.at.reachable, path.at.reach.margin, np.inf)
     parts: list[Document] = []
@@ -229,7 +234,7 @@ def _parts(path: EvaluatedPath, of_move: IntArray, count: int) -> list[Document]
 
 
 def _rows_of(part: IntArray, count: int) -> list[IntArray]:
-    """The rows of each of `count` parts, in order; `part` (n,) says in which each row is."""
+    """Rows of each of `count` parts, in order; `part` (n,) is the part of each row."""
     if count == 1:
         return [np.arange(len(part))]
     order = np.argsort(part, kind="stable")
@@ -266,7 +271,7 @@ def sample_columns(path: EvaluatedPath, rows: slice | IntArray = slice(None)) ->
 
 
 def table_rows(path: EvaluatedPath) -> IntArray:
-    """Samples of `samples.csv`: all, but of a move shorter than half a step that has two the last one alone."""
+    """Samples in `samples.csv`: all, except that a move shorter than half a step gives only its last."""
     samples = path.samples
     last = np.flatnonzero(np.diff(samples.move, append=-1))
     first = np.append(0, last[:-1] + 1)[: len(last)]

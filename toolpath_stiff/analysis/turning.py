@@ -29,11 +29,11 @@ from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import deg_from_rad, nm_from_m, rad_from_deg
 
 FIXED, FEED, BEST = "fixed", "feed", "best"
-TURNS = 72  # of 5 degrees: compliance is smooth over the turn, and next ones differ by some tenths of a percent
+TURNS = 72  # steps of 5 degrees: compliance is smooth over the turn, neighbours differ by some tenths of a percent
 NODES = 200  # poses of a path at which every turn and configuration is tried; between them the turn is interpolated
-STEP = 0.35  # rad and m, most that a joint moves between two nodes; assumed, more is another way of standing there
+STEP = 0.35  # rad and m, largest move of a joint between two nodes; assumed: more means another configuration
 GAIN = 0.002  # share of the mean compliance that a changing turn must save, for the joints that it moves
-WINDOW = 6  # turns between two nodes
+WINDOW = 6  # most steps of turn between two nodes
 SMOOTH = 1e-3  # of the mean compliance, what a squared step of a joint of 1 rad costs
 
 
@@ -73,7 +73,7 @@ class TurnChoice:
     def evaluate(
         self, model: StiffnessModel, samples: Samples, load: Load, force: float, progress: Progress | None = None
     ) -> Evaluation:
-        """What the machine does along the path, stretch by stretch of one configuration where these were chosen."""
+        """Evaluation along the path, in stretches of one configuration where configurations were chosen."""
         parts, chosen = [], self.mode not in (FIXED, FEED) and len(model.machine.configurations) > 1
         changes = (np.flatnonzero(np.diff(self.configuration)) + 1).tolist()
         for start, stop in pairwise([0, *changes, len(samples)]):
@@ -86,7 +86,7 @@ class TurnChoice:
 
     @property
     def sentence(self) -> str:
-        """What was chosen, in words."""
+        """Sentence on what was chosen."""
         first, last = deg_from_rad(float(self.turn[0])), deg_from_rad(float(self.turn[-1]))
         if self.mode == FEED:
             return "the tool is turned about its axis with the feed"
@@ -104,7 +104,7 @@ class TurnChoice:
 
 
 def check_free_turn(machine: MachineTool, mode: str | float) -> None:
-    """Raise `InputError` where a machine has no more joints than a cut needs, or for a way to turn that is none."""
+    """Raise `InputError` if a machine has no more joints than a cut needs, or for an unknown mode of turning."""
     if isinstance(mode, str) and mode not in (FIXED, FEED, BEST):
         raise InputError(f"--turn {mode}", expected=f"{FIXED}, {FEED}, {BEST}, or degrees")
     if len(machine.joint_names) < 6 or machine.joint_kinds.count("rotary") < 3:
@@ -120,7 +120,7 @@ def choose_turn(
     load: Load,
     mode: str | float = BEST,
 ) -> TurnChoice:
-    """The turn at n poses of a path under a load.
+    """Choose the turn at n poses of a path under a load.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def choose_turn(
 
 
 def _kept(rotation: FloatArray, turn: FloatArray) -> TurnChoice:
-    """A turn that is given."""
+    """Choice of a given turn."""
     abc = roll_pitch_yaw(turned_about_tool(rotation, turn)) + 0.0
     nothing = np.zeros(len(turn), dtype=np.int64)
     return TurnChoice(turn, abc, nothing, bool((turn == turn[:1]).all()), nothing[:0])

@@ -1,4 +1,4 @@
-"""How far the stiffness along a path may be off on a machine that was fitted to measurements.
+"""Uncertainty of the stiffness along a path on a machine that was fitted to measurements.
 
 A linear propagation (JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation 13): the errors of
 the parameters times slopes of the stiffness, which are differences of whole evaluations; where the machine file states
@@ -24,8 +24,8 @@ from toolpath_stiff.stiffness.geometry_slopes import geometry_slopes
 from toolpath_stiff.stiffness.model import StiffnessModel, parameter_slopes
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
-BLOCK = 8192  # samples whose struts and joints are looked at at a time
-MOST_OF_MEAN = 400  # samples by which it is told how far what the model lacks averages out along a path
+BLOCK = 8192  # samples processed at a time
+MOST_OF_MEAN = 400  # samples used to find how far the model's form error averages out along a path
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class ParameterBand:
 def parameter_band(
     model: StiffnessModel, samples: Samples, load: Load, force: float, stiffness: FloatArray
 ) -> ParameterBand | None:
-    """The band of a path, given its stiffness (n,); None where the machine file states no uncertainty of what acts."""
+    """Band of a path, given its stiffness (n,); None if the machine file states no uncertainty of what acts."""
     path = (samples.position, samples.abc, samples.tangent, samples.tool_length)
     slopes_of = parameter_slopes(model, lambda moved: evaluate(moved, *path, load, force).stiffness, stiffness)
     uncertainty = model.given.uncertainty if model.given is not None else None
@@ -105,7 +105,7 @@ def _blocks(rows: IntArray) -> Iterator[IntArray]:
 
 
 def band_figures(band: ParameterBand, stiffness: FloatArray, weight: FloatArray) -> Document | None:
-    """Standard deviations and 95 % intervals of mean and smallest stiffness of samples (n,) that have a weight."""
+    """Standard deviations and 95 % intervals of mean and smallest stiffness of the weighted samples (n,)."""
     if not weight.any():
         return None
     low = int(np.argmin(np.where(weight > 0.0, stiffness, np.inf)))

@@ -1,1 +1,1 @@
-"""What people import, by what it is about; `toolpath_stiff` itself shows all of it."""
+"""The public API, by topic; `toolpath_stiff` itself re-exports all of it."""

@@ -16,14 +16,14 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import fit_effects
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import scaled_law
-from toolpath_stiff.machine.model import EffectEntry, Hexapod, StrutLaw, as_hexapod
+from toolpath_stiff.machine.model import EffectEntry, Hexapod, StrutLaw
 from toolpath_stiff.stiffness.active import read_parameters
 from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
 
 class Preview:
-    """The error at every reading with effects of any size, at once: what a slider moves; `preview` makes one.
+    """The error at every reading with effects of any size, in milliseconds, as for a slider; made by `preview`.
 
     Examples
     --------
@@ -37,7 +37,7 @@ class Preview:
 
     def __init__(self, question: Question) -> None:
         data, given = question.readings, question.common
-        # Under the noise that a diagnosis writes out in full.
+        # The noise model that a diagnosis reports in full.
         noise = max(noise_models(data, given["noise"], given["strut_spread"]), key=lambda noise: noise.typical)
         self._problem = Problem.of(predictor_of(question.model, data, question.on.effect_files), noise)
         self._on, self._model = question.on, question.model
@@ -87,17 +87,17 @@ class Preview:
         }
 
     def _fit_near(self, effects: Mapping[str, Document]) -> Fit:
-        """The fit beside these effects; the last one is kept."""
+        """The fit with these effects; the last one is cached."""
         wanted = {name: dict(keys) for name, keys in effects.items()}
         if self._near is None or self._near[0] != wanted:
             self._near = (wanted, self._fit(wanted))
         return self._near[1]
 
     def _fit(self, effects: Mapping[str, Document], law_free: bool = True, near: Fit | None = None) -> Fit:
-        """The strut law fitted beside effects of these sizes, or left as it is.
+        """The fit of the strut law with effects of these sizes, or with the law kept.
 
-        With `near`, a fit of other sizes, from its law on and with the readings wild that are wild there: to find out
-        which are takes most of the time where readings are many.
+        With `near`, a fit of other sizes: from its law on and with its wild readings, as finding these takes most of
+        the time where readings are many.
         """
         candidates, sizes = [], []
         for entry in _entries(effects):
@@ -118,20 +118,19 @@ class Preview:
 
 
 def with_effects(machine: Machine, effects: Mapping[str, Document], strut_law: StrutLaw | None = None) -> Machine:
-    """A machine with further effects, name -> the keys of its entry in a machine file, and with another strut law."""
+    """A machine with further effects (name -> keys of the entry in a machine file) and, if given, another strut law."""
     entries, stated = _entries(effects), machine.stated
     read = [entry for entry in entries if find_effect(entry.name, machine.effect_files).is_instrument]
-    carrying = stated.with_changes(
-        effects=(*stated.effects, *(entry for entry in entries if entry not in read)),
-        instruments=(*stated.instruments, *read),
-    )
-    if strut_law is not None:
-        return machine.carrying(as_hexapod(carrying, "a strut law").with_changes(strut_law=strut_law))
-    return machine.carrying(carrying)
+    carried = {
+        "effects": (*stated.effects, *(entry for entry in entries if entry not in read)),
+        "instruments": (*stated.instruments, *read),
+    }
+    law = {} if strut_law is None else {"strut_law": strut_law}
+    return machine.carrying(stated.with_changes(**carried, **law))
 
 
 def _entries(effects: Mapping[str, Document]) -> list[EffectEntry]:
-    """Effects as a machine file would have them."""
+    """Effects as entries of a machine file."""
     return [EffectEntry(name, dict(keys)) for name, keys in effects.items()]
 
 

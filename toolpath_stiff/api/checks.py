@@ -1,4 +1,4 @@
-"""What a program uses and leaves out, apart from its stiffness: this loads the readers of all languages."""
+"""Check of a program apart from stiffness: the words it uses and those left out; loads the readers of all languages."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def check(
     origin_mm_deg: Origin = None,
     step_mm: Step = 1.0,
 ) -> ProgramCheck:
-    r"""What a program uses, what is not understood, extents and times; with a machine its reach and fastest strut.
+    r"""Words that a program uses and those not understood, extents, times; with a machine its reach and fastest strut.
 
     Where the reader would refuse the program the check says so and goes on with the next block.
 
@@ -44,8 +44,6 @@ def check(
     >>> [(finding.line, finding.severity) for finding in found.errors]
     [(3, 'error')]
     """
-    part = program_from(program)
-    on = None if machine is None else machine_from(machine)
-    hexapod = None if on is None else on.model.machine
-    request = part.placed(origin_si(origin_mm_deg), ZERO if hexapod is None else hexapod.default_origin)
-    return check_program(request, hexapod, m_from_mm(step_mm))
+    part, on = program_from(program), None if machine is None else machine_from(machine).model.machine
+    request = part.placed(origin_si(origin_mm_deg), ZERO if on is None else on.default_origin)
+    return check_program(request, on, m_from_mm(step_mm))

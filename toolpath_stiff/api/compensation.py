@@ -1,4 +1,4 @@
-"""The micrometres that cutting forces make of a part: a program without them, measured walls held against them."""
+"""Compensation of a program for deflection by cutting forces, and measured walls compared with the predicted error."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Annotated
 
 from toolpath_stiff.api import inputs
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, cut_setup
-from toolpath_stiff.api.inputs import origin_si
+from toolpath_stiff.api.inputs import origin_si, read_at
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.comparison.walls import WallComparison, read_walls
@@ -20,7 +20,6 @@ from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.nc.program import Program, program_from
 from toolpath_stiff.nc.reader import read
 from toolpath_stiff.options import Option, checked
-from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Progress, teller
 from toolpath_stiff.units import m_from_mm
 
@@ -43,7 +42,7 @@ def compensate(
     Parameters
     ----------
     program, machine
-        What it runs on, what runs.
+        The program, and the machine that runs it.
     cut, material, stock_mm
         As of `analyze`.
     origin_mm_deg
@@ -51,7 +50,7 @@ def compensate(
     step_mm
         Largest distance of two samples.
     decimals
-        Of the numbers written; unless given, 4 in mm, 5 in inch.
+        Decimals of the numbers written; unless given, 4 in mm, 5 in inch.
     progress
         Called with what is being done.
 
@@ -80,7 +79,7 @@ def compensate(
     on, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
     model, setup = on.running(part), _known(cut_setup(cut, material, stock_mm))
     default = model.machine.default_origin
-    first, place = _read(part, origin, default)
+    first, place = read_at(part, origin, default)
     tell = teller(progress)
 
     def evaluate(program: ReadProgram) -> Cut:
@@ -107,7 +106,7 @@ def compare_walls(
     step_mm: inputs.Step = 1.0,
     progress: Progress | None = None,
 ) -> WallComparison:
-    r"""Measured walls of a part against the error of the surface that its cut foretells: where the model fails.
+    r"""Measured walls of a part against the surface error that its cut predicts: where the model fails.
 
     Parameters
     ----------
@@ -115,11 +114,11 @@ def compare_walls(
         Points of a coordinate measuring machine: x_mm,y_mm,z_mm in program coordinates, nx,ny,nz out of the part, and
         deviation_um along that, + material left, unless the points themselves have it.
     machine, program
-        What the part was cut on, by what.
+        The machine that cut the part, and the program that it ran.
     cut, material, stock_mm
         As of `analyze`.
     columns
-        Which columns the file calls otherwise: "deviation=dev:mm", or such a dict.
+        Columns that the file names differently: "deviation=dev:mm", or such a dict.
     origin_mm_deg, step_mm
         Where program zero sat; largest distance of two samples.
     progress
@@ -151,10 +150,10 @@ def compare_walls(
     on, part, origin = machine_from(machine), program_from(program), origin_si(origin_mm_deg)
     model, setup = on.running(part), _known(cut_setup(cut, material, stock_mm))
     points, normal, deviation, notes = read_walls(str(data), columns)
-    first, place = _read(part, origin, model.machine.default_origin)
-    foretold = evaluate_cut(model, first, place, setup, m_from_mm(step_mm), progress)
-    notes = (*notes, *foretold.assumptions, *foretold.warnings)
-    compared = compare_points(foretold, first.moves, points, normal, deviation, notes)
+    first, place = read_at(part, origin, model.machine.default_origin)
+    predicted = evaluate_cut(model, first, place, setup, m_from_mm(step_mm), progress)
+    notes = (*notes, *predicted.assumptions, *predicted.warnings)
+    compared = compare_points(predicted, first.moves, points, normal, deviation, notes)
     return replace(compared, inputs=(str(data), *part.inputs, *on.inputs, *setup.inputs))
 
 
@@ -162,9 +161,3 @@ def _known(setup: CutSetup | None) -> CutSetup:
     if setup is None:
         raise InputError("nothing is known of the cut", hint="say --cut FILE, or --material and --stock")
     return setup
-
-
-def _read(part: Program, origin: Pose | None, default: Pose) -> tuple[ReadProgram, Pose]:
-    """A program as read for a zero, and where that then is."""
-    first = part.moves(origin, default)
-    return first, origin or (first.origin if first.origin_source == "program" else default)

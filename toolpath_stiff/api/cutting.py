@@ -1,10 +1,10 @@
-"""What several functions take of a cut: its setup file, or material and stock; a template of that file."""
+"""Input of functions that compute a cut: its setup file, or material and stock; a template of that file."""
 
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
+from toolpath_stiff.api.inputs import template
 from toolpath_stiff.cutting.setup import CutSetup, read_setup, setup_of
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import Option
@@ -17,7 +17,7 @@ Tolerance = Annotated[float | None, Option("--tolerance", "um", above=0, at_most
 
 
 def cut_setup(cut: Cutting, material: Material, stock_mm: StockBox) -> CutSetup | None:
-    """The setup that is given in one way or the other; None for none. Raises `InputError`."""
+    """The setup, given in one way or the other; None if not given. Raises `InputError`."""
     if isinstance(cut, CutSetup):
         return cut
     if cut is not None:
@@ -26,9 +26,8 @@ def cut_setup(cut: Cutting, material: Material, stock_mm: StockBox) -> CutSetup 
         return None
     if material is None:
         raise InputError("--stock without --material", hint="say --material NAME, or --cut FILE with both")
-    if stock_mm is None or isinstance(stock_mm, str):
-        return setup_of(material, stock_mm)
-    return setup_of(material, ",".join(map(str, stock_mm)))
+    words = stock_mm if stock_mm is None or isinstance(stock_mm, str) else ",".join(map(str, stock_mm))
+    return setup_of(material, words)
 
 
 def cut_template(file: str | Path = "cut.toml") -> TextFile:
@@ -40,5 +39,4 @@ def cut_template(file: str | Path = "cut.toml") -> TextFile:
     >>> tps.cut_template("part.toml").name
     'part'
     """
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / "cut.toml.txt").read_text("utf-8")
-    return TextFile(Path(file).stem, text.replace("CUT_FILE", Path(file).name))
+    return TextFile(Path(file).stem, template("cut.toml").replace("CUT_FILE", Path(file).name))

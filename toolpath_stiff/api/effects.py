@@ -1,10 +1,10 @@
-"""The physical effects that a machine can carry: the catalogue, and one's own."""
+"""The physical effects that a machine can have: the catalogue's and one's own."""
 
 from collections.abc import Iterable
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
+from toolpath_stiff.api.inputs import template
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.file import KINDS
@@ -28,7 +28,7 @@ def effects(
     files
         Files with effects of one's own.
     kind
-        Of machine that they hold for.
+        Kind of machine that they apply to.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def check_effects(file: str | Path, machine: Machine | str | Path = "nist") -> E
     True
     """
     on = machine_from(machine)
-    known_effects([str(file)], on.stated.kind)  # names that are taken
+    known_effects([str(file)], on.stated.kind)  # refuses names that are taken
     trials = {name: try_effect(effect, on.stated) for name, effect in effects_from_file(str(file)).items()}
     return EffectCheck(str(file), on.name, trials)
 
@@ -73,7 +73,7 @@ def effect_template(name: str) -> TextFile:
     Parameters
     ----------
     name
-        Of the effect and of its file without the ending.
+        Name of the effect, and of its file without the ending.
 
     Examples
     --------
@@ -83,12 +83,11 @@ def effect_template(name: str) -> TextFile:
     """
     if not name.isidentifier():
         raise InputError(f"{name!r} cannot be an effect's name", expected="a name such as my_screw")
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / "effect.py.txt").read_text("utf-8")
-    return TextFile(name, text.replace("EFFECT_NAME", name).replace("EFFECT_FILE", f"{name}.py"))
+    return TextFile(name, template("effect.py").replace("EFFECT_NAME", name).replace("EFFECT_FILE", f"{name}.py"))
 
 
 def effect_name(file: str | Path, ending: str = ".py") -> str:
-    """The name of the effect that a file is to hold: the file's own, without the ending."""
+    """The name of the effect to be kept in a file: the file's own, without the ending."""
     path = Path(file)
     if path.suffix != ending or not path.stem.isidentifier():
         raise InputError(f"{str(file)!r} cannot hold an effect", expected=f"a name such as my_screw{ending}")

@@ -34,7 +34,7 @@ def forces(
     cut
         Setup file with the tool that cut the slots, as [[tool]].
     columns
-        Which columns the files call otherwise: "fx=Kraft X:kN, feed_per_tooth==0.05", or such a dict; unless given, as
+        Columns that the files name differently: "fx=Kraft X:kN, feed_per_tooth==0.05", or such a dict; unless given, as
         FILE.columns.toml beside a file says.
     axes
         Axes of the dynamometer that point along the feed, to its left and up; what it reads acts on the work.

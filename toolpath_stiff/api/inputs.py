@@ -1,27 +1,30 @@
-"""Options that several functions share, and the checks of what arguments say: mm, degrees and N."""
+"""Options shared by several functions, and checks of argument values: mm, degrees and N."""
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 from toolpath_stiff.analysis.turning import BEST, FEED, FIXED
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.nc.moves import ReadProgram
+from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import Option, number_in, numbers
 from toolpath_stiff.poses import Pose, pose_in_si
 
-FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a slip of unit or key
+FARTHEST_MM = 1e5  # 100 m: no machine is larger; more is a mistaken unit or key
 FARTHEST_DEG = 360.0
 
 
 def turn_of(word: str) -> str | float:
-    """One of the words, or degrees. Raises `ValueError`."""
+    """One of the words `fixed`, `feed`, `best`, or degrees. Raises `ValueError`."""
     try:
         return word if word in (FIXED, FEED, BEST) else float(word)
     except ValueError:
         raise ValueError(f"{FIXED}, {FEED}, {BEST}, or degrees") from None
 
 
-# Options that several functions share.
+# Options shared by several functions.
 Step = Annotated[float, Option("--step", "mm", above=0, at_most=1000)]
 Force = Annotated[float, Option("--force", "N", above=0, at_most=1e6)]
 LoadDirection = Annotated[str, Option("--load", "DIRECTION")]
@@ -32,8 +35,19 @@ Decimals = Annotated[int | None, Option("--decimals", at_least=2, at_most=9)]
 Linearised = Annotated[float | None, Option("--linearise", "mm", above=0, at_most=10)]
 
 
+def template(file: str) -> str:
+    """The text of a packaged template."""
+    return (Path(__file__).parents[1] / "data" / "templates" / f"{file}.txt").read_text("utf-8")
+
+
+def read_at(part: Program, origin: Pose | None, default: Pose) -> tuple[ReadProgram, Pose]:
+    """A program as read for a zero, and where that then is."""
+    first = part.moves(origin, default)
+    return first, origin or (first.origin if first.origin_source == "program" else default)
+
+
 def finite(name: str, value: Any) -> float:
-    """A number that is neither infinite nor nan: of a command, a call and a page alike. Raises `InputError`."""
+    """A number, neither infinite nor nan, from a command, a call or a page. Raises `InputError`."""
     number = number_in(value)
     if not math.isfinite(number):
         raise InputError(f"{name} {str(value)[:40]!r}".strip(), expected="a finite number")
@@ -52,5 +66,5 @@ def pose_si(name: str, pose: Sequence[float]) -> Pose:
 
 
 def origin_si(origin_mm_deg: Sequence[float] | None) -> Pose | None:
-    """A placement in SI, None where none is given. Raises `InputError`."""
+    """A placement in SI, None if not given. Raises `InputError`."""
     return None if origin_mm_deg is None else pose_si("--origin", origin_mm_deg)

@@ -1,10 +1,9 @@
-"""Machines with the effects that act on them; machine files made."""
+"""Machines with the effects that act on them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -14,20 +13,17 @@ from toolpath_stiff.analysis.evaluation import joint_columns
 from toolpath_stiff.analysis.machine_check import MachineCheck, check_machine
 from toolpath_stiff.api.inputs import pose_si
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.files import read_bytes, write_atomically
-from toolpath_stiff.machine import dh_table, freecad, urdf
+from toolpath_stiff.files import write_atomically
 from toolpath_stiff.machine.elements import Stance
-from toolpath_stiff.machine.file import KINDS, load_machine, packaged_machines
+from toolpath_stiff.machine.file import load_machine, packaged_machines
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.limits import Reach, reach_along, stand
-from toolpath_stiff.machine.linuxcnc import UNITS_MM, machine_from_hal, units_of
-from toolpath_stiff.machine.linuxcnc_kinds import control_files, machine_from_control, module_of
 from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
-from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_text
+from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.program import Program
-from toolpath_stiff.options import Option, checked, names
+from toolpath_stiff.options import Option, checked
 from toolpath_stiff.poses import pose_in_mm, pose_in_si
-from toolpath_stiff.results import DataFrame, Figure, Result, TextFile, frame_of
+from toolpath_stiff.results import DataFrame, Figure, Result, frame_of
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.contract import Conditions
 from toolpath_stiff.stiffness.model import NO_SETUP, StiffnessModel, build_model, check_setup
@@ -39,7 +35,7 @@ FIGURE_2_MM_DEG = (-300.0, 300.0, 300.0, -30.0, 0.0, 0.0)  # the pose of the pap
 
 @dataclass(frozen=True)
 class Machine(Result):
-    """A machine with the physical effects that act on it, and what it runs under.
+    """A machine with the physical effects that act on it, and the conditions that it runs under.
 
     `Machine.load` makes one from a packaged machine or a machine file.
 
@@ -134,7 +130,7 @@ class Machine(Result):
     ) -> Machine:
         """The same machine under a set-up and a temperature.
 
-        Whether an effect knows the set-up is checked where it matters: beside a second machine one of them has to.
+        That an effect knows the set-up is checked later: of two machines compared, one must have such an effect.
 
         Parameters
         ----------
@@ -154,7 +150,7 @@ class Machine(Result):
         return replace(self, setup=setup, temperature_C=temperature_C)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For another process: effects of one's own travel as their files, a class of such a file cannot."""
+        """Pickling for another process: effects of one's own travel as files, as their classes cannot."""
         files = tuple(str(Path(file).absolute()) for file in self.effect_files)
         told = (self.asked, files, self.setup, self.temperature_C, self.allow_unchecked_effects)
         return _machine_again, (self.stated, self.model.conditions, self.model.unchecked, told)
@@ -184,7 +180,7 @@ class Machine(Result):
 
     @property
     def name(self) -> str:
-        """Its short name."""
+        """Short name of the machine."""
         return self.model.machine.name
 
     @property
@@ -193,22 +189,22 @@ class Machine(Result):
         return self.model.given or self.model.machine
 
     def carrying(self, stated: MachineTool) -> Machine:
-        """The same with what another machine file would have."""
+        """The same machine with its file's content replaced."""
         model = build_model(stated, self.effect_files, conditions=self.model.conditions)
         return replace(self, model=replace(model, unchecked=self.model.unchecked))
 
     @property
     def effects(self) -> list[str]:
-        """Names of the effects that it carries, those that act on readings too."""
+        """Names of the machine's effects, those that act on readings included."""
         return [active.effect.name for active in (*self.model.effects, *self.model.instruments)]
 
     @property
     def origin_mm_deg(self) -> tuple[float, ...]:
-        """Where program zero sits unless a program or an argument says: X, Y, Z, A, B, C in machine coordinates."""
+        """Default position of program zero: X, Y, Z, A, B, C in machine coordinates."""
         return pose_in_mm(self.model.machine.default_origin)
 
     def running(self, program: Program | None = None, beside: Sequence[Machine] = ()) -> StiffnessModel:
-        """The model under what it runs under: what `load` was told, then a program's controller file, then its own.
+        """The model under its conditions: those given to `load`, else a program's controller file's, else its own.
 
         `beside` are machines that the same is said of. Raises `InputError` for a set-up that none of them knows.
 
@@ -243,7 +239,7 @@ class Machine(Result):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The files that it was read from."""
+        """Files from which the machine was read."""
         return (self.asked, *self.effect_files)
 
     def strut_lengths_mm(self, pose_mm_deg: Sequence[float]) -> FloatArray:
@@ -274,7 +270,7 @@ class Machine(Result):
         return {name: float(values[0]) for name, values in columns.items()}
 
     def to_frame(self) -> DataFrame:
-        """Its figures: quantity, value, unit, origin (published, recovered, assumed, fitted), remark.
+        """The machine's figures: quantity, value, unit, origin (published, recovered, assumed, fitted), remark.
 
         Examples
         --------
@@ -329,11 +325,11 @@ class Machine(Result):
         return mm_from_m(reach_along(self.model.machine, pose[:3], rays, rotation_matrices(pose[3:])))
 
     def picture(self, pose_mm_deg: Sequence[float] | None = None) -> bytes:
-        """What `plot` draws as a PNG."""
+        """The drawing of `plot`, as a PNG."""
         return self._picture(machine=self.model.machine, pose=self.standing(pose_mm_deg)[0])
 
     def page(self, pose_mm_deg: Sequence[float] | None = None) -> str:
-        """The machine at a pose as a page on which it can be turned, with its reach and its figures.
+        """The machine at a pose as an interactive page, with its reach and its figures.
 
         Examples
         --------
@@ -345,7 +341,7 @@ class Machine(Result):
         return str(self.view.page(self.model.machine, pose, stand))
 
     def text(self, pose_mm_deg: Sequence[float] | None = None) -> str:
-        """Its figures with their origin, and how far the limits are at a pose.
+        """The machine's figures with their origin, and the distances from its limits at a pose.
 
         Examples
         --------
@@ -387,7 +383,7 @@ class Machine(Result):
         return check_machine(self.running(), self.asked)
 
     def save(self, file: str | Path) -> Path:
-        """Write the machine file, effects included, whole or not at all.
+        """Write the machine file, effects included, completely or not at all.
 
         Examples
         --------
@@ -405,7 +401,7 @@ class Machine(Result):
 def _machine_again(
     stated: MachineTool, conditions: Conditions, unchecked: tuple[str, ...], told: tuple[Any, ...]
 ) -> Machine:
-    """A machine in another process."""
+    """A machine rebuilt in another process."""
     return Machine(replace(build_model(stated, told[1], conditions=conditions), unchecked=unchecked), *told)
 
 
@@ -422,164 +418,3 @@ def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects
 def machine_from(machine: Machine | str | Path) -> Machine:
     """A machine, loaded if it is a name or a file."""
     return machine if isinstance(machine, Machine) else Machine.load(machine)
-
-
-@checked
-def machine_template(
-    file: str | Path = "mine.toml",
-    *,
-    kind: Annotated[str, Option("--kind", choices=tuple(KINDS))] = Hexapod.kind,
-) -> TextFile:
-    """A commented machine file to edit, named after its file; nothing is written before `save`.
-
-    Parameters
-    ----------
-    file
-        That it will be.
-    kind
-        Of machine: six telescopic struts, or joints in series, five struts, a linear delta, struts on moving feet.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_template("mill.toml").name
-    'mill'
-    """
-    target = Path(file)
-    name = "machine" if kind == Hexapod.kind else kind
-    text = (resources.files("toolpath_stiff") / "data" / "templates" / f"{name}.toml.txt").read_text("utf-8")
-    text = text.replace('"MACHINE_NAME"', toml_text(target.stem)).replace("MACHINE_FILE", target.name)
-    return TextFile(target.stem, text.replace("REMARK", TEMPLATE_REMARK))
-
-
-@checked
-def machine_from_linuxcnc(
-    file: Annotated[str | Path, Option("FILE.hal")],
-    units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None,
-) -> TextFile:
-    """The machine of the kinematics pins in a LinuxCNC HAL file.
-
-    Of genhexkins strut stiffness and limits are assumed; of other modules (trivkins, 5axiskins, xyzac-trt-kins,
-    xyzbc-trt-kins, genserkins, pumakins, pentakins, lineardeltakins) compliances are left to fill in.
-
-    Parameters
-    ----------
-    file
-        The HAL file; kinematics and limits of joints are read in the ini files beside it.
-    units
-        Of the pins, "mm" or "inch"; unless given, LINEAR_UNITS of the ini file beside it.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, lacks pins, or nobody says the unit.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_from_linuxcnc("nowhere.hal")
-    Traceback (most recent call last):
-    toolpath_stiff.errors.InputError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
-    """
-    path = Path(file)
-    text = read_bytes(path, "the file of HAL pins").decode("utf-8", "replace")
-    ini = "\n".join(ini.read_text("utf-8", "replace") for ini in sorted(path.parent.glob("*.ini")))
-    unit = units or units_of(path)
-    if (module := module_of(text, ini)) not in ("", "genhexkins"):
-        files = control_files(text, ini, module, UNITS_MM[unit], path.name)
-        return TextFile(path.stem, *machine_from_control(files, path.stem))
-    machine, notes = machine_from_hal(text, unit, path.name)
-    heading = f"Made from {path.name}, pins in {unit}.\n" + "\n".join(notes)
-    return TextFile(machine.name, machine_toml(machine, heading), notes)
-
-
-@checked
-def machine_from_urdf(
-    file: Annotated[str | Path, Option("FILE.urdf")], tip: Annotated[str, Option("--tip", "LINK")]
-) -> TextFile:
-    """The robot of a URDF file, from its root link to a tip link; compliances are left to fill in.
-
-    Parameters
-    ----------
-    file
-        The URDF file.
-    tip
-        The link whose frame is that of the tool's tip, z to the shank; a flange, where the tool is added by hand.
-
-    Raises
-    ------
-    InputError
-        Not a chain, limits that are missing, units that cannot be.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_from_urdf("nowhere.urdf", "flange")
-    Traceback (most recent call last):
-    toolpath_stiff.errors.InputError: cannot read the URDF file 'nowhere.urdf': No such file or directory
-    """
-    path = Path(file)
-    text = read_bytes(path, "the URDF file").decode("utf-8", "replace")
-    return TextFile(path.stem, *urdf.machine_from_urdf(text, tip, path.name))
-
-
-@checked
-def machine_from_dh(
-    file: Annotated[str | Path, Option("TABLE")],
-    convention: Annotated[str, Option("--convention", choices=("modified", "standard"))],
-) -> TextFile:
-    """The robot of a table of Denavit-Hartenberg rows; compliances are left to fill in.
-
-    Parameters
-    ----------
-    file
-        Columns alpha_deg, a_mm, d_mm, offset_deg, min_deg, max_deg and, if there, name and type (R, or P with min_mm,
-        max_mm).
-    convention
-        Of the rows: modified (Craig) or standard; they do not show it.
-
-    Raises
-    ------
-    InputError
-        A cell that is no number, a limit that is missing.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_from_dh("nowhere.csv", "modified")
-    Traceback (most recent call last):
-    toolpath_stiff.errors.InputError: cannot read DH rows 'nowhere.csv': No such file or directory
-    """
-    name = Path(str(file)).stem
-    return TextFile(name, *dh_table.machine_from_dh(str(file), name, f"{convention} DH"))
-
-
-@checked
-def machine_from_freecad(
-    file: Annotated[str | Path, Option("FILE.fcm")],
-    order: Annotated[Sequence[str], Option("--order", "X,Y,...", read=names)] = (),
-) -> TextFile:
-    """The mill of a FreeCAD machine (.fcm); compliances are left to fill in.
-
-    Parameters
-    ----------
-    file
-        The machine.
-    order
-        Axes from the base outwards, where the file does not say which carries which.
-
-    Raises
-    ------
-    InputError
-        Not a machine, an order that nobody says, mirrored axes.
-
-    Examples
-    --------
-    >>> import toolpath_stiff as tps
-    >>> tps.machine_from_freecad("nowhere.fcm")
-    Traceback (most recent call last):
-    toolpath_stiff.errors.InputError: cannot read the FreeCAD machine 'nowhere.fcm': No such file or directory
-    """
-    path = Path(file)
-    text = read_bytes(path, "the FreeCAD machine").decode("utf-8", "replace")
-    return TextFile(path.stem, *freecad.machine_from_fcm(text, order, path.name))

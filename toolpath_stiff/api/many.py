@@ -1,4 +1,4 @@
-"""Many programs on one machine: each its report, one overview of all; in processes, or wherever an executor works."""
+"""Many programs on one machine: a report each, one overview of all; in processes, or on any executor."""
 
 import dataclasses
 import json
@@ -36,7 +36,7 @@ _ALONE = threading.Lock()  # a process analyzes one program at a time, however m
 
 
 class ManyAnalyses(Result):
-    """What became of each program; the reports are in a folder.
+    """The outcome of each program; the reports are in a folder.
 
     Attributes
     ----------
@@ -55,17 +55,17 @@ class ManyAnalyses(Result):
 
     @property
     def failed(self) -> list[ProgramOutcome]:
-        """The programs that have no report, each with its reason."""
+        """Programs without a report, each with its reason."""
         return [outcome for outcome in self.outcomes if outcome.status == "failed"]
 
     @property
     def complete(self) -> bool:
-        """Whether no program failed and no sample was left out."""
+        """True if no program failed and no sample was left out."""
         return all(outcome.status == "done" for outcome in self.outcomes)
 
     @property
     def below_required(self) -> list[ProgramOutcome]:
-        """The programs with a cut below what was required."""
+        """Programs with a cut below the required stiffness."""
         return [outcome for outcome in self.outcomes if outcome.figure("lines_below_required")]
 
     def to_dict(self) -> list[Document]:  # type: ignore[override]  # the command prints a list
@@ -80,7 +80,7 @@ class ManyAnalyses(Result):
         return {**summary, "file": outcome.file, "report": str(report)}
 
     def to_frame(self) -> DataFrame:
-        """One row a program, the columns of `summary.csv`."""
+        """A row for each program, in the columns of `summary.csv`."""
         return frame_of(columns_of(self.outcomes))
 
     def __str__(self) -> str:
@@ -114,11 +114,11 @@ def analyze_many(
         Files, folders (every program in them and below), `Program` objects. A file that is named twice is read once,
         as its `Program` object says if there is one of the same path.
     machine
-        What they run on; a name or a file is loaded.
+        The machine that runs them; a name or a file is loaded.
     folder
-        Where the reports go: a folder for each program, `index.html` and `summary.csv` beside them.
+        Folder of the reports: a folder for each program, `index.html` and `summary.csv` beside them.
     executor
-        What the programs are handed to, one a call: any `concurrent.futures.Executor`, as Dask's
+        Takes the programs, one a call: any `concurrent.futures.Executor`, as Dask's
         `client.get_executor()`. It stays open. Its processes must see the programs and `folder` by the same paths.
         Unless given, processes of this computer.
     jobs
@@ -160,7 +160,7 @@ def analyze_many(
     path_options = {name: options.pop(name) for name in arguments if name in options}
     compared = path_options.pop("compare_with", None)
     other = on.like(compared) if isinstance(compared, str | Path) else compared
-    # A mistake in them is one error.
+    # A mistake in these options is a single error.
     origin_si(path_options.get("origin_mm_deg"))
     parse_load(path_options.get("load", LOAD))
     for name, value in path_options.items():
@@ -178,7 +178,7 @@ def analyze_many(
     rules = Rules(inputs=(*(file for program in each for file in program.inputs), *shared), replace=replace)
     out = Path(folder)
     check_folder(out, RESERVED, rules)
-    # The overview of an earlier run goes, as its reports do from now on, one after the other.
+    # Remove an earlier run's overview: its reports are replaced from now on, one by one.
     write_folder(out, {}, command="analyze", rules=rules, unfinished=True)
     work = partial(analyze, machine=on, compare_with=other, **path_options)
     tasks = []
@@ -188,7 +188,7 @@ def analyze_many(
         absolute = dataclasses.replace(program, file=program.file and str(Path(program.file).absolute()), _last=[])
         opens = (report.folder / ("report.html" if plots else "summary.json")).as_posix()
         tasks.append(Task(absolute, report, out.absolute(), opens, work, save))
-        with writing_errors(out, "write to"):  # before the processes, which would take each other's away
+        with writing_errors(out, "write to"):  # made here, as parallel processes would remove each other's
             tasks[-1].folder.parent.mkdir(parents=True, exist_ok=True)
     count = max(1, min(jobs or usable_cpus(), len(tasks)))
     outcomes = dict.fromkeys(range(len(tasks)), ProgramOutcome("", ""))
@@ -202,12 +202,12 @@ def analyze_many(
 
 
 def _in_file(example: Program, file: str) -> Program:
-    """A program in a file, read as the example."""
+    """A program in a file, read with the example's options."""
     return dataclasses.replace(example, name=Path(file).name, file=file, text=None, _last=[])
 
 
 def _listed(programs: Iterable[str | Path | Program]) -> tuple[list[Found], dict[str, Program]]:
-    """The programs, each once, and the `Program` objects among them by file, or by name where they have none."""
+    """The programs, each once, and the `Program` objects among them by file, or by name if they have no file."""
     several = [programs] if isinstance(programs, str | Path | Program) else list(programs)
     given: dict[str, Program] = {}
     for program in several:
@@ -216,7 +216,7 @@ def _listed(programs: Iterable[str | Path | Program]) -> tuple[list[Found], dict
             if file in given:
                 raise InputError(f"two programs are named {file!r}", hint="give each a name of its own")
             given[file] = program
-    objects = [Found(file, Path(Path(file).name)) for file in given]  # first, as they say how they are read
+    objects = [Found(file, Path(Path(file).name)) for file in given]  # first, as they hold their reading options
     listed, _ = find_programs([*objects, *(str(program) for program in several if not isinstance(program, Program))])
     if not listed:
         raise InputError("no programs", expected="files, folders or Program objects")
@@ -225,16 +225,16 @@ def _listed(programs: Iterable[str | Path | Program]) -> tuple[list[Found], dict
 
 @dataclass(frozen=True)
 class Task:
-    """One program, for another process.
+    """One program to be analysed, in any process.
 
     Attributes
     ----------
     program, listed
-        What is read, its path absolute; its name and the folder of its report, below `out`, which is absolute.
+        The program, its path absolute; its name and the folder of its report, below `out`, which is absolute.
     opens
         The file that shows most of it, seen from `out`.
     analyze, save
-        What makes its analysis, and what writes it to a folder.
+        Functions that make its analysis, and write it to a folder.
     """
 
     program: Program
@@ -246,11 +246,11 @@ class Task:
 
     @property
     def folder(self) -> Path:
-        """The folder of its report."""
+        """Folder of the program's report."""
         return self.out / self.listed.folder
 
     def failed(self, reason: str) -> ProgramOutcome:
-        """A failure: a sentence in one line that begins with the file as named; errors know its last name alone."""
+        """The outcome of a failure: one line that begins with the file as named; errors know its last name alone."""
         file, last = self.listed.file, f"{Path(self.listed.file).name}:"
         line = "; ".join(reason.splitlines()).replace(self.program.file or file, file)
         if file not in line:
@@ -259,7 +259,7 @@ class Task:
 
 
 def analyze_task(task: Task) -> ProgramOutcome:
-    """Analyse a program and write its report: what an executor is handed, in whatever process."""
+    """Analyse a program and write its report: the call submitted to an executor, in any process."""
     if not task.out.is_dir():
         return task.failed(f"its process does not see {task.out}: reports need a file system that all processes share")
     try:
@@ -268,13 +268,13 @@ def analyze_task(task: Task) -> ProgramOutcome:
             task.save(analysis, task.folder)
     except TpsError as error:
         return task.failed(str(error))
-    except Exception as error:  # it must not stop the other programs
+    except Exception as error:  # one failure must not stop the other programs
         return task.failed(f"{_named(error)} (analyze it alone to see where)")
     return ProgramOutcome(task.listed.name, task.listed.file, "", task.opens, figures_of(analysis.to_dict()))
 
 
 def _outcomes(tasks: Sequence[Task], executor: Executor | None, jobs: int) -> Iterator[tuple[int, ProgramOutcome]]:
-    """Position and outcome of each task, as they come; of no executor, from so many processes, one being this one."""
+    """Position and outcome of each task, as completed; without an executor from `jobs` processes, 1 being this one."""
     if executor is None and jobs == 1:
         yield from enumerate(map(analyze_task, tasks))
     elif executor is None:
@@ -286,7 +286,7 @@ def _outcomes(tasks: Sequence[Task], executor: Executor | None, jobs: int) -> It
             for future in as_completed(list(futures)):
                 place = futures.pop(future)
                 outcome = _answer(tasks[place], future)
-                del future  # what is held a cluster computes again when the worker that has it dies
+                del future  # a cluster recomputes results still referenced if their worker dies
                 yield place, outcome
         finally:
             for future in futures:
@@ -294,7 +294,7 @@ def _outcomes(tasks: Sequence[Task], executor: Executor | None, jobs: int) -> It
 
 
 def _answer(task: Task, future: Future[ProgramOutcome]) -> ProgramOutcome:
-    """What became of a program, also where its process gave no answer."""
+    """The outcome of a program, even if its process gave no answer."""
     if future.cancelled():
         return task.failed("was cancelled: the executor was shut down, or lost its workers")
     error = future.exception()

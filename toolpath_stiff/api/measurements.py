@@ -25,7 +25,7 @@ class Measurements:
     files
         Their names: CSV, "FILE.xlsx#SHEET", or "nist-table1", the paper's Table 1.
     columns
-        Which columns they call otherwise, as --columns has it; None: as FILE.columns.toml beside a file says.
+        Columns that they name differently, as in --columns; None: as FILE.columns.toml beside a file says.
 
     Examples
     --------
@@ -51,7 +51,7 @@ class Measurements:
         files
             CSV, "FILE.xlsx#SHEET", or "nist-table1".
         columns
-            Which columns the files call otherwise: "stiffness=stiff_mean:N/um, date=day:DD.MM.YYYY", or such a dict.
+            Columns that the files name differently: "stiffness=stiff_mean:N/um, date=day:DD.MM.YYYY", or such a dict.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class Measurements:
         return self._last[1]
 
     def to_frame(self, machine: Machine | str | Path = MACHINE) -> DataFrame:
-        """One row a reading: file, line, point, pose, direction, measured stiffness, force.
+        """A row for each reading: file, line, point, pose, direction, measured stiffness, force.
 
         Examples
         --------
@@ -96,7 +96,7 @@ class Measurements:
         return frame_of(reading_columns(self.on(machine_from(machine))))
 
     def to_dict(self, machine: Machine | str | Path = MACHINE) -> Document:
-        """The files, and the readings as `to_frame` has them: the unit in each key, None where one does not say.
+        """The files, and the readings as in `to_frame`: the unit in each key, None for values not given.
 
         Examples
         --------
@@ -111,7 +111,7 @@ class Measurements:
         return f"<Measurements {', '.join(self.files)}>"
 
     def _repr_html_(self) -> str:
-        """For notebooks: the readings on the default machine, its first and last rows if they are many."""
+        """HTML for notebooks: the readings on the default machine; of many, the first and last rows."""
         return str(self.to_frame().to_html(max_rows=20, notebook=True))
 
 
@@ -119,7 +119,7 @@ Data = Measurements | str | Path | Sequence[str | Path]
 
 
 def measurements_from(data: Data, columns: Mapped = None) -> Measurements:
-    """Measurements; of a file's name or several, those in the files, whose columns are called as `columns` says."""
+    """Measurements as given, or those in a file or several, with columns named as `columns` says."""
     if isinstance(data, Measurements):
         return data
     return Measurements([str(file) for file in ([data] if isinstance(data, str | Path) else data)], columns)

@@ -1,4 +1,4 @@
-"""Placements of the work: the search, any placement tried, the program written for a placement."""
+"""Placements of the work: the search, a trial of any placement, the program rewritten for a placement."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.analysis.turning import BEST, FEED, FIXED, check_free_turn
 from toolpath_stiff.api import inputs
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, cut_setup
-from toolpath_stiff.api.inputs import origin_si, pose_si
+from toolpath_stiff.api.inputs import origin_si, pose_si, read_at
 from toolpath_stiff.api.machines import Machine, machine_from
 from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD, OBJECTIVES
@@ -36,7 +36,7 @@ from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, ra
 
 FARTHEST_TURN_DEG = 720.0
 MOST_FRONT_POINTS = 1000
-ERROR = "error"  # the objective that takes a cut
+ERROR = "error"  # the objective that requires a cut
 Range = tuple[float, float] | float
 
 
@@ -79,13 +79,13 @@ def place(
     Parameters
     ----------
     program, machine
-        What it runs on, what runs.
+        The program, and the machine that runs it.
     x_mm, y_mm, z_mm
-        Of program zero, mm: low and high, or a number to fix it; unless given, as far as the machine reaches.
+        Position of program zero, mm: low and high, or a number to fix it; unless given, as far as the machine reaches.
     z_values_mm
         The only heights that there are, mm.
     base_mm
-        Where the work's table stands, from the machine's base: bounds and heights that are given count from there.
+        Position of the work's table from the machine's base: bounds and heights that are given count from there.
     rotate_deg, tilt_a_deg, tilt_b_deg
         Turn and tilts of the set-up, degrees: low and high, or a number to fix it.
     turn
@@ -103,7 +103,7 @@ def place(
     points
         Most points of the front.
     seed
-        Of the search.
+        Random seed of the search.
     origin_mm_deg
         The present placement, X, Y, Z or X, Y, Z, A, B, C of program zero; unless given, where the program's G10 says,
         else the machine's default.
@@ -118,7 +118,7 @@ def place(
     write
         The program itself, transformed so that, run at the present origin, it cuts at the placement: name of its file.
     decimals
-        Of its numbers; unless given, 4 in mm and degrees, 5 in inch.
+        Decimals of its numbers; unless given, 4 in mm and degrees, 5 in inch.
     linearise_mm
         Write arcs that the turn takes out of the planes as straight moves within so much; unless given, refuse them.
     progress
@@ -143,8 +143,7 @@ def place(
     model, origin, turns = on.running(part), origin_si(origin_mm_deg), (tilt_a_deg, tilt_b_deg, rotate_deg)
     default, setup = model.machine.default_origin, cut_setup(cut, material, stock_mm)
     _check_together(write is None, decimals is None and linearise_mm is None, objective, setup is None, turn)
-    read = part.moves(origin, default)
-    present, step = origin or (read.origin if read.origin_source == "program" else default), m_from_mm(step_mm)
+    (read, present), step = read_at(part, origin, default), m_from_mm(step_mm)
     now = None if setup is None else evaluate_cut(model, read, present, setup, step, progress)
     task = PlacementTask(
         model=model,
@@ -167,7 +166,7 @@ def place(
 
 
 def _check_together(unwritten: bool, as_written: bool, objective: str, uncut: bool, turn: str | float) -> None:
-    """Raise `InputError` for options that ask for others, or shut them out."""
+    """Raise `InputError` for options that require or exclude each other."""
     if unwritten and not as_written:
         raise InputError("--decimals or --linearise without --write", hint="say with --write FILE where it goes")
     if (objective == ERROR) == uncut:
@@ -178,7 +177,7 @@ def _check_together(unwritten: bool, as_written: bool, objective: str, uncut: bo
 
 
 def _keep_out(text: str) -> KeepOut:
-    """`NAME:X0,Y0,Z0,X1,Y1,Z1`."""
+    """The box of `NAME:X0,Y0,Z0,X1,Y1,Z1`."""
     name, _, corners = text.rpartition(":")
     values = numbers(corners)
     if not name or len(values) != 6:
@@ -193,7 +192,7 @@ def _bounds(
     turns: Sequence[Range],
     tool: str | float,
 ) -> Bounds:
-    """Bounds of the search, in SI; where nothing is said, the machine's workspace."""
+    """Bounds of the search, in SI; where not given, the machine's workspace."""
     heights = sorted(set(map(float, heights_mm)))
     sides = [*box[:2], (heights[0], heights[-1]) if heights else box[2]]
     workspace = mm_from_m(working_box(machine)).T.tolist()
@@ -209,7 +208,7 @@ def _bounds(
 
 
 def _turn_of_tool(machine: MachineTool, turn: str | float) -> list[Range]:
-    """Bounds of a constant turn of the tool about its axis, one or, as programmed, none. Raises `InputError`."""
+    """Bounds of a constant turn of the tool about its axis, one or, if as programmed, none. Raises `InputError`."""
     if turn == FIXED:
         return []
     check_free_turn(machine, turn)
@@ -220,15 +219,13 @@ def _turn_of_tool(machine: MachineTool, turn: str | float) -> list[Range]:
 
 def _from_base(
     base_mm: Sequence[float], box: Sequence[Range | None], heights_mm: Sequence[float]
-) -> tuple[list[Range | None], list[float]]:
+) -> tuple[Sequence[Range | None], list[float]]:
     """Bounds and heights that are given, counted from the machine's base. Raises `InputError`."""
     base = [inputs.finite("--base", value) for value in base_mm]
     if len(base) != 3:
         raise InputError(f"--base of {len(base)} numbers", expected="X,Y,Z in mm")
-    moved: list[Range | None] = []
-    for side, offset in zip(box, base, strict=True):
-        ends = side if side is None else np.add(side, offset).tolist()
-        moved.append(tuple(ends) if isinstance(ends, list) else ends)
+    sides = zip(box, base, strict=True)
+    moved = [side if side is None else tuple(np.add(_pair(side), offset).tolist()) for side, offset in sides]
     return moved, [z + base[2] for z in heights_mm]
 
 
@@ -240,7 +237,7 @@ def _pair(given: Range) -> tuple[float, float]:
 
 
 class PlacementTrial:
-    r"""A program that can be put anywhere, with the figures of every place at once; `try_placement` makes one.
+    r"""A program ready for trial at any placement, with figures in no time; made by `try_placement`.
 
     Examples
     --------
@@ -289,9 +286,8 @@ def try_placement(
     on, part = machine_from(machine), program_from(program)
     model, direction = on.running(part), parse_load(load)
     read = part.moves(None, model.machine.default_origin)
-    return PlacementTrial(
-        read, Evaluator(model, work_path(read, m_from_mm(step_mm), direction, model.machine), direction, force_N)
-    )
+    path = work_path(read, m_from_mm(step_mm), direction, model.machine)
+    return PlacementTrial(read, Evaluator(model, path, direction, force_N))
 
 
 @checked
@@ -303,7 +299,7 @@ def rewrite(
     decimals: inputs.Decimals = None,
     linearise_mm: inputs.Linearised = None,
 ) -> RewrittenProgram:
-    r"""Write a program so that, run where its zero sits now, it does what it would do untouched at another placement.
+    r"""Write a program so that, run at its present zero, it does what the untouched one would do at another placement.
 
     Parameters
     ----------
@@ -312,7 +308,7 @@ def rewrite(
     to_mm_deg, from_mm_deg
         Where program zero is to sit in effect, and where it sits: X, Y, Z or X, Y, Z, A, B, C.
     decimals
-        Of the numbers written; unless given, 4 in mm and degrees, 5 in inch.
+        Decimals of the numbers written; unless given, 4 in mm and degrees, 5 in inch.
     linearise_mm
         Write arcs that the turn takes out of the planes as straight moves within this; unless given they are refused.
 

@@ -1,4 +1,4 @@
-"""A program on a machine: its stiffness along the path; its path alone; the paper's regions."""
+"""A program on a machine: stiffness along the path; the path alone; the paper's regions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -11,7 +11,6 @@ from toolpath_stiff.analysis.turning import FIXED
 from toolpath_stiff.api.cutting import Cutting, Material, StockBox, Tolerance, cut_setup
 from toolpath_stiff.api.inputs import Force, LoadDirection, Origin, Step, Turn, origin_si, pose_si
 from toolpath_stiff.api.machines import Machine, machine_from
-from toolpath_stiff.cutting.cut import evaluate_cut
 from toolpath_stiff.defaults import FORCE, LOAD
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
@@ -51,7 +50,7 @@ def analyze(
     Parameters
     ----------
     program, machine
-        What it runs on, what runs; names and files are loaded.
+        The program, and the machine that runs it; names and files are loaded.
     origin_mm_deg
         Where program zero (G54) sits in machine coordinates: X, Y, Z or X, Y, Z, A, B, C. Unless given, where the
         program's G10 says, else the machine's default.
@@ -125,6 +124,8 @@ def analyze(
     analysis = on(first, second, counter(progress, f"{part.name}: samples"))
     cut_of = None
     if setup is not None:
+        from toolpath_stiff.cutting.cut import evaluate_cut
+
         at, model = (analysis.program, analysis.origin, setup, analysis.step), analysis.model
         ways = model.machine.configurations
         if len(ways) > 1 and analysis.at.configuration in ways:
@@ -186,7 +187,7 @@ def case_study(
     Parameters
     ----------
     program
-        What runs; unless given, the packaged contour of a 200 mm square.
+        The program; unless given, the packaged contour of a 200 mm square.
     machine
         A machine, its name or its file.
     regions
@@ -220,7 +221,7 @@ def case_study(
 
 
 def _regions(named: Mapping[str, Sequence[float]]) -> dict[str, Region]:
-    """Regions by name in mm and degrees, checked."""
+    """Regions by name, from mm and degrees, checked."""
     if not 0 < len(named) <= MOST_REGIONS:
         raise InputError(f"{len(named)} regions", expected=f"1 to {MOST_REGIONS}")
     regions = {}

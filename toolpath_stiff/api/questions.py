@@ -1,4 +1,4 @@
-"""What is asked of measurements: where the model fails, what it lacks, what corrects it, what to measure next."""
+"""Questions about measurements: where the model fails, what it lacks, what corrects it, what to measure next."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -48,20 +48,20 @@ StrutSpread = Annotated[
     float, Option("--strut-spread", "%", at_least=0, at_most=50, help="Standard deviation of the struts' stiffness.")
 ]
 Seed = Annotated[int, Option("--seed", at_least=0, help="Of every random draw.")]
-COMMON = ("columns", "noise_percent", "strut_spread_percent")  # options that `Asked.command` says
+COMMON = ("columns", "noise_percent", "strut_spread_percent")  # options that `Asked.command` writes
 
 
 class Question:
-    """What all of them are given, checked and in SI.
+    """Arguments shared by all questions, checked and in SI.
 
     Attributes
     ----------
     on, model, data
         The machine; as its file has it; the measurements, None where there are none.
     request
-        The same as commands take it.
+        The same, as words of a command.
     common
-        What every function below takes by these names.
+        Keyword arguments that every function below takes.
     inputs
         The files that are read.
     """
@@ -89,36 +89,32 @@ class Question:
 
     @property
     def readings(self) -> Readings:
-        """Of the measurement files, on this machine."""
+        """Readings in the measurement files, on this machine."""
         assert self.data is not None
         return self.data.on(self.on)
 
-    def hexapod(self, asking: str) -> Hexapod:
-        """The machine as its file has it. Raises `InputError` where it is of another kind, which `asking` cannot do."""
-        return as_hexapod(self.model, asking)
-
     @property
     def has_pulls(self) -> bool:
-        """Whether the measurements are forces and displacements as vectors, on a machine of elements."""
+        """True if the measurements are vectors of force and displacement, on a machine of elements."""
         if self.data is None or isinstance(self.model, Hexapod):
             return False
         return bool(pull_tables(self.data.files, self.model, self.data.columns))
 
     def pulls(self) -> tuple[PullProblem, bool]:
-        """Pulls, or stiffnesses, on a machine of elements, and whether somebody states their scatter."""
+        """Pulls, or stiffnesses, on a machine of elements, and True if their scatter is given."""
         assert self.data is not None
         noise = self.common["noise"] and float(np.hypot.reduce(np.atleast_1d(self.common["noise"])))
         spread, files = float(self.common["strut_spread"]), tuple(map(str, self.on.effect_files))
         return pull_problem(self.on.running(), self.data.files, self.data.columns, noise, spread, files)
 
     def of_elements(self) -> ElementDiagnosis:
-        """A diagnosis of these."""
+        """Diagnosis of a machine of elements from its pulls or stiffnesses."""
         return replace(diagnose_elements(*self.pulls()), inputs=self.inputs)
 
     def diagnosed(self, tell: Callable[[str], None], *words: str, inputs: Iterable[str] = ()) -> Diagnosis:
-        """A diagnosis of the readings; `words` are further ones of the command that gives it."""
+        """A diagnosis of the readings; `words`: further words of the command that repeats it."""
         return replace(
-            diagnose_readings(self.hexapod("diagnose"), self.readings, progress=tell, **self.common),
+            diagnose_readings(as_hexapod(self.model, "diagnose"), self.readings, progress=tell, **self.common),
             names=self.request.data,
             line=self.request.command("diagnose", *words),
             asked=self.request,
@@ -154,14 +150,14 @@ def compare(
     data, machine
         The machine; measurements, or the files that hold them.
     columns
-        Which columns the files call otherwise: "stiffness=stiff_mean:N/um", or such a dict.
+        Columns that the files name differently: "stiffness=stiff_mean:N/um", or such a dict.
     noise_percent
         Standard deviation of one reading, re-clamping included; or of the reading alone and of a clamping. Unless
         given, from repeats, else from the column sd_N_per_mm, else a low and a high guess.
     strut_spread_percent
         Standard deviation of the struts' stiffness.
     seed
-        Of every random draw.
+        Seed of every random draw.
     progress
         Called with what is being done.
 
@@ -289,7 +285,7 @@ def update(
         Write what the data do not support as well, never what fits worse than the machine given; and as
         --replace.
     believe
-        Machine or instrument: take for its what an error of the other would show as well; else it is refused.
+        Machine or instrument: the one to hold responsible for an error that either could cause; else it is refused.
     objective
         Mean-error: the strut law alone, as the paper fitted it.
     machine_file
@@ -350,7 +346,7 @@ def draft_effect(
     data, machine
         The machine, whose effect files take part; measurements, or the files that hold them.
     file
-        Where it will be saved: the effect is named after it. Nothing is written yet.
+        File to save it in: the effect is named after it. Nothing is written yet.
     noise_percent, strut_spread_percent, seed, progress
         As of `diagnose`.
 
@@ -376,7 +372,7 @@ def draft_effect(
 
 
 def _cost(text: str) -> tuple[str, float]:
-    """`pose=15`."""
+    """Name and minutes from `pose=15`."""
     name, _, value = text.partition("=")
     return name, finite_number(value)
 
@@ -412,23 +408,23 @@ def plan(
         Effects to tell apart, on elements "joint_torsion:joint 2", or "none"; unless given, what a diagnosis of the
         data leaves standing.
     n
-        Poses; unless given 6, or 24 of a first campaign.
+        Number of poses; unless given, 6, or 24 in a first campaign.
     radius_mm
-        How far poses may lie from the axis; unless given, 300 mm.
+        Largest distance of poses from the axis; unless given, 300 mm.
     heights_mm
-        Of the tool tip; unless given, five levels.
+        Heights of the tool tip; unless given, five levels.
     max_tilt_deg
-        Of the spindle; unless given, 25 degrees.
+        Largest tilt of the spindle; unless given, 25 degrees.
     loads_N
-        Unless given, 500, 1000, 4000 and those of the data.
+        Loads; unless given, 500, 1000, 4000 and those of the data.
     tool_extensions_mm
-        Tools, longer than the reference tool by; the first is in the spindle. Unless given, as last, and 150.
+        Extensions of tools beyond the reference tool; the first is in the spindle. Unless given, as last, and 150.
     setups
-        The first is on the table; unless given, those of the data.
+        Set-ups, the first now on the table; unless given, those of the data.
     indicators
         Take a second indicator across a link of the load path where that tells more.
     minutes
-        What work costs: of a "reading" (1), a "pose" (15), another "tool" (10), another "setup" (45), a second
+        Cost of work: of a "reading" (1), a "pose" (15), another "tool" (10), another "setup" (45), a second
         "indicator" (10).
     columns
         As of `compare`.

@@ -1,1 +1,1 @@
-"""A case: machine versions, data and steps with undo in one folder, and what was found out on it."""
+"""A case: one folder with machine versions, data, results and the steps taken, which can be undone."""

@@ -1,11 +1,11 @@
-"""A case: a folder with a machine, measurements, a program, and all that was done with them, step by step.
+"""A case: a folder with a machine, measurements, a program, and everything done with them, step by step.
 
     case.json       the steps: what each led to, its command line and its Python line
     machines/       every version of the machine, copied or fitted
     data/           copies of the measurement files
     used/           the same without the readings that were set aside: commented out, so that line numbers stay
     programs/       copies of the programs
-    results/        a folder a result, as the commands write them
+    results/        a folder per result, as the commands write them
     exercise/       a blind exercise, if one was started
 
 No file is written twice: a change is a new file and a step that names it, so to undo is to forget the last steps.
@@ -43,7 +43,7 @@ DRAFT = "missing"
 
 
 class Case:
-    r"""A folder that holds a machine, measurements, a program, and every step that was done with them.
+    r"""A folder that holds a machine, measurements, a program, and every step done with them.
 
     Attributes
     ----------
@@ -126,16 +126,16 @@ class Case:
 
     @property
     def state(self) -> CaseState:
-        """What holds now."""
+        """State after the last step."""
         return self.history[-1].state if self.history else CaseState()
 
     def path(self, name: str) -> str:
-        """A file of the case, as functions and commands take it."""
+        """Path of a file of the case, as functions and commands take it."""
         return str(self.folder / name)
 
     @property
     def effect_files(self) -> tuple[str, ...]:
-        """The files of own effects; raises `InputError` for one whose code this user has not agreed to run."""
+        """Files of the user's own effects; raises `InputError` for one whose code this user has not agreed to run."""
         for name in self.state.effects:
             file = self.folder / name
             if not is_file(file) or not is_agreed(file.read_bytes()):
@@ -145,11 +145,11 @@ class Case:
 
     @property
     def machine(self) -> tps.Machine:
-        """The machine, effects of one's own included."""
+        """The machine, with the user's own effects."""
         return self.machine_of(self.state.machine)
 
     def machine_of(self, file: str) -> tps.Machine:
-        """A machine file of the case with the effects of one's own.
+        """A machine file of the case, with the user's own effects.
 
         Examples
         --------
@@ -163,7 +163,7 @@ class Case:
         return tps.Machine.load(self.path(file), effects=self.effect_files)
 
     def machine_with(self, on: Mapping[str, Document]) -> tps.Machine:
-        """The machine with effects of these sizes; where there are readings, the strut law is refitted beside them.
+        """The machine with effects of given sizes; if there are readings, the strut law is refitted with them.
 
         Examples
         --------
@@ -179,42 +179,42 @@ class Case:
 
     @property
     def cut(self) -> str | None:
-        """The setup file of the cut; None without one."""
+        """Setup file of the cut; None if there is none."""
         return self.path(self.state.cut) if self.state.cut else None
 
     @property
     def data(self) -> tps.Measurements:
-        """The readings in use. Raises `InputError` where there are none."""
+        """Readings in use. Raises `InputError` if there are none."""
         if not self.state.data:
             raise InputError("this case has no measurements", hint="add a file with add_data, or start an exercise")
         return tps.Measurements(list(map(self.path, self.state.data_files)))
 
     @property
     def preview(self) -> Preview:
-        """The error of the readings in use with effects of any size, as `tps.preview`; made once for these readings."""
+        """Errors of the readings in use for effects of any size, as `tps.preview`; made once for a set of readings."""
         if self._preview is None or self._preview[0] != self.state.judged:
             self._preview = (self.state.judged, preview(self.data, self.machine))
         return self._preview[1]
 
     @property
     def program(self) -> tps.Program:
-        """The program. Raises `InputError` where there is none."""
+        """The program. Raises `InputError` if there is none."""
         if not self.state.program:
             raise InputError("this case has no program", hint="add one with add_program")
         return self._program(self.state)
 
     def _program(self, state: CaseState) -> tps.Program:
         reading = {key: self.path(value) if key in TABLES else value for key, value in state.reading.items()}
-        if not state.program:  # the tables are read all the same
+        if not state.program:  # without a program the tables are still read, so that errors show
             return tps.Program.from_text("M2", **cast("Reading", reading))
         return tps.Program.read(self.path(state.program), **cast("Reading", reading))
 
     def latest(self, kind: str) -> str:
-        """Folder of the latest result of a kind; "" without one."""
+        """Folder of the latest result of a kind; "" if there is none."""
         return next((step.result for step in reversed(self.history) if step.kind == kind and step.result), "")
 
     def record(self, kind: str, text: str, python: str, command: str = "", result: str = "", **change: Any) -> None:
-        """Add a step that changes these attributes of the state, and write the case.
+        """Add a step that changes these attributes of the state, and save the case.
 
         Without a command, it is the one that shows what the readings or the program give with the change.
         """
@@ -223,7 +223,7 @@ class Case:
         self._write([*self.history, Step(kind, text, command, python, state, result)])
 
     def undo(self) -> Step | None:
-        """Take back the last step that changed something, and what was found since; None where there is none."""
+        """Take back the last step that changed something, and all results since; None if there is none."""
         changes = [n for n, step in enumerate(self.history) if n and step.state != self.history[n - 1].state]
         undone = self.history[changes[-1]] if changes else None
         if undone:
@@ -242,7 +242,7 @@ class Case:
         return free_name(self.folder, f"results/{len(self.history) + 1:03d}-{kind}")
 
     def set_machine(self, machine: str | Path) -> None:
-        """Use another machine: a name or a file, of which the case keeps a copy.
+        """Use another machine, by name or file; the case keeps a copy.
 
         Examples
         --------
@@ -266,7 +266,7 @@ class Case:
             raise InputError(f"{name} is no file of own effects of this case", expected=", ".join(self.state.effects))
 
     def add_effects(self, file: str | Path, instead_of: str = "") -> None:
-        """Use a Python file with effects of one's own. Its code is run: to add it is to agree to that.
+        """Use a Python file with the user's own effects. Its code is run: to add it is to agree to that.
 
         `instead_of`: the file of the case that it takes the place of.
 
@@ -297,7 +297,7 @@ class Case:
         self.record("effects", text, python, command_line("effects", "check", new), effects=effects, on=on)
 
     def add_data(self, *files: str | Path) -> None:
-        """Add measurement files; the case keeps copies, and nothing is kept of a file that cannot be used.
+        """Add measurement files; the case keeps copies, but of none if one cannot be used.
 
         Examples
         --------
@@ -318,7 +318,7 @@ class Case:
         self.record("data", text, call("add_data", *files), data=data)
 
     def set_aside(self, file: str, line: int, back: bool = False) -> None:
-        """Leave out the readings of a line of a measurement file of the case; `back`: use them again."""
+        """Leave out the readings on a line of a measurement file of the case; `back`: use them again."""
         state, entry = self.state, f"{file}:{line}"
         lines = {int(other.rpartition(":")[2]) for other in state.aside if other.rpartition(":")[0] == file} ^ {line}
         known = tps.Measurements([self.path(file)]).on(self.machine).line if file in state.data else ()
@@ -359,7 +359,7 @@ class Case:
         self.record("switch", text, call("switch", effect, values), command, on=on)
 
     def accept(self, file: str | Path) -> None:
-        """Go on with the machine file that an update of this case wrote.
+        """Continue with the machine file that an update of this case wrote.
 
         Examples
         --------
@@ -377,7 +377,7 @@ class Case:
         self.record("accept", f"goes on with {name}", call("accept", file), command, machine=name, on={})
 
     def add_program(self, file: str | Path | None = None, **reading: Unpack[Reading]) -> None:
-        r"""Use an NC program or cutter-location file; without one, read the present one otherwise.
+        r"""Use an NC program or cutter-location file; without one, read the present program with other settings.
 
         Further arguments as of `Program.read`: dialect, controller, offsets, tools, block_delete, feed_mm_per_min. They
         hold for later programs of the case too, until they are given anew; None takes one back.
@@ -421,20 +421,20 @@ class Case:
         self.record("program", text, call("add_program", *filter(None, [file]), **reading), **vars(state))
 
     def place_at(self, origin_mm_deg: Sequence[float]) -> None:
-        """Put program zero somewhere: X, Y, Z, A, B, C in machine coordinates."""
+        """Place program zero: X, Y, Z, A, B, C in machine coordinates."""
         pose_si("origin", origin_mm_deg)
         origin = tuple(round(float(value), 6) for value in origin_mm_deg)
         text = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", origin, strict=False))
         self.record("place_at", f"program zero at {text}", call("place_at", origin), origin=origin)
 
     def require(self, stiffness_N_per_mm: float) -> None:
-        """Ask a stiffness of every cut; 0: none."""
+        """Require a stiffness of every cut; 0: none."""
         option = arguments_of(tps.analyze)["require_N_per_mm"]
         required = 0.0 if stiffness_N_per_mm == 0 else float(option.check(stiffness_N_per_mm) or 0)
         self.record("require", f"{required:g} N/mm required", call("require", required), require=required)
 
     def set_cut(self, file: str | Path) -> None:
-        """Say how programs cut: stock, tools and coefficients, from a setup file that names no other files.
+        """Describe how programs cut: stock, tools and coefficients, from a setup file that names no other files.
 
         Examples
         --------
@@ -452,7 +452,7 @@ class Case:
         self.record("cut", f"cuts as {Path(file).name} says", call("set_cut", file), cut=name)
 
     def find(self, kind: str, progress: Progress | None = None, **given: Any) -> Any:
-        """A result as a step, in results/: analyze, compensate, compare, diagnose, update, plan, place, draft, set_up.
+        """Result as a step, in results/: analyze, compensate, compare, diagnose, update, plan, place, draft, set_up.
 
         What the public function of that name gives for the machine, readings and program of the case, with further
         arguments of it; `draft_effect` for "draft", whose effect the case uses from then on. "set_up" is the program
@@ -478,7 +478,7 @@ class Case:
         return kept
 
     def start_exercise(self, seed: int, hidden: str | None = None, layout: str = "tilted") -> None:
-        """Begin a blind exercise: a simulated machine that hides something, and what was measured on it.
+        """Begin a blind exercise: a simulated machine with something hidden, and measurements of it.
 
         `hidden` and `layout` as of `tps rig new`.
         """
@@ -509,7 +509,7 @@ class Case:
 
 
 def find(case: Case, kind: str, result: str, progress: Progress | None = None, **given: Any) -> Found:
-    """A result of this kind, kept in a folder of the case without a step; and the command that gives it."""
+    """A result of a kind, kept in a folder of the case without a step, and the command that gives it."""
     if kind in FINDERS:
         return FINDERS[kind](case, result, progress, **given)
     watched: Document = {} if kind == "plan" else {"progress": progress}
@@ -530,7 +530,7 @@ def _analyze(case: Case, result: str, progress: Progress | None, machine: str = 
 
 
 def _switched(case: Case, result: str) -> tuple[tps.Machine, str]:
-    """The machine with the effects that are switched on, and its file among the results; "" where none is."""
+    """The machine with the effects that are switched on, and its file among the results; "" if none is on."""
     on, name = case.machine_with(case.state.on), f"{result}/machine.toml"
     if not case.state.on:
         return on, ""

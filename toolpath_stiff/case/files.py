@@ -1,4 +1,4 @@
-"""Files of a case: copies under names that are free, readings that are commented out."""
+"""Files of a case: copies under free names, and copies with readings commented out."""
 
 import re
 from collections.abc import Collection, Iterator, Sequence
@@ -17,7 +17,7 @@ LONGEST_NAME = 80
 
 
 def free_name(folder: Path, name: str) -> str:
-    """The name, or the next one with a number that the folder does not have yet."""
+    """The name, or the first of its numbered variants that the folder does not have yet."""
     path, number = Path(name), 1
     stem = re.sub(r"-[0-9]+$", "", path.stem)
     while (folder / name).exists():
@@ -28,7 +28,7 @@ def free_name(folder: Path, name: str) -> str:
 
 @contextmanager
 def kept_if_read(folder: Path, names: Sequence[str]) -> Iterator[None]:
-    """Take new files of the case away again where they cannot be read."""
+    """Remove the new files of the case again if they cannot be read."""
     try:
         yield
     except TpsError:
@@ -38,7 +38,7 @@ def kept_if_read(folder: Path, names: Sequence[str]) -> Iterator[None]:
 
 
 def copied(folder: Path, file: str | Path, room: str, content: bytes | None = None) -> str:
-    """Copy a file, or this content under its name, into a room of the case under a name that is free; the name."""
+    """Copy a file, or `content` under its name, into a subfolder of the case under a free name, which is returned."""
     content = read_bytes(file, "the file") if content is None else content
     source = Path(str(file).partition("#")[0])
     suffix = ".csv" if room == "data" else UNSAFE.sub("_", source.suffix)
@@ -57,6 +57,6 @@ def measurements_csv(file: str | Path, machine: Machine) -> bytes:
 
 
 def without_lines(file: Path, lines: Collection[int]) -> bytes:
-    """A file with these lines commented out: the others keep their numbers."""
+    """A file with these lines commented out, so that the others keep their numbers."""
     rows = file.read_bytes().split(b"\n")
     return b"\n".join(b"# " + row if number in lines else row for number, row in enumerate(rows, 1))

@@ -1,4 +1,4 @@
-"""The steps of a case and the state that each led to: as values, as commands to paste, as the file case.json."""
+"""Steps of a case and the state after each: as values, as commands to paste, as the file case.json."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ READING = ("dialect", *TABLES, "block_delete", "feed_mm_per_min")  # of `Program
 
 @dataclass(frozen=True)
 class CaseState:
-    """What holds after some steps; files are named within the case's folder.
+    """State of a case after some steps; files are named within the case's folder.
 
     Attributes
     ----------
@@ -60,21 +60,21 @@ class CaseState:
 
     @property
     def data_files(self) -> tuple[str, ...]:
-        """The files of the readings in use."""
+        """Files of the readings in use."""
         return tuple(self.used.get(file, file) for file in self.data)
 
     @property
     def judged(self) -> tuple[object, ...]:
-        """Everything that a diagnosis hangs on."""
+        """Everything that a diagnosis depends on."""
         return (self.machine, self.effects, self.data_files)
 
     def question(self, name: str, machine: str = "", *words: str, files: Sequence[str] | None = None) -> str:
-        """The command line that asks this of the readings in use, or of these files."""
+        """Command line that asks a question (`name`) of the readings in use, or of `files`."""
         common = options(machine=machine or self.machine, effects=list(self.effects))
         return command_line(*name.split(), *(self.data_files if files is None else files), *common, *words)
 
     def program_line(self, name: str = "analyze", machine: str = "", **given: Any) -> str:
-        """The command line that asks this of the program; "" without one."""
+        """Command line that runs `name` on the program; "" if there is no program."""
         cut = self.cut if name in ("analyze", "compensate") else ""
         stated: Document = {"origin_mm_deg": self.origin or None, "require_N_per_mm": self.require or None,
                             "partial": name == "analyze", "cut": cut or None, **given}  # fmt: skip
@@ -84,7 +84,7 @@ class CaseState:
 
 @dataclass(frozen=True)
 class Step:
-    """Something that was done.
+    """One step of a case.
 
     Attributes
     ----------
@@ -107,14 +107,14 @@ class Step:
 
 
 def call(method: str, *words: object, **named: object) -> str:
-    """A call of a method of the case as a Python line: paths by their names, without what says nothing."""
+    """A call of a method of the case as a Python line: paths by name, arguments that say nothing left out."""
     entries = [("", word) for word in words] + [(f"{name}=", value) for name, value in named.items() if value]
     shown = (f"{name}{(value.name if isinstance(value, Path) else value)!r}" for name, value in entries)
     return f"case.{method}({', '.join(shown)})"
 
 
 def read_steps(file: Path) -> list[Step]:
-    """The steps of a case, which may come from anybody. Raises `InputError` for what no case has written."""
+    """Steps of a case, which may come from anybody. Raises `InputError` for content that no case writes."""
     text = read_text(file, "the case")
     try:
         document = json.loads(text)
@@ -137,7 +137,7 @@ def case_text(steps: Sequence[Step]) -> str:
 
 
 def _state(document: Document) -> CaseState:
-    """Each value as its attribute has it; ValueError, TypeError, AttributeError for what cannot be."""
+    """State with each value in its attribute's type; ValueError, TypeError, AttributeError for impossible values."""
     blank = CaseState()
     state = CaseState(**{name: type(getattr(blank, name))(value) for name, value in document.items()})
     if not set(state.reading) <= set(READING) or not all(isinstance(keys, dict) for keys in state.on.values()):

@@ -1,1 +1,1 @@
-"""The command line: thin, arguments to calls and results to files."""
+"""The command line, a thin layer: arguments become calls, results become files."""

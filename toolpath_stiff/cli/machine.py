@@ -38,7 +38,7 @@ def pose(
       tps pose --csv poses.csv > stiffness.csv
 
     Angles are roll A, pitch B, yaw C in degrees, R = Rz(C) Ry(B) Rx(A); the position is the tool tip in mm, machine
-    coordinates. --csv reads columns x_mm,y_mm,z_mm and, if there, a_deg,b_deg,c_deg; it writes one row a pose in the
+    coordinates. --csv reads columns x_mm,y_mm,z_mm and, if there, a_deg,b_deg,c_deg; it writes one row per pose in the
     same order, with empty cells where a pose is out of reach (exit code 1).
 
     Parameters
@@ -118,7 +118,7 @@ def show_machine(
 
 
 def _draw(args: Namespace, out: str | None, name: str, makers: Mapping[str, Callable[[], bytes]]) -> str:
-    """Write --out, or all to reports unless JSON is printed; what was written. Raises `InputError`."""
+    """Write drawings to --out, or to reports unless JSON is printed; text of the files written. Raises `InputError`."""
     files = [Path(out)] if out else [] if args.json else [Path(f"reports/{name}{suffix}") for suffix in makers]
     if out and files[0].suffix.lower() not in makers:
         raise InputError(f"--out {out}", expected=f"a name that ends in {' or '.join(makers)}")
@@ -147,7 +147,7 @@ Made = Annotated[str | None, Option("-o --out", "FILE", help="machine file to wr
 
 
 def _made_by(function: Callable[..., TextFile]) -> Callable[..., int]:
-    """A command that writes, or prints, what a public function makes of a file."""
+    """A command that writes or prints the file that a public function makes from another."""
 
     def make(args: Namespace, out: Made = None) -> int:
         made = run.call(args, function)

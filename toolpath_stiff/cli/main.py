@@ -1,4 +1,4 @@
-"""The entry point: commands are listed here and imported when they are asked for, as `tps --help` loads no numpy."""
+"""The entry point: commands are listed here and imported on demand, so that `tps --help` loads no numpy."""
 
 import importlib
 import os
@@ -47,7 +47,7 @@ GROUPS = {
 }
 MODULES = {name: module for module, commands in GROUPS.items() for name in commands}
 
-DESCRIPTION = "Stiffness of a hexapod (Stewart-platform) mill along a real NC program."
+DESCRIPTION = "Stiffness of a machine tool along an NC program: hexapods, mills, deltas, milling robots."
 EPILOG = """\
 examples:
   tps analyze part.nc                      stiffness along the path: reports/part/report.html
@@ -60,7 +60,7 @@ examples:
 
 
 def help_text() -> str:
-    """The help of `tps` itself."""
+    """Help text of `tps` itself."""
     lines = ["usage: tps [--version] COMMAND ...", "", DESCRIPTION, ""]
     for group, commands in GROUPS.items():
         lines += [f"{group}:", *(f"  {name:<11} {about}" for name, about in commands.items())]
@@ -74,13 +74,13 @@ def actions_of(name: str) -> dict[str, Command]:
 
 
 class Screen:
-    """Standard output or standard error: control characters of a program or a file name do not reach the terminal."""
+    """Standard output or error, filtered: control characters of a program or file name do not reach the terminal."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
 
     def write(self, text: str) -> int:
-        """Write text, without what steers a terminal."""
+        """Write text without characters that steer a terminal."""
         return self.stream.write(harmless(text))
 
     def __getattr__(self, name: str) -> Any:
@@ -91,7 +91,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code (2 for wrong input and for whatever else went wrong, 130 for Ctrl-C)."""
     code = 0
     with (
-        Path(os.devnull).open("w", encoding="utf-8") as nothing,  # for one that is closed
+        Path(os.devnull).open("w", encoding="utf-8") as nothing,  # stands in for a stream that is closed
         redirect_stdout(cast("TextIO", Screen(sys.stdout or nothing))),
         redirect_stderr(cast("TextIO", Screen(sys.stderr or nothing))),
     ):
@@ -110,7 +110,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    """The command that the words name."""
+    """Run the command that the words name."""
     name = next((word for word in words if not word.startswith("-")), "")
     if not name:
         print(f"tps {VERSION}" if "--version" in words else help_text())
@@ -126,7 +126,7 @@ def _run(words: list[str]) -> int:
 
 
 def _known(title: str, titles: Iterable[str]) -> str:
-    """The title, if it is one of these. Raises `InputError`."""
+    """The title, if it is one of `titles`. Raises `InputError`."""
     if title in titles:
         return title
     near = nearest(title, titles)
@@ -135,25 +135,25 @@ def _known(title: str, titles: Iterable[str]) -> str:
 
 
 def actions_help(name: str, actions: Mapping[str, Command]) -> str:
-    """The actions of a command, a line each, and its examples."""
+    """Help on the actions of a command, one line each, with its examples."""
     examples = (sys.modules[f"toolpath_stiff.cli.{MODULES[name]}"].__doc__ or "").partition("\n\n")[2]
     about = [f"  {title:<22} {(action.run.__doc__ or '').splitlines()[0]}" for title, action in actions.items()]
     return "\n".join([f"usage: tps {name} ACTION ...", "", "actions:", *about, "", examples])
 
 
 def _ended(text: str, code: int) -> int:
-    """Say why a run ended, if that can be said; the exit code."""
+    """Print why a run ended, if that is possible; returns the exit code."""
     for stream, rest in ((sys.stdout, ""), (sys.stderr, text)):
         try:
             stream.write(rest)
             stream.flush()
-        except OSError:  # nobody hears it: what is still held back goes nowhere
+        except OSError:  # nobody reads it: buffered output is dropped
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     return code
 
 
 def last_resort(error: Exception) -> str:
-    """What no command foresaw, in one line: memory, recursion, the file system, a defect of this package."""
+    """One line on an error that no command foresaw: memory, recursion, the file system, a defect of this package."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f", {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
     words = " ".join(str(error).split()) or "no more is known"

@@ -153,7 +153,7 @@ def plan(
 def forces(args: Namespace, records: Annotated[Sequence[str], Option("RECORDS", count="+")]) -> int:
     """Coefficients of the cutting force from dynamometer records of slots.
 
-    columns of RECORDS, a row a moment:
+    columns of RECORDS, a row per moment:
       time_s, fx_N, fy_N, fz_N     what the dynamometer reads: forces on the work; fx and fz may lack
       feed_per_tooth_mm            or feed_mm_per_min; the same in all rows of a record, as are
       spindle_rpm, depth_mm        speed and depth of the slot

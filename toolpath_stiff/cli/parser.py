@@ -1,4 +1,4 @@
-"""Commands made of functions: their options and their help are signatures and docstrings."""
+"""Commands made from functions: options and help come from signatures and docstrings."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ FOLDER = (OUT, REPLACE, NO_PLOTS, JSON)
 
 @dataclass(frozen=True)
 class Command:
-    """A command: what runs it and gives the exit code, what it takes options of, names of options that it leaves.
+    """A command: function that runs it and gives the exit code, sources of its options, options left out.
 
     It takes those of public functions by name, which are imported with what they need when the command is run.
     """
@@ -45,7 +45,7 @@ class Command:
 
     @property
     def arguments(self) -> dict[str, Argument]:
-        """All arguments by name, its own first; of one that several functions take, the first."""
+        """All arguments by name, its own first; of one shared by several functions, the first definition."""
         arguments = dict(arguments_of(self.run))
         for part in self.takes:
             taken = {part.name: part} if isinstance(part, Argument) else arguments_of(attrgetter(part)(tps))
@@ -96,7 +96,7 @@ class Command:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """What may have been meant; "" where nothing is near."""
+    """Known word that was probably meant; "" if none is close."""
     return next(iter(difflib.get_close_matches(word, list(known), n=1)), "")
 
 
@@ -104,7 +104,7 @@ COMMANDS: dict[str, Command] = {}  # "rig new": of the modules that are imported
 
 
 def command(name: str, *takes: str | Argument, without: Iterable[str] = ()) -> Callable[[Run], Run]:
-    """Make a command of a function of (all values, those of its own options by name)."""
+    """Make a command of a function of (all values, and its own options by name)."""
 
     def listed(run: Run) -> Run:
         COMMANDS[name] = Command(run, takes, tuple(without))
@@ -114,14 +114,14 @@ def command(name: str, *takes: str | Argument, without: Iterable[str] = ()) -> C
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose mistakes are `InputError`s."""
+    """A parser that raises `InputError` for mistakes."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise what is wrong."""
+        """Raise the message as an `InputError`."""
         raise InputError(f"{self.prog}: {message}")
 
     def add(self, argument: Argument) -> None:
-        """Take an argument as words."""
+        """Add an argument of a public function."""
         option, text = argument.option, argument.help.rstrip(".")
         if argument.default and argument.kind is not bool and "default" not in text:
             text += f" (default: {','.join(argument.words(argument.default))})"

@@ -62,7 +62,7 @@ def analyze(
       folders are ignored. Each program has the files above in a folder of its own below --out (default: reports), and
       beside these folders there are
       index.html    all programs in one sortable table, drawn on one scale of stiffness; failures with their reason
-      summary.csv   the same for a spreadsheet, one row a program
+      summary.csv   the same for a spreadsheet, one row per program
       A program that fails does not stop the others and is named at the end.
 
     exit code

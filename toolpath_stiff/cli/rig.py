@@ -114,13 +114,13 @@ def reveal_truth(args: Namespace, folder: Exercise, claim: Annotated[str, Option
 
 
 def _diagnose(folder: str, *more: str) -> str:
-    """The diagnosis of an exercise, all measurements together."""
+    """Hint with the command that diagnoses an exercise from all its measurements."""
     files = dict.fromkeys((str(Path(folder, "measurements.csv")), *more))
     return hint("next", Asked(tuple(files), str(Path(folder, "machine.toml"))).command("diagnose"))
 
 
 def _wording(truth: Document) -> str:
-    """What was hidden, in lines."""
+    """Lines of text on the hidden effects."""
     lines = [f"claim {', '.join(truth['claim'])}: {truth['verdict']}"]
     for effect in truth["effects"]:
         values = (f"{value:.4g}" if isinstance(value, float) else value for value in effect["parameters"].values())

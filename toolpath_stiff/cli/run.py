@@ -1,4 +1,4 @@
-"""What commands have in common: public functions called by what a command line gives, results shown and written.
+"""Shared steps of the commands: calling public functions with a command line, showing and writing results.
 
 What a command writes may not be what it reads: one check for all of them, before any work is done. Every argument that
 names a file is an input, but those that say where results go. With `--replace` the old file is kept beside the new one.
@@ -24,24 +24,24 @@ from toolpath_stiff.results_folder import Rules, check_folder
 from toolpath_stiff.workbooks import split_name
 
 Made = TypeVar("Made")
-REDRAW_SECONDS = 0.5  # work shorter than this shows nothing
+REDRAW_SECONDS = 0.5  # shorter work shows no progress
 LONGEST = 60  # letters of a default folder's name; of more files, the first and how many there are
 DESTINATIONS = ("out", "output", "write")
 
 
 def given(args: Namespace, *functions: Callable[..., Any]) -> dict[str, Any]:
-    """The arguments of functions that a command line gives."""
+    """Arguments of functions that the command line gives."""
     names = {name for function in functions for name in arguments_of(function)}
     return {name: value for name, value in vars(args).items() if name in names}
 
 
 def machine_for(args: Namespace) -> tps.Machine:
-    """The machine that the options describe. Raises `InputError`."""
+    """Machine that the options describe. Raises `InputError`."""
     return tps.Machine.load(**given(args, tps.Machine.load)).under(**given(args, tps.Machine.under))
 
 
 def call(args: Namespace, function: Callable[..., Made], **more: Any) -> Made:
-    """What a public function makes of a command line: options by their names, program, measurements and machine."""
+    """Result of a public function called from the command line: options by name, program, measurements and machine."""
     parameters = inspect.signature(function).parameters
     values = given(args, function) | more
     if "program" in parameters and "program" not in more:
@@ -56,7 +56,7 @@ def call(args: Namespace, function: Callable[..., Made], **more: Any) -> Made:
 
 @contextmanager
 def progress_line() -> Iterator[Progress | None]:
-    """Yield what functions of the library call with (text, done, in all), or None where nobody watches.
+    """Yield the progress callback for library functions, (text, done, total), or None where nobody watches.
 
     It draws a line on the terminal, which is taken away at the end.
     """
@@ -69,7 +69,7 @@ def progress_line() -> Iterator[Progress | None]:
             say(f"{text} {done}/{total} " if total else text)
 
     def say(text: str) -> None:
-        # The one text that steers the terminal, past what takes control characters out of all others.
+        # The one text that steers the terminal: it bypasses the filter of control characters.
         stream = getattr(sys.stderr, "stream", sys.stderr)
         print(f"\r\x1b[K{harmless(text)}", end="", file=stream, flush=True)
 
@@ -83,13 +83,13 @@ def progress_line() -> Iterator[Progress | None]:
 
 
 def tell(kind: str, texts: Iterable[object]) -> None:
-    """Lines on standard error: of kind "note" or "warning"."""
+    """Print lines of a kind ("note" or "warning") on standard error."""
     for text in texts:
         print(f"tps: {kind}: {text}", file=sys.stderr)
 
 
 def show(args: Namespace, result: Any, *after: str, document: Callable[[], Any] | None = None, code: int = 0) -> int:
-    """Print a result (or its text, where `document` is told), and lines after it, or with --json its document.
+    """Print a result (or only its text, if `document` is given) and lines after it, or with --json its document.
 
     Returns the exit code.
     """
@@ -101,12 +101,12 @@ def show(args: Namespace, result: Any, *after: str, document: Callable[[], Any] 
 
 
 def written_text(files: Iterable[Path]) -> str:
-    """What was written, a file a line."""
+    """List of the files written, one a line."""
     return "\n".join(["written:", *(f"  {file}" for file in files)])
 
 
 def rules_of(args: Namespace, **more: Any) -> Rules:
-    """What must not be replaced: every argument that may name a file is an input; of a sheet, the workbook."""
+    """Rules against overwriting: every argument that may name a file is an input; of a sheet, its workbook."""
     values = [value for name, value in vars(args).items() if name not in DESTINATIONS]
     words = [word for value in values for word in (value if isinstance(value, list) else [value])]
     inputs = tuple(split_name(word)[0] for word in words if isinstance(word, str) and word)
@@ -114,19 +114,19 @@ def rules_of(args: Namespace, **more: Any) -> Rules:
 
 
 def tell_kept(file: Path, kept: Path) -> None:
-    """Say where an old file is."""
+    """Tell where an old file is kept."""
     print(f"kept the old {file} as {kept}")
 
 
 def check_single(args: Namespace, file: str | Path | None, *more_inputs: str | Path) -> None:
-    """Raise `InputError` where a file to write is an input, unless that may be replaced."""
+    """Raise `InputError` if a file to write is an input, unless it may be replaced."""
     check_outputs([file] if file else [], [*rules_of(args).inputs, *more_inputs], args.replace)
 
 
 def write_single(
     args: Namespace, contents: Mapping[Path, Content], *more_inputs: str | Path, fresh: bool = False
 ) -> list[Path]:
-    """Write files; what stands there and is not the same is kept, or refused with `fresh`.
+    """Write files; an existing file with other content is kept, or refused with `fresh`.
 
     Raises `InputError` where one is an input.
     """
@@ -143,7 +143,7 @@ def write_single(
 
 
 def write_text(args: Namespace, file: str, text: str, sentence: str, *words: str, fresh: bool = False) -> int:
-    """Write a file, and say so and which command comes next; the exit code of success. Raises as `write_single`."""
+    """Write a file, tell which and the next command; returns the exit code of success. Raises as `write_single`."""
     written = write_single(args, {Path(file): text}, fresh=fresh)
     print(written_text(written), hint(sentence, command_line(*words)), sep="\n")
     return 0
@@ -152,7 +152,7 @@ def write_text(args: Namespace, file: str, text: str, sentence: str, *words: str
 def destination(
     args: Namespace, kind: type[FolderResult], sources: Sequence[str], omit: Collection[str] = ()
 ) -> tuple[Path, Rules]:
-    """The folder of --out, else `reports/<sources>-<command>`, which belongs to these sources; what is safe there.
+    """Folder of --out, else `reports/<sources>-<command>`; and the rules of what may be overwritten there.
 
     Raises `InputError` where the files of a result of this kind, but for `omit`, cannot be written.
     """
@@ -174,7 +174,7 @@ def to_folder(
     sources: Sequence[str],
     **more: Any,
 ) -> int:
-    """Make a result, write its folder, print it; the exit code of success."""
+    """Make a result, write its folder and print it; returns the exit code of success."""
     folder, rules = destination(args, kind, sources)
     result = call(args, function, **more)
     return show(args, result, written_text(result.save(folder, plots=not args.no_plots, rules=rules)))

@@ -11,7 +11,7 @@ from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import Option, arguments_of
 from toolpath_stiff.studio.run import opened_case, serve
 
-# A case reads programs by itself: no other interpreter, no files from anywhere.
+# A case uses its own program reader: no other interpreter, no files from elsewhere.
 NOT_IN_A_CASE = ("interpreter", "rs274", "subprograms", "unconfined")
 
 

@@ -1,1 +1,1 @@
-"""Where the model fails: residuals and their structure."""
+"""Comparison of model and measurements: residuals and their structure."""

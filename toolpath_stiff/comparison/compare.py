@@ -1,4 +1,4 @@
-"""`tps compare`: how far the model is from the measurements, where, and how much of it is more than scatter.
+"""`tps compare`: size of the model's error, where it is, and how much of it is more than scatter.
 
 What is tested are residuals r = ln(measured / modelled), on which noise and effects are both additive. How errors are
 counted and which sign they have: `baseline`.
@@ -36,7 +36,7 @@ DRAWS = 2000  # simulated sets of readings: probabilities down to 0.05 %
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(FolderResult):
-    """How far the model is from n readings of the tip, where, and how much of it is more than scatter.
+    """Size of the model's error over n readings of the tip, where it is, and how much is more than scatter.
 
     Readings of other loops are in the document only.
 
@@ -93,15 +93,15 @@ class Comparison(FolderResult):
 
     @cached_property
     def document(self) -> Document:
-        """The content of compare.json."""
+        """Content of compare.json."""
         return dict(to_dict(self.summary))
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of compare.json."""
+        """Content of compare.json."""
         return dict(self.document)
 
     def to_frame(self) -> DataFrame:
-        """One row a reading, as in `residuals.csv`: measured, modelled, deviation, and what it may vary with."""
+        """One row per reading, as in `residuals.csv`: measured, modelled, deviation, and variables it may depend on."""
         import pandas as pd
 
         return pd.read_csv(StringIO(self.view.residuals_csv(self)))
@@ -120,7 +120,7 @@ def compare(
     seed: int = 0,
     draws: int = DRAWS,
 ) -> Comparison:
-    """How far the model is from measurements, where, and how much of it is more than scatter.
+    """Compare model and measurements: size of the error, where it is, and how much of it is more than scatter.
 
     The machine is compared as its file has it; `Comparison.summary` is what compare.json holds.
 
@@ -173,7 +173,7 @@ def compare(
         structures.append(find_structure(values, looked_for, scattering))
         outcomes.append(assess(checks, tip, scattering.covariance, scattering.draws(0.0)))
     summary = summary_of(predictor, values, structures, outcomes, not_checked, notes, seed)
-    if data.beside is not None:  # other loops against the machine as its file has it
+    if data.beside is not None:  # other loops are compared with the machine as in its file
         every = Predictor(as_hexapod(machine, "a reading beside the tip"), data, effect_files)
         spread = covariance(noise_models(data, noise, strut_spread)[-1], every)
         summary = replace(summary, loops=beside_tip(data, every.log_stiffness(), spread))

@@ -42,7 +42,7 @@ def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
             energy += (series * f**2).sum(axis=1)
         if form is not None:
             energy += np.einsum("ni,nij,nj->n", loads, form, loads)
-        if beside is not None:  # its motion x is that of the platform: J x = Q_ff f + Q_fw w
+        if beside is not None:  # its motion x is the platform's: J x = Q_ff f + Q_fw w
             stretch = np.einsum("nij,nj->ni", whole[:, :6], loads)
             motion = np.linalg.solve(path.struts.jacobian, stretch[..., None])[..., 0]
             energy += np.einsum("ni,nij,nj->n", motion, beside, motion)
@@ -51,7 +51,7 @@ def _by_link(model: StiffnessModel, data: Readings) -> FloatArray:
 
 
 def _by_element(model: StiffnessModel, data: Readings) -> FloatArray:
-    """(n, elements and effects) m/N along each row's direction, of a machine of elements."""
+    """(n, elements and effects) m/N along each row's direction, for a machine made of elements."""
     path = measured_path(model, data)
     columns = energies(stance_of(path), data.direction)
     for active in model.effects:

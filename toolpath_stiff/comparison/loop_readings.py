@@ -1,4 +1,4 @@
-"""Readings of indicators beside the tip against the model: how much each loop gives way, and how much it should."""
+"""Readings of indicators beside the tip, compared with the model: measured and modelled give of each loop."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,12 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.inference.covariances import Covariance
 from toolpath_stiff.readings.measurements import Readings
 
-STANDS_OUT = 3.0  # standard deviations from which a loop is said to read something else than the model has
+STANDS_OUT = 3.0  # standard deviations from which a loop's readings are said to differ from the model
 
 
 @dataclass(frozen=True)
 class LoopMean:
-    """All readings of one loop, nm per N of load at the tip (of a strut alone: of force in it).
+    """Mean of all readings of one loop, nm per N of load at the tip (of a strut alone: of force in it).
 
     Counted in the direction in which the machine file's struts would move it.
     """
@@ -29,7 +29,7 @@ class LoopMean:
 
 
 def beside_tip(data: Readings, log_model: FloatArray, spread: Covariance) -> tuple[LoopMean, ...]:
-    """Readings of loops beside the tip, by loop.
+    """Means of the readings beside the tip, one for each loop.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ class Check:
 
 @dataclass(frozen=True)
 class CheckOutcome:
-    """The outcome of a check."""
+    """Outcome of a check."""
 
     check: str
     holds: bool
@@ -82,7 +82,7 @@ def symmetries(machine: MachineTool) -> list[FloatArray]:
 
 
 def model_free_checks(machine: MachineTool, data: Readings) -> tuple[list[Check], dict[str, str]]:
-    """The checks that n readings allow; for the others, why not."""
+    """Checks that n readings allow; for the other checks, the reason why not."""
     cells, turns = Groups.by(repeat_groups(data)).members(), symmetries(machine)
     threefold = sum(np.linalg.det(q) > 0 for q in turns) == 2
     turned = "a turn by 120 degrees does not leave this machine's joints as they are"
@@ -125,7 +125,7 @@ def _mean(n: int, rows: Rows) -> FloatArray:
 
 
 def _on_axis(data: Readings, cells: list[Rows]) -> Iterator[Check]:
-    """Differences ln k_x - ln k_y at upright poses on the axis."""
+    """Checks that ln k_x - ln k_y vanishes at upright poses on the axis."""
     central = (radius(data) <= SAME) & (np.abs(data.angles[:, :2]).max(axis=1) <= UPRIGHT)
     along, poses = directions(data), repeat_groups(data, apart=("direction",))
     on_axis = [rows for rows in cells if central[rows[0]]]
@@ -143,7 +143,7 @@ def _on_axis(data: Readings, cells: list[Rows]) -> Iterator[Check]:
 
 
 def _images(data: Readings, cells: list[Rows], turns: list[FloatArray]) -> Iterator[Check]:
-    """Two readings that a symmetry of the machine maps onto each other."""
+    """Checks on pairs of readings that a symmetry of the machine maps onto each other."""
     firsts = np.array([rows[0] for rows in cells])
     place, turn, along = data.position[firsts], data.rotation[firsts], data.direction[firsts]
     alike = repeat_groups(data, apart=("position", "angles", "direction"))[firsts]
@@ -168,7 +168,7 @@ def _images(data: Readings, cells: list[Rows], turns: list[FloatArray]) -> Itera
 
 
 def _proportionality(data: Readings) -> Iterator[Check]:
-    """Slope of ln k over ln F within readings that differ in the load only, for a doubling of the load."""
+    """Checks on the slope of ln k over ln F among readings that differ in load only, per doubling of the load."""
     if "force_N" in data.missing:
         return
     groups = repeat_groups(data, apart=("force",))
@@ -187,7 +187,7 @@ def _proportionality(data: Readings) -> Iterator[Check]:
 
 
 def _setups(data: Readings) -> Iterator[Check]:
-    """Means of the differences between two set-ups at poses and directions measured in both."""
+    """Checks on the mean difference between two set-ups at poses and directions measured in both."""
     groups = repeat_groups(data, apart=("setup", "loop"))
     n, along, cells = len(data), directions(data), Groups.by(groups).members()
     for a, b in combinations(np.unique(data.setup).tolist(), 2):

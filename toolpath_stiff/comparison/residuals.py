@@ -1,4 +1,4 @@
-"""Residuals, and what they are held against: every column of the data, and every quantity that the model does not use.
+"""Residuals and the variables they are tested against: columns of the data, and quantities that the model ignores.
 
 A `Variable` is numbers (height, time, force), `ReadingNames` are names (set-up, clamping, plane). Planes are groups of
 heights, zones are distances from the machine's axis.
@@ -22,14 +22,14 @@ from toolpath_stiff.units import deg_from_rad, min_from_s, mm_from_m, n_per_mm_f
 AXIS_ALIGNED = 0.999  # |cosine| from which a direction counts as X, Y or Z
 SAME_PLANE = 0.005  # m, heights closer than this are one plane
 MOST_PLANES = 5  # beyond, heights are put into three bands of equally many readings
-# Number of planes -> their names, the lowest first; of more by their heights.
+# Number of planes -> their names, the lowest first; more planes are named by height.
 PLANES = {
     1: ("only plane",),
     2: ("lower plane", "upper plane"),
     3: ("lower plane", "middle plane", "upper plane"),
 }
 ON_AXIS, NEAR_AXIS = 0.1, 0.6  # of the largest distance from the axis: limits of the zones
-FEWEST = 2  # readings in a level; a single one is a reading, not a pattern
+FEWEST = 2  # readings in a level; a single reading is not a pattern
 CURVED = ("order", "time_min", "height", "mean_strut_length")  # variables whose curvature is looked for too
 ALL = "all"
 MOST_LEVELS = 100  # of a label: beyond, its levels are not tested one by one
@@ -59,7 +59,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class ReadingNames:
-    """Names, one a reading: `text` turns a level into words such as "with set-up riser"."""
+    """Labels, one a reading; `text` turns a level into words such as "with set-up riser"."""
 
     name: str
     text: str
@@ -68,11 +68,11 @@ class ReadingNames:
 
 
 def modelled(predictor: Predictor) -> FloatArray:
-    """(n,) ln(N/m) that the predictor's readings should show. Raises `InputError` where there is no stiffness."""
+    """(n,) ln(N/m) that the model predicts for the readings. Raises `InputError` where it has no stiffness."""
     data, log_model = predictor.data, predictor.log_stiffness()
     bad = np.flatnonzero(~np.isfinite(log_model))
     if len(bad):
-        model_stiffness(predictor.base, data)  # which effect leaves none, at which pose, if it is one
+        model_stiffness(predictor.base, data)  # names the effect, if one leaves no stiffness, and the pose
         raise InputError(
             "the model has no stiffness for this reading",
             hint="check the pose and the machine file's effects",
@@ -115,7 +115,7 @@ def radius(data: Readings) -> FloatArray:
 
 
 def zones(data: Readings) -> TextArray:
-    """(n,) "on the axis", "near the axis" or "far from the axis"; "" where all are on it."""
+    """(n,) "on the axis", "near the axis" or "far from the axis"; "" if all readings are on it."""
     r = radius(data)
     if float(r.max()) < SAME_PLANE:
         return np.full(len(r), "", dtype="<U18")
@@ -125,7 +125,7 @@ def zones(data: Readings) -> TextArray:
 
 
 def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
-    """Numbers to hold the residuals of n readings against; only those that vary.
+    """Variables to test the residuals of n readings against; only those that vary.
 
     `log_model` (n,): ln(N/m) that the model says.
     """
@@ -169,7 +169,7 @@ def variables(predictor: Predictor, log_model: FloatArray) -> list[Variable]:
 
 
 def _of_elements(predictor: Predictor) -> Iterator[Variable]:
-    """How the machine stands, and the share of each of its elements in the compliance."""
+    """Joint values or strut lengths, and the share of each element in the compliance, as variables."""
     machine, path = predictor.base.machine, predictor.full_path
     if isinstance(machine, Hexapod):
         lengths, names = mm_from_m(predictor.strut_lengths()), [f"strut {i}" for i in range(1, 7)]
@@ -187,13 +187,13 @@ def _of_elements(predictor: Predictor) -> Iterator[Variable]:
 
 
 def varies(values: FloatArray) -> bool:
-    """Whether at least three finite numbers are there and not all are the same."""
+    """True if at least three numbers are finite and they are not all equal."""
     known = values[np.isfinite(values)]
     return len(known) >= 3 and float(np.ptp(known)) > 1e-9 * max(float(np.abs(known).max()), 1e-12)
 
 
 def labels(data: Readings) -> tuple[list[ReadingNames], list[str]]:
-    """Names to hold residuals against, only those with two levels or more; notes about those with too many."""
+    """Labels to test residuals against, only those with two levels or more; notes about those with too many."""
     prefix = f"{data.file[0]}: " if len(set(data.file.tolist())) == 1 else ""
     clamps = np.array([clamp.removeprefix(prefix) for clamp in data.clamp.tolist()])
     known = [
@@ -212,7 +212,7 @@ def labels(data: Readings) -> tuple[list[ReadingNames], list[str]]:
 
 
 def patterns(data: Readings, numbers: list[Variable], names: list[ReadingNames]) -> list[Pattern]:
-    """Everything that is looked for in n residuals; patterns equal to one before are only named with it."""
+    """All patterns to look for in n residuals; one equal to an earlier pattern is only named with it."""
     kept: dict[bytes, list[Pattern]] = {}
     for pattern in _candidates(data, numbers, names):
         centred = pattern.values - pattern.values.mean() if pattern.kind != "level" else pattern.values
@@ -224,7 +224,7 @@ def patterns(data: Readings, numbers: list[Variable], names: list[ReadingNames])
 
 
 def _candidates(data: Readings, numbers: list[Variable], names: list[ReadingNames]) -> Iterator[Pattern]:
-    """Levels of the labels and slopes along the variables, in all directions and in each."""
+    """Levels of the labels and slopes along the variables, over all directions and in each."""
     along, whole = directions(data), np.ones(len(data), dtype=bool)
     axes = np.unique(along).tolist()
     groups = {ALL: whole} | ({axis: along == axis for axis in axes} if len(axes) > 1 else {})
@@ -253,7 +253,7 @@ def _candidates(data: Readings, numbers: list[Variable], names: list[ReadingName
 
 
 def _slopes(variable: Variable, group: str, rows: BoolArray) -> Iterator[Pattern]:
-    """A straight course along a variable, and of some variables a bent one beside it."""
+    """Straight slope along a variable and, for some variables, a curved one as well."""
     known = rows & np.isfinite(variable.values)
     if not varies(variable.values[known]):
         return

@@ -1,4 +1,4 @@
-"""Structure in residuals: which of many possible patterns are more than scatter would make of nothing.
+"""Structure in residuals: patterns, among many possible ones, that scatter alone would not produce.
 
 Residuals r = ln(measured / modelled) scatter with the covariance S of `noise`: repeats, clamping, strut spread, joint
 positions. Where they scatter more than that from place to place, for reasons unknown, the excess is taken as a variance
@@ -26,13 +26,13 @@ from toolpath_stiff.inference.noise import Noise
 # tau: relative sd of the excess; 0, then 0.3 % to 100 % in steps of 30 %.
 EXCESSES = np.concatenate([[0.0], np.geomspace(0.003, 1.0, 23)])
 SIGNIFICANT = 0.05  # family-wise
-FAR_OFF = 4.0  # standard deviations, of a reading that is named
+FAR_OFF = 4.0  # standard deviations from which a single reading is named
 MOST_PATTERNS = 8  # found one after the other
 ALIKE = 0.9  # correlation from which two patterns cannot be told apart in these data
-WILD = 3.0  # standard deviations at which a reading is drawn in
+WILD = 3.0  # standard deviations to which a wild residual is clipped
 FEWEST_REPEATED = 5  # readings beyond one a place from which the noise itself is checked
-TIED = 1e-9  # share by which statistics differ that are one and the same: of patterns that cannot be told apart
-DEPENDENT = 1e-6  # of a column's square that is left after the patterns already found: less is nothing
+TIED = 1e-9  # relative difference of statistics that count as equal: of patterns that cannot be told apart
+DEPENDENT = 1e-6  # share of a column's square left beside the patterns found: below it nothing is left
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class Pattern:
 
 @dataclass(frozen=True)
 class FoundPattern:
-    """The answer about one pattern.
+    """Test result of one pattern.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class FoundPattern:
 
 
 class Scattering:
-    """The scatter of n readings, S, beside an excess of their places, and simulated sets of it.
+    """Scatter of n readings, covariance S plus an excess from place to place, and simulated sets of it.
 
     With an excess tau the inverse covariance is, for Z' S^-1 Z = U diag(g) U' (Woodbury 1950),
 
@@ -132,7 +132,7 @@ class Scattering:
         self.of_places = turn.T @ solved
         self.taken = EXCESSES[:, None] ** 2 / (1.0 + EXCESSES[:, None] ** 2 * np.maximum(weight, 0.0))
         self.sd = np.sqrt(covariance.diagonal)
-        # Wild readings included; how well the noise itself is known is not.
+        # Includes wild readings, but not the uncertainty of the noise itself.
         self.square = covariance.diagonal + noise.repeat**2 * noise.outliers * (noise.outlier_width**2 - 1.0)
         rng = np.random.default_rng(seed)
         self._normal, self._of_place = self._draw(noise, Groups.by(clamp), draws, rng)
@@ -140,7 +140,7 @@ class Scattering:
     def _draw(
         self, noise: Noise, clamps: Groups, draws: int, rng: np.random.Generator
     ) -> tuple[FloatArray, FloatArray]:
-        """Scatter of `draws` sets of readings, and the excess of each place for an excess of 1."""
+        """Scatter of `draws` simulated sets of readings, and their scatter from place to place for an excess of 1."""
         n = len(clamps.of)
         common = rng.standard_normal((draws, len(self.covariance.shared))) @ self.covariance.shared
         clamped = rng.standard_normal((draws, clamps.count))[:, clamps.of]
@@ -153,18 +153,18 @@ class Scattering:
         wild = np.where(rng.random((draws, n)) < noise.outliers, noise.outlier_width, 1.0)
         repeat_error = rng.standard_normal((draws, n)) * noise.repeat * wild
         if np.isfinite(noise.freedom) and noise.freedom > 0:
-            # The noise is itself an estimate: what it is for depends on the draw.
+            # The noise is itself an estimate, so its true size is drawn too.
             repeat_error = repeat_error * np.sqrt(noise.freedom / rng.chisquare(noise.freedom, (draws, 1)))
         return common + clamped + repeat_error, rng.standard_normal((draws, self.places.count))[:, self.places.of]
 
     def draws(self, excess: float) -> FloatArray:
-        """(draws, n) simulated residuals with that excess."""
+        """(draws, n) simulated residuals with a given excess."""
         return np.asarray(self._normal + excess * self._of_place)
 
 
 @dataclass(frozen=True)
 class _Weighed(ArrayColumns):
-    """m rows of residuals under S: with themselves (m,), with k columns (m, k), with the places (m, p)."""
+    """Products of m rows of residuals under S: with themselves (m,), k columns (m, k) and p places (m, p)."""
 
     square: FloatArray
     columns: FloatArray
@@ -172,7 +172,7 @@ class _Weighed(ArrayColumns):
 
 
 class _Fit:
-    """Patterns (count, n) made free of those in `base` (b, n), for every excess of the grid."""
+    """Patterns (count, n) orthogonalised against those in `base` (b, n), for every excess of the grid."""
 
     def __init__(self, scattering: Scattering, patterns: FloatArray, base: FloatArray) -> None:
         self.scattering, self.base, self.count = scattering, base, len(patterns)
@@ -181,14 +181,14 @@ class _Fit:
         self._places = every @ scattering.of_places.T
         self._products = every @ self._solved.T
         self.free = cache(self._free)
-        # (n, b) from residuals to their share in each row of the base.
+        # (n, b): maps residuals to their component along each row of the base.
         self._share = self._solved[self.count :].T @ np.linalg.pinv(self._products[self.count :, self.count :])
         scatter = self._weighed(self.tamed(scattering.draws(0.0)))
         self._target = float(np.median(self._squares(scatter, 0)))
         self._within = float(np.median(self._squares(scatter, -1)))
 
     def _free(self, grid: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Of an excess: combinations (k, count) of all columns that are the patterns free of the base and of length 1.
+        """Combinations (k, count) of all columns that give the patterns free of the base, of unit length, at an excess.
 
         Then the patterns' lengths before; their products (count, count); combinations (k, r) that are the base.
         """
@@ -202,7 +202,7 @@ class _Fit:
         return combined, size, combined.T @ form @ combined, of_base
 
     def tamed(self, residuals: FloatArray) -> FloatArray:
-        """Rows (m, n) of residuals beside the base, wild ones drawn in (Huber 1981, Robust Statistics, psi)."""
+        """Rows (m, n) of residuals without the base, wild ones clipped (Huber 1981, Robust Statistics, psi)."""
         rest = residuals - (residuals @ self._share) @ self.base
         typical = np.median(np.abs(rest) / self.scattering.sd, axis=1, keepdims=True)
         # 0.6745: the median of the size of a standard normal variable.
@@ -214,16 +214,16 @@ class _Fit:
         return _Weighed(squares, rows @ self._solved.T, rows @ self.scattering.of_places.T)
 
     def _with_columns(self, rows: _Weighed, grid: int) -> FloatArray:
-        """(m, k) r' V^-1 x of each column x."""
+        """(m, k) products r' V^-1 x with each column x."""
         return np.asarray(rows.columns - (rows.places * self.scattering.taken[grid]) @ self._places.T)
 
     def _squares(self, rows: _Weighed, grid: int) -> FloatArray:
-        """(m,) r' V^-1 r beside the base."""
+        """(m,) sums of squares r' V^-1 r, without the base."""
         whole = rows.square - rows.places**2 @ self.scattering.taken[grid]
         return np.asarray(whole - ((self._with_columns(rows, grid) @ self.free(grid)[3]) ** 2).sum(axis=1))
 
     def _excess(self, rows: _Weighed, target: FloatArray) -> IntArray:
-        """(m,) index of the smallest excess that brings the sum of squares of rows down to the target (m,)."""
+        """(m,) index of the smallest excess at which a row's sum of squares falls to the target (m,)."""
         chosen, left = np.full(len(target), len(EXCESSES) - 1), np.arange(len(target))
         for grid in range(len(EXCESSES)):
             good = self._squares(rows.take(left), grid) <= target[left]
@@ -234,7 +234,7 @@ class _Fit:
         return chosen
 
     def statistics(self, residuals: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Of rows (m, n) of residuals: (m, patterns) t, (m,) index of the excess, (m,) factor on the noise."""
+        """(m, patterns) t, (m,) index of the excess and (m,) factor on the noise, for residuals (m, n)."""
         rows = self._weighed(self.tamed(residuals))
         inflation = np.ones(len(residuals))
         if len(residuals.T) - self.scattering.places.count >= FEWEST_REPEATED:
@@ -249,7 +249,7 @@ class _Fit:
 
 @dataclass(frozen=True)
 class FoundPatterns:
-    """All answers under one noise model.
+    """All test results under one noise model.
 
     Attributes
     ----------
@@ -273,13 +273,13 @@ class FoundPatterns:
     probability: float
 
     def least_p(self, pattern: Pattern) -> float:
-        """Smallest adjusted probability that a pattern got, tested alone or beside others."""
+        """Smallest adjusted probability of a pattern, tested alone or beside others."""
         same = (test for test in (*self.tests, *self.patterns) if test.pattern is pattern)
         return min((test.p_adjusted for test in same), default=1.0)
 
 
 def find_structure(residual: FloatArray, patterns: list[Pattern], scattering: Scattering) -> FoundPatterns:
-    """Which of the patterns residuals (n,), ln(measured / modelled), show beyond scatter."""
+    """Patterns that residuals (n,), ln(measured / modelled), show beyond scatter."""
     columns = np.array([pattern.values for pattern in patterns])
     base = np.zeros((0, len(residual)))
     detections: list[FoundPattern] = []
@@ -313,7 +313,7 @@ def find_structure(residual: FloatArray, patterns: list[Pattern], scattering: Sc
 
 
 def shared_tests(structures: Sequence[FoundPatterns]) -> tuple[FoundPattern, ...]:
-    """Every pattern on its own under the last noise model, with the largest probability of any."""
+    """Test of every single pattern under the last noise model, with the largest probability under any of them."""
     by_noise = [{test.pattern: test.p_adjusted for test in structure.tests} for structure in structures]
     return tuple(
         replace(test, p_adjusted=max(of_noise.get(test.pattern, test.p_adjusted) for of_noise in by_noise))
@@ -322,7 +322,7 @@ def shared_tests(structures: Sequence[FoundPatterns]) -> tuple[FoundPattern, ...
 
 
 def far_off(residual: FloatArray, structure: FoundPatterns) -> tuple[FloatArray, IntArray, FloatArray]:
-    """(n,) residuals with the patterns found taken out, rows far from nought, the furthest first, and (n,) in sd."""
+    """(n,) residuals without the patterns found, rows far from zero, the furthest first, and (n,) residuals in sd."""
     columns = np.array([answer.pattern.values for answer in structure.patterns]).reshape(-1, len(residual)).T
     rest = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0] if columns.size else residual
     ratio = rest / np.sqrt(structure.scattering.covariance.diagonal + structure.excess_left**2)

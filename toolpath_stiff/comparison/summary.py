@@ -1,4 +1,4 @@
-"""What a comparison says: the content of compare.json in shop units, made of the answers under each noise model."""
+"""Content of compare.json in shop units, made from the results under each noise model."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FEWEST_TO_REFIT = 6  # readings; two constants of the strut law are refitted
 
 @dataclass(frozen=True)
 class GroupErrors:
-    """Errors of some readings, and what scatter alone would leave, by noise."""
+    """Errors of a group of readings, and the error that scatter alone would leave, by noise model."""
 
     readings: int
     mean_abs_error_percent: float
@@ -41,7 +41,7 @@ class GroupErrors:
 
 @dataclass(frozen=True)
 class LawRefitted:
-    """What refitting the strut law would leave; N/um at two lengths, of a constant law one stiffness and no length."""
+    """Errors left after refitting the strut law; its N/um at two lengths (a constant law: one value, no length)."""
 
     mean_abs_error_percent: float
     bias_percent: float
@@ -52,7 +52,7 @@ class LawRefitted:
 
 @dataclass(frozen=True)
 class AllErrors(GroupErrors):
-    """Of all readings."""
+    """Errors of all readings."""
 
     probability: dict[str, float]
     excess_scatter_percent: dict[str, float]
@@ -61,7 +61,7 @@ class AllErrors(GroupErrors):
 
 @dataclass(frozen=True)
 class PatternFinding:
-    """A pattern in words."""
+    """A pattern found, in words."""
 
     text: str
     statistic: float
@@ -90,7 +90,7 @@ class FarReading:
 
 @dataclass(frozen=True)
 class NoiseFigures:
-    """A noise model."""
+    """Figures of a noise model."""
 
     name: str
     repeat_percent: float
@@ -100,14 +100,14 @@ class NoiseFigures:
 
     @classmethod
     def of(cls, noise: Noise) -> NoiseFigures:
-        """Of a noise model in relative standard deviations."""
+        """Figures of a noise model given in relative standard deviations."""
         repeat, clamping, spread = (100.0 * sd for sd in (noise.typical_repeat, noise.clamping, noise.strut_spread))
         return cls(noise.name, repeat, clamping, spread, noise.origin)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ComparisonSummary:
-    """The content of compare.json.
+    """Content of compare.json.
 
     `model_free`: checks that need no stiffness model; `not_checked`: those that these data do not allow -> why.
     """
@@ -138,7 +138,7 @@ class ComparisonSummary:
     next: tuple[str, ...] = ()  # commands that go on from here
 
 
-MOST_ALIKE = 6  # patterns named as not to be told apart
+MOST_ALIKE = 6  # most patterns named as indistinguishable
 
 
 def summary_of(
@@ -150,7 +150,7 @@ def summary_of(
     notes: Sequence[str],
     seed: int,
 ) -> ComparisonSummary:
-    """The content of compare.json, its figures not rounded yet.
+    """Content of compare.json, with unrounded figures.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def summary_of(
 
 
 def _errors(values: FloatArray, structures: Sequence[FoundPatterns], rows: BoolArray) -> GroupErrors:
-    """Errors of some readings, and what scatter alone would give."""
+    """Errors of a group of readings, and those that scatter alone would give."""
     squares = {f.scattering.noise.name: float(f.scattering.square[rows].mean()) for f in structures}
     measured = max(float((values[rows] ** 2).mean()), 1e-300)
     return GroupErrors(
@@ -226,18 +226,18 @@ def _errors(values: FloatArray, structures: Sequence[FoundPatterns], rows: BoolA
 
 
 def _refitted(given: StrutLaw, fit: Fit) -> LawRefitted:
-    """What refitting the strut law's constants would leave, as in a diagnosis."""
+    """Errors left after refitting the strut law's constants, as a diagnosis does."""
     law = scaled_law(given, fit.law)
     return LawRefitted(
         **error_figures(fit.residual),
-        # Of a constant law one, which belongs to no length.
+        # A constant law has one stiffness, which belongs to no length.
         at_mm=[] if law.constant else [mm_from_m(law.length_1), mm_from_m(law.length_2)],
         N_per_um=[n_per_um_from_n_per_m(k) for k in (law.stiffness_1, law.stiffness_2)][: len(law.parameters)],
     )
 
 
 def _outcome(of_noises: Sequence[CheckOutcome]) -> CheckOutcome:
-    """A check without a model: it holds if it does under any noise model."""
+    """Outcome of a check without a model: it holds if it holds under any noise model."""
     holds = any(outcome.holds for outcome in of_noises)
     text = [outcome.text for outcome in of_noises if outcome.holds == holds][-1]
     return replace(of_noises[-1], holds=holds, p_adjusted=max(outcome.p_adjusted for outcome in of_noises), text=text)
@@ -292,7 +292,7 @@ def _assumptions(noises: Sequence[Noise], hexapod: bool) -> list[str]:
 
 
 def overall_text(figures: AllErrors, *, pattern: bool) -> str:
-    """Error, bias and what scatter explains, in a few sentences; `pattern`: one stands out."""
+    """Error, bias and the part that scatter explains, in a few sentences; `pattern`: a pattern stands out."""
     bias, refit = figures.bias_percent, figures.strut_law_refitted
     side = f"{abs(bias):.1f} % {'softer' if bias < 0.0 else 'stiffer'}"
     balance = "neither softer nor stiffer" if abs(bias) < 0.05 else side

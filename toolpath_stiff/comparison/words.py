@@ -1,4 +1,4 @@
-"""A pattern that residuals show, in a sentence."""
+"""Sentences on patterns found in residuals."""
 
 import numpy as np
 
@@ -7,12 +7,12 @@ from toolpath_stiff.comparison.residuals import ALL
 from toolpath_stiff.comparison.structure import FoundPattern, Pattern
 from toolpath_stiff.stiffness.sizes import about
 
-NOUGHT = 0.3  # of a course's change: a residual below is nothing beside it
+NOUGHT = 0.3  # share of a slope's change below which a residual counts as zero
 SHARE = "share_of_"  # of the compliance; the element's name follows
 
 
 def sentence(finding: FoundPattern, residual: FloatArray, first: bool) -> tuple[str, float]:
-    """A finding in words, and its size in per cent: of a level the readings' mean, of a slope the change end to end.
+    """Sentence on a finding, and its size in per cent: mean of a level's readings, change from end to end of a slope.
 
     `first`: nothing was found before it, so that what it says is what the readings show as they are.
     """
@@ -42,7 +42,7 @@ def sentence(finding: FoundPattern, residual: FloatArray, first: bool) -> tuple[
 
 
 def _as_if(pattern: Pattern, first: float, last: float, low: float, high: float) -> str:
-    """Which element of what stiffness would make such a course from its low to its high share of the compliance, or "".
+    """Words on the element whose wrong stiffness would make this slope over its share of the compliance; "" if none.
 
     An element's stiffness times f adds share (1 / f - 1) to the compliance, and nothing where the share is nothing.
     """
@@ -75,7 +75,7 @@ def _capital(text: str) -> str:
 
 
 def _short(value: float, largest: float) -> str:
-    """A value to three digits; 0 where it is nothing beside the others."""
+    """A value to three digits; 0 if it is negligible beside the others."""
     if abs(value) < 1e-3 * largest:
         return "0"
     return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
@@ -86,5 +86,5 @@ def _side(change: float) -> str:
 
 
 def percent(log_ratio: float) -> float:
-    """A logarithm of a ratio as a change in per cent."""
+    """A logarithm of a ratio, as a change in per cent."""
     return float(100.0 * np.expm1(log_ratio))

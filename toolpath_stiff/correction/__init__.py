@@ -1,1 +1,1 @@
-"""Effects added to a machine and fitted, judged by readings that they have not seen."""
+"""Correction of a machine: effects added and fitted, judged by readings that they have not seen."""

@@ -1,4 +1,4 @@
-"""What `tps update --add` names: an effect and, if the user says so, what it acts on."""
+"""Effects that `tps update --add` names and, if the user states them, the elements they act on."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -19,7 +19,7 @@ def parse_addition(
     effect_files: Sequence[str | Path] = (),
     choices_of: Callable[[Effect], list[Candidate]] | None = None,
 ) -> list[Candidate]:
-    """What may be fitted of `weak_strut`, `weak_strut:strut=3`, `gauge_scale:direction=Z,setup=riser`.
+    """Candidates for a text such as `weak_strut`, `weak_strut:strut=3`, `gauge_scale:direction=Z,setup=riser`.
 
     One candidate of the choices that are named, or one for each choice where none is (`choices_of`).
 
@@ -50,7 +50,7 @@ def parse_addition(
 
 
 def _chosen(parameter: Parameter, value: str, text: str, data: Readings | Pulls) -> str | int:
-    """The value of a choice. A direction may be called by its axis, a set-up must be one of the data's."""
+    """Value of a choice. A direction may be given by its axis; a set-up must be one of the data's."""
     if parameter.kind == "text":
         setups = sorted(set(data.setup.tolist()) - {""})
         if parameter.name == "setup" and value not in setups:

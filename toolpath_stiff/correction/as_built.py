@@ -28,9 +28,9 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.portrait.portrait import LACKING
 
 AS_BUILT = "struts and joints as read"
-FURTHEST = 3.0  # standard deviations from which on an offset is no tolerance: the model lacks something else
+FURTHEST = 3.0  # standard deviations beyond which an offset is not a tolerance: the model lacks something else
 CERTAIN = 2.0  # standard errors by which the error at left-out points must fall beside an instrument's error
-DIGITS = 9  # of ln and m, on which all processors agree
+DIGITS = 9  # decimals of ln and m on which all processors agree
 
 
 def last_step(task: UpdateTask, before: LadderStep) -> tuple[Hexapod | None, LadderStep]:
@@ -69,7 +69,7 @@ def _fitted(task: UpdateTask, fit: Fit, shared: FloatArray) -> Fit:
 
 
 def _held_out(fit: Fit, known: FloatArray, pull: FloatArray, held: HeldOut) -> HeldOut:
-    """Residuals at left-out points, law, sizes and offsets by the others: `known` (42, n), `pull` known V^-1.
+    """Residuals at left-out points, with law, sizes and offsets from the others: `known` (42, n), `pull` known V^-1.
 
     With A = V^-1, V_ss^-1 r_s of the readings that stay is A r with r_o less A_oo^-1 (A r)_o (Schur's complement).
     """

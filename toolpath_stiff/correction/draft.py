@@ -1,4 +1,4 @@
-"""An effect file drafted from a portrait: what is missing, as terms that an engineer reads and edits.
+"""An effect file drafted from a portrait: what is missing, as terms for an engineer to read and edit.
 
 The file says what the portrait says, no more: terms that were read off the readings, at most three sizes, constants in
 the open. It records the readings that it was drawn from, so that no diagnosis takes it for confirmed by them
@@ -32,7 +32,7 @@ MARKS_A_LINE = 10
 
 
 class EffectDraft(TextFile):
-    """What a diagnosis leaves unexplained, as the text of an effect file.
+    """Text of an effect file for what a diagnosis leaves unexplained.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class EffectDraft(TextFile):
         self.effects, self.reason, self.diagnosis, self.next = list(effects), reason, diagnosis, list(commands)
 
     def to_dict(self) -> dict[str, Any]:
-        """Names and text, the verdict and the portrait; `reason` where nothing is drafted."""
+        """Names and text, the verdict and the portrait; `reason` if nothing is drafted."""
         diagnosis = self.diagnosis.to_dict()
         return {
             "effect": self.name if self.text else None,
@@ -72,14 +72,14 @@ class EffectDraft(TextFile):
         return self.text or self.reason
 
     def save(self, file: str | Path) -> Path:
-        """Write the file, whole or not at all; raises `InputError` where nothing is drafted."""
+        """Write the file, whole or not at all; raises `InputError` if nothing is drafted."""
         if not self.text:
             raise InputError(f"nothing is drafted: {self.reason}")
         return super().save(file)
 
 
 def draft(diagnosis: Diagnosis, file: str) -> EffectDraft:
-    """What a diagnosis leaves unexplained, as an effect file.
+    """Effect file for what a diagnosis leaves unexplained.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def draft(diagnosis: Diagnosis, file: str) -> EffectDraft:
 
 
 def _nothing_to_describe(diagnosis: Diagnosis) -> str:
-    """Why there is nothing that an effect could describe, a sentence; "" where there is something."""
+    """Reason why there is nothing that an effect could describe, a sentence; "" if there is something."""
     portrait, verdict = diagnosis.portrait, diagnosis.verdict
     if diagnosis.main.question:
         return f"{diagnosis.main.question} Nothing is drafted from readings that may be of another machine."
@@ -167,7 +167,7 @@ def draft_text(
     lines += [
         "",
         "# The readings that this was drawn from, a mark each. They cannot confirm it: judged by them it is",
-        "# `described`, and `identified` only when readings that are not among them foretell it.",
+        "# `described`, and `identified` only when readings that are not among them predict it.",
         "[drawn_from]",
         'readings = """',
         *(" ".join(marks[k : k + MARKS_A_LINE]) for k in range(0, len(marks), MARKS_A_LINE)),
@@ -177,7 +177,7 @@ def draft_text(
 
 
 def size_name(term: Term) -> str:
-    """What the size of a term is called: its link, which one, and its direction."""
+    """Name of a term's size: its link, which one of its kind, and its direction."""
     action, strut = term.action, f"strut_{term.where}" if term.where else ""
     parts = [strut if term.link == "one strut" else f"{term.link} {term.where or ''}", term.direction]
     if action == "coupling":
@@ -195,7 +195,7 @@ def size_name(term: Term) -> str:
 
 
 def _comment(text: str) -> list[str]:
-    """A paragraph as comment lines; a command, which is indented, stays on one."""
+    """A paragraph as comment lines; a command, which is indented, stays on one line."""
     if text.startswith("    "):
         return [f"# {text}"]
     wrapper = textwrap.TextWrapper(

@@ -1,4 +1,4 @@
-"""A fit as a machine: the fitted values, how well they are known, and where they come from."""
+"""A fit as a machine: its fitted values, their uncertainty, and their origin."""
 
 import hashlib
 from collections.abc import Iterable, Sequence
@@ -21,7 +21,7 @@ from toolpath_stiff.stiffness.contract import ELEMENT, SETUP
 from toolpath_stiff.units import n_per_um_from_n_per_m
 from toolpath_stiff.workbooks import split_name
 
-LOADING_DIGITS = 6  # of standard deviations, on which all processors agree
+LOADING_DIGITS = 6  # digits of standard deviations on which all processors agree
 
 
 def data_hash(files: Sequence[str]) -> str:
@@ -43,7 +43,7 @@ def fitted_machine(
     errors: ErrorModel | None = None,
     known: Fit | None = None,
 ) -> Hexapod:
-    """The machine with a fit's strut law and effects, their joint uncertainty, and where they come from.
+    """The machine with a fit's strut law and effects, their joint uncertainty, and their origin.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def fitted_machine(
         The fit that says how well law and sizes are known; None: the same.
     """
     effects, instruments = entries_of(machine, fit, provenance)
-    # The fitted law's factors to digits on which all processors agree.
+    # Factors of the fitted law, rounded to digits on which all processors agree.
     law = scaled_law(machine.strut_law, np.round(fit.law, 8))
     named = machine.setups
     if any(SETUP in active.waits_for for active in fit.effects):
@@ -87,7 +87,7 @@ def fitted_machine(
 def entries_of(
     machine: MachineTool, fit: Fit, provenance: Document, first: int = 0
 ) -> tuple[tuple[EffectEntry, ...], tuple[EffectEntry, ...]]:
-    """Effects and instruments of the machine with those of a fit, from a candidate's number on."""
+    """Effects and instruments of the machine followed by those of a fit, the latter from candidate number `first`."""
     effects, instruments = list(machine.effects), list(machine.instruments)
     for candidate, active in zip(fit.candidates[first:], fit.effects[first:], strict=True):
         in_file = {
@@ -103,21 +103,21 @@ def entries_of(
 def fitted_elements(
     machine: MachineTool, fit: Fit, provenance: Document, widened: float, torsions: Sequence[float]
 ) -> MachineTool:
-    """A machine of elements with the torsions of its joints, nrad/(N m), and the other effects of a fit.
+    """A machine of elements with fitted torsions of its joints, nrad/(N m), and the other effects of a fit.
 
     `torsions`: of the fit's first candidates; none where these are not fitted.
     """
     effects, instruments = entries_of(machine, fit, provenance, len(torsions))
     names = [entry.name for entry in (*effects, *instruments)]
     carrying = machine.with_changes(effects=effects, instruments=instruments)
-    if len(set(names)) == len(names):  # else no name says which of two it is
+    if len(set(names)) == len(names):  # otherwise a name would stand for two of them
         known = uncertainty_of(machine, fit, fit, widened, None, torsions=len(torsions))
         carrying = carrying.with_changes(uncertainty=known)
     return parse_machine(elements_toml(carrying, torsions), machine.name)
 
 
 def _certain(value: float) -> float:
-    """A fitted number to the digits on which all processors agree: far more than any fit is certain of."""
+    """A fitted number rounded to digits on which all processors agree: far more than any fit determines."""
     return float(f"{value:.7g}")
 
 
@@ -130,7 +130,7 @@ def uncertainty_of(
     law: StrutLaw | None = None,
     torsions: int = 0,
 ) -> Uncertainty | None:
-    """Joint uncertainty of what was fitted, in the units of the keys, beside what the machine file says already.
+    """Joint uncertainty of the fitted values, in the units of their keys, added to that of the machine file.
 
     The fit's first candidates are so many `torsions` of joints, in place of the file's.
     """

@@ -23,7 +23,7 @@ from toolpath_stiff.inference.left_out import HeldOut
 
 STARTS, START_SPREAD = 6, 0.2  # sd of the starts' logarithms: a law wrong by 20 %
 FINE, ROUGH = 1e-7, 1e-5  # of the law; a resampled search scatters a thousand times as much
-SAME = 1e-5  # of the mean error: two ends that close are one minimum
+SAME = 1e-5  # of the mean error: two ends this close count as one minimum
 RESAMPLES = 200
 
 
@@ -42,7 +42,7 @@ def update_by_mean_error(task: UpdateTask) -> Update:
     starts = [np.zeros(2), *rng.normal(0.0, START_SPREAD, (STARTS - 1, 2))]
     each, labels = np.ones(len(task.data)), np.unique(task.data.point)
     task.progress("searching from several starts")
-    # A second search from the first one's end: a simplex can collapse on a kink.
+    # Search again from the end of the first search: a simplex can collapse on a kink.
     ends = [_searched(problem, _searched(problem, start, each, FINE), each, FINE) for start in starts]
     errors = np.array([_error(problem, end, each) for end in ends])
     law = ends[int(np.argmin(errors))]
@@ -68,13 +68,13 @@ def update_by_mean_error(task: UpdateTask) -> Update:
 
 
 def _error(problem: Problem, law: FloatArray, weight: FloatArray) -> float:
-    """Mean |model - measured| / measured by weights (n,)."""
+    """Mean |model - measured| / measured, weighted by (n,)."""
     ratio = np.exp(-problem.observed) / problem.compliance(law, np.zeros(1))
     return float(np.average(np.abs(ratio - 1.0), weights=weight))
 
 
 def _searched(problem: Problem, start: FloatArray, weight: FloatArray, fine: float) -> FloatArray:
-    """(2,) logarithms of the law with the smallest mean error near a start; of a constant law both are one."""
+    """(2,) logarithms of the law with the smallest mean error near a start; both equal for a constant law."""
     from scipy.optimize import minimize
 
     free = 1 if problem.predictor.machine.strut_law.constant else 2

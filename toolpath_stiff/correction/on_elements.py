@@ -1,4 +1,4 @@
-"""Updates of machines of elements by pulls: the ladder, its judges and its result as of hexapods, without a strut law.
+"""Updates of machines of elements by pulls: ladder, judges and result as for hexapods, but without a strut law.
 
 In the law's place are the torsions of the joints that turn, all fitted together: one step, written into the file.
 """
@@ -44,12 +44,12 @@ from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.sizes import joined
 
 FEWEST_POSES = 3
-JOINTS_FIRST = "all joints refitted foretell pose after pose better (--joints)"
+JOINTS_FIRST = "all joints refitted predict pose after pose better (--joints)"
 
 
 @dataclass(frozen=True, eq=False)
 class PullTask(UpdateTask):
-    """Pulls in place of stiffnesses; `strut_law` asks for the torsions of the joints."""
+    """A task with pulls in place of stiffnesses; `strut_law` asks for the torsions of the joints."""
 
     machine: MachineTool  # type: ignore[assignment]
     data: Pulls  # type: ignore[assignment]
@@ -68,7 +68,7 @@ class PullTask(UpdateTask):
 
 
 class PullField(Field):
-    """All candidates on top of a fit."""
+    """All candidate effects on top of a fit to pulls."""
 
     def __init__(self, task: UpdateTask, before: Fit) -> None:
         assert isinstance(task.problem, PullProblem)
@@ -131,7 +131,7 @@ def build_pull_ladder(task: PullTask) -> ElementUpdate:
         steps.append(better)
         supports.append(tried[-1])
         tried = []
-    if task.strut_law:  # beside the same effects on the file's torsions
+    if task.strut_law:  # compared with the same effects on the file's torsions
         others = [[candidate] for candidate in steps[-1].fit.candidates[count:]]
         given = LadderStep.of(AS_GIVEN, fitted_with(task, problem.none, others), task.data)
         supports.insert(0, _support_of_joints(task, given, steps[-1]))
@@ -139,12 +139,12 @@ def build_pull_ladder(task: PullTask) -> ElementUpdate:
 
 
 def _support_of_joints(task: PullTask, given: LadderStep, fitted: LadderStep) -> Support:
-    """Judge the torsions of all joints against the file's: at left-out poses, and against errors of the instrument."""
+    """Judge the torsions of all joints against the file's, at left-out poses and against instrument errors."""
     in_se, reasons, instruments = gain_in_standard_errors(given.held, fitted.held), list[str](), dict[str, str]()
     if not in_se > NEEDED:
         reasons.append(f"the error at left-out poses falls by {in_se:.1f} standard errors: {NEEDED:g} is needed")
     elif not outvoted(votes(task.problem, fitted.fit, {AS_GIVEN: given.fit})[AS_GIVEN]):
-        reasons.append("the file's torsions foretell pose after pose as well")
+        reasons.append("the file's torsions predict pose after pose as well")
     else:
         families = PullField(task, given.fit).families(of_instrument=True)
         rivals = {family.name: family.best for family in families if family.best}
@@ -159,47 +159,47 @@ def _support_of_joints(task: PullTask, given: LadderStep, fitted: LadderStep) ->
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ElementUpdate(Update):
-    """A machine of elements corrected by pulls, or why it was not; `refitted` is the step that effects begin from."""
+    """A machine of elements corrected by pulls, or the reason why not; effects begin from the step `refitted`."""
 
     shown_by: ClassVar[str] = "update_elements"
     task: PullTask
 
     @property
     def question(self) -> str:
-        """That these are hardly pulls of this machine, and why; "" where nothing says so."""
+        """Reason to doubt that these are pulls of this machine; "" if there is none."""
         return question(self.task.problem)
 
     @property
     def rises(self) -> list[str]:
-        """Pulls come under no conditions."""
+        """No conditions: pulls are not grouped by any."""
         return []
 
     @property
     def errors(self) -> None:
-        """Bands are of fitted parameters alone."""
+        """No error model: bands come from the fitted parameters alone."""
 
     @property
     def fitted_joints(self) -> dict[str, float]:
-        """Joint -> nrad/(N m), where the joints were refitted."""
+        """Joint -> nrad/(N m), if the joints were refitted."""
         problem = self.task.problem
         torsions = fitted_torsions(problem, self.steps[-1].fit) if self.task.strut_law else {}
         return {name: NRAD * value for name, value in torsions.items()}
 
     @property
     def cause(self) -> str:
-        """What was fitted, in words."""
+        """Words on what was fitted."""
         joints = ", ".join(f"{name} {value:.0f}" for name, value in self.fitted_joints.items())
         parts = [f"the joints turn by, nrad/(N m): {joints}"] if joints else []
         return joined([*parts, *self.steps[-1].fit.findings[len(self.fitted_joints) :]])
 
     @property
     def added(self) -> Sequence[str]:
-        """Names of what was added."""
+        """Names of the effects added."""
         joints = self.fitted_joints
         return [*([JOINTS] if joints else []), *self.steps[-1].fit.names[len(joints) :]]
 
     def fitted(self, provenance: Document) -> Any:
-        """The machine with the last model, which comes from there."""
+        """The machine with the last model; `provenance` states its origin."""
         torsions = list(self.fitted_joints.values())
         return fitted_elements(self.task.machine, self.last.fit, provenance, self.widening, torsions)
 
@@ -208,7 +208,7 @@ class ElementUpdate(Update):
 
     @cached_property
     def document(self) -> Document:
-        """The content of update.json."""
+        """Content of update.json."""
         task, problem = self.task, self.task.problem
         return {
             "verdict": self.verdict,

@@ -1,4 +1,4 @@
-"""The result of an update: its steps, what the data support of them, in words, and the machine that came of it."""
+"""The result of an update: its steps, the data's support for them, in words, and the resulting machine."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -34,7 +34,7 @@ from toolpath_stiff.units import mm_from_m
 
 UPDATED, REFUSED, FORCED, NOTHING = "updated", "refused", "forced", "nothing added"
 NEEDED = 1.0  # standard errors by which the error at left-out points must fall
-# Share of the mean error, or of what scatter alone leaves of it, by which it may rise: a likelier strut law can raise
+# Share of the mean error, or of the part due to scatter, by which it may rise: a likelier strut law can raise
 # it a little (9.62 to 9.72 % on the paper's Table 1).
 WORSE = 0.05
 RISEN = 2.0  # standard errors by which the error at left-out points must rise under one of the conditions measured
@@ -42,7 +42,7 @@ RISEN = 2.0  # standard errors by which the error at left-out points must rise u
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Update(FolderResult):
-    """A machine's model corrected by measurements, or why it was not.
+    """A machine's model corrected by measurements, or the reason why not.
 
     Attributes
     ----------
@@ -111,32 +111,32 @@ class Update(FolderResult):
 
     @property
     def noise(self) -> Noise:
-        """The noise model that was counted with."""
+        """Noise model used."""
         return self.task.noise_model
 
     @cached_property
     def question(self) -> str:
-        """That these are hardly readings of this machine, and why; "" where nothing says so."""
+        """Reason to doubt that these are readings of this machine; "" if there is none."""
         return question(self.task.problem.predictor)
 
     @property
     def described(self) -> Drawn | None:
-        """`drawn`, if new readings have not confirmed it."""
+        """`drawn`, unless new readings have confirmed it."""
         return None if self.drawn is None or self.drawn.confirmed else self.drawn
 
     @property
     def last(self) -> LadderStep:
-        """The last model of the ladder; the machine file as given where nothing is to be changed."""
+        """Last model of the ladder; the machine file as given if nothing is to change."""
         return self.steps[-1] if self.changed else self.steps[0]
 
     @property
     def model(self) -> LadderStep:
-        """The last step that fits law and sizes: struts and joints that are moved afterwards are none of these."""
+        """Last step that fits law and sizes, before struts and joints are moved."""
         return self.steps[-1 if self.as_built is None else -2]
 
     @property
     def kept_law(self) -> Support | None:
-        """Why the strut law stays as given beside effects, where the data do not support the refitted one."""
+        """Judgement by which the strut law stays as given beside effects; None if the data support the refitted law."""
         return next((support for support in self.turned_down if support.effect == LAW_REFITTED), None)
 
     @cached_property
@@ -150,13 +150,13 @@ class Update(FolderResult):
 
     @property
     def changed(self) -> bool:
-        """True where there is something to be written."""
+        """True if there is something to write."""
         law = any(support.effect == LAW_REFITTED for support in self.supports)
         return bool(self.steps[-1].fit.names) or self.task.strut_law or law
 
     @property
     def worse(self) -> bool:
-        """True where the last model fits worse than the machine as given; such a machine is never written.
+        """True if the last model fits worse than the machine as given; such a machine is never written.
 
         Counted by the mean error, which users see. The fit is by likelihood, which bounds the factor by which readings
         are off, not the difference: where nothing fits, the one can fall while the other multiplies.
@@ -166,7 +166,7 @@ class Update(FolderResult):
 
     @cached_property
     def rises(self) -> list[str]:
-        """Conditions under which left-out points are foretold worse than as given, beyond chance; a draft that lacks.
+        """Conditions under which left-out points are predicted worse than as given, beyond chance; insufficient forms.
 
         Load, set-up and tool: a path is under one of each as a whole, and what falls on average may rise there.
         """
@@ -185,8 +185,8 @@ class Update(FolderResult):
                     change = f"{100 * before.mean_error:.2f} to {100 * after.mean_error:.2f} %"
                     clauses.append(f"{words.format(value)} the error at left-out points rises, {change}")
         left, floor = 100 * last.mean_error, self.noise.floor_percent
-        # A form that leaves more than scatter stands for something else, which elsewhere does otherwise; what it leaves
-        # of an instrument's error is taken for the machine's.
+        # A form that leaves more than scatter stands in for something else, which acts differently elsewhere; what
+        # an instrument's error leaves would be taken for the machine's.
         names, of_instrument = self.model.fit.names, self.model.instruments
         beside = f"{joined(names)} together leave" if of_instrument and len(of_instrument) < len(names) else ""
         of = "what was read off these readings leaves" if self.described else beside
@@ -194,18 +194,18 @@ class Update(FolderResult):
             clauses.append(f"{of} {left:.2f} % at left-out points, scatter {floor:.2f} %")
         refitted = self.steps[self.steps.index(self.model) - bool(self.kept_law)].held
         if len(of_instrument) < len(names) and gain_in_standard_errors(refitted, last) < -RISEN:
-            foretold = f"{100 * refitted.mean_error:.2f} % beside the refitted one"
-            clauses.append(f"{left:.2f} % are left at left-out points beside the strut law as given, {foretold}")
+            predicted = f"{100 * refitted.mean_error:.2f} % beside the refitted one"
+            clauses.append(f"{left:.2f} % are left at left-out points beside the strut law as given, {predicted}")
         return clauses
 
     @property
     def supported(self) -> bool:
-        """True where nothing speaks against what is to be changed."""
+        """True if nothing speaks against the changes."""
         return not self.question and not self.rises and all(support.supported for support in self.supports)
 
     @property
     def accepted(self) -> bool:
-        """True where a machine is to be written: the data support what was added, or it was forced."""
+        """True if a machine is to be written: the data support the additions, or they were forced."""
         return self.changed and not self.worse and (self.task.force or self.supported)
 
     @property
@@ -219,13 +219,13 @@ class Update(FolderResult):
 
     @property
     def widening(self) -> float:
-        """Factor on standard deviations: how much wider the residuals are than the noise model says, at least 1."""
-        # A bootstrap over points has the residuals' own width already.
+        """Factor on standard deviations: width of the residuals over that of the noise model, at least 1."""
+        # A bootstrap over points already has the width of the residuals.
         return 1.0 if self.search else float(np.sqrt(dispersion(self.known)))
 
     @cached_property
     def errors(self) -> ErrorModel | None:
-        """How far the last model may be off at a pose; None where too little was measured to tell."""
+        """Error of the last model to expect at a pose; None if too little was measured to tell."""
         if self.search:
             return None
         given, problem = self.last.fit if self.kept_law else None, self.task.problem
@@ -234,11 +234,11 @@ class Update(FolderResult):
 
     @cached_property
     def corrected(self) -> Hexapod | None:
-        """The machine with the last model; None where nothing is to be written."""
+        """The machine with the last model; None if nothing is to be written."""
         return self.fitted(self.provenance) if self.accepted else None
 
     def fitted(self, provenance: Document) -> Hexapod:
-        """The machine with the last model, which comes from there."""
+        """The machine with the last model; `provenance` states its origin."""
         setups = self.task.data.setup.tolist()
         machine, fit = self.as_built or self.task.machine, self.last.fit
         return fitted_machine(machine, fit, provenance, self.widening, setups, self.errors, self.known)
@@ -251,12 +251,12 @@ class Update(FolderResult):
 
     @property
     def machine(self) -> Any:
-        """The machine that carries what was added; raises `InputError` where it was refused."""
+        """The machine with the additions; raises `InputError` if they were refused."""
         machine = self._written()
         return machine if self.opened is None else self.opened(machine)
 
     def machine_text(self) -> str:
-        """The new machine file, with where its fitted values come from; raises `InputError` where it was refused."""
+        """Text of the new machine file, with the origin of its fitted values; raises `InputError` if refused."""
         heading = (
             f"{fill(f'Machine {self.task.machine.name}, updated. {self.text}', 110)}\n"
             f"Command: {self.provenance['command']}\n"
@@ -272,7 +272,7 @@ class Update(FolderResult):
         return write_atomically(file, self.machine_text())
 
     def files(self, *, plots: bool = True, machine: bool = True) -> Mapping[str, Content | Callable[[], Content]]:
-        """The files of `tps update`; the machine file too, unless it is said not."""
+        """Files that `tps update` writes; the machine file only with `machine`."""
         return self._files(plots, [] if machine and self.accepted else ["machine.toml"])
 
     def _short(self) -> str:
@@ -284,12 +284,12 @@ class Update(FolderResult):
         return frame_of(self.document["steps"])
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of update.json."""
+        """Content of update.json."""
         return dict(self.document)
 
     @cached_property
     def document(self) -> Document:
-        """The content of update.json."""
+        """Content of update.json."""
         task, predictor, law = self.task, self.task.problem.predictor, self.task.machine.strut_law
         before = (None, *self.steps)
         steps = [step.document(law, self.widening, before[k]) for k, step in enumerate(self.steps)]
@@ -332,7 +332,7 @@ class Update(FolderResult):
 
     @property
     def text(self) -> str:
-        """What was done, the cause first, then the error step by step."""
+        """Sentences on what was done, the cause first, then the error step by step."""
         doubt = f"{self.question} " if self.question else ""
         last, verdict = self.steps[-1], self.verdict
         if verdict == NOTHING:
@@ -361,17 +361,17 @@ class Update(FolderResult):
 
     @property
     def cause(self) -> str:
-        """What was fitted, in words."""
+        """Words on what was fitted."""
         return joined(self.steps[-1].fit.findings)
 
     @property
     def added(self) -> Sequence[str]:
-        """Names of what was added."""
+        """Names of the effects added."""
         return self.steps[-1].fit.names
 
     @property
     def _errors(self) -> str:
-        """Mean error of every step; of a law that is kept also what refitting it would leave."""
+        """Mean error of every step; if the law is kept, also the error that refitting it would leave."""
         steps = [(step.name.replace("+ ", "with ", 1), 100.0 * step.error) for step in self.steps]
         kept = LAW_REFITTED not in [step.name for step in self.steps] and not self.search
         law = [(f"({LAW_REFITTED} alone)", 100.0 * self.refitted.error)] if kept else []
@@ -379,7 +379,7 @@ class Update(FolderResult):
 
     @property
     def assumptions(self) -> list[str]:
-        """What the result rests on, sentences."""
+        """Sentences on what the result rests on."""
         sentences = [
             f"noise: {self.noise.origin}",
             "as given, nothing is fitted, so leaving points out changes nothing: where the machine file's figures were "
@@ -395,7 +395,7 @@ class Update(FolderResult):
             f"an effect is kept if the error at left-out points falls by more than {NEEDED:g} standard error, no "
             "parameter ends at its bound, and its gain in likelihood is beyond what the best of all candidates gains "
             "by chance once in twenty campaigns: the strut law refitted with and without it, or kept with and without "
-            "it where a refitted one foretells left-out points no better"
+            "it where a refitted one predicts left-out points no better"
         )
         if self.widening > 1.0:
             sentences.append(

@@ -1,4 +1,4 @@
-"""The steps of an update: a fit with its errors, and how far the data support an effect."""
+"""Steps of an update: a fit with its errors, and the data's support for an effect."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
 @dataclass(frozen=True)
 class LadderStep:
-    """One rung of the ladder: its fit to all readings, its errors over those of the tip.
+    """One rung of the ladder: its fit to all readings, its errors over the readings of the tip.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class LadderStep:
 
     @classmethod
     def of(cls, name: str, fit: Fit, data: Readings | Pulls, held: HeldOut | None = None) -> LadderStep:
-        """Of a fit to these data; `held`: its residuals at left-out points, where they are known."""
+        """Step made of a fit to data; `held`: its residuals at left-out points, if known."""
         left_out = (held or held_out(fit, data.point)).of_readings(data.tip)
         return cls(name, fit, left_out, data.tip, np.asarray(directions(data.of_tip)))
 
@@ -59,12 +59,12 @@ class LadderStep:
 
     @property
     def title(self) -> str:
-        """Its effects, "with a + b"; its name where it has none."""
+        """The step's effects as "with a + b"; its name if it has none."""
         return f"with {' + '.join(self.fit.names)}" if self.fit.names else self.name
 
     @property
     def instruments(self) -> Sequence[str]:
-        """Its errors of the instrument."""
+        """Names of the step's instrument errors."""
         return [candidate.name for candidate in self.fit.candidates if candidate.effect.is_instrument]
 
     @property
@@ -80,9 +80,9 @@ class LadderStep:
         }
 
     def law_ends(self, given: StrutLaw, widening: float) -> list[Document]:
-        """The strut law at its lengths, N/um; a constant law's length and deviations of a law that was kept: None."""
+        """Strut law at its lengths, N/um; None for a constant law's length and for deviations of a law kept."""
         law = scaled_law(given, self.fit.law)
-        count = len(law.parameters)  # of a constant law one, which belongs to no length
+        count = len(law.parameters)  # a constant law has one stiffness, which belongs to no length
         deviations = widening * np.sqrt(np.maximum(np.diag(self.fit.covariance)[:count], 0.0))
         lengths_mm = [None] if law.constant else [float(mm_from_m(x)) for x in (law.length_1, law.length_2)]
         stiffnesses = [n_per_um_from_n_per_m(stiffness) for stiffness in (law.stiffness_1, law.stiffness_2)[:count]]
@@ -96,7 +96,7 @@ class LadderStep:
         ]
 
     def sizes(self, widening: float) -> dict[str, dict[str, FittedSize | str | int]]:
-        """Effect -> key -> what it acts on, or value, unit and 95 % interval."""
+        """Effect -> key -> the element it acts on, or value, unit and 95 % interval."""
         sizes = fitted_sizes(self.fit, widening=widening)
         return {
             candidate.name: {key: value for key, value in candidate.choice if value not in ("", 0)}
@@ -105,7 +105,7 @@ class LadderStep:
         }
 
     def document(self, given: StrutLaw, widening: float, before: LadderStep | None) -> Document:
-        """A step as update.json has it; with one before also what it gains over that."""
+        """A step as an entry of update.json, with its gain over the step before, if there is one."""
         document = {
             "name": self.name,
             "effects": list(self.fit.names),
@@ -129,7 +129,7 @@ class LadderStep:
 
 @dataclass(frozen=True)
 class Support:
-    """How far the data support an effect, as update.json has it.
+    """The data's support for an effect, as in update.json.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ class Support:
     likelihood_gain, threshold
         Twice the log likelihood gained, in units of the scatter that remains; what chance alone reaches.
     instruments
-        Of an effect of the machine: errors of the instrument that foretell left-out poses as well; of one of the
+        Of an effect of the machine: errors of the instrument that predict left-out poses as well; of one of the
         instrument: effects of the machine.
     """
 
@@ -158,7 +158,7 @@ class Support:
 
 
 def dispersion(fit: Fit) -> float:
-    """Weighted squares of a fit over their degrees of freedom, at least 1."""
+    """Weighted squares of a fit per degree of freedom, at least 1."""
     squares = float(fit.scatter.precision.squares(fit.residual))
     fitted = len(fit.free) + (2 if fit.law_free else 0)
     return max(1.0, squares / max(len(fit.residual) - fitted, 1))

@@ -1,4 +1,4 @@
-"""A task: the machine that is to be corrected, by which measurements, and what of it may change."""
+"""A task: the machine to correct, the measurements, and what may change."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ LIKELIHOOD, MEAN_ERROR = "likelihood", "mean-error"
 
 @dataclass(frozen=True, eq=False)
 class UpdateTask:
-    """A machine, measurements, and what of the machine they are to change.
+    """A machine, measurements, and the parts of the machine that they may change.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class UpdateTask:
 
     @cached_property
     def noise_model(self) -> Noise:
-        """Of several noise models the one with the largest noise, as in a diagnosis."""
+        """Noise model with the largest noise, if there are several, as in a diagnosis."""
         return max(noise_models(self.data, self.noise, self.strut_spread), key=lambda model: model.typical)
 
     @cached_property

@@ -8,14 +8,14 @@ An effect is supported if
 
 - the error at left-out points falls by more than one standard error of that fall, paired by point;
 - no parameter ends at its upper bound, and not all end at zero;
-- of an effect of the machine, no error of the instrument foretells left-out poses as well (`inference.votes`), and the
+- of an effect of the machine, no error of the instrument predicts left-out poses as well (`inference.votes`), and the
   other way, unless the user says which to believe;
 - its gain in likelihood, the strut law refitted with and without it, is more than the best of all candidates reaches
   by chance in one campaign of twenty: the relative gate of the diagnosis. The gain is counted in units of the scatter
   that remains, so that data which no effect explains do not lend every effect significance.
 
 Of several effects each is judged beside the others. Effects of the machine that a refitted law can stand for are judged
-beside the file's law, with and without them, where that law foretells with them as well as a refitted one: which of the
+beside the file's law, with and without them, where that law predicts with them as well as a refitted one: which of the
 two gives way the readings do not tell, but either takes the error away. Where `--auto` finds no effect it does so with
 the law.
 """
@@ -61,7 +61,7 @@ LAW_GIVEN = "strut law as given"
 
 
 def update(task: UpdateTask, build: Callable[[Any], Update] | None = None) -> Update:
-    """Fit effects to measurements, judge whether the data support them, and make the machine that carries them.
+    """Fit effects to measurements, judge whether the data support them, and make the machine with them.
 
     `build` makes the ladder; unless given, `build_ladder`.
 
@@ -94,7 +94,7 @@ def update(task: UpdateTask, build: Callable[[Any], Update] | None = None) -> Up
         force=task.force, believe=task.believe, objective=task.objective if result.search else None,
         seed=task.seed or None,
     )  # fmt: skip
-    # No date: the same data and command give the same bytes.
+    # No date, so that the same data and command give the same bytes.
     provenance = {
         **({} if result.described is None else {"described": f"not confirmed: {result.described.reason}"}),
         "data": list(task.files),
@@ -109,7 +109,7 @@ def update(task: UpdateTask, build: Callable[[Any], Update] | None = None) -> Up
     result = replace(result, provenance=provenance)
     if result.corrected is None:
         return result
-    # An effect that belongs to a set-up acts only where that is named.
+    # An effect of a set-up acts only where the set-up is named.
     setups = (active.setup for active in build_model(result.corrected, task.effect_files).effects if active.setup)
     shown = options(machine=task.machine_file, effects=list(task.effect_files), setup=next(setups, None))
     compare = hint("what is left", request.command("compare", machine=task.machine_file))
@@ -156,7 +156,7 @@ def build_ladder(task: UpdateTask) -> Update:
 
 
 def _supports(task: UpdateTask, full: Fit, groups: Sequence[Sequence[Candidate]]) -> list[Support]:
-    """Of each effect of a fit beside the others; each is one of the candidates of its group."""
+    """Support for each effect of a fit beside the others; each is one of the candidates of its group."""
     by_name, supports = {candidates[0].name: candidates for candidates in groups}, []
     for j, name in enumerate(full.names):
         others = [[candidate] for k, candidate in enumerate(full.candidates) if k != j]
@@ -180,21 +180,21 @@ def _check(task: UpdateTask, names: Sequence[str]) -> None:
 
 
 def fitted_with(task: UpdateTask, fit: Fit, groups: Iterable[Sequence[Candidate]]) -> Fit:
-    """A fit with one effect of each group on top."""
+    """A fit with one further effect from each group."""
     for candidates in groups:
         fit = add_effect(task.problem, fit, candidates, fit.law_free)
     return fit
 
 
 def step_up(task: UpdateTask, before: LadderStep, groups: Sequence[Sequence[Candidate]]) -> LadderStep:
-    """A rung higher: one effect, or several as one step."""
+    """The next rung: one effect more, or several in one step."""
     fit = fitted_with(task, before.fit, groups)
     labels = [candidate.label for candidate in fit.candidates[-len(groups) :]]
     return LadderStep.of(f"+ {' + '.join(labels)}", fit, task.data)
 
 
 def ladder_of(task: UpdateTask, start: LadderStep, wanted: Sequence[Sequence[Candidate]]) -> list[LadderStep]:
-    """Steps that add the effects asked for, each lower than the one before; one step if no order does."""
+    """Steps that add the requested effects, each with a lower error than the last; one step if no order gives that."""
     rest, steps = list(wanted), [start]
     while rest:
         task.progress(f"fitting {', '.join(candidates[0].name for candidates in rest)}")
@@ -209,7 +209,7 @@ def ladder_of(task: UpdateTask, start: LadderStep, wanted: Sequence[Sequence[Can
 
 
 def _drawn(task: UpdateTask, full: Fit) -> Drawn | None:
-    """How the effects stand that were drawn from the readings, against the model without them."""
+    """Status of the effects whose form was read off these readings, against the model without them; None if none."""
     others = [[c] for c in full.candidates if not seen_readings([c.effect], task.data).any()]
     if len(others) == len(full.candidates):
         return None
@@ -218,7 +218,7 @@ def _drawn(task: UpdateTask, full: Fit) -> Drawn | None:
 
 
 class Field:
-    """All candidates on a machine that carries other effects.
+    """All candidate effects on a machine that carries other effects.
 
     Attributes
     ----------
@@ -242,7 +242,7 @@ class Field:
 
 
 def _field_of(task: UpdateTask, others: Fit) -> Field:
-    """What an effect is judged against on a machine that carries the other effects."""
+    """Field against which an effect is judged, on a machine that carries the other effects."""
     task.progress("searching all effects for what chance alone would gain")
     carrying = fitted_machine(task.machine, others, {"command": "", "data_sha256": ""})
     problem = Problem.of(Predictor(carrying, task.data, task.effect_files), task.noise_model)
@@ -285,11 +285,11 @@ def support_of(
     if not as_free:
         refitted = refine(task.problem, before.fit)
         if outvoted(votes(task.problem, refitted, {LAW_GIVEN: fit})[LAW_GIVEN]):
-            reasons.append(f"the {LAW_REFITTED} alone foretells left-out poses better")
+            reasons.append(f"the {LAW_REFITTED} alone predicts left-out poses better")
         elif believed == INSTRUMENT != task.believe and not outvoted(votes(task.problem, fit, {"": refitted})[""]):
-            reasons.append(f"the {LAW_REFITTED} alone foretells left-out poses as well")
+            reasons.append(f"the {LAW_REFITTED} alone predicts left-out poses as well")
     instruments = dict[str, str]()
-    if not reasons:  # what is refused anyway needs no vote
+    if not reasons:  # an effect refused anyway needs no vote
         if believed == MACHINE and not as_free:
             rivals = rivals_of_law(task.problem, before.fit)
         else:
@@ -307,10 +307,10 @@ def support_of(
 
 
 def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Support]:
-    """Judge the refitted strut law of a step; the same effects beside the file's law."""
+    """Judge the refitted strut law of a step against the same effects with the file's law."""
     task.progress("judging the strut law")
     fit, problem = after.fit, task.problem
-    groups = [[candidate] for candidate in fit.candidates]  # anew: beside a refitted law some may be absent
+    groups = [[candidate] for candidate in fit.candidates]  # chosen anew: beside a refitted law some may be absent
     given = LadderStep.of(LAW_GIVEN, fitted_with(task, base_fit(problem, law_free=False), groups), task.data)
     differences = votes(problem, fit, {LAW_GIVEN: given.fit})[LAW_GIVEN]
     reasons, instruments = [], dict[str, str]()
@@ -328,7 +328,7 @@ def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Suppo
 
 
 def as_well(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, str]:
-    """Rivals that a fit has not outvoted -> the reading that would tell."""
+    """Rivals that a fit does not outvote -> reading that would tell them apart."""
     against = votes(problem, fit, rivals)
     return {
         name: reading_words(telling(rivals[name].candidates[-1].effect))
@@ -338,13 +338,13 @@ def as_well(problem: Problem, fit: Fit, rivals: Mapping[str, Fit]) -> dict[str, 
 
 
 def mistakable(task: UpdateTask, rivals: Mapping[str, str], believed: str) -> list[str]:
-    """That what is taken for the machine's may be an instrument's, or the other way; nothing where the user knows."""
+    """Reason why a machine effect may be an instrument's error, or the reverse; empty if the user has decided."""
     if not rivals or task.believe == believed:
         return []
     kind = "an error of the instrument" if believed == MACHINE else "an effect of the machine"
     tells = joined([f"{tells} would tell {name}" for name, tells in rivals.items()])
     return [
-        f"{kind} foretells left-out poses as well: {joined(list(rivals))}; {tells}; "
+        f"{kind} predicts left-out poses as well: {joined(list(rivals))}; {tells}; "
         f"--believe {believed} (believe='{believed}') takes it for the {believed}'s"
     ]
 
@@ -352,12 +352,12 @@ def mistakable(task: UpdateTask, rivals: Mapping[str, str], believed: str) -> li
 def next_effect(
     task: UpdateTask, before: LadderStep, field_of: Callable[[UpdateTask, Fit], Field]
 ) -> tuple[LadderStep | None, list[Support]]:
-    """The most likely effect that the data support on top of a step, and the supports of all that were tried."""
+    """The most likely effect that the data support on top of a step, and the judgement of each effect tried."""
     others, tried = field_of(task, before.fit), list[Support]()
     families = [family for side in (True, False) for family in others.families(of_instrument=side)]
     for family in sorted(families, key=lambda f: (-f.log_evidence, f.name))[:TRIED]:
         task.progress(f"fitting {family.name}")
-        candidates = family.best.candidates if family.best else ()  # the choice that its tables make the likeliest
+        candidates = family.best.candidates if family.best else ()  # the choice that is the likeliest by its tables
         step = step_up(task, before, [candidates])
         tried.append(support_of(task, others, before, step.fit, len(step.fit.candidates) - 1, candidates))
         if tried[-1].supported:

@@ -1,1 +1,1 @@
-"""Cutting forces and what they make of the part: stock, engagement, forces, the error of a surface."""
+"""Cutting forces and their effect on the part: stock, engagement, forces, surface error."""

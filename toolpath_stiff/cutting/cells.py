@@ -1,4 +1,4 @@
-"""The cells of boxes in a grid."""
+"""Cells of boxes in a grid."""
 
 from collections.abc import Iterator
 
@@ -8,7 +8,7 @@ PORTION = 20_000  # entries at a time: the arrays stay in the processor's cache
 
 
 def cells_of_boxes(low: IntArray, high: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """(k,) box and (k, d) cell, in portions, of boxes from `low` to `high` (n, d), both inside."""
+    """Cells of boxes from `low` to `high` (n, d), both included, in portions: (k,) box and (k, d) cell."""
     wide = high - low + 1
     counts = wide.prod(axis=1)
     for rows in portions(counts, PORTION):

@@ -1,4 +1,4 @@
-"""Thickness of the chip before each flute, with run-out, and its integrals over the angle of the edge.
+"""Chip thickness at each flute, with run-out, and its integrals over the angle of the edge.
 
 Flutes are numbered in the order in which they pass: flute j stands 2 pi j / N behind flute 0, and, with a run-out rho,
 R + rho cos(lambda + 2 pi j / N) from the axis (Kline, DeVor, International Journal of Machine Tool Design and Research
@@ -16,7 +16,7 @@ from toolpath_stiff.cutting.cutters import Cutter
 
 
 def flute_gaps(cutter: Cutter) -> FloatArray:
-    """(flutes, flutes) m by which flute j stands out farther than the one m = 1 ... flutes before it."""
+    """(flutes, flutes) m by which flute j projects beyond the one m = 1 ... flutes before it."""
     flutes = cutter.flutes
     radius = flute_radii(cutter)
     before = (np.arange(flutes)[:, None] - np.arange(1, flutes + 1)) % flutes
@@ -24,20 +24,20 @@ def flute_gaps(cutter: Cutter) -> FloatArray:
 
 
 def flute_laws(cutter: Cutter) -> list[tuple[FloatArray, int]]:
-    """Gaps of each kind of flute and how many flutes have them: all the same without run-out."""
+    """Gaps of each kind of flute, and the number of flutes with them: all alike without run-out."""
     gaps = flute_gaps(cutter)
     return [(row, 1) for row in gaps] if cutter.run_out else [(gaps[0], cutter.flutes)]
 
 
 def flute_radii(cutter: Cutter) -> FloatArray:
-    """(flutes,) m by which each flute stands out beyond the radius."""
+    """(flutes,) m by which each flute projects beyond the cutter's radius."""
     return np.asarray(
         cutter.run_out * np.cos(cutter.run_out_angle + 2.0 * np.pi * np.arange(cutter.flutes) / cutter.flutes)
     )
 
 
 def chip_pieces(gaps: FloatArray, taper: float) -> FloatArray:
-    """(q, 5) pieces of a flute's chip: u from which it holds, chip a u + b, share of the force at the edge c u + d.
+    """(q, 5) pieces of a flute's chip: u at which each begins, chip a u + b, share of the edge force c u + d.
 
     `gaps`: (flutes,) of the flute; `taper`: m of chip over which the force at the edge sets in.
     """
@@ -80,13 +80,13 @@ def chip_integrals(angle: FloatArray, feed: FloatArray, pieces: FloatArray) -> F
     turned = np.where(behind, np.pi - angle, angle)
     part = _to_quarter(turned, feed[:, None], pieces)
     whole = _to_quarter(np.full((len(feed), 1), 0.5 * np.pi), feed[:, None], pieces)
-    for even in (1, 2, 4, 5):  # h cos and w cos have the same integral to phi and to pi - phi
+    for even in (1, 2, 4, 5):  # integrals of h cos and w cos up to phi and up to pi - phi are equal
         part[even] = np.where(behind, 2.0 * whole[even] - part[even], part[even])
     return part
 
 
 def _to_quarter(angle: FloatArray, feed: FloatArray, pieces: FloatArray) -> FloatArray:
-    """The same up to 90 degrees."""
+    """The integrals of `chip_integrals` for angles up to 90 degrees."""
     sine, cosine = np.sin(angle), np.cos(angle)
     total = np.zeros((6, *angle.shape))
     with np.errstate(over="ignore"):
@@ -99,7 +99,7 @@ def _to_quarter(angle: FloatArray, feed: FloatArray, pieces: FloatArray) -> Floa
             s = np.minimum(np.maximum(sine, low), high)
             cos = np.minimum(np.maximum(cosine, np.sqrt(1.0 - high * high)), low_cosine)
             phi = np.minimum(np.maximum(angle, low_angle), np.arcsin(high))
-        turn = phi - low_angle  # integrals of 1, cos, sin, sin cos, sin^2 over the piece, up to the angle
+        turn = phi - low_angle  # integrals of 1, cos, sin, sin cos, sin^2 from the piece's start to the angle
         cosines, sines = s - low, low_cosine - cos
         mixed = 0.5 * (s + low) * cosines
         squares = 0.5 * (turn - s * cos + low * low_cosine)

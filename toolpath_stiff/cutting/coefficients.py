@@ -1,4 +1,4 @@
-"""Coefficients of the cutting force with their covariance: materials that are known, numbers that are stated."""
+"""Cutting force coefficients with their covariance: from the list of materials, or as given."""
 
 import json
 from collections.abc import Callable
@@ -26,16 +26,16 @@ SYMBOLS = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
 SHOWN = np.array([n_per_mm2_from_pa(1.0)] * 3 + [n_per_mm_from_n_per_m(1.0)] * 3)  # N/mm2 and N/mm per SI
 SPREAD = 0.3  # relative standard deviation where none is stated: of one aluminium, published ones spread by a factor 2
 UNKNOWN = (0.3, 1.0)  # standard deviation of what is not known, shares of Ktc and Kte: the size of radial ones
-TAPER = 1e-6  # m of chip over which the force at the edge sets in: assumed, so that no force jumps
+TAPER, TAPERS_UM = 1e-6, (1e-3, 10.0)  # m of chip over which the force at the edge sets in: assumed, so that none jumps
 STRONGEST = 1e5  # N/mm2, N/mm: twenty times a nickel alloy
 KEYS = ("material", "origin", "cutting_N_per_mm2", "edge_N_per_mm", "covariance", "spread_percent", "thinnest_chip_um",
-        "thickest_chip_um")  # fmt: skip
+        "thickest_chip_um", "edge_sets_in_um")  # fmt: skip
 Fault = Callable[[str, str, str], InputError]  # of a key: what is wrong, what was expected
 
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Force of an edge per height of cut, tangential, radial and axial: cutting x thickness of the chip + edge.
+    """Force on an edge per height of cut, tangential, radial and axial: cutting x chip thickness + edge.
 
     Altintas, Manufacturing Automation, 2nd ed., chapter 2.
 
@@ -73,7 +73,7 @@ class Coefficients:
         return np.sqrt(np.diagonal(self.covariance))
 
     def document(self) -> Document:
-        """The same in the shop's units, as a setup file takes it."""
+        """The coefficients in shop units, as in a setup file."""
         shown = [json_number(value, 9) for value in self.values * SHOWN]
         covariance = self.covariance * SHOWN * SHOWN[:, None]
         return {
@@ -84,12 +84,13 @@ class Coefficients:
             "covariance": [[json_number(value, 9) for value in row] for row in covariance.tolist()],
             "thinnest_chip_um": json_number(um_from_m(self.thinnest)),
             "thickest_chip_um": json_number(um_from_m(self.thickest)),
+            **({} if self.taper == TAPER else {"edge_sets_in_um": json_number(um_from_m(self.taper))}),
         }
 
 
 @cache
 def materials() -> dict[str, Coefficients]:
-    """Name -> coefficients of the materials that ship with the package."""
+    """Name -> coefficients of the materials that come with the package."""
     reader = TomlReader.read(Path(__file__).parent.parent / "data" / "materials.toml", "materials")
 
     def fault(key: str, mistake: str, expected: str) -> InputError:
@@ -99,7 +100,7 @@ def materials() -> dict[str, Coefficients]:
 
 
 def material(name: str) -> Coefficients:
-    """Coefficients of a material by its name, however it is spelled. Raises `InputError`."""
+    """Coefficients of a material, named in any spelling. Raises `InputError`."""
     known = {key.casefold(): value for key, value in materials().items()}
     if name.casefold() not in known:
         hint = "measure slots at several feeds and let `tps forces` make them, or write them into the setup file"
@@ -108,7 +109,7 @@ def material(name: str) -> Coefficients:
 
 
 def read_coefficients(file: str | Path) -> Coefficients:
-    """Coefficients from the JSON that `tps forces` writes. Raises `InputError`."""
+    """Coefficients from a JSON file written by `tps forces`. Raises `InputError`."""
     content = read_bytes(file, "coefficients")
     try:
         document = json.loads(content)
@@ -126,7 +127,7 @@ def read_coefficients(file: str | Path) -> Coefficients:
 
 
 def coefficients_from(table: Document, fault: Fault) -> Coefficients:
-    """Coefficients from numbers in the shop's units, those of a file.
+    """Coefficients from a file's numbers in shop units.
 
     Parameters
     ----------
@@ -160,11 +161,17 @@ def coefficients_from(table: Document, fault: Fault) -> Coefficients:
         spread = table.get("spread_percent", 100.0 * SPREAD)
         if not is_number(spread) or not 0.0 <= spread <= 200.0:
             raise fault("spread_percent", f"spread_percent = {spread!r}", "0 to 200 %, a standard deviation")
-        # One scatter for all: a harder batch has all of them higher.
+        # One common deviation: in a harder batch all coefficients are higher.
         covariance = np.outer(values, values) * (spread / 100.0) ** 2
         if "spread_percent" not in table:
             remarks.append(f"standard deviation of {100.0 * SPREAD:g} % assumed")
     covariance = covariance + np.diag(np.where(unknown, size, 0.0) ** 2)
+    taper, (least, most) = table.get("edge_sets_in_um"), TAPERS_UM
+    if taper is None:
+        taper = um_from_m(TAPER)
+        remarks.append(f"the force at the edge sets in over {taper:g} um of chip (edge_sets_in_um assumed)")
+    elif not is_number(taper) or not least <= taper <= most:
+        raise fault("edge_sets_in_um", f"edge_sets_in_um = {shortened(taper)}", f"{least:g} to {most:g} um of chip")
     chips = [table.get(key) for key in ("thinnest_chip_um", "thickest_chip_um")]
     thinnest, thickest = (m_from_um(float(chip)) if is_number(chip) else np.nan for chip in chips)
     return Coefficients(
@@ -175,11 +182,12 @@ def coefficients_from(table: Document, fault: Fault) -> Coefficients:
         origin="; ".join(remarks),
         thinnest=thinnest,
         thickest=thickest,
+        taper=m_from_um(taper),
     )
 
 
 def _three(table: Document, key: str, fault: Fault) -> FloatArray:
-    """t, r and a; the first must be there and positive."""
+    """The t, r and a values; the first is required and positive."""
     numbers = table.get(key)
     expected = f"[t, r, a], t from 0 to {STRONGEST:g}, r and a within +-{STRONGEST:g} or nan"
     if not isinstance(numbers, list) or len(numbers) != 3 or not all(map(is_number, numbers)):
@@ -192,7 +200,7 @@ def _three(table: Document, key: str, fault: Fault) -> FloatArray:
 
 
 def _covariance(table: Document, values: FloatArray, fault: Fault) -> FloatArray | None:
-    """(6, 6) in the shop's units as it is given; None where it is not."""
+    """(6, 6) covariance in shop units as given; None if not given."""
     rows = table.get("covariance")
     if rows is None:
         return None

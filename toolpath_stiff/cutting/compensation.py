@@ -1,4 +1,4 @@
-"""A program shifted against the deflection: the mirror method, iterated with the engagement of the shifted path.
+"""A program shifted to compensate deflection: the mirror method, iterated with the engagement of the shifted path.
 
 p' = p + e n, n into the work, e the mean over the wall's height of the error that the cut along p' makes (Law, Geddam,
 J. Mater. Process. Technol. 138 (2003) 379, "mirror" compensation). The error of the surface against the drawing is then
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 LARGEST = 1e-4  # m, and half of the width of cut: a line that would be shifted by more is left alone
 SETTLED = 5e-8  # m, half of the last decimal written: a change of the shift that is worth another turn
 MOST_TURNS, SWINGING = 6, 0.9
-CONTRACTION = 0.3  # of a turn's change to that of the turn before; a warning beyond
+CONTRACTION = 0.3  # ratio of a turn's change to that of the turn before; above it a warning
 SHORT = 3e-3  # m of a move, below which it is a part of a wall
 SAME = 1e-7  # m by which the error of a wall may grow: rounding of the numbers written, and of the stock's grid
 WORSE = "it would be worse"
@@ -43,7 +43,7 @@ BETWEEN = "it lies between two walls: what a shift takes off one it adds to the 
 
 @dataclass(frozen=True)
 class Walls(ArrayColumns):
-    """Where the final walls of a program are made, at n stations. SI.
+    """Stations at which the final walls of a program are made, and the walls' errors there. SI.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Walls(ArrayColumns):
 
     @property
     def wanted(self) -> FloatArray:
-        """(n,) m, the shift to the left that takes the error out; between two walls it makes neither worse."""
+        """(n,) m, shift to the left that removes the error; between two walls, the shift that makes neither worse."""
         both = np.stack([self.error[:, 0] + self.shift, self.shift - self.error[:, 1]], axis=1)
         size, alike = np.abs(both), both.prod(axis=1) > 0.0
         between = np.where(alike, np.minimum(size.mean(axis=1), 2.0 * size.min(axis=1)) * np.sign(both[:, 0]), 0.0)
@@ -78,13 +78,13 @@ class Walls(ArrayColumns):
 
 
 def walls_of(cut: Cut, written: Moves, row_of: IntArray, untouched: Moves) -> Walls:
-    """The walls that a program makes, whose moves stand in the place of rows `row_of` of the untouched ones."""
+    """Walls made by a program whose moves replace the rows `row_of` of the original program's moves."""
     rows = np.flatnonzero(np.isfinite(cut.wall_mean).any(axis=1))
     move, s = cut.samples.move[rows], cut.samples.s[rows]
     length = move_lengths(written)
     before = np.cumsum(length) - length
     along = np.clip((s - before[move]) / np.where(length > 0.0, length, 1.0)[move], 0.0, 1.0)
-    first = np.unique(row_of, return_index=True)[1]  # rows ascend, so does where each begins
+    first = np.unique(row_of, return_index=True)[1]  # rows ascend, and so do their first indices
     whole = np.bincount(row_of, length)[row_of[move]]
     start = before[first][np.searchsorted(row_of[first], row_of[move])]
     share, shift = places_beside(untouched, row_of[move], points_along(written, move, along)[0], (s - start) / whole)
@@ -94,14 +94,14 @@ def walls_of(cut: Cut, written: Moves, row_of: IntArray, untouched: Moves) -> Wa
         share=share,
         shift=shift,
         error=cut.wall_mean[rows] + sides * shift[:, None],
-        spread=(cut.wall_high - cut.wall_low)[rows],
+        spread=(cut.highest - cut.lowest)[rows, :2],
         width=cut.ae[rows],
         weight=cut.samples.weight[rows],
     )
 
 
 def places_beside(moves: Moves, row: IntArray, points: FloatArray, near: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n,) share of moves beside which points lie, and how far left of them, m; of a circle's turns the one `near`.
+    """(n,) share along moves of points' feet, and how far left of the move points lie, m; of turns the one `near`.
 
     An arc that stands on edge is straight in plan; `near` is also the share of a move that is a point there.
     """
@@ -122,14 +122,14 @@ def places_beside(moves: Moves, row: IntArray, points: FloatArray, near: FloatAr
 
 
 def _by_row(walls: Walls) -> Iterator[tuple[int, IntArray]]:
-    """Rows, and the stations of each."""
+    """Each row, and its stations."""
     order = np.argsort(walls.row, kind="stable")
     rows, first = np.unique(walls.row[order], return_index=True)
     yield from zip(rows.tolist(), np.split(order, first[1:]), strict=True)
 
 
 def _shifts(walls: Walls, shift: FloatArray) -> dict[int, tuple[FloatArray, FloatArray]]:
-    """Shifts of moves, mm to the left, by those (n,) m of the stations of their walls."""
+    """Shifts of moves, mm to the left, from the shifts (n,) m at the stations of their walls."""
     shifts, wanted = {}, mm_from_m(shift)
     for row, some in _by_row(walls):
         shares, which = np.unique(walls.share[some], return_inverse=True)
@@ -152,7 +152,7 @@ def _too_far(walls: Walls) -> dict[int, str]:
 
 
 def figures_of_walls(walls: Walls, rows: int) -> dict[str, FloatArray]:
-    """Of each move and side, (rows, 2): length m, mean error, its mean size, rms and peak, mean range, shift; SI."""
+    """Figures by move and side, (rows, 2): length m, mean error, mean size, rms, peak, mean range, shift; SI."""
     station, side = np.nonzero(np.isfinite(walls.error))
     key, size, error = walls.row[station] * 2 + side, 2 * rows, walls.error[station, side]
     weight = np.maximum(walls.weight[station], 1e-12)
@@ -169,14 +169,14 @@ def figures_of_walls(walls: Walls, rows: int) -> dict[str, FloatArray]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Compensation(Result):
-    """A program shifted against the deflection of its final walls, and what that does to each of them.
+    """A program shifted to compensate the deflection at its final walls, and the effect on each wall.
 
     Attributes
     ----------
     rewritten
         The program as written; the untouched one where nothing could be shifted.
     lines
-        A row a line of the program and side of its feed on which it makes a final wall, by columns: line, side,
+        A row per line of the program and side of its feed on which it makes a final wall, by columns: line, side,
         length_mm, shift_um (mean, + into the work); of the mean over the wall's height, mean and mean size along the
         line and the largest, before and after (error, size, peak; um, + material left); spread_um, the mean range over
         the height, which no shift removes; left_alone, the reason or "". Nan after, where other lines make it then.
@@ -209,7 +209,7 @@ class Compensation(Result):
 
     @property
     def walls(self) -> Document:
-        """Of all walls together: length, mean size before and after, what is left of it, worst, range over the height.
+        """Figures over all walls: length, mean size before and after, share left, worst, range over the height.
 
         Those left alone are included.
         """
@@ -231,8 +231,8 @@ class Compensation(Result):
 
     @property
     def changed(self) -> bool:
-        """Whether anything of the program was shifted."""
-        return bool(np.abs(self.lines["shift_um"]).max() > 1e-3)  # below: what is left of a difference
+        """True if any part of the program was shifted."""
+        return bool(np.abs(self.lines["shift_um"]).max() > 1e-3)  # less is rounding
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
@@ -242,7 +242,7 @@ class Compensation(Result):
         return dict(certain(without_nan(to_dict(document | {name: getattr(self, name) for name in names}))))
 
     def to_frame(self) -> DataFrame:
-        """A row a line and side, as `lines`."""
+        """A row per line and side, as `lines`."""
         return frame_of(dict(self.lines))
 
     def _short(self) -> str:
@@ -250,7 +250,7 @@ class Compensation(Result):
         return f"{self.rewritten.name}, {walls['mean_before_um']:.2f} to {walls['mean_after_um']:.2f} um"
 
     def save(self, file: str | Path) -> Path:
-        """Write the program, whole or not at all."""
+        """Write the program, completely or not at all."""
         return self.rewritten.save(file)
 
 
@@ -263,7 +263,7 @@ def compensate_program(
     decimals: int | None = None,
     control: Controller = UNKNOWN_CONTROL,
 ) -> Compensation:
-    """A program shifted against the deflection of its final walls, with what that does to each of them.
+    """A program shifted to compensate the deflection at its final walls, and the effect on each wall.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def compensate_program(
         change = after.wanted - _intended(shifts, after)
         changes.append(_quantile(change[~np.isin(after.row, list(alone))]))
         if changes[-1] > SETTLED and turn < MOST_TURNS:
-            # Half way where it swings. A wall that another pass has taken over for the moment keeps its shift.
+            # Half a step if it oscillates. A wall that another pass makes in this turn keeps its shift.
             back = 0.5 if changes[-1] > SWINGING * changes[-2] else 0.0
             shifts |= _shifts(after, after.wanted - back * change)
             alone = _too_far(after) | alone
@@ -313,7 +313,7 @@ def compensate_program(
         spoilt = _spoilt(before, after, moves)
         if not spoilt or not side.courses:
             break
-        # A wall that was not shifted is spoilt by others: the nearest that are shifted stay too, ever more of them.
+        # An unshifted wall is spoilt by others: leave its nearest shifted neighbours alone too, more of them each time.
         away = {row: min(abs(row - other) for other in spoilt) for row in shifts.keys() - alone.keys()}
         alone |= {row: WORSE for row, far in away.items() if far <= 2 * min(away.values())}
     shift = np.zeros(len(before_cut.samples))
@@ -328,12 +328,12 @@ def compensate_program(
 
 
 def _quantile(values: FloatArray) -> float:
-    """Size below which 95 % of values lie; 0 of none."""
+    """Size below which 95 % of the values lie; 0 if there are none."""
     return float(np.quantile(np.abs(values), 0.95)) if len(values) else 0.0
 
 
 def _intended(shifts: Shifts, walls: Walls) -> FloatArray:
-    """(n,) m, the shift that was asked for at each station."""
+    """(n,) m, the requested shift at each station."""
     intended = np.zeros(len(walls.row))
     for row, some in _by_row(walls):
         intended[some] = m_from_mm(np.interp(walls.share[some], *shifts[row])) if row in shifts else 0.0
@@ -341,7 +341,7 @@ def _intended(shifts: Shifts, walls: Walls) -> FloatArray:
 
 
 def _spoilt(before: Walls, after: Walls, moves: Moves) -> set[int]:
-    """Rows of walls whose error grew, in its mean size or its rms, along the wall and summed up over its length.
+    """Rows of walls whose error grew, in mean size or rms, along the wall and in total over its length.
 
     One that is new counts against the worst there was. A move is a wall; moves shorter than `SHORT` that follow each
     other, as chords do, are one together.
@@ -352,7 +352,7 @@ def _spoilt(before: Walls, after: Walls, moves: Moves) -> set[int]:
     worse, made = np.zeros(now["length"].shape, dtype=bool), was["length"] > 0.0
     for name in ("size", "rms"):
         base = np.where(made, was[name], np.nanmax(was[name]))
-        # A line that now makes less of a wall than before may have lost the better part of it.
+        # A line that makes less of the wall than before may have lost the part with the smaller error.
         whole = now[name] * now["length"] > (base + SAME) * was["length"]
         worse |= (now[name] - base > SAME) & whole
     spoilt: BoolArray = np.asarray(worse.any(axis=1))[wall[before.row]]

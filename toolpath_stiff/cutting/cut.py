@@ -1,4 +1,4 @@
-"""A cut along a program: engagement, forces, what gives way, and the error of the surface that is left."""
+"""A cut along a program: engagement, forces, deflections, and the resulting surface error."""
 
 import math
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.coefficients import Coefficients
-from toolpath_stiff.cutting.cutters import Cutter, radii_of
+from toolpath_stiff.cutting.cutters import Cutter, of_tools
 from toolpath_stiff.cutting.engagement import engage
 from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
@@ -17,7 +17,6 @@ from toolpath_stiff.cutting.passes import walls_of_all_passes
 from toolpath_stiff.cutting.patches import Contact, Patches, of_stations
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
 from toolpath_stiff.cutting.stations import samples_seen
-from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
 from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
@@ -35,10 +34,10 @@ from toolpath_stiff.units import per_min_from_rad_per_s
 BLOCK = 16_384  # stations at a time
 KEPT = np.float32  # precision of results
 MOST_NAMED = 5  # lines in a warning
-THIN = 0.1  # of the width of cut: an error of more changes what is cut
-OTHER = 0.1  # of the error of a wall: where a pass has less of it by itself, most is of an earlier one
+THIN = 0.1  # of the width of cut: a larger error changes the engagement
+OTHER = 0.1  # of a wall's error: if the pass itself makes less, most comes from an earlier pass
 ROUNDED = 1e-12  # of a cosine
-# What samples with the same contact have alike.
+# Results shared by samples with the same contact.
 SHARED = ("ap", "ae", "entry", "exit", "mean_force", "peak_force", "deflection", "wall_force", "errors", "lowest",
           "highest", "deviation", "wall_profiles")  # fmt: skip
 SAME_WALL = 1e-6  # m, ranges of height closer than this are one
@@ -46,7 +45,7 @@ SAME_WALL = 1e-6  # m, ranges of height closer than this are one
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Cut:
-    """What is cut at n samples of a program, and the error of the surface that they leave. SI.
+    """The cut at n samples of a program, and the error of the surface it leaves. SI.
 
     Vectors are in the station's frame: x along the horizontal feed, y to its left, z up; forces act on the tool. Errors
     count out of the part: + material is left, - it is cut too deep. nan: there is no such thing at that sample. Results
@@ -105,37 +104,22 @@ class Cut:
     warnings: tuple[str, ...]
 
     @property
-    def stock(self) -> Stock:
-        """The stock before the first cut."""
-        return self.work.stock
-
-    @property
     def wall_mean(self) -> FloatArray:
         """(n, 2) m, error of the left and right wall, mean over the height."""
         return self.errors[:, :2]
 
     @property
-    def wall_low(self) -> FloatArray:
-        """(n, 2) m, its smallest value over the height."""
-        return self.lowest[:, :2]
-
-    @property
-    def wall_high(self) -> FloatArray:
-        """(n, 2) m, its largest."""
-        return self.highest[:, :2]
-
-    @property
     def turning(self) -> BoolArray:
-        """(n,) whether a tool turns on its way and cuts: no error of what it makes is foretold."""
+        """(n,) True where a tool cuts while it changes its orientation: no surface error is predicted there."""
         return np.asarray(self.samples.cutting & (self.work.tilts[self.samples.move] == TURNING))
 
     @property
     def machine_only(self) -> bool:
-        """Whether a tool's own compliance is not known, so that the errors are too small."""
+        """True if the compliance of a tool itself is unknown, so that the errors are too small."""
         return any(np.isnan(cutter.lateral_compliance) for cutter in self.cutters.values())
 
     def lines_warning(self, rows: BoolArray, words: str) -> list[str]:
-        """A sentence that names the lines of some samples (n,), and what of them; none of none."""
+        """A sentence that names the lines of the chosen samples (n,) and the problem; [] without samples."""
         lines = np.unique(self.samples.line[rows]).tolist()
         if not lines:
             return []
@@ -183,12 +167,12 @@ def evaluate_cut(
     stock = stock_of(setup, program, cutters)
     try:
         engaged = engage(stages_of(stock, program.moves, cutters, orient), program.moves, samples, cutters, progress)
-    except ProgramError as error:  # which knows no file
+    except ProgramError as error:  # this error knows no file
         raise error.in_line(program.name, error.line or 0) from None
     work = engaged.work
     tilt, seen = samples_seen(work, samples)
     walls, own = walls_of_passes(work, tilt, seen, cutters)
-    # Samples that share a contact are computed once, but where their walls differ.
+    # Samples that share a contact are computed once, unless their walls differ.
     source = engaged.source.copy()
     apart = ~np.isclose(walls, walls[source], rtol=0.0, atol=SAME_WALL, equal_nan=True).all(axis=(1, 2))
     source[apart] = np.flatnonzero(apart)
@@ -223,16 +207,14 @@ def evaluate_cut(
 
 
 def _feed_per_tooth(samples: Samples, cutters: Mapping[int, Cutter], spindle: FloatArray) -> FloatArray:
-    """(n,) m; nan where nothing turns or cuts."""
-    teeth = np.ones(len(samples))
-    for number, cutter in cutters.items():
-        teeth[samples.tool == number] = cutter.flutes
+    """(n,) m; nan where the spindle is stopped or nothing cuts."""
+    teeth = of_tools(cutters, samples.tool, "flutes", 1.0)
     per_second = np.where(samples.cutting & (np.abs(spindle) > 0.0), teeth * np.abs(spindle) / (2.0 * np.pi), np.nan)
     return np.asarray(samples.feed / per_second)
 
 
 def _along_teeth(samples: Samples, moves: Moves, feed: FloatArray) -> Samples:
-    """Samples with the direction of feed over a tooth's feed, where moves are shorter: rounding turns short chords."""
+    """Samples with the feed direction taken over one tooth's feed if moves are shorter: rounding turns short chords."""
     rows = np.flatnonzero(samples.cutting & (move_lengths(moves)[samples.move] < feed))
     ends = (samples.s[rows] + side * feed[rows] for side in (0.5, -0.5))
     after, before = ([np.interp(path, samples.s, axis) for axis in samples.position.T] for path in ends)
@@ -245,7 +227,7 @@ def _along_teeth(samples: Samples, moves: Moves, feed: FloatArray) -> Samples:
 def _nothing_cut(
     samples: Samples, cutters: Mapping[int, Cutter], work: Workpiece, coefficients: Coefficients, feed: FloatArray
 ) -> Cut:
-    """A cut to be filled in."""
+    """A cut without results, to be filled in."""
 
     def column(value: float, *shape: int) -> AnyArray:
         return np.full((len(samples), *shape), value, KEPT)
@@ -268,7 +250,7 @@ def _nothing_cut(
 
 
 def _note_engagement(cut: Cut, patches: Patches) -> None:
-    """Enter depth, width and angles from all patches of each station."""
+    """Enter depth, width and angles of engagement from all patches of each station."""
     if not len(patches.station):
         return
     first = np.flatnonzero(np.diff(patches.station, prepend=-1))
@@ -280,7 +262,7 @@ def _note_engagement(cut: Cut, patches: Patches) -> None:
     ahead = np.minimum(patches.entry, np.pi), np.minimum(patches.exit, np.pi)
     left, right = (np.cos(angle) for angle in ahead)
     widths = np.maximum.reduceat(left, first) - np.minimum.reduceat(right, first)
-    cut.ae[rows] = radii_of(cut.cutters, cut.samples.tool[rows]) * widths
+    cut.ae[rows] = of_tools(cut.cutters, cut.samples.tool[rows], "radius") * widths
 
 
 def _evaluate(
@@ -291,7 +273,7 @@ def _evaluate(
     strips: FloatArray,
     rows: IntArray,
 ) -> None:
-    """Enter forces, deflections and errors of some samples (m,) with their contact; `strips`: of floor (n, 2)."""
+    """Enter forces, deflections and errors of samples `rows` (m,) with their contact; `strips` (n, 2): of floor."""
     samples = cut.samples.take(rows)
     mean = mean_force(contact)
     cut.mean_force[rows], cut.peak_force[rows] = mean, peak_force(contact)
@@ -304,7 +286,7 @@ def _evaluate(
     cut.wall_profiles[rows] = walls
     _enter(cut, rows, slice(0, 2), walls @ shares()[1], walls)
     _enter(cut, rows, slice(2, 3), floors.mean(axis=1)[:, None], floors[:, None])
-    # Of the machine as a share of the compliance that acts along the normal.
+    # Deviation of the machine as a share of the compliance along the normal.
     compliance = whole[:, (1, 1, 2), (1, 1, 2)]
     share = machine_deviation(model, samples, origin, axes, mean, machine)[:, (0, 0, 1)] / compliance
     of_coefficients = np.concatenate([of_walls, of_floors[:, None]], axis=1)
@@ -312,7 +294,7 @@ def _evaluate(
 
 
 def _with_walls_of_all_passes(cut: Cut, seen: Samples, tilt: IntArray, own: FloatArray, step: float) -> Cut:
-    """The cut with each wall at the pass that owns it; samples as seen by tilts (n,), `own` as `Cut.wall_heights`."""
+    """The cut with each wall at the pass that owns it; samples in frames of tilts (n,); `own` as `Cut.wall_heights`."""
     walls_of_all_passes(seen, tilt, cut.cutters, cut.wall_heights, own, cut.wall_profiles, step)
     before, deviation = np.abs(cut.wall_mean), cut.deviation[:, :2].copy()
     share = deviation / np.where(before > 0.0, before, np.nan)  # the coefficients scatter all errors alike
@@ -332,9 +314,9 @@ def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: 
 
 
 def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str, ...]:
-    """All that was assumed, a sentence each."""
+    """All assumptions made, one sentence each."""
     sentences = [
-        f"stock: {cut.stock.origin}",
+        f"stock: {cut.work.stock.origin}",
         f"coefficients of {cut.coefficients.material}: {cut.coefficients.origin}",
     ]
     sentences += [sentence for cutter in cut.cutters.values() for sentence in cutter.origin]
@@ -353,7 +335,7 @@ def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str,
 
 
 def _warnings(cut: Cut, struck: BoolArray) -> tuple[str, ...]:
-    """What deserves a look, a sentence each."""
+    """Warnings for the user, one sentence each."""
     samples, warnings = cut.samples, []
     if cut.machine_only:
         numbers = [f"T{number}" for number, cutter in cut.cutters.items() if np.isnan(cutter.lateral_compliance)]
@@ -369,10 +351,10 @@ def _warnings(cut: Cut, struck: BoolArray) -> tuple[str, ...]:
     on_the_spot = cut.turning & ~samples.tangent.any(axis=1)
     large = (np.abs(np.nan_to_num(cut.wall_mean)).max(axis=1) > THIN * cut.ae) & (cut.ae > 0.0)
     for rows, words in (
-        (large, f"walls off by over {THIN:g} of the width of cut, foretold too large: the chip is not thinner for it"),
+        (large, f"walls off by over {THIN:g} of the width of cut, predicted too large: the chip is not thinner for it"),
         (struck, "rapids run into material, which counts as still there afterwards"),
         (plunges, "plunges: cutting with the end is not modelled, no force is known there"),
-        (cut.turning & ~on_the_spot, "the tool turns on its way: no error of the surface is foretold there"),
+        (cut.turning & ~on_the_spot, "the tool turns on its way: no error of the surface is predicted there"),
         (on_the_spot, "the tool turns on the spot: it takes off what it meets, no force is known there"),
     ):  # fmt: skip
         warnings += cut.lines_warning(rows, words)

@@ -1,4 +1,4 @@
-"""The cutters of a program: geometry, teeth, and how far the tool itself gives way; from tool tables and `cut.toml`."""
+"""Cutters of a program: geometry, teeth, and the tool's own compliance; from tool tables and `cut.toml`."""
 
 import math
 from collections.abc import Mapping
@@ -68,17 +68,22 @@ class Cutter:
         """m, half of the diameter."""
         return self.diameter / 2.0
 
+    @property
+    def flat(self) -> float:
+        """m, radius of the flat part of its end."""
+        return self.radius - self.corner_radius
 
-def radii_of(cutters: Mapping[int, Cutter], tools: IntArray) -> FloatArray:
-    """(n,) m, radius of the cutter of each tool number (n,); 0 of one that does not cut."""
-    radii = np.zeros(len(tools))
+
+def of_tools(cutters: Mapping[int, Cutter], tools: IntArray, name: str, without: float = 0.0) -> FloatArray:
+    """(n,) attribute of the cutter of each tool number (n,); `without` for tools that do not cut."""
+    values = np.full(len(tools), without)
     for number, cutter in cutters.items():
-        radii[tools == number] = cutter.radius
-    return radii
+        values[tools == number] = getattr(cutter, name)
+    return values
 
 
 def merged_tool(table: ToolEntry, further: ToolEntry) -> ToolEntry:
-    """A tool of the tool table with what `cut.toml` says of it, which wins."""
+    """A tool of the tool table, overridden by its values in `cut.toml`."""
     known = {name: getattr(further, name) for name in ("length", "diameter", "stick_out")}
     known = {name: value for name, value in known.items() if not math.isnan(value)}
     words = {name: getattr(further, name) or getattr(table, name) for name in ("remark", "material")}
@@ -86,7 +91,7 @@ def merged_tool(table: ToolEntry, further: ToolEntry) -> ToolEntry:
 
 
 def cutter_of(tool: ToolEntry) -> Cutter:
-    """The cutter of a tool. Raises `InputError` where it is not known well enough; names what is missing."""
+    """The cutter of a tool. Raises `InputError` that names missing data."""
     name = f"tool {tool.number}"
     given: dict[str, float] = {"diameter_mm": tool.diameter, "stick_out_mm": tool.stick_out, **tool.cutter}
     given = {key: value for key, value in given.items() if not math.isnan(value)}
@@ -122,7 +127,7 @@ def cutter_of(tool: ToolEntry) -> Cutter:
 
 
 def _beam(given: Mapping[str, float], material: str) -> tuple[float, float, str]:
-    """Compliances of the tool's own beam across and along, m/N, and where they come from; nan: not known.
+    """Lateral and axial compliance of the tool as a beam, m/N, and their source; nan: unknown.
 
     A cantilever of the core's diameter: L^3 / 3EI across and L / EA along (Timoshenko, Strength of Materials).
     """
@@ -134,12 +139,9 @@ def _beam(given: Mapping[str, float], material: str) -> tuple[float, float, str]
     assumed = []
     if "core_mm" not in given:
         assumed.append(f"a core of {CORE_SHARE:g} of the diameter")
+    modulus = given.get("modulus_GPa", MODULI.get(material.lower(), MODULI["carbide"]))
     if "modulus_GPa" not in given:
-        known = material.lower() in MODULI
-        modulus = MODULI[material.lower()] if known else MODULI["carbide"]
-        assumed.append(f"{modulus:g} GPa{'' if known else ' (carbide)'}")
-    else:
-        modulus = given["modulus_GPa"]
+        assumed.append(f"{modulus:g} GPa{'' if material.lower() in MODULI else ' (carbide)'}")
     core = m_from_mm(given.get("core_mm", CORE_SHARE * given["diameter_mm"]))
     length, stress = m_from_mm(given["stick_out_mm"]), pa_from_gpa(modulus)
     lateral = length**3 / (3.0 * stress * math.pi * core**4 / 64.0)

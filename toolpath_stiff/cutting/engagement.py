@@ -1,4 +1,4 @@
-"""Engagement: where the cutter's envelope meets what stands before it, and how much it takes.
+"""Engagement: contact of the cutter's envelope with the stock before it, and the volume removed.
 
 Tested on rings around the envelope, one for each layer of height: a point of the front (where the motion has a part
 along the outward normal) is in the material if this stands above it after all pieces before the station's. Where that
@@ -31,11 +31,11 @@ from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.results import Progress, counter
 
-AROUND = 33  # points of a ring, denser at the sides, where a light cut is
+AROUND = 33  # points of a ring, denser at the sides, where light cuts are
 LEVELS, PARTS = 12, 3  # layers of the cylinder; parts of each where the work has not levels alone
-CORNER_LAYERS, LOW, FEWER = 10, 0.8, 2.0  # of a corner or ball; so many fewer where it is in contact up to such a kappa
-COARSE = 3  # rings that look how high a corner or ball cuts
-END_POINTS = 200  # of the end of a cutter that descends
+CORNER_LAYERS, LOW, FEWER = 10, 0.8, 2.0  # of a corner or ball; by FEWER less if its contact ends at a kappa of LOW
+COARSE = 3  # rings for finding the height up to which a corner or ball cuts
+END_POINTS = 200  # on the end of a descending cutter
 HALVINGS = 14, 7  # of up to 9 degrees: 1e-5 rad; of up to 18 degrees round a corner or a ball: 2.5e-3 rad
 # Stations that share a contact: turn, rad, and tilt of the feed from one to the next; relative difference of rate and
 # size of the contacts at the ends of a stretch, which has so many radii at most; stations that it may have.
@@ -44,7 +44,7 @@ NARROW = 1e-4  # rad, arcs below are rounding
 PLATEAU = 1e-6  # m: heights closer than this are a level
 # Relative change of the rate of removal between two stations that is looked into, and the steps for it in radii: the
 # rate begins as a root where a cutter enters.
-SMALL = 1e-4  # cubes of the radius, volumes that are not looked into
+SMALL = 1e-4  # cubes of the radius; smaller volumes are not refined
 STEPS = ((0.1, 0.05), (0.2, 0.01), (0.2, 0.002))
 
 NO_PATCHES = Patches(np.zeros(0, dtype=np.int64), *[np.zeros(0)] * 4)
@@ -53,7 +53,7 @@ SIDES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, AROUND))  # shares of a ring
 
 @dataclass(frozen=True)
 class Engagement:
-    """What n samples cut.
+    """Engagement at n samples: contact and volume removed.
 
     Attributes
     ----------
@@ -83,13 +83,13 @@ def engage(
     cutters: Mapping[int, Cutter],
     progress: Progress | None = None,
 ) -> Engagement:
-    """The engagement of samples; `stages` as of `workpiece.stages_of` the moves, `cutters` by number of the tool.
+    """The engagement of samples; `stages` as from `workpiece.stages_of` for the moves, `cutters` by tool number.
 
     A rapid whose tool turns on the way is not looked at.
     """
     count, parts, tell = len(samples), [NO_PATCHES], counter(progress, "engagement")
     source, removed, struck = np.arange(count), np.zeros(count), np.zeros(count, dtype=bool)
-    regime = np.zeros(count, dtype=np.int64)  # changes of what forces hang on besides the path
+    regime = np.zeros(count, dtype=np.int64)  # changes of other quantities on which forces depend
     for column in (samples.tool, samples.feed, samples.spindle):
         regime[1:] += np.nan_to_num(column[1:]) != np.nan_to_num(column[:-1])
     regime, begin = np.cumsum(regime), 0
@@ -121,7 +121,7 @@ def engage(
 
 
 def _placed(moves: Moves, samples: Samples) -> float:
-    """M of path from where on the program has said where the tool is, in all three axes."""
+    """Path length (m) up to which the program has not yet stated the tool's position in all three axes."""
     named = moves.end[:, :3] != moves.start[:, :3]
     return float(samples.s[samples.move <= named.argmax(axis=0).max()].max(initial=0.0))
 
@@ -134,7 +134,7 @@ def _volumes(
     joined: BoolArray,
     level: int = 0,
 ) -> FloatArray:
-    """(n - 1,) m3 between n stations, where `joined` (n - 1,); in ever finer steps where the rate changes."""
+    """(n - 1,) m3 between n stations, where `joined` (n - 1,); with finer steps where the rate changes."""
     length = np.where(joined, np.diff(stations["path"]), 0.0)
     volume = 0.5 * length * (rate[1:] + rate[:-1])
     if level == len(STEPS):
@@ -157,7 +157,7 @@ def _volumes(
 
 
 def _contact_along(work: Workpiece, stations: AnyArray, regime: IntArray) -> tuple[Patches, IntArray, FloatArray]:
-    """`_contact` of stations in the order of the path, where it changes, and (n,) the station that each shares it with.
+    """Contact of stations along the path, computed where it changes, and (n,) the station whose contact each shares.
 
     At every 32nd station, then between those that differ, up to every one. The end of a move and the start of the
     next, which goes on as that ended, count as one.
@@ -193,7 +193,7 @@ def _contact_along(work: Workpiece, stations: AnyArray, regime: IntArray) -> tup
 
 
 def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
-    """Patches of stations, numbered from 0, and (n,) m2 the volume that each removes per length of path."""
+    """Patches of stations, numbered from 0, and (n,) m2, volume removed per path length by each."""
     rate = _end_area(work, stations)
     corner = stations["reach"] - stations["flat"]
     rows = np.flatnonzero(~stations["end_alone"])
@@ -214,7 +214,7 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
         height, span = 0.5 * (low + high), own["reach"] - own["flat"]
         angle = np.arccos(np.clip(1.0 - height / np.where(span > 0.0, span, height), 0.0, 1.0))  # to the axis
         radius = own["flat"] + span * np.sin(angle) - TOUCH
-        back = np.zeros(len(row))  # where the front of a cutter that descends reaches behind the sides
+        back = np.zeros(len(row))  # angle by which a descending cutter's front reaches behind the sides
         if round_part:
             steep = own["down"] / np.maximum(own["level"], 1e-12) / np.maximum(np.tan(angle), 1e-12)
             back = np.arcsin(np.clip(steep, -1.0, 1.0))
@@ -223,7 +223,7 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
         else:
             ring = np.broadcast_to(np.pi * SIDES, (len(row), AROUND))
             inside = (beside[0][row] > height[:, None]) & (beside[1][row] < height[:, None])
-            if work.tilted:  # there may be gaps between
+            if work.tilted:  # there may be gaps in the material
                 inside = _cuts(work, own, radius[:, None], ring, height[:, None])
         which, entry, exit_ = _arcs(work, own, radius, height, ring, inside, HALVINGS[round_part])
         parts.append(Patches(some[row][which], low[which], high[which], entry, exit_))
@@ -233,7 +233,7 @@ def _contact(work: Workpiece, stations: AnyArray) -> tuple[Patches, FloatArray]:
 
 
 def _cuts(work: Workpiece, stations: AnyArray, radius: FloatArray, angle: FloatArray, height: FloatArray) -> BoolArray:
-    """Whether material stands above points of the envelope."""
+    """True where material stands above points of the envelope."""
     x, y, tilt, window = around(stations, radius, angle)
     shape = np.broadcast_shapes(radius.shape, angle.shape)
     z = height + stations["z"].reshape((-1,) + (1,) * (len(shape) - 1))
@@ -248,7 +248,7 @@ def _heights_around(
     ceiling: FloatArray | float,
     enough: FloatArray | float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Top and underside of the material before each station, m above the tip; points as `points_around`.
+    """Top and underside of the material around each station, m above the tip; points as in `points_around`.
 
     `ceiling` and `enough`, m above the tip, are the ends of `Workpiece.span`.
     """
@@ -261,7 +261,7 @@ def _heights_around(
 
 
 def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatArray:
-    """(n,) rad between axis and normal, up to where a corner or a ball is in contact: narrowed down twice."""
+    """(n,) rad between tool axis and normal up to which a corner or a ball is in contact; refined twice."""
     reached, span = np.full(len(stations), 0.5 * np.pi), corner[:, None, None]
     for _ in range(2 if len(stations) else 0):
         rings = reached[:, None, None] * np.linspace(0.0, 1.0, COARSE + 1)[1:, None]
@@ -276,7 +276,7 @@ def _reached(work: Workpiece, stations: AnyArray, corner: FloatArray) -> FloatAr
 
 
 def _levels(around: tuple[FloatArray, FloatArray], corner: FloatArray, longest: FloatArray, parts: int) -> FloatArray:
-    """(n, LEVELS * parts + 1) m above the tip, borders of layers in which heights (n, k) around the cylinder are alike.
+    """(n, LEVELS * parts + 1) m above the tip, borders of layers in which heights (n, k) around the cylinder are equal.
 
     From the corner or the underside of the stock: all, or evenly many of more.
     """
@@ -309,7 +309,7 @@ def _arcs(
     inside: BoolArray,
     halvings: int,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Row, entry and exit of each arc in the material, in [0, 2 pi]; its ends by halving between points of the ring."""
+    """Row, entry and exit of each arc in the material, in [0, 2 pi]; ends bisected between points of the ring."""
     padded = np.pad(inside, ((0, 0), (1, 1)))
     row, start = np.nonzero(padded[:, 1:-1] & ~padded[:, :-2])
     stop = np.nonzero(padded[:, 1:-1] & ~padded[:, 2:])[1]
@@ -318,7 +318,7 @@ def _arcs(
     entry, exit_ = np.split(_ends(work, stations[both], radius[both], height[both], bracket, halvings), 2)
     wide = exit_ - entry > NARROW
     row, entry, exit_ = row[wide], entry[wide], exit_[wide]
-    # Behind the left side: an arc across 0 is two.
+    # Behind the left side: an arc across 0 becomes two arcs.
     across = np.flatnonzero(entry < 0.0)
     row = np.concatenate([row, row[across]])
     behind = np.minimum(exit_[across], 0.0) + 2.0 * np.pi
@@ -332,7 +332,7 @@ def _arcs(
 def _ends(
     work: Workpiece, stations: AnyArray, radius: FloatArray, height: FloatArray, bracket: FloatArray, halvings: int
 ) -> FloatArray:
-    """(k,) rad, where a ring leaves the material in a bracket (2, k) from outside to within; equal: the ring's end."""
+    """(k,) rad where a ring leaves the material in a bracket (2, k) from outside to inside; equal: the ring's end."""
     ends: FloatArray = bracket[1].copy()
     moving = np.flatnonzero(bracket[0] != bracket[1])
     some, r, z, (a, b) = stations[moving], radius[moving], height[moving], bracket[:, moving]
@@ -345,7 +345,7 @@ def _ends(
 
 
 def _rates(stations: AnyArray, patches: Patches) -> FloatArray:
-    """(p,) m2 of each patch: the motion along the normal, over its area (r dz / sin kappa dphi)."""
+    """(p,) m2 of each patch: the motion along the normal, integrated over its area (r dz / sin kappa dphi)."""
     corner = stations["reach"] - stations["flat"]
     safe = np.where(corner > 0.0, corner, 1.0)
     rounded = patches.low < corner
@@ -365,7 +365,7 @@ def _rates(stations: AnyArray, patches: Patches) -> FloatArray:
 
 
 def _end_area(work: Workpiece, stations: AnyArray) -> FloatArray:
-    """(n,) m2 that the flat end of a cutter which descends removes per length; of a plunge or a rapid all of its end.
+    """(n,) m2 removed per path length by the flat end of a descending cutter; for a plunge or a rapid by its whole end.
 
     Counted over a spiral of even points (Vogel 1979), which turns along the path: its errors cancel.
     """

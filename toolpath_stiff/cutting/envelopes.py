@@ -1,4 +1,4 @@
-r"""The height that a piece of the path leaves above a point, and the least over many pieces, on arrays or compiled.
+r"""Height that a piece of the path leaves above a point, and the least over many pieces, on arrays or compiled.
 
 The surface that a piece leaves above a point is the lowest height of the cutter's envelope while its axis passes:
 z0 + m s + p(d(s)) least over s, where p is the profile of the cutter's end, d(s) the distance of the point from the
@@ -17,15 +17,15 @@ import numpy as np
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
 
 CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
-ROUNDED = 1e-12  # m: what a cutter touches to this it does not take, in whatever frame
+ROUNDED = 1e-12  # m: a contact shallower than this removes nothing, in any frame
 NEWTON = 8  # steps: heights to 1e-9 m
-FLATTEST = 1e-6  # slope; the heights of less differ by less than a nanometre
+FLATTEST = 1e-6  # slope; smaller ones change heights by less than a nanometre
 Index = tuple[IntArray, IntArray, IntArray, FloatArray]
 Grid = tuple[FloatArray, float, tuple[int, int]]  # corner (3,) and size of cells, m; cells along y and z
 
 
 def foot(part: AnyArray, x: FloatArray, y: FloatArray, arc: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Place along the whole line or circle of a piece that is nearest to a point, distance from there, and one more.
+    """Place on the whole line or circle of a piece nearest to a point, the distance to it, and a third value.
 
     This is the square of the unit of the place, m2, at the point; of lines 0.
     """
@@ -39,19 +39,19 @@ def foot(part: AnyArray, x: FloatArray, y: FloatArray, arc: bool) -> tuple[Float
 
 
 def within(along: FloatArray, extent: FloatArray) -> FloatArray:
-    """The place on a piece that is nearest to one along its whole line or circle."""
+    """The place on a piece nearest to a place on its whole line or circle."""
     return np.minimum(np.maximum(along, 0.0), extent)
 
 
 def distance(beside: FloatArray, away: FloatArray, spoke: FloatArray, arc: bool) -> FloatArray:
-    """M from a point to the axis at a place so far `away` from the point's foot."""
+    """Distance (m) from a point to the tool axis at a place that is `away` from the point's foot."""
     across = 4.0 * spoke * np.sin(0.5 * away) ** 2 if arc else away**2
     whole: FloatArray = np.sqrt(beside**2 + across)
     return whole
 
 
 def rise(reach: FloatArray, flat: FloatArray, beside: FloatArray) -> FloatArray:
-    """M, height of the cutter's end above its tip at a distance from the axis of up to its radius."""
+    """Height (m) of the cutter's end above its tip at a distance from the axis of up to its radius."""
     corner, inset = reach - flat, np.maximum(beside - flat, 0.0)
     height: FloatArray = corner - np.sqrt(np.maximum(corner * corner - inset * inset, 0.0))
     return height
@@ -60,7 +60,7 @@ def rise(reach: FloatArray, flat: FloatArray, beside: FloatArray) -> FloatArray:
 def down_slope(
     slope: FloatArray, beside: FloatArray, reach: FloatArray, flat: FloatArray, bull: bool = True
 ) -> FloatArray:
-    """M, how far down a slope (above 0) from the nearest point the envelope is lowest, `beside` at most the radius.
+    """Distance (m) down a slope (> 0) from the nearest point to the envelope's lowest; `beside` at most the radius.
 
     kappa, between axis and normal, solves (a + r sin kappa)^2 (1 - m^2 cot^2 kappa) = d^2: cos^2 of it by Newton's
     rule, from a start that is right for a flat end and for a ball.
@@ -80,13 +80,13 @@ def down_slope(
 def height_above(
     part: AnyArray, along: FloatArray, beside: FloatArray, spoke: FloatArray, arc: bool, sloped: bool, bull: bool = True
 ) -> FloatArray:
-    """M, lowest height of the cutter's envelope above a point within its reach, whose foot this is."""
+    """Lowest height (m) of the cutter's envelope above a point within its reach, given the point's foot."""
     place = along
     if sloped:
         unit = np.sqrt(spoke) if arc else 1.0 + 0.0 * along
         down = down_slope(np.abs(part["slope"]) / unit, beside, part["reach"], part["flat"], bull) / unit
         if arc:
-            down = 2.0 * np.arcsin(np.minimum(0.5 * down, 1.0))  # along the circle, whose chord this is
+            down = 2.0 * np.arcsin(np.minimum(0.5 * down, 1.0))  # from chord to arc length
         place = along - np.sign(part["slope"]) * down
     place = within(place, part["extent"])
     from_axis = np.minimum(distance(beside, place - along, spoke, arc), part["reach"])
@@ -96,7 +96,7 @@ def height_above(
 def bounds(
     part: AnyArray, x: FloatArray, y: FloatArray, half: float, arc: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """M from a piece to the middle of a cell of diagonal 2 `half`; what it leaves there is between the others."""
+    """Distance (m) of a piece from a cell's middle (diagonal 2 `half`), lower and upper bound of height left there."""
     along, beside, spoke = foot(part, x, y, arc)
     place, reach, flat = within(along, part["extent"]), part["reach"], part["flat"]
     far = distance(beside, place - along, spoke, arc)
@@ -113,7 +113,7 @@ def bound_pairs(pieces: AnyArray, piece: IntArray, x: FloatArray, y: FloatArray,
 
 
 def first_from(piece: IntArray, low: int, high: int, value: int) -> int:
-    """First of the entries low to high whose piece is no less than the value."""
+    """First of the entries from low to high whose piece is not below the value."""
     while low < high:
         middle = (low + high) // 2
         if piece[middle] < value:
@@ -133,7 +133,7 @@ def lower(
     result: tuple[FloatArray, IntArray],
     enough: FloatArray,
 ) -> None:
-    """Lower the tops and set the owners of points in `result`, as `Workpiece.lowest` has them.
+    """Lower the tops and set the owners of points in `result`, as defined by `Workpiece.lowest`.
 
     The tops come as those of the stock, or lower: what is above them is not looked at. A height below `enough` ends
     the search.
@@ -188,7 +188,7 @@ def lower(
 
 @cache
 def compiled() -> tuple[Callable[..., None], Callable[..., None]]:
-    """`bound_pairs` and `lower`, compiled; kept on disk where a folder can be written. numba takes half a second."""
+    """`bound_pairs` and `lower`, compiled; cached on disk if possible. Importing numba takes half a second."""
     import numba
 
     for formula in (within, foot, distance, rise, down_slope, height_above, bounds, first_from):

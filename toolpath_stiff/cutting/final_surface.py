@@ -1,4 +1,4 @@
-"""What stays in the finished part: which stations make its walls, its floors and scallops; its heights, with owners."""
+"""Surface of the finished part: the stations that make its walls, floors and scallops; its heights, with owners."""
 
 from collections.abc import Iterator, Mapping
 
@@ -17,7 +17,7 @@ BESIDE = 2e-6  # m, outside of a wall, where it must stand; and how far above th
 COLUMNS, DEEP = 32, 1e9  # of cells at a time; m, below everything
 MADE = 5.0  # times that, along a tool, within which the piece lies that made a surface
 TOUCHED = 2e-7  # m, within which a later pass touches a surface, and makes it: less than any surface error
-LATER = 0.1  # radii of the cutter along the path from where on a pass is another one
+LATER = 0.1  # radii of the cutter along the path, beyond which a pass is another one
 ACROSS = 41  # points across the cutter's end
 # Radii of a ball, above the finished surface: where the nearest of these points may lie beside a narrow scallop,
 # (pi / 80)^2 / 2.
@@ -27,7 +27,7 @@ SCALLOP = 8e-4
 def walls_of_passes(
     work: Workpiece, tilt: IntArray, samples: Samples, cutters: Mapping[int, Cutter]
 ) -> tuple[FloatArray, FloatArray]:
-    """(n, 2, 2) m above the tip: lowest and highest point of the wall that a sample makes on its left and right.
+    """(n, 2, 2) m above the tip: lowest and highest point of the walls that a sample makes, left and right.
 
     Samples and their tilts (n,) as `stations.samples_seen`.
 
@@ -67,7 +67,7 @@ def final_strip(
     for rows, stations in _blocks(work, tilt, samples, cutters, chosen):
         offset = stations["reach"][:, None] * np.sin(np.linspace(-0.5, 0.5, ACROSS) * np.pi)[None, :]
         reach, flat = stations["reach"][:, None], stations["flat"][:, None]
-        # On a slope the envelope leaves a point behind the tip, or before it, where its normal is square to the motion.
+        # On a slope the envelope leaves a point behind or ahead of the tip, where its normal is square to the motion.
         slope = stations["down"] / np.maximum(stations["level"], 1e-12)
         back = down_slope(np.abs(slope)[:, None], np.abs(offset), reach, flat)
         back = np.where(slope == 0.0, 0.0, np.sign(slope))[:, None] * back
@@ -97,7 +97,7 @@ def final_strip(
 def finished_surface(
     work: Workpiece, samples: Samples, cell: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
-    """(nx,) and (ny,) m, the middles of cells; (nx, ny) m, height of the finished part there; the sample that made it.
+    """(nx,) and (ny,) m, centres of cells; (nx, ny) m, height of the finished part; (nx, ny) the sample that made it.
 
     -inf and -1: no material, or the wall of a tool that stood aslant; nothing cut.
     """
@@ -131,7 +131,7 @@ def finished_surface(
 def _blocks(
     work: Workpiece, tilt: IntArray, samples: Samples, cutters: Mapping[int, Cutter], chosen: BoolArray
 ) -> Iterator[tuple[IntArray, AnyArray]]:
-    """Of the samples chosen (n,) that cut and move, with a tool that stands still, some rows and their records."""
+    """Blocks of the chosen samples (n,) that cut and move with a tool of fixed orientation: rows and their records."""
     chosen = chosen & (work.tilts[samples.move] != TURNING) & (samples.motion != RAPID)
     moving = np.flatnonzero(chosen & (samples.tangent != 0.0).any(axis=1))
     yield from blocks_of_stations(work, samples, tilt, cutters, moving)

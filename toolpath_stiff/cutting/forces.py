@@ -1,4 +1,4 @@
-"""Forces on a cutter from where it touches the stock: at an angle of the spindle, their mean and peak over a turn.
+"""Forces on a cutter from its contact with the stock: at an angle of the spindle, mean and peak over a revolution.
 
 All is linear in the six coefficients (tangential, radial, axial; of the chip and of the edge): with `EACH` as sets of
 values forces come per coefficient. Along the cylinder of a cutter the integral over the height is one over the angle,
@@ -19,31 +19,51 @@ from toolpath_stiff.cutting.chips import chip_integrals, chip_pieces, flute_laws
 from toolpath_stiff.cutting.patches import TURN, Contact
 from toolpath_stiff.cutting.torus import torus_forces, torus_mean
 
-PEAK_STEPS = 24  # angles of a tooth's pitch among which the peak is looked for: within 1 % of it
-EACH = np.eye(6)  # sets of coefficients of which one is 1
+PEAK_STEPS = 18  # angles from an edge's first touch to its last among which the peak is looked for, besides bends
+EACH = np.eye(6)  # six sets of coefficients, each with a single 1
 
 
 def mean_force(contact: Contact) -> FloatArray:
-    """(n, 3) N on the tool, mean over a turn of the spindle."""
+    """(n, 3) N on the tool, mean over a revolution of the spindle."""
     force, values = np.zeros((len(contact.feed), 3)), contact.coefficients.values[:, None]
     for block, part in contact.blocks():
-        force[block] = _sideways(mean_forces_of_sets(part, values), part.turning)
+        force[block] = mean_forces_of_sets(part, values)[..., 0]
     return force
 
 
 def peak_force(contact: Contact) -> FloatArray:
-    """(n, 3) N on the tool: of each component the value of largest size in a turn."""
+    """(n, 3) N on the tool: for each component the value of largest size in a revolution."""
     cutter, values = contact.cutter, contact.coefficients.values[:, None]
     peaks = np.zeros((len(contact.feed), 3))
-    pitches = cutter.flutes if cutter.run_out else 1
-    steps = PEAK_STEPS * pitches
-    angle = TURN * pitches / cutter.flutes * np.arange(steps) / steps
+    flutes = TURN * np.arange(cutter.flutes if cutter.run_out else 1)[:, None] / cutter.flutes
     for block, part in contact.blocks():
-        force = forces_of_sets(part, np.broadcast_to(angle, (len(part.feed), steps)), values)
-        force = _sideways(force, part.turning[:, None])
+        angle = (_peak_angles(part)[:, None] + flutes).reshape(len(part.feed), -1)
+        force = forces_of_sets(part, angle, values)[..., 0]
         largest = np.abs(force).argmax(axis=1)
         peaks[block] = np.take_along_axis(force, largest[:, None], axis=1)[:, 0]
     return peaks
+
+
+def _peak_angles(contact: Contact) -> FloatArray:
+    """(n, 6 + PEAK_STEPS) rad of a flute: kinks of the force, and angles from its first contact to its last.
+
+    It bends where an end of an edge, or its corner's, passes entry or exit: the peak of a light cut is there.
+    """
+    patches = contact.seen_clockwise().patches
+    angles = np.zeros((len(contact.feed), 6 + PEAK_STEPS))
+    if len(patches.station):
+        first = np.flatnonzero(np.diff(patches.station, prepend=-1))
+        rows = patches.station[first]
+        low, entry = (np.minimum.reduceat(ends, first) for ends in (patches.low, patches.entry))
+        high, leave = (np.maximum.reduceat(ends, first) for ends in (patches.high, patches.exit))
+        heights = np.stack([low, np.clip(contact.cutter.corner_radius, low, high), high], axis=1)
+        ends = np.stack([entry, np.minimum(leave, np.pi)], axis=1)
+        bends = (contact.lag[rows, None, None] * heights[:, :, None] + ends[:, None]).reshape(-1, 6)
+        begin = bends.min(axis=1)
+        span = np.minimum(bends.max(axis=1) - begin, TURN / contact.cutter.flutes)
+        angles[rows, :6] = bends
+        angles[rows, 6:] = begin[:, None] + span[:, None] * (np.arange(PEAK_STEPS) + 0.5) / PEAK_STEPS
+    return angles
 
 
 def force_at(contact: Contact, angle: FloatArray) -> FloatArray:
@@ -51,28 +71,21 @@ def force_at(contact: Contact, angle: FloatArray) -> FloatArray:
 
     With a spindle that turns counter-clockwise the angles count counter-clockwise from the right of the feed.
     """
-    forces = forces_of_sets(contact, angle, contact.coefficients.values[:, None])
-    return _sideways(forces, contact.turning[:, None])
-
-
-def _sideways(force: FloatArray, turning: FloatArray) -> FloatArray:
-    """(..., 3) of forces (..., 3, 1) computed mirrored, in the stations' frame."""
-    force[..., 1, 0] *= turning
-    return force[..., 0]
+    return forces_of_sets(contact, angle, contact.coefficients.values[:, None])[..., 0]
 
 
 def forces_of_sets(contact: Contact, angle: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, a, 3, k) forces at angles (n, a) of k sets of coefficients, values (6, k).
-
-    Mirrored across the feed where the spindle turns counter-clockwise.
-    """
+    """(n, a, 3, k) forces at angles (n, a), as of `force_at`, of k sets of coefficients, values (6, k)."""
     seen = contact.seen_clockwise()
     force = _cylinder_forces(seen, angle, values)
-    return force + torus_forces(seen, angle, values) if contact.cutter.corner_radius else force
+    if contact.cutter.corner_radius:
+        force += torus_forces(seen, angle, values)
+    force[..., 1, :] *= contact.turning[:, None, None]
+    return force
 
 
 def mean_forces_of_sets(contact: Contact, values: FloatArray) -> FloatArray:
-    """(n, 3, k) mean forces over a turn of k sets of coefficients, values (6, k); mirrored as `forces_of_sets`."""
+    """(n, 3, k) mean forces over a revolution of k sets of coefficients, values (6, k)."""
     seen = contact.seen_clockwise()
     straight = seen.above(seen.cutter.corner_radius)
     rows, arcs = straight.station, np.stack([straight.entry, straight.exit], axis=1)
@@ -82,11 +95,14 @@ def mean_forces_of_sets(contact: Contact, values: FloatArray) -> FloatArray:
         moments += count * (integrals[..., 1:] - integrals[..., :1])
     moments *= ((straight.high - straight.low) / TURN)[:, None]
     force = _of_moments(_per_station(moments, rows, len(seen.feed)), seen.lag, values)[:, 0]
-    return force + torus_mean(seen, values) if seen.cutter.corner_radius else force
+    if seen.cutter.corner_radius:
+        force += torus_mean(seen, values)
+    force[:, 1] *= seen.turning[:, None]
+    return force
 
 
 def _cylinder_forces(contact: Contact, angle: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, a, 3, k) forces along the cylinder, of all flutes: integrals of the chip over the height of each patch."""
+    """(n, a, 3, k) forces on the cylinder, all flutes: integrals of the chip over the height of each patch."""
     patches, lag = contact.above(contact.cutter.corner_radius), contact.lag
     station, feed = patches.station, contact.feed[patches.station, 0]
     entry, leave = np.minimum(patches.entry, np.pi)[:, None], np.minimum(patches.exit, np.pi)[:, None]
@@ -117,7 +133,7 @@ def _per_station(values: FloatArray, station: IntArray, count: int) -> FloatArra
 
 
 def _of_moments(moments: FloatArray, lag: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, a, 3, k) forces of k sets of coefficients from integrals (6, n, a) of the chip along the cylinder.
+    """(n, a, 3, k) forces for k sets of coefficients from integrals (6, n, a) of the chip along the cylinder.
 
     A left-hand helix pushes where a right-hand one draws.
     """

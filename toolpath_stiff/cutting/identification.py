@@ -1,4 +1,4 @@
-"""Coefficients of the cutting force from mean forces of slots at several feeds, by least squares.
+"""Cutting force coefficients from mean forces in slots at several feeds, by least squares.
 
 Mean forces are linear in the coefficients (`forces.mean_forces_of_sets`; of a flat end mill the straight lines over
 the feed of Altintas, Manufacturing Automation, 2nd ed., section 2.8.1). Each direction of force has its own scatter.
@@ -17,11 +17,11 @@ from toolpath_stiff.errors import MeasurementError
 
 LEAST_SCATTER = 1e-6  # of the largest force: no dynamometer reads finer
 SURE = 0.975  # quantile of Student's t: intervals of 95 %
-SOUGHT = Coefficients(np.zeros(3), np.zeros(3), np.zeros((6, 6)))  # of which the taper alone is known
+SOUGHT = Coefficients(np.zeros(3), np.zeros(3), np.zeros((6, 6)), taper=0.0)  # no taper: straight lines over the feed
 
 
 def slot(cutter: Cutter, feed: float, depth: float, coefficients: Coefficients = SOUGHT) -> Contact:
-    """The contact in a slot of a depth (m) at a feed (m per tooth)."""
+    """The contact in a slot of given depth (m) at a feed (m per tooth)."""
     one = np.ones(1)
     patches = Patches(np.arange(1), 0.0 * one, depth * one, 0.0 * one, np.pi * one)
     return Contact(patches, cutter, coefficients, np.array([[feed, 0.0]]), one)
@@ -39,7 +39,7 @@ def slot_responses(cutter: Cutter, feed: FloatArray, depth: FloatArray, angle: F
 
 
 def least_squares(response: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """(6,) coefficients, (6, 6) covariance, (6,) those that the forces tell; what they do not tell is 0 +- `UNKNOWN`.
+    """(6,) coefficients, (6, 6) covariance, (6,) True if determined by the forces; the others are 0 +- `UNKNOWN`.
 
     Parameters
     ----------
@@ -57,10 +57,10 @@ def least_squares(response: FloatArray, force: FloatArray) -> tuple[FloatArray, 
     design = response[:, recorded]
     determined = np.abs(design).max(axis=(0, 1)) > 0.0
     design, measured = design[..., determined], force[:, recorded]
-    freedom = len(force) - 2  # a straight line each
+    freedom = len(force) - 2  # each a straight line, with two parameters
     deviation = np.ones(measured.shape[1])
     size = np.sqrt((design**2).sum(axis=(0, 1)))  # of columns: N per N/m2 beside N per N/m
-    for _ in range(2):  # the first fit gives the scatter of each direction, the second weighs by it
+    for _ in range(2):  # the first fit gives the scatter of each direction, the second is weighted by it
         rows = (design / size / deviation[:, None]).reshape(-1, determined.sum())
         solved, _, rank, _ = np.linalg.lstsq(rows, (measured / deviation).ravel(), rcond=1e-12)
         if rank < determined.sum() or freedom < 1:
@@ -82,7 +82,7 @@ def least_squares(response: FloatArray, force: FloatArray) -> tuple[FloatArray, 
 
 
 def left_out(response: FloatArray, force: FloatArray, feed: FloatArray) -> FloatArray:
-    """(n, 3) N, measured force less what the slots of all other feeds predict; nan where these do not suffice."""
+    """(n, 3) N, measured force minus the prediction from slots at all other feeds; nan if these do not suffice."""
     off = np.full(force.shape, np.nan)
     for value in np.unique(feed):
         chosen = feed == value

@@ -1,4 +1,4 @@
-"""Walls that several passes make: at each height stays what the deepest of them leaves.
+"""Walls made by several passes: at each height the deepest pass determines the wall that remains.
 
 The second level of a pocket passes the wall of the first along all of its height. Where the first left material, the
 second takes it off as far as it stands aside itself; where the first cut too deep, nothing puts it back. So the error
@@ -16,8 +16,8 @@ from toolpath_stiff.cutting.tip import walls_beside
 from toolpath_stiff.path.sampling import Samples
 
 BLOCK = 16_384  # walls at a time
-MOST_PASSES = 8  # places of earlier passes beside one of the last that are looked at
-ALIKE = 10.0  # steps along the wall that a turn of its normal by a radian counts
+MOST_PASSES = 8  # nearest places of earlier passes that are checked for each of the last
+ALIKE = 10.0  # steps along the wall that count as much as a radian of its normal
 SAME = 1e-7  # m, ranges of height closer than this are one
 
 
@@ -30,7 +30,7 @@ def walls_of_all_passes(
     profiles: AnyArray,
     step: float,
 ) -> None:
-    """Turn profiles of what each pass makes, in place, into those of the walls that stay; nan: no wall.
+    """Convert, in place, profiles that each pass makes into those of the walls that remain; nan: no wall.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def walls_of_all_passes(
         for begin in range(0, len(rows), BLOCK):
             some, side = rows[begin : begin + BLOCK], sides[begin : begin + BLOCK]
             foot, into = (of[:, :2] for of in walls_beside(samples, cutters, some, side))
-            # Walls with another normal are far, those of another tilt farther.
+            # Walls with another normal count as far away, those of another tilt as farther.
             parts.append(np.column_stack([foot, ALIKE * step * into, tilt[some]]))
         return np.concatenate(parts)
 
@@ -60,7 +60,7 @@ def walls_of_all_passes(
         from scipy.spatial import cKDTree
 
         tree = cKDTree(places(rows, sides))
-    # The last first: of earlier passes counts what they made, not what of it stays.
+    # From the last backward: for earlier passes the wall they made counts, not the part of it that remains.
     for begin in range((len(owners) - 1) // BLOCK * BLOCK, -1, -BLOCK):
         last, wall = owners[begin : begin + BLOCK], walls[begin : begin + BLOCK]
         low, high = own[last, wall, :, None].swapaxes(0, 1)
@@ -81,7 +81,7 @@ def walls_of_all_passes(
 
 
 def profile_at(profiles: AnyArray, ranges: FloatArray, heights: FloatArray) -> FloatArray:
-    """(m, h) errors at heights (m, h), from profiles (m, HEIGHTS) over ranges (m, 2); nan beyond."""
+    """(m, h) errors at heights (m, h), from profiles (m, HEIGHTS) over ranges (m, 2); nan outside these."""
     nodes, low, span = shares()[0], ranges[:, :1], np.maximum(ranges[:, 1:] - ranges[:, :1], SAME)
     share = (heights - low) / span
     place = np.clip(np.searchsorted(nodes, share) - 1, 0, HEIGHTS - 2)

@@ -1,4 +1,4 @@
-"""Where a cutter touches the stock: rectangles on its envelope, height above the tip over the angle of the edge."""
+"""Contact of a cutter with the stock: rectangles on its envelope, height above the tip over the angle of the edge."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.cutters import Cutter
 
 BLOCK, ROUND_BLOCK = 2048, 128  # stations computed at once: their arrays stay in the processor's cache
-LEAST_LAG = 1e-3  # rad/m: straight flutes lag by this, some microradians over a cut, which spares the limit
+LEAST_LAG = 1e-3  # rad/m: straight flutes lag by this, some microradians over a cut, which avoids a division by 0
 TURN = 2.0 * np.pi
 
 
@@ -39,7 +39,7 @@ class Patches(ArrayColumns):
 
 
 def of_stations(patches: Patches, stations: IntArray) -> Patches:
-    """The patches of some stations (n,), counted among these; a station may come more than once."""
+    """Patches of stations (n,), renumbered by their place in `stations`; a station may occur more than once."""
     first, last = (np.searchsorted(patches.station, stations, side) for side in ("left", "right"))
     station, place = numbered(last - first)
     return replace(patches.take(first[station] + place), station=station)
@@ -47,7 +47,7 @@ def of_stations(patches: Patches, stations: IntArray) -> Patches:
 
 @dataclass(frozen=True)
 class Contact(ArrayColumns):
-    """How one cutter cuts at n stations: where it touches the stock, its feed, how it turns, what its edges are met by.
+    """The cut of one cutter at n stations: its contact with the stock, feed, direction of rotation, coefficients.
 
     Attributes
     ----------
@@ -69,22 +69,22 @@ class Contact(ArrayColumns):
 
     @property
     def lag(self) -> FloatArray:
-        """(n,) rad/m by which a flute lags per height above the tip, as seen clockwise; less than 0: it leads."""
+        """(n,) rad/m by which a flute lags per height above the tip, counted clockwise; negative: it leads."""
         angle = float(np.tan(self.cutter.helix)) / self.cutter.radius
         return self.cutter.hand * max(angle, LEAST_LAG) * self.turning
 
     def of(self, rows: IntArray) -> "Contact":
-        """Some of the stations, counted anew."""
+        """The contact of the stations `rows`, renumbered."""
         return replace(self.take(rows), patches=of_stations(self.patches, rows))
 
     def blocks(self) -> Iterator[tuple[slice, "Contact"]]:
-        """Slices of stations with what is theirs."""
+        """Slices of stations, with their contact."""
         size, count = ROUND_BLOCK if self.cutter.corner_radius else BLOCK, len(self.feed)
         for start in range(0, count, size):
             yield slice(start, start + size), self.of(np.arange(start, min(start + size, count)))
 
     def seen_clockwise(self) -> "Contact":
-        """The same without stations that stand, those that turn the other way mirrored across the feed."""
+        """The contact without stations of a stopped spindle, counter-clockwise ones mirrored across the feed."""
         patches = self.patches.take(self.feed[self.patches.station, 0] > 0.0)
         other = self.turning[patches.station] < 0.0
         if other.any():
@@ -99,13 +99,9 @@ class Contact(ArrayColumns):
         return replace(self, patches=patches)
 
     def above(self, height: float) -> Patches:
-        """What is above a height (m): along the cylinder."""
-        patches = self.patches
-        if not height:
-            return patches
-        return replace(patches, low=np.maximum(patches.low, height)).take(patches.high > height)
+        """Patches above a height (m): those on the cylinder."""
+        return replace(self.patches, low=np.maximum(self.patches.low, height)).take(self.patches.high > height)
 
     def below(self, height: float) -> Patches:
-        """What is below a height (m): round the corner."""
-        patches = self.patches
-        return replace(patches, high=np.minimum(patches.high, height)).take(patches.low < height)
+        """Patches below a height (m): those on the corner."""
+        return replace(self.patches, high=np.minimum(self.patches.high, height)).take(self.patches.low < height)

@@ -1,4 +1,4 @@
-"""What a cut is computed from besides program and machine: `cut.toml` with stock, tools, coefficients and spindle.
+"""Input of a cut besides program and machine: `cut.toml` with stock, tools, coefficients and spindle.
 
 What is missing is refused with one line that says what to write where; what is assumed stands in the result.
 """
@@ -37,7 +37,7 @@ COEFFICIENTS_HINT = "write [coefficients] with material = NAME, numbers or file 
 
 @dataclass(frozen=True)
 class CutSetup:
-    """What a cut is computed from besides program and machine. SI.
+    """Input of a cut besides program and machine. SI.
 
     Attributes
     ----------
@@ -67,12 +67,12 @@ class CutSetup:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The files that it was read from."""
+        """Files from which the setup is read."""
         return tuple(name for name in (self.file, self.body) if name)
 
 
 def read_setup(file: str | Path) -> CutSetup:
-    """The setup of a file. Raises `InputError` with line and key."""
+    """The setup in a file. Raises `InputError` with line and key."""
     toml = TomlReader.read(file, "the cut's setup")
     toml.only("", toml.data, SECTIONS)
     if "coefficients" not in toml.data:
@@ -84,7 +84,7 @@ def read_setup(file: str | Path) -> CutSetup:
 
 
 def setup_of(material_name: str, stock: str | None) -> CutSetup:
-    """The setup of `--material` and `--stock` ("X,Y,Z" in mm, "extents", None: the program's). Raises `InputError`."""
+    """The setup for `--material` and `--stock` ("X,Y,Z" in mm, "extents", None: the program's). Raises `InputError`."""
     coefficients = material(material_name)
     if stock is None or stock == "extents":
         return CutSetup(coefficients, from_program=stock is None)
@@ -98,7 +98,7 @@ def setup_of(material_name: str, stock: str | None) -> CutSetup:
 
 
 def _numbers(toml: TomlReader, where: str, value: object, least: float) -> tuple[float, float, float]:
-    """Three numbers in mm, in m."""
+    """Three numbers, given in mm, in m."""
     if not isinstance(value, list) or len(value) != 3:
         raise toml.error(f"{where} = {value!r}", "[X, Y, Z] in mm", where=where)
     x, y, z = (toml.number(where, part, LARGEST_MM) for part in value)
@@ -129,7 +129,7 @@ def _stock_in(
 
 
 def _beside(toml: TomlReader, where: str, value: object) -> str:
-    """A file named in the setup, whose folder it is relative to."""
+    """The path of a file named in the setup, relative to the setup's folder."""
     if not is_text(value):
         raise toml.error(f"{where} = {value!r}", "the name of a file", where=where)
     return str(Path(toml.file).parent / value)
@@ -166,7 +166,7 @@ def _spindle_in(toml: TomlReader) -> float:
 
 
 def cutters_of(setup: CutSetup, program: ReadProgram) -> dict[int, Cutter]:
-    """Number -> cutter of the tools that cut. Raises `InputError` where one is not known well enough."""
+    """Number -> cutter of the tools that cut. Raises `InputError` for one with missing data."""
     known = {tool.number: tool for tool in program.tools}
     numbers = np.unique(program.moves.tool[program.moves.motion != RAPID]).tolist()
     tools = (merged_tool(tool_of(known, n), tool_of(dict(setup.tools), n)) for n in numbers)
@@ -209,7 +209,7 @@ def _usual_corner(size: tuple[float, float, float], cuts: Extents) -> tuple[floa
 
 
 def spindle_of(setup: CutSetup, program: ReadProgram, samples: Samples) -> FloatArray:
-    """(n,) rad/s at samples, less than 0 counter-clockwise. Raises `ProgramError` where a cut has none."""
+    """(n,) rad/s at samples, negative counter-clockwise. Raises `ProgramError` for a cut without a speed."""
     speed = np.asarray(samples.spindle)
     if not math.isnan(setup.spindle):
         speed = np.where(speed == 0.0, setup.spindle, speed)

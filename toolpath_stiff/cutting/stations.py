@@ -7,7 +7,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray, product
-from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.cutters import Cutter, of_tools
 from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.workpiece import Window, Workpiece
 from toolpath_stiff.nc.courses import points_along
@@ -18,7 +18,7 @@ BLOCK = 8192  # stations at a time
 # Radii of the cutter along the path, whose pieces are those just before. Where the tool turns on its way, these count
 # as not yet cut: a piece ends with the tool turned back a little from where the next begins.
 RECENT, RECENT_TURNING = 0.05, 0.25
-TOUCH = 1e-9  # m, by which the envelope is taken for smaller: what it only touches is not in cut
+TOUCH = 1e-9  # m, by which the envelope is reduced: mere touching is no cut
 
 Seen = tuple[IntArray, FloatArray, FloatArray]
 STATION = np.dtype([
@@ -28,19 +28,19 @@ STATION = np.dtype([
     *((name, np.float64) for name in ("reach", "flat", "longest")),  # cutter: radius, of its flat end, cutting length
     *((name, np.float64) for name in ("swing_ahead", "swing_left")),  # motion per height above the corner
     ("move", np.int64),
-    ("piece", np.int64),  # the station's own, of a rapid the next
-    ("recent", np.int64),  # first piece of those just before
-    ("until", np.int64),  # the pieces before this have cut what the station meets
+    ("piece", np.int64),  # the station's own piece, for a rapid the next
+    ("recent", np.int64),  # first of the pieces just before
+    ("until", np.int64),  # pieces before this one have cut the material that the station meets
     ("path", np.float64),  # from the program's start
-    ("tilt", np.int64),  # in whose frame all this is
-    ("end_alone", np.bool_),  # a plunge or a rapid: only what is below the cutter's end is looked at
+    ("tilt", np.int64),  # the frame of the quantities above
+    ("end_alone", np.bool_),  # a plunge or a rapid: only material below the cutter's end counts
 ])  # fmt: skip
 
 
 def stations_at(
     work: Workpiece, cutters: Mapping[int, Cutter], columns: tuple[IntArray, IntArray, FloatArray], seen: Seen
 ) -> AnyArray:
-    """(n,) records of places along moves of some length; tool, move, path from the start of each, as `seen_upright`."""
+    """(n,) records of places along moves of nonzero length; `columns`: tool, move, path from its start."""
     (tool, move, path), (tilt, position, motion) = columns, seen
     stations = np.zeros(len(move), dtype=STATION)
     stations["x"], stations["y"], stations["z"] = position.T
@@ -50,16 +50,14 @@ def stations_at(
         motion[:, :2].T, level, out=np.tile([[1.0], [0.0]], len(move)), where=level > 0.0
     )
     stations["level"], stations["down"] = level, -motion[:, 2]
-    for number, cutter in cutters.items():
-        rows = tool == number
-        stations["reach"][rows], stations["flat"][rows] = cutter.radius, cutter.radius - cutter.corner_radius
-        stations["longest"][rows] = np.nan_to_num(cutter.cutting_length, nan=np.inf)
+    stations["reach"], stations["flat"] = (of_tools(cutters, tool, name) for name in ("radius", "flat"))
+    stations["longest"] = np.nan_to_num(of_tools(cutters, tool, "cutting_length"), nan=np.inf)
     stations["move"], stations["path"] = move, path
     stations["piece"] = pieces_at(work, move, path)
     rapid = work.first[move + 1] == work.first[move]
     steep = np.cos(defaults.PLUNGE_ANGLE) * np.hypot(level, motion[:, 2])
     stations["end_alone"] = rapid | (np.abs(motion[:, 2]) >= steep - 1e-12)
-    turning = (work.tilts[move] == TURNING) & (stations["flat"] > 0.0)  # balls go on as they were, however they turn
+    turning = (work.tilts[move] == TURNING) & (stations["flat"] > 0.0)  # a ball moves the same however it turns
     radii = np.where(turning, RECENT_TURNING, RECENT)
     recent = np.searchsorted(work.pieces["after"], path - radii * stations["reach"], "right")
     stations["recent"] = np.where(rapid, len(work.pieces), recent)
@@ -77,7 +75,7 @@ def stations_at(
 
 
 def seen_upright(work: Workpiece, move: IntArray, path: FloatArray, position: FloatArray, tangent: FloatArray) -> Seen:
-    """(n,) number of the frame in which the tool stands upright at places along moves; tip and motion (n, 3) in it.
+    """(n,) number of the frame in which the tool is upright at places along moves; tip and motion (n, 3) in it.
 
     The motion is that per length of path. Where the tool turns, both are those of the piece of constant tilt; on a
     rapid of which nothing is: the number is `TURNING`.
@@ -109,7 +107,7 @@ def samples_seen(work: Workpiece, samples: Samples) -> tuple[IntArray, Samples]:
 
 
 def pieces_at(work: Workpiece, move: IntArray, path: FloatArray) -> IntArray:
-    """(n,) the piece at places along moves; of a rapid the next."""
+    """(n,) the piece at places along moves; for a rapid the next one."""
     first, count = work.first[move], work.first[move + 1] - work.first[move]
     row = np.minimum(first, len(work.pieces) - 1)
     before, after = work.pieces["before"][row], work.pieces["after"][row]
@@ -120,7 +118,7 @@ def pieces_at(work: Workpiece, move: IntArray, path: FloatArray) -> IntArray:
 def stations_between(
     work: Workpiece, moves: Moves, cutters: Mapping[int, Cutter], move: IntArray, path: FloatArray
 ) -> AnyArray:
-    """(n,) records of places between samples, along cutting moves, ascending."""
+    """(n,) records of places between samples along cutting moves, in ascending order."""
     begin = int(move[0])
     some = moves.take(slice(begin, int(move[-1]) + 1))
     before, after = work.pieces["before"][work.first[move]], work.pieces["after"][work.first[move + 1] - 1]
@@ -132,7 +130,7 @@ def stations_between(
 def blocks_of_stations(
     work: Workpiece, samples: Samples, tilt: IntArray, cutters: Mapping[int, Cutter], rows: IntArray
 ) -> Iterator[tuple[IntArray, AnyArray]]:
-    """Some rows of samples that move, as `samples_seen`, and their records, in blocks."""
+    """Rows of samples that move, as from `samples_seen`, and their records, in blocks."""
     for first in range(0, len(rows), BLOCK):
         some = rows[first : first + BLOCK]
         tool, move, path = (getattr(samples, name)[some] for name in ("tool", "move", "s"))
@@ -141,7 +139,7 @@ def blocks_of_stations(
 
 
 def points_around(stations: AnyArray, radius: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """x, y, m, of points around the axis, end to end; radius and angle (from the left, clockwise) are (n, ...)."""
+    """x, y, m, of points around the axis, flattened; radius and angle (from the left, clockwise) are (n, ...)."""
     shape = (-1,) + (1,) * (np.broadcast(radius, angle).ndim - 1)
     x, y, ahead_x, ahead_y = (stations[name].reshape(shape) for name in ("x", "y", "ahead_x", "ahead_y"))
     across, ahead = radius * np.cos(angle), radius * np.sin(angle)
@@ -151,7 +149,7 @@ def points_around(stations: AnyArray, radius: FloatArray, angle: FloatArray) -> 
 def around(
     stations: AnyArray, radius: FloatArray, angle: FloatArray
 ) -> tuple[FloatArray, FloatArray, IntArray, Window]:
-    """x, y of points as `points_around`; their tilts, and the window of what stands before each station."""
+    """x, y of points as `points_around`; their tilts, and the window of pieces cut before each station."""
     x, y = points_around(stations, radius, angle)
     names = ("tilt", "until", "recent")
     tilt, until, recent = (np.repeat(stations[name], len(x) // max(len(stations), 1)) for name in names)

@@ -1,4 +1,4 @@
-"""The stock: what stands on the table before the program runs, as heights of its top and underside over x and y."""
+"""The stock: material on the table before the program runs, as heights of its top and underside over x and y."""
 
 import struct
 from collections.abc import Mapping
@@ -34,8 +34,8 @@ class Stock:
 
     Examples
     --------
-    >>> box_stock((0.0, 0.0, -0.02), (0.1, 0.08, 0.0), "given")
-    <Stock: 100 x 80 mm, z -20 to 0 mm: given>
+    >>> [end.tolist() for end in box_stock((0.0, 0.0, -0.02), (0.1, 0.08, 0.0), "given").ends]
+    [[0.0, 0.0, -0.02], [0.1, 0.08, 0.0]]
     """
 
     corner: FloatArray
@@ -46,33 +46,22 @@ class Stock:
 
     @property
     def ends(self) -> tuple[FloatArray, FloatArray]:
-        """(3,) m, lowest and highest corner of the box around it."""
+        """(3,) m, lowest and highest corner of the bounding box."""
         high = np.append(self.corner + self.cell * self.top.shape, self.top.max())
         return np.append(self.corner, self.bottom.min()), high
 
-    def __repr__(self) -> str:
-        x, y = mm_from_m(self.cell * self.top.shape)
-        low, high = mm_from_m(float(self.bottom.min())), mm_from_m(float(self.top.max()))
-        return f"<Stock: {x:g} x {y:g} mm, z {low:g} to {high:g} mm: {self.origin}>"
-
     def tops(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """(n,) m of the top at points x, y; -inf beside the stock."""
-        if self.top.size == 1:
-            end = self.corner + self.cell
-            inside = (x >= self.corner[0]) & (x < end[0]) & (y >= self.corner[1]) & (y < end[1])
-            return np.where(inside, self.top[0, 0], -np.inf)
+        """(n,) m, height of the top at points x, y; -inf outside the stock."""
         i, j, inside = self._cells(x, y)
         return np.where(inside, self.top[i, j], -np.inf)
 
     def bottoms(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """(n,) m of the underside at points x, y."""
-        if self.top.size == 1:
-            return np.full(len(x), self.bottom[0, 0])
+        """(n,) m, height of the underside at points x, y."""
         i, j, _ = self._cells(x, y)
         return np.asarray(self.bottom[i, j])
 
     def through(self, x: FloatArray, y: FloatArray, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n,) m, where lines along z of frames enter the box around it, and (n,) leave it; less: they miss it.
+        """(n,) m, where lines along z of frames enter the bounding box, and (n,) leave it; less: they miss it.
 
         `turn` (n, 3, 3): axes of its own frame as columns in those.
         """
@@ -98,7 +87,7 @@ def box_stock(low: tuple[float, float, float], high: tuple[float, float, float],
 
 
 def stock_of_extents(moves: Moves, cutters: Mapping[int, Cutter]) -> Stock:
-    """A box around all cuts, grown by the largest cutter's radius; its top is z = 0, or the highest level cut above it.
+    """A box around all cuts, grown by the largest cutter's radius; top at z = 0, or the highest level cut above it.
 
     An assumption: how much the first passes cut from the side is a guess then.
     """
@@ -117,7 +106,7 @@ def stock_of_extents(moves: Moves, cutters: Mapping[int, Cutter]) -> Stock:
 
 
 def stock_from_stl(path: str | Path, cell: float) -> Stock:
-    """The body of an STL file in mm, placed as the program has it: a ray downward through the middle of each cell, m.
+    """The body of an STL file (mm, program coordinates), sampled by a ray down the middle of each cell, m.
 
     Raises `InputError` where the file is none, or has more cells than fit into memory.
     """
@@ -141,7 +130,7 @@ def stock_from_stl(path: str | Path, cell: float) -> Stock:
         x, y = (low + (ray + 0.5) * size - a[:, :2]).T
         ab, ac = b - a, c - a
         area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-        area = np.where(area == 0.0, np.nan, area)  # upright triangles are edges of others
+        area = np.where(area == 0.0, np.nan, area)  # vertical triangles are edges of others
         u, v = (x * ac[:, 1] - y * ac[:, 0]) / area, (ab[:, 0] * y - ab[:, 1] * x) / area
         hit = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9)
         height, cells = (a[:, 2] + u * ab[:, 2] + v * ac[:, 2])[hit], tuple(ray[hit].T)
@@ -152,7 +141,7 @@ def stock_from_stl(path: str | Path, cell: float) -> Stock:
 
 
 def _triangles(path: Path) -> FloatArray:
-    """(t, 3, 3) corners of the triangles of an STL file, binary or as text."""
+    """(t, 3, 3) corners of the triangles of an STL file, binary or text."""
     content = read_bytes(path, "the stock's STL file")
     count = struct.unpack_from("<I", content, 80)[0] if len(content) >= 84 else -1
     if len(content) == 84 + 50 * count:

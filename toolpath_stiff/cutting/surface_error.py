@@ -1,4 +1,4 @@
-"""Error of the surface that a cutter leaves: how far it stands aside at the moment when an edge makes the surface.
+"""Error of the surface that a cutter leaves: its deflection at the moment when an edge makes the surface.
 
 A wall is made at height z when an edge passes it there (0 or 180 degrees), by the force of all slices that cut at that
 moment: not by the mean force (Kline, DeVor, Shareef, Journal of Engineering for Industry 104 (1982) 272; Budak,
@@ -19,7 +19,7 @@ from toolpath_stiff.cutting.coefficients import Coefficients
 from toolpath_stiff.cutting.forces import EACH, forces_of_sets
 from toolpath_stiff.cutting.patches import TURN, Contact
 
-HEIGHTS = 9  # of a wall at which its error is computed, both ends among them
+HEIGHTS = 9  # on a wall, both ends included, at which its error is computed
 STRIPS = 5  # of a floor
 Passes = tuple[FloatArray, ...]  # errors (n, h) m, their slopes (n, h, 6) over the coefficients, forces (n, h, 3) N
 
@@ -38,7 +38,7 @@ def shares() -> tuple[FloatArray, FloatArray]:
 def wall_error(
     contact: Contact, compliance: FloatArray, walls: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(n, 2, HEIGHTS) m, error of the walls to the left and right of n stations, from lower to upper end.
+    """(n, 2, HEIGHTS) m, error of the walls left and right of n stations, from lower to upper end.
 
     Parameters
     ----------
@@ -64,14 +64,14 @@ def wall_error(
         normal = np.broadcast_to([0.0, outward, 0.0], (*heights.shape, 3))
         chosen = contact.of(cut)
         tip = _tip_angle(chosen, np.full_like(heights, angle), heights)
-        error[cut, side], slope, acting = _errors(chosen, tip, _pull(chosen, normal, compliance[cut]))
+        error[cut, side], slope, acting = _errors(chosen, tip, product(normal, compliance[cut]))
         deviation[cut, side] = _deviation((slope * weights[:, None]).sum(axis=1), contact.coefficients)
         force[cut, side] = (acting * weights[:, None]).sum(axis=1)
     return error, deviation, force
 
 
 def floor_error(contact: Contact, compliance: FloatArray, strip: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n, STRIPS) m, error of the surface below n stations, from right to left across each strip; of a ball (n, 1).
+    """(n, STRIPS) m, error of the surface below n stations, from right to left across each strip; for a ball (n, 1).
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def floor_error(contact: Contact, compliance: FloatArray, strip: FloatArray) -> 
         Errors, nan where no surface stays; (n,) m, standard deviation of their mean that comes from the coefficients.
     """
     corner = contact.cutter.corner_radius
-    flat = contact.cutter.radius - corner
+    flat = contact.cutter.flat
     count = STRIPS if flat > 0.0 else 1  # a scallop is narrow, and a ball passes each of its points once
     error, deviation = np.full((len(strip), count), np.nan), np.full(len(strip), np.nan)
     cut = np.flatnonzero(np.isfinite(strip).all(axis=1))
@@ -98,11 +98,11 @@ def floor_error(contact: Contact, compliance: FloatArray, strip: FloatArray) -> 
     chosen = contact.of(cut)
     along = np.sqrt(1.0 - out * out) / np.hypot(*chosen.feed.T)[:, None]
     slope = chosen.feed[:, :, None] * along[:, None]
-    normal = np.stack([-slope[:, 1], -np.sign(aside) * out, slope[:, 0]], axis=-1)  # square to a ramp's feed
-    pull = _pull(chosen, normal, compliance[cut])
+    normal = np.stack([-slope[:, 1], -np.sign(aside) * out, slope[:, 0]], axis=-1)  # perpendicular to a ramp's feed
+    pull = product(normal, compliance[cut])
     ahead = np.arccos(np.clip(aside / max(flat, 1e-9), -1.0, 1.0))  # beyond the flat end: beside the axis
     height = corner - np.sqrt(np.maximum(corner**2 - beyond**2, 0.0))
-    # On a slope the end passes a point once more higher up: behind the axis where it climbs, ahead where it descends.
+    # On a slope the end passes a point again, higher up: behind the axis when it climbs, ahead when it descends.
     above = 2.0 * np.sqrt(np.maximum(flat**2 - aside**2, 0.0)) * slope[:, 1]
     passes = []
     for angle, higher in ((ahead, -above), (TURN - ahead, above))[:count]:
@@ -114,19 +114,12 @@ def floor_error(contact: Contact, compliance: FloatArray, strip: FloatArray) -> 
 
 
 def _tip_angle(contact: Contact, angle: FloatArray, height: FloatArray) -> FloatArray:
-    """(n, h) rad of flute 0 at the tip when it passes angles (n, h) at heights (n, h), as `forces.force_at` counts."""
+    """(n, h) rad of flute 0 at the tip when a flute passes angles (n, h) at heights (n, h), as in `forces.force_at`."""
     return np.where(contact.turning[:, None] < 0.0, np.pi - angle, angle) + contact.lag[:, None] * height
 
 
-def _pull(contact: Contact, normal: FloatArray, compliance: FloatArray) -> FloatArray:
-    """(n, h, 3) m/N of error per force as `forces.forces_of_sets` counts, by normals (n, h, 3)."""
-    pull = product(normal, compliance)
-    pull[..., 1] *= contact.turning[:, None]
-    return pull
-
-
 def _errors(contact: Contact, tip: FloatArray, pull: FloatArray) -> Passes:
-    """The lowest of the flutes' passes."""
+    """The lowest of the passes of all flutes; `pull` (n, h, 3) m/N is the error per force."""
     cutter = contact.cutter
     radii = flute_radii(cutter) if cutter.run_out else np.zeros(1)
     lowest = np.zeros(tip.shape), np.zeros((*tip.shape, 6)), np.zeros((*tip.shape, 3))
@@ -139,12 +132,11 @@ def _errors(contact: Contact, tip: FloatArray, pull: FloatArray) -> Passes:
             passes.append(((pull[block] * force).sum(axis=-1) + short, slope, force))
         for whole, values in zip(lowest, _lowest(passes), strict=True):
             whole[block] = values
-    lowest[2][..., 1] *= contact.turning[:, None]
     return lowest
 
 
 def _lowest(passes: list[Passes]) -> Passes:
-    """Of several passes the one with the lowest error at each place."""
+    """The pass with the lowest error at each place."""
     lowest = passes[0]
     for other in passes[1:]:
         lower = other[0] < lowest[0]
@@ -156,6 +148,6 @@ def _lowest(passes: list[Passes]) -> Passes:
 
 
 def _deviation(slope: FloatArray, coefficients: Coefficients) -> FloatArray:
-    """(n,) m from slopes (n, 6): JCGM 100:2008, equation 13."""
+    """(n,) m, standard deviation from slopes (n, 6): JCGM 100:2008, equation 13."""
     variance = (product(slope, coefficients.covariance) * slope).sum(axis=1)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))

@@ -1,4 +1,4 @@
-"""What the cutter sweeps, piece by piece of the path: straight lines and arcs in the plane, with a slope.
+"""Volume swept by the cutter, piece by piece of the path: straight lines and arcs in the plane, with a slope.
 
 Each in the frame of its tilt, in which the tool stands upright. Where the tool turns on its way, a piece is a chord
 with the tool as it stands in its middle, along which the middle of the cutter's corner goes: a ball stays where it is.
@@ -9,17 +9,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered, product
-from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.cutters import Cutter, of_tools
 from toolpath_stiff.cutting.tilts import TURNING, axes_along, tilts_of, upright_frames
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves
 from toolpath_stiff.path.sampling import Orient
 
-SAGITTA = 5e-7  # m, of chords in place of an arc that is not level in the plane
-STRAIGHT, ARC_TURN, NARROW_TURN = 4.0, 0.5 * np.pi, np.pi / 60.0  # longest pieces: radii of the cutter; rad
-ROUNDED = 1e-9  # share of a radius: arcs turned in space differ by less
-PIECE_TURN = np.radians(0.5)  # that a tool makes along a piece: a quarter of a degree is 4.4 um a mm above its corner
+SAGITTA = 5e-7  # m, of the chords that replace an arc that is not parallel to the plane
+STRAIGHT, ARC_TURN, NARROW_TURN = 4.0, 0.5 * np.pi, np.pi / 60.0  # longest: radii of the cutter; rad, rad
+ROUNDED = 1e-9  # share of a radius: rounding of arcs rotated in space
+PIECE_TURN = np.radians(0.5)  # turn of a tool along a piece: a quarter of a degree is 4.4 um a mm above its corner
 
 
 # A piece of the cutting path; SI. Pieces stand in the order of time.
@@ -30,7 +30,7 @@ FIELDS = (
     "y",
     "z",  # ... at the height of its start
     "turn",  # 0: line; 1, -1: arc counter-clockwise, clockwise
-    "heading",  # direction of a line, or where on its circle an arc begins
+    "heading",  # direction of a line, or angle on the circle at which an arc begins
     "cos",  # of the heading
     "sin",
     "extent",  # length in the plane, m, or turn, rad
@@ -48,7 +48,7 @@ PIECE = np.dtype([*((name, np.float64) for name in FIELDS), ("tilt", np.int64)])
 def sweeps_of(
     moves: Moves, cutters: Mapping[int, Cutter], orient: Orient
 ) -> tuple[AnyArray, IntArray, IntArray, FloatArray]:
-    """The pieces of the moves that cut, and (n + 1,) the first piece of each move.
+    """The pieces of cutting moves, and (n + 1,) the first piece of each move.
 
     And (n,) the number of each move's tilt, `TURNING` of some; (t, 3, 3) the axes of the tilts' frames as columns, the
     first upright; `orient` gives roll, pitch, yaw of the tool of programmed angles. Raises `ProgramError` where the
@@ -101,21 +101,18 @@ def sweeps_of(
 
 
 def _ends_of(moves: Moves, cutters: Mapping[int, Cutter], cuts: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """(n,) and (n,) m, radius of the cutter, and of its flat end, of moves that cut (n,); raises `ProgramError`."""
+    """(n,) and (n,) m, radius of the cutter and of its flat end, for moves that cut (n,); raises `ProgramError`."""
     unknown = np.flatnonzero(cuts & ~np.isin(moves.tool, list(cutters)))
     if len(unknown):
         mistake = f"tool {moves.tool[unknown[0]]} cuts and its geometry is not known"
         hint = "give it a [[tool]] in the file of --cut"
         raise ProgramError(mistake, hint=hint, line=int(moves.line[unknown[0]]))
-    radius, flat = np.zeros(len(moves)), np.zeros(len(moves))
-    for tool in np.unique(moves.tool[cuts]).tolist():
-        radius[cuts & (moves.tool == tool)] = cutters[tool].radius
-        flat[cuts & (moves.tool == tool)] = cutters[tool].radius - cutters[tool].corner_radius
+    radius, flat = (np.where(cuts, of_tools(cutters, moves.tool, name), 0.0) for name in ("radius", "flat"))
     return radius, flat
 
 
 def _enter_arcs(pieces: AnyArray, rows: IntArray, arcs: Moves, turns: FloatArray, upward: FloatArray) -> None:
-    """Make arcs (k,) of the lines in some rows; (k, 3, 3) frames, (k,) side of the normal over the number of pieces."""
+    """Turn lines in some rows into arcs (k,); (k, 3, 3) frames, (k,) side of the normal over number of pieces."""
     frame, sweep = arc_frame(arcs, np.arange(len(rows))), arcs.arc_sweep
     x, y = product(frame.center[:, None], turns)[:, 0, :2].T
     part, beside = np.abs(sweep * upward), (pieces["x"][rows] - x, pieces["y"][rows] - y)
@@ -131,7 +128,7 @@ def _enter_arcs(pieces: AnyArray, rows: IntArray, arcs: Moves, turns: FloatArray
 def _counts(
     moves: Moves, length: FloatArray, radius: FloatArray, angle: FloatArray, cuts: BoolArray, bent: BoolArray
 ) -> FloatArray:
-    """(n,) number of pieces of each move; `bent` arcs are chords, `angle` is what the tool turns by."""
+    """(n,) number of pieces of each move; `bent` arcs become chords, `angle` is the turn of the tool."""
     counts = np.where(cuts, np.maximum(np.ceil(length / (STRAIGHT * np.where(cuts, radius, 1.0)) - 1e-9), 1.0), 0.0)
     arcs = np.flatnonzero(cuts & (moves.arc_sweep != 0.0))
     if len(arcs):

@@ -1,4 +1,4 @@
-"""Tools that do not stand along Z: the directions that they have, and frames in which they stand upright."""
+"""Tools not parallel to Z: their directions, and the frames in which they are upright."""
 
 from itertools import pairwise
 
@@ -9,14 +9,14 @@ from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.path.sampling import Orient
 from toolpath_stiff.rotations import rotation_matrices
 
-TURNING = -1  # the number of moves whose tool turns on the way
-DIGITS = 9  # of a unit vector: tools that differ by less stand alike
-SHARES = (0.0, 0.13, 0.26, 0.37, 0.5, 0.61, 0.74, 0.87, 1.0)  # of a move, where the tool must stand alike
-WHOLE = 2.0 * np.pi  # rad of a rotary axis, from where on the tool may stand alike at the shares and not between
+TURNING = -1  # the tilt's number for moves that turn the tool
+DIGITS = 9  # of a unit vector: tools that differ by less count as parallel
+SHARES = (0.0, 0.13, 0.26, 0.37, 0.5, 0.61, 0.74, 0.87, 1.0)  # of a move, at which the tool must be parallel
+WHOLE = 2.0 * np.pi  # rad of a rotary axis, from which on the tool may be parallel at the shares but not between them
 
 
 def tilts_of(moves: Moves, orient: Orient) -> tuple[IntArray, FloatArray, FloatArray]:
-    """(n,) number of each move's tilt, (t, 3, 3) the axes of their frames as columns, (n,) rad by which the tool turns.
+    """(n,) number of each move's tilt, (t, 3, 3) axes of their frames as columns, (n,) rad by which the tool turns.
 
     The first frame is upright. `orient` gives roll, pitch, yaw of the tool of programmed angles.
     """
@@ -39,12 +39,12 @@ def tilts_of(moves: Moves, orient: Orient) -> tuple[IntArray, FloatArray, FloatA
 
 
 def axes_along(moves: Moves, move: IntArray, share: FloatArray, orient: Orient) -> FloatArray:
-    """(n, 3) unit vectors of the tool at shares (n,) of moves (n,)."""
+    """(n, 3) unit vectors of the tool axis at shares (n,) of moves (n,)."""
     first, last = moves.start[move, 3:], moves.end[move, 3:]
     return rotation_matrices(orient(first + share[:, None] * (last - first)))[:, :, 2]
 
 
 def upright_frames(axes: FloatArray) -> FloatArray:
-    """(n, 3, 3) axes as columns of frames in which tools along `axes` (n, 3) stand upright."""
+    """(n, 3, 3) axes as columns of frames in which tools along `axes` (n, 3) are upright."""
     x, y, z = axes.T
     return rotation_matrices(np.stack([-np.arcsin(np.clip(y, -1.0, 1.0)), np.arctan2(x, z), 0.0 * x], axis=1))

@@ -1,4 +1,4 @@
-"""How far the tip gives way in the frame of a station: the machine with all its effects, and the tool's own beam."""
+"""Compliance of the tip in the frame of a station: the machine with all its effects, and the tool's own bending."""
 
 from collections.abc import Mapping
 
@@ -6,23 +6,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray, IntArray, product
-from toolpath_stiff.cutting.cutters import Cutter, radii_of
+from toolpath_stiff.cutting.cutters import Cutter, of_tools
 from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.rotations import along_tool_axis, rotation_matrices
 from toolpath_stiff.stiffness import core
 from toolpath_stiff.stiffness.model import StiffnessModel, parameter_slopes
 
-ALONG = 1e-12  # part of a unit vector square to the tool that is rounding
+ALONG = 1e-12  # a smaller component of a unit vector across the tool is rounding
 
 
 def station_axes(samples: Samples, origin: ArrayLike) -> FloatArray:
-    """(n, 3, 3) in machine coordinates, as `axes_at` of samples in the set-up frame."""
+    """(n, 3, 3) `axes_at` in machine coordinates, of samples in the set-up frame."""
     return product(rotation_matrices(np.asarray(origin, dtype=float)[3:])[None], axes_at(samples))
 
 
 def axes_at(samples: Samples) -> FloatArray:
-    """(n, 3, 3) frames of stations, columns x along the feed square to the tool, y to its left, z along the tool."""
+    """(n, 3, 3) frames of stations as columns: x along the feed square to the tool, y to its left, z along the tool."""
     axes = rotation_matrices(samples.abc)
     level = samples.tangent - along_tool_axis(samples.tangent, samples.abc)[:, None] * axes[:, :, 2]
     length = np.linalg.norm(level, axis=1)[:, None]
@@ -34,16 +34,16 @@ def axes_at(samples: Samples) -> FloatArray:
 def walls_beside(
     samples: Samples, cutters: Mapping[int, Cutter], rows: IntArray, sides: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(m, 3) m, the foot of the wall beside samples (sides 0 left, 1 right), and its normal into the part."""
+    """(m, 3) m, foot of the wall beside each sample (`sides`: 0 left, 1 right), and its normal into the part."""
     some = samples.take(rows)
     into = axes_at(some)[:, :, 1] * np.where(sides == 0, 1.0, -1.0)[:, None]
-    return some.position + radii_of(cutters, some.tool)[:, None] * into, into
+    return some.position + of_tools(cutters, some.tool, "radius")[:, None] * into, into
 
 
 def tip_compliances(
     model: StiffnessModel, samples: Samples, origin: ArrayLike, axes: FloatArray, force: FloatArray
 ) -> FloatArray:
-    """(n, 3, 3) m/N of the machine at samples of the set-up frame, in frames of `axes` (n, 3, 3).
+    """(n, 3, 3) m/N of the machine at samples in the set-up frame, in frames of `axes` (n, 3, 3).
 
     `force` (n, 3) N in these frames is the one that acts, for effects that depend on it.
     """
@@ -56,12 +56,9 @@ def tip_compliances(
 
 
 def with_tools(compliance: FloatArray, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
-    """The same with each tool's own beam, where it is known."""
-    total = compliance.copy()
-    for number, cutter in cutters.items():
-        beam = np.nan_to_num([cutter.lateral_compliance, cutter.lateral_compliance, cutter.axial_compliance])
-        total[samples.tool == number] += np.diag(beam)
-    return total
+    """The compliance with that of each tool added, where it is known."""
+    lateral, axial = (of_tools(cutters, samples.tool, f"{which}_compliance") for which in ("lateral", "axial"))
+    return compliance + np.eye(3) * np.nan_to_num(np.stack([lateral, lateral, axial], axis=1))[:, None]
 
 
 def machine_deviation(

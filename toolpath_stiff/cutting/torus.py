@@ -22,7 +22,7 @@ ANGLES = 8  # nodes of an arc: up to a half turn to nine digits
 
 
 def torus_mean(contact: Contact, values: FloatArray) -> FloatArray:
-    """(n, 3, k) forces, mean over a turn."""
+    """(n, 3, k) forces, mean over a revolution."""
     layers, radius, taper = _layers(contact), contact.cutter.corner_radius, contact.coefficients.taper
     nodes, weights = np.polynomial.legendre.leggauss(ANGLES)
     layer, arc = np.repeat(np.arange(len(layers.low)), ANGLES), layers.exit - layers.entry
@@ -42,7 +42,7 @@ def torus_mean(contact: Contact, values: FloatArray) -> FloatArray:
 
 
 def torus_forces(contact: Contact, angle: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, a, 3, k) forces with flute 0 at angles (n, a); all flutes."""
+    """(n, a, 3, k) forces of all flutes, with flute 0 at angles (n, a)."""
     layers, motion, cutter = _layers(contact), _motion(contact), contact.cutter
     slope, radius, count = contact.lag[layers.station][:, None], cutter.corner_radius, angle.shape[1]
     low, high = (radius * (1.0 - np.cos(kappa))[:, None] for kappa in (layers.low, layers.high))
@@ -69,7 +69,7 @@ def torus_forces(contact: Contact, angle: FloatArray, values: FloatArray) -> Flo
 
 
 def _layers(contact: Contact) -> Patches:
-    """The patches round the corner in layers of kappa, their `low` and `high`; on the level an edge cuts only ahead."""
+    """Patches on the corner in layers of kappa, from `low` to `high`; in level motion an edge cuts only ahead."""
     radius = contact.cutter.corner_radius
     patches = contact.below(radius)
     first, last = (np.arccos(1.0 - height / radius) for height in (patches.low, patches.high))
@@ -84,7 +84,7 @@ def _layers(contact: Contact) -> Patches:
 def _edge_forces(
     across: FloatArray, normal: FloatArray, length: FloatArray, motion: FloatArray, law: FloatArray, values: FloatArray
 ) -> FloatArray:
-    """(3, k, q) forces of slices of an edge, of such lengths.
+    """(3, k, q) forces on slices of an edge with the given lengths.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _edge_forces(
         (1 + flutes,) m of taper, then how far the flute stands out beyond those before it.
     """
     (sine, cosine), (out, up) = across, normal
-    # Square to the envelope; the feed along z of a ramp cuts at the lower end, ahead and behind.
+    # Perpendicular to the envelope; a ramp's feed along z cuts at the lower end, ahead and behind.
     chip = motion[0] * sine * out - motion[1] * up
     if law[1:].any():
         chip = np.minimum.reduce([m * chip + gap * out for m, gap in enumerate(law[1:], 1)])
@@ -114,17 +114,17 @@ def _edge_forces(
 
 
 def _direction(angle: FloatArray) -> FloatArray:
-    """(2, q) sine and cosine."""
+    """(2, q) sine and cosine of angles."""
     return np.stack([np.sin(angle), np.cos(angle)])
 
 
 def _motion(contact: Contact) -> FloatArray:
-    """(3, n) of `_edge_forces`."""
+    """(3, n) the `motion` of `_edge_forces`."""
     return np.stack([*contact.feed.T, np.sign(contact.lag)])
 
 
 def _summed(forces: FloatArray, place: IntArray, count: int) -> FloatArray:
-    """(count, 3, k) sums of forces (3, k, q) by their places (q,)."""
+    """(count, 3, k) sums of forces (3, k, q) by their `place` (q,)."""
     sums = np.zeros((count, *forces.shape[:2]))
     for row, column in np.ndindex(*forces.shape[:2]):
         sums[:, row, column] = np.bincount(place, forces[row, column], minlength=count)

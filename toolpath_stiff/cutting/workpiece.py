@@ -1,4 +1,4 @@
-"""The stock and what the program takes from it: heights of the part at any point and time, by an index of cells.
+"""The stock less the program's cuts: heights of the part at any point and time, by an index of cells.
 
 A cell of the index lists the pieces that pass over it, in the order of time. A piece that lies nowhere in the cell
 below what an earlier one left all over it is not listed; a query begins at the first piece that still counts at its
@@ -37,7 +37,7 @@ from toolpath_stiff.cutting.sweeps import PIECE, sweeps_of
 from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.path.sampling import Orient
 
-# Of a line through the work, where what other tools have left is looked for, and the steps in which it is bounded.
+# Shares of a line through the work at which the material left by other tools is sought, and bisections to bound it.
 SHARES = np.union1d(np.geomspace(1e-5, 0.0625, 13), np.linspace(1e-7, 1.0 - 1e-7, 9))
 HALVINGS = 20
 # The front of the cutter would touch what the pieces just before have left: these are taken for smaller by SLACK. It is
@@ -45,8 +45,8 @@ HALVINGS = 20
 # axes take more by it: what two of them only touch is rounding.
 SLACK = 5e-7  # m
 CELL = 0.33  # radii of the smallest cutter, size of a cell of the index
-MOST_CUBES = 1e6  # of a stock for tools that stand aslant
-MANY = 500  # pieces from where on it pays to import numba: half a second
+MOST_CUBES = 1e6  # of a stock, for inclined tools
+MANY = 500  # pieces from which on it pays to import numba: half a second
 STAGE = 8192  # pieces
 BEFORE = 1024  # pieces: between a station of the stage before and the first of a stage are fewer
 Window = tuple[IntArray, ...]  # (n,) the first piece, the one after the last; the first of those just before
@@ -54,7 +54,7 @@ Window = tuple[IntArray, ...]  # (n,) the first piece, the one after the last; t
 ENTRY = np.dtype([("cell", np.int32), ("piece", np.int32), ("below", np.float64), ("above", np.float64)])
 OFFSET = np.array(
     [0.3819e-3, 0.2764e-3, 0.1459e-3]
-)  # m: walls at round coordinates shall not run along borders of cells
+)  # m: so that walls at round coordinates do not lie along the borders of cells
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Workpiece:
 
     @property
     def tilted(self) -> bool:
-        """Whether a tool stands otherwise than along Z."""
+        """True if any tool is not parallel to Z."""
         return len(self.turns) > 1
 
     @cached_property
@@ -105,7 +105,7 @@ class Workpiece:
 
     @cached_property
     def has_levels(self) -> bool:
-        """Whether all that is left stands level, between upright walls."""
+        """True if the remaining material has only level surfaces and vertical walls."""
         return not (self.tilted or self.pieces["slope"].any() or (self.pieces["flat"] < self.pieces["reach"]).any())
 
     def tops(
@@ -116,7 +116,7 @@ class Workpiece:
         ceiling: FloatArray | float = np.inf,
         enough: FloatArray | float = -np.inf,
     ) -> tuple[FloatArray, IntArray]:
-        """(n,) m, height of what some pieces of upright tools leave, (n,) the last piece that left it; -1: the stock.
+        """(n,) m, height left by some pieces of upright tools, and (n,) the last piece that left it; -1: the stock.
 
         A `ceiling` (n,) stands for what is higher; a height below `enough` (n,) may be any that is. Owners are right
         without them.
@@ -127,7 +127,7 @@ class Workpiece:
     def lowest(
         self, places: FloatArray, tilt: IntArray, window: Window, top: FloatArray, enough: FloatArray | float = -np.inf
     ) -> tuple[FloatArray, IntArray]:
-        """(n,) m, height above places (3, n) along the tools of the lowest of some pieces, or `top`; the piece, or -1.
+        """(n,) m, lowest height above places (3, n), along the tools, left by some pieces, or `top`; the piece, or -1.
 
         `tilt` (n,): of a tool at the place, which pieces of other tilts are taken for larger than by `SLACK`.
         """
@@ -164,7 +164,7 @@ class Workpiece:
         return top, owner
 
     def standing(self, points: FloatArray, tilt: IntArray, window: Window) -> BoolArray:
-        """(n,) whether some pieces leave material at points (3, n), each in the frame of a tilt (n,)."""
+        """(n,) True where some pieces leave material at points (3, n), each in the frame of a tilt (n,)."""
         x, y, z = points
         if not self.tilted:
             return np.asarray((self.stock.bottoms(x, y) < z) & (self.tops(x, y, window, z + CLEAR, z)[0] > z))
@@ -184,7 +184,7 @@ class Workpiece:
         ends: tuple[FloatArray | float, FloatArray | float],
         window: Window,
     ) -> tuple[FloatArray, FloatArray]:
-        """(n,) m, lowest and highest place of material between `ends` on lines along tools; less: there is none.
+        """(n,) m, lowest and highest place of material between `ends` on lines along tools; highest below lowest: none.
 
         Below the lower of the ends the highest place may be any that is.
         """
@@ -217,7 +217,7 @@ class Workpiece:
         return low, high
 
     def _entries(self, places: FloatArray, first: IntArray, last: IntArray) -> tuple[IntArray, IntArray]:
-        """(n,) first entry, and (n,) the one after the last, to look at."""
+        """(n,) first entry to look at, and (n,) the one after the last."""
         i, j, k = np.floor((places - self.corner[:, None]) / self.size).astype(np.int64)
         wide, deep = self.columns
         inside = (i >= 0) & (j >= 0) & (j < wide) & (k >= 0) & (k < deep)
@@ -234,14 +234,14 @@ class Workpiece:
 def stages_of(
     stock: Stock, moves: Moves, cutters: Mapping[int, Cutter], orient: Orient = np.asarray
 ) -> Iterator[Workpiece]:
-    """The stock with the pieces of the moves up to one after the other; the last has all.
+    """One workpiece per stage, with the pieces cut up to the stage's end; the last has all of them.
 
     `orient` as of `sweeps_of`. Raises `ProgramError`.
     """
     pieces, first, tilts, turns = sweeps_of(moves, cutters, orient)
     quick = (len(pieces) >= MANY or len(turns) > 1) and importlib.util.find_spec("numba") is not None
     if not len(pieces):
-        pieces = np.zeros(1, PIECE)  # far from everything: its reach is 0
+        pieces = np.zeros(1, PIECE)  # a piece without effect: its reach is 0
     low, high = _boxes(pieces, turns, stock)
     size = CELL * max(float(pieces["reach"].min()), 1e-6)
     if len(turns) > 1:
@@ -266,16 +266,16 @@ def stages_of(
         index = before[starts], piece[kept].astype(np.int64), counts_from, below[kept]
         kept &= ~_redone(cell, below, np.where(piece < until - BEFORE, above, np.inf))
         entries = entries[kept]
-        del cell, piece, below, above, outdone, before, counts_from, kept  # while the stage is looked into
+        del cell, piece, below, above, outdone, before, counts_from, kept  # free memory while the stage is in use
         yield Workpiece(stock, pieces, first, until, tilts, turns, *grid, index, quick)
 
 
 def _bounded(pieces: AnyArray, turns: FloatArray, piece: IntArray, cell: IntArray, grid: Grid, quick: bool) -> AnyArray:
-    """Entries (k,) of pieces in cells that they pass, some of those (e, 3) given."""
+    """Entries (e,) for pairs (k,) of a piece and a cell (k, 3), for those where the piece passes the cell."""
     corner, size, (wide, deep) = grid
     tilted = len(turns) > 1
     x, y, z = in_frames((corner + (cell + 0.5) * size).T, turns, pieces["tilt"][piece])
-    half = size * float(np.sqrt(0.75 if tilted else 0.5)) + 1e-6  # of a cell's diagonal, and a little for rounding
+    half = size * float(np.sqrt(0.75 if tilted else 0.5)) + 1e-6  # half a cell's diagonal, and a little for rounding
     rows = np.empty((3, len(piece)))
     if quick:
         compiled()[0](pieces, piece, np.ascontiguousarray(x), np.ascontiguousarray(y), half, rows)
@@ -287,7 +287,7 @@ def _bounded(pieces: AnyArray, turns: FloatArray, piece: IntArray, cell: IntArra
     far, below, above = rows
     reach = pieces["reach"][piece]
     near, all_over = far <= reach + half, far + half <= reach
-    if tilted:  # what counts is the first piece that takes all of a cell, not how far below it is
+    if tilted:  # the first piece that removes all of a cell counts, not how deep it goes
         near &= below < z + half
         taken = np.where(all_over & (above < z - half), 2.0 * CLEAR * (piece - len(pieces)), np.inf)
         below, above = np.minimum(-CLEAR, taken), taken
@@ -300,7 +300,7 @@ def _bounded(pieces: AnyArray, turns: FloatArray, piece: IntArray, cell: IntArra
 
 
 def _heights(part: AnyArray, x: FloatArray, y: FloatArray, smaller: FloatArray) -> FloatArray:
-    """(e,) m that pieces leave above the point of each row; inf: not passed."""
+    """(e,) m, height that each row's piece leaves above the row's point; inf: not passed."""
     heights, kind = np.full(len(x), np.inf), 2 * (part["turn"] != 0.0) + (part["slope"] != 0.0)
     for arc, sloped in ((False, False), (False, True), (True, False), (True, True)):
         rows = np.flatnonzero(kind == 2 * arc + sloped)
@@ -315,7 +315,7 @@ def _heights(part: AnyArray, x: FloatArray, y: FloatArray, smaller: FloatArray) 
 
 
 def in_frames(points: FloatArray, turns: FloatArray, tilt: IntArray) -> tuple[FloatArray, ...]:
-    """x, y, z (n,) of points (3, n) in the frames of tilts (n,); of a single frame as they are."""
+    """x, y, z (n,) of points (3, n) in the frames of tilts (n,); unchanged if there is only one frame."""
     if len(turns) == 1:
         return tuple(points)
     turn = turns[tilt]
@@ -323,7 +323,7 @@ def in_frames(points: FloatArray, turns: FloatArray, tilt: IntArray) -> tuple[Fl
 
 
 def _boxes(pieces: AnyArray, turns: FloatArray, stock: Stock) -> tuple[FloatArray, FloatArray]:
-    """(m, 3) m, lowest and highest x, y, z that each piece passes: of upright tools z is 0, of others in the stock."""
+    """(m, 3) m, lowest and highest x, y, z that each piece passes: for upright tools z is 0, else within the stock."""
     bulge = np.where(pieces["turn"] != 0.0, pieces["radius"] * pieces["extent"] ** 2 / 32.0, 0.0)
     margin = (1.1 * bulge + pieces["reach"])[:, None] * (1.0, 1.0, float(len(turns) > 1))
     places = [np.stack(_along(pieces, share)) for share in (0.0, 0.5, 1.0)]
@@ -334,7 +334,7 @@ def _boxes(pieces: AnyArray, turns: FloatArray, stock: Stock) -> tuple[FloatArra
         [np.stack(in_frames(place, np.swapaxes(turns, 1, 2), pieces["tilt"]), axis=1) for place in places]
     )
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    # Along the tool, as far as the stock is.
+    # Extended along the tool to the end of the stock.
     axis = turns[pieces["tilt"], :, 2]
     lowest, highest = stock.ends
     room = np.where(axis > 0.0, highest - low, high - lowest) / np.maximum(np.abs(axis), 1e-12)
@@ -353,7 +353,7 @@ def _along(pieces: AnyArray, share: float) -> tuple[FloatArray, ...]:
 
 
 def _outdone(cell: IntArray, below: FloatArray, above: FloatArray) -> IntArray:
-    """(e,) the first entry of the cell that leaves less than each all over it; beyond the cell: none.
+    """(e,) first later entry of the cell that leaves less than this one everywhere in it; beyond the cell: none.
 
     By the least bound so far in each cell: a running minimum over all entries, the cells set apart by a large step.
     """
@@ -364,7 +364,7 @@ def _outdone(cell: IntArray, below: FloatArray, above: FloatArray) -> IntArray:
 
 
 def _redone(cell: IntArray, below: FloatArray, above: FloatArray) -> BoolArray:
-    """(e,) whether a later entry of the cell leaves no more than each all over it."""
+    """(e,) True if a later entry of the cell leaves no more than this one everywhere in it."""
     highest = float(below.max(initial=0.0)) + 1e-4
     apart = (highest - float(below.min(initial=0.0)) + 1e-3) * (cell.max(initial=0) - cell)
     bound = np.minimum.accumulate((np.minimum(above, highest) - apart)[::-1])[::-1]

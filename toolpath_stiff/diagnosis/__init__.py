@@ -1,1 +1,1 @@
-"""Which physical effect is missing: the verdict that all noise models share, and what stands behind it."""
+"""Diagnosis of the missing physical effect: the verdict that all noise models share, and its grounds."""

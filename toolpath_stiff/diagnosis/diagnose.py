@@ -43,7 +43,7 @@ FEWEST = 6  # readings below which a diagnosis is refused: strut law, one effect
 
 
 def check_measured(data: Readings, purpose: str, fewest: int = FEWEST) -> None:
-    """Raise `InputError` where readings are too few, or some have no stiffness."""
+    """Raise `InputError` if readings are too few, or some have no stiffness."""
     lacking = int(np.isnan(data.stiffness).sum())
     if len(data) < fewest or lacking:
         raise InputError(
@@ -62,7 +62,7 @@ def diagnose(
     seed: int = 0,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Diagnosis:
-    """Find out which physical effect the model lacks, if any: everything that `tps diagnose` says.
+    """Find the physical effect that the model lacks, if any: everything that `tps diagnose` reports.
 
     Parameters
     ----------
@@ -101,8 +101,8 @@ def diagnose(
         for model in noise_models(data, noise, strut_spread):
             progress(f"searching {len(effects)} effects, noise {model.name}")
             judgements[model.name] = judge(Problem.of(predictor, model), model, effects, seed)
-        predictor.tables.pop(FORMS, None)  # of 5,000 readings 0.4 GB, of no use after the judgement
-        # Of several noise models the one with the largest noise is written out: the one that leaves most standing.
+        predictor.tables.pop(FORMS, None)  # 0.4 GB for 5,000 readings, not needed after the judgement
+        # Of several noise models the one with the largest noise, which leaves most standing, is reported in full.
         return judgements, max(judgements.values(), key=lambda judgement: judgement.noise.typical)
 
     judgements, main, data, suspects = _without_slips(judged, data, progress)
@@ -111,7 +111,7 @@ def diagnose(
     tested, tip = {family.name for family in main.families}, data.tip
     cannot |= {effect.name: () for effect in effects if effect.name not in tested}
     as_given, refitted = baseline(main.problem)
-    # Of every family that the judgement has only on tables and that is not ruled out, once more with the model itself.
+    # Families judged on tables only, and not ruled out, are fitted again with the model itself.
     fits = {family.name: family.best for family in main.families if family.best is not None} | main.fits
     likely = [name for name in fits if name not in main.fits and main.probability.get(name, 0.0) >= SHOWN]
     fits |= {name: refine(main.problem, fits[name]) for name in likely}
@@ -133,7 +133,7 @@ def diagnose(
 def _without_slips(
     judged: Callable[[Readings], Judged], data: Readings, progress: Callable[[str], None]
 ) -> tuple[dict[str, Judgement], Judgement, Readings, tuple[slips.SuspectEntry, ...]]:
-    """Judgements of the readings without rows that are clearly mistyped, these readings, suspects."""
+    """Judgements of the readings without clearly mistyped rows, the last of them, these readings, the suspect rows."""
     judgements, main = judged(data)
     if main.question or data.beside is not None:
         return judgements, main, data, ()
@@ -143,7 +143,7 @@ def _without_slips(
     kept = np.ones(len(data), dtype=bool)
     kept[[int(row) for suspect in clear for row in suspect.rows]] = False
     if clear and kept.sum() >= FEWEST:
-        # Where something is missing, any freedom helps: a slip is one only if nothing is left once it is mended.
+        # If something is missing, any freedom helps: a row is a slip only if correcting it leaves nothing unexplained.
         progress("once more with the rows mended that look mistyped")
         clear = [] if judged(slips.mended(data, clear))[1].verdict == "unexplained" else clear
     entries = tuple(slips.suspect_entries(suspects, data, left_out=clear))
@@ -154,7 +154,7 @@ def _without_slips(
 
 
 def common_verdict(judgements: Sequence[Judgement]) -> str:
-    """The verdict that all noise models share, of names the same ones; else `ambiguous`."""
+    """Verdict that all noise models share (if it names effects, the same ones); otherwise `ambiguous`."""
     verdicts = {judgement.verdict for judgement in judgements}
     same = len({frozenset(judgement.plausible) for judgement in judgements}) == 1
     if same and verdicts == set(NAMING):
@@ -163,7 +163,7 @@ def common_verdict(judgements: Sequence[Judgement]) -> str:
 
 
 def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portrait | None:
-    """What the missing thing looks like: of unexplained readings, and of what the best explanation leaves behind.
+    """Portrait of what is missing: from unexplained readings, or from what the best explanation leaves.
 
     None where nothing stands out of what is left, and where the readings do not look as if they were of this machine.
     """
@@ -173,7 +173,7 @@ def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portra
     left = gate is not None and gate.probability <= FALSE_ALARM and noise.tip is None
     if main.question or diagnosis.verdict == "adequate" or not (unexplained or left):
         return None
-    if noise.tip is not None:  # its terms are compliances at the tip: other loops are left out
+    if noise.tip is not None:  # the terms are compliances at the tip, so other loops are left out
         noise = noise.select(noise.tip)
         problem = Problem.of(Predictor(diagnosis.machine, diagnosis.data, diagnosis.predictor.effect_files), noise)
         base = problem.score_base()
@@ -183,7 +183,7 @@ def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portra
 
 
 def alike_of(diagnosis: Diagnosis) -> dict[str, Alike]:
-    """What else would look the same as each effect that is named: parts that the catalogue does not have."""
+    """Alternatives to each named effect: parts outside the catalogue that would look the same."""
     main = diagnosis.main
     named = diagnosis.fits.get(diagnosis.best or "")
     if diagnosis.verdict not in NAMING or named is None or main.noise.tip is not None:
@@ -192,12 +192,12 @@ def alike_of(diagnosis: Diagnosis) -> dict[str, Alike]:
 
 
 def with_plan(diagnosis: Diagnosis, progress: Callable[[str], None] = lambda text: None) -> Diagnosis:
-    """With rows of a plan that would tell the plausible explanations apart, each with its reason; and remarks.
+    """Diagnosis with rows of a plan that would tell the plausible explanations apart, with reasons; and remarks.
 
     Of an answer that is only `described`, what would confirm it. No rows with any other verdict than these two, and
     where they would gain nothing: the first remark says so.
     """
-    # Under several noise models the most demanding one that leaves rivals, with those of the others.
+    # Of several noise models, plan under the last that leaves rivals, with the rivals of all of them.
     open_ones = [j for j in diagnosis.judgements.values() if j.verdict == diagnosis.verdict]
     if diagnosis.verdict not in ("ambiguous", "described") or not open_ones:
         return diagnosis
@@ -228,7 +228,7 @@ def with_plan(diagnosis: Diagnosis, progress: Callable[[str], None] = lambda tex
 def choice_on_path(
     diagnosis: Diagnosis, program: ReadProgram, origin: Pose | None = None, given: Conditions | None = None
 ) -> Document:
-    """Mean, range and minimum along a program under each plausible explanation: how much the choice matters.
+    """Mean, range and minimum along a program under each plausible explanation, which show how much the choice matters.
 
     Where the program is out of reach, or a model has no answer there, the reason instead. `given` is under what the
     program runs; unless it names a set-up, the one that an explanation belongs to: there the choice matters.
@@ -244,7 +244,7 @@ def choice_on_path(
         machine = diagnosis.machine.with_changes(strut_law=scaled_law(diagnosis.machine.strut_law, fit.law))
         try:
             model = build_model(machine, diagnosis.predictor.effect_files, fit.effects, conditions)
-            model = replace(model, instruments=())  # readings differ, the machine under the tool does not
+            model = replace(model, instruments=())  # instrument effects change readings, not the machine under the tool
             analysis = analyze(model, program, origin=origin, step=PATH_STEP)
         except TpsError as error:
             return {"program": program.name, "reason": str(error)}

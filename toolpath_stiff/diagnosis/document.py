@@ -1,4 +1,4 @@
-"""A diagnosis as JSON: the content of diagnose.json, in shop units; None stands for what JSON cannot hold."""
+"""A diagnosis as JSON: content of diagnose.json, in shop units; None stands for values that JSON cannot hold."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ ERRORS = (
 
 
 def document_of(diagnosis: Diagnosis) -> Document:
-    """Everything that `diagnose.json` holds."""
+    """Content of diagnose.json."""
     main, noise, rows = diagnosis.main, diagnosis.noise, diagnosis.rows
     drawn = diagnosis.unconfirmed or main.drawn
     links = {family.name: family.effect.link for family in main.families}
@@ -75,7 +75,7 @@ def document_of(diagnosis: Diagnosis) -> Document:
 def _baseline(diagnosis: Diagnosis) -> Document:
     """The model as given, and with its strut law refitted."""
     law, rows = diagnosis.machine.strut_law, diagnosis.rows
-    count = len(law.parameters)  # of a constant law one, which belongs to no length
+    count = len(law.parameters)  # a constant law has one stiffness, which belongs to no length
     factors, deviations = np.exp(diagnosis.base.law[:count]), np.sqrt(np.diag(diagnosis.base.covariance)[:count])
     ends = ((law.length_1, law.stiffness_1), (law.length_2, law.stiffness_2))[:count]
     return {
@@ -103,7 +103,7 @@ def _part(row: HypothesisRow, names: tuple[str, ...]) -> Document:
 
 
 def _hypothesis(row: HypothesisRow, judgement: Judgement, head: Document, parameters: Document) -> Document:
-    """Effects with figures and the vote for the first explanation against them, none of that itself and its own part.
+    """Figures of effects, with the vote of the first explanation against them (None for that one and for parts of it).
 
     Without the probability of its gate where an effect fits best when it is absent.
     """
@@ -114,20 +114,20 @@ def _hypothesis(row: HypothesisRow, judgement: Judgement, head: Document, parame
 
 
 def _candidate(row: HypothesisRow, judgement: Judgement, link: str) -> Document:
-    """A single effect."""
+    """A single effect, as an entry of the document."""
     parameters = {"parameters": to_dict(row.sizes.get(row.name, {})), "choice": row.choice.get(row.name, {})}
     head = {"effect": row.name, "title": row.title, "link": link}
     return {**_hypothesis(row, judgement, head, parameters), **_part(row, ("eligible", "remark"))}
 
 
 def _pair(row: HypothesisRow, judgement: Judgement) -> Document:
-    """Several effects; parameters by effect, with what it acts on."""
+    """Several effects, as an entry of the document; parameters by effect, with the elements they act on."""
     parameters = {name: to_dict(sizes) | dict(row.choice[name]) for name, sizes in row.sizes.items()}
     return _hypothesis(row, judgement, {"effects": row.name.split(" + ")}, {"parameters": parameters})
 
 
 def _not_excluded(hidden: Unexcluded) -> Document:
-    """How far an effect may go that the readings do not show."""
+    """Largest size of an effect that the readings do not show, as an entry of the document."""
     return {
         "effect": hidden.effect.name,
         "title": hidden.effect.title,
@@ -143,7 +143,7 @@ def _not_excluded(hidden: Unexcluded) -> Document:
 
 
 def _gates(judgement: Judgement) -> Document:
-    """The absolute test of the model without a further effect."""
+    """Absolute test of the model without a further effect, as an entry of the document."""
     gate = judgement.base_gate
     return {
         "baseline_probability": json_number(gate.probability, 3),
@@ -157,7 +157,7 @@ def _gates(judgement: Judgement) -> Document:
 
 
 def _in_short(judgement: Judgement) -> Document:
-    """A judgement under one noise model."""
+    """Summary of a judgement under one noise model."""
     return {
         "verdict": judgement.verdict,
         "plausible": list(judgement.plausible),

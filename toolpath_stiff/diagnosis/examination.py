@@ -1,4 +1,4 @@
-"""What a diagnosis has found: judgements under each noise model, fits, errors held out; a row for each hypothesis."""
+"""Findings of a diagnosis: judgements under each noise model, fits, errors held out; a row for each hypothesis."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -36,7 +36,7 @@ from toolpath_stiff.stiffness.sizes import joined
 
 NAMING = ("identified", "described")  # verdicts that give one explanation as the answer
 SHOWN = 0.005  # probability below which a hypothesis is ruled out, and printed as "< 0.5 %"
-TOUCHES = 0.01  # of an interval's length from a bound: it reaches to the bound
+TOUCHES = 0.01  # of an interval's length: an end this close to a bound counts as at the bound
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class FittedSize:
 
 @dataclass(frozen=True)
 class HypothesisRow:
-    """A hypothesis: figures rounded as documents have them, None where there is none.
+    """A hypothesis, its figures rounded as in documents; None for a figure it does not have.
 
     Attributes
     ----------
@@ -91,13 +91,13 @@ class HypothesisRow:
 
     @property
     def offered(self) -> bool:
-        """Whether it may be relied on."""
+        """True if it may be relied on."""
         return self.eligible or self.standing
 
 
 @dataclass(frozen=True)
 class HypothesisRows:
-    """All hypotheses; pairs and candidates with the likeliest first. `best`: the explanation that is written about."""
+    """All hypotheses; pairs and candidates sorted, the likeliest first. `best`: the explanation that is reported."""
 
     as_given: HypothesisRow
     refitted: HypothesisRow
@@ -109,7 +109,7 @@ class HypothesisRows:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(FolderResult):
-    """Which physical effect the model lacks, if any, and what stands behind it; arrays in SI.
+    """Verdict on the physical effect that the model lacks, if any, with its grounds; arrays in SI.
 
     Attributes
     ----------
@@ -177,11 +177,11 @@ class Diagnosis(FolderResult):
     inputs: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of diagnose.json."""
+        """Content of diagnose.json."""
         return dict(self.view.document(self))
 
     def to_frame(self) -> DataFrame:
-        """The candidates, one a row: probability, errors, why not."""
+        """Candidates, one a row: probability, errors, reason for not being offered."""
         return frame_of(self.to_dict()["candidates"])
 
     def _short(self) -> str:
@@ -189,17 +189,17 @@ class Diagnosis(FolderResult):
 
     @property
     def noise(self) -> Noise:
-        """The noise model of `main`."""
+        """Noise model of `main`."""
         return self.main.noise
 
     @property
     def predictor(self) -> Predictor:
-        """The model's answers to the data."""
+        """Model predictions for the data."""
         return self.main.problem.predictor
 
     @cached_property
     def explanations(self) -> tuple[str, ...]:
-        """Hypotheses left standing, the most likely first: effects, `none`, "a + b"; one alone where one is the answer.
+        """Hypotheses left standing, the most likely first: effects, `none`, "a + b"; a single one if it is the answer.
 
         Of several noise models by turns, as many entries as of one.
         """
@@ -215,12 +215,12 @@ class Diagnosis(FolderResult):
 
     @property
     def entries(self) -> list[tuple[str, ...]]:
-        """The explanations, those together that sit at one place and that these readings could not tell apart."""
+        """Explanations, grouped where they sit at one place and these readings could not tell them apart."""
         return entries(self.main.problem, self._standing_fits, self.explanations)
 
     @property
     def beside(self) -> list[Unexcluded]:
-        """Effects that may be there beside the likeliest explanation at a size that matters, and are in none."""
+        """Effects outside the explanations that may be present beside the likeliest one, at a size that matters."""
         return [hidden for hidden in self.unexcluded if hidden.matters and hidden.effect.name not in self.plausible]
 
     @property
@@ -230,7 +230,7 @@ class Diagnosis(FolderResult):
 
     @cached_property
     def best(self) -> str | None:
-        """Name of the best explanation by an effect or a pair; None where there is none.
+        """Name of the best explanation by an effect or a pair; None if there is none.
 
         The likeliest, of equals the one with more evidence; what lowers no error at left-out points is none. Those that
         are left standing come first.
@@ -240,13 +240,13 @@ class Diagnosis(FolderResult):
         return next((name for name in names if name in self.fits and self._answers(name)), None)
 
     def _answers(self, name: str) -> bool:
-        """Whether an explanation is there at all, and lowers the error at left-out points."""
+        """True if an explanation has a size other than zero and lowers the error at left-out points."""
         there = any(size.any() for size in self.fits[name].sizes)
         return there and lowers_error(self.held_out_base, self.held_out[name])
 
     @cached_property
     def nuisances(self) -> list[Document]:
-        """The struts' and joints' deviations that the likeliest explanation fits, the one that stands out most first.
+        """Deviations of struts and joints fitted with the likeliest explanation, the most conspicuous first.
 
         Of the model alone where nothing is missing.
         """
@@ -255,25 +255,25 @@ class Diagnosis(FolderResult):
 
     @property
     def likeliest(self) -> Fit:
-        """The fit of the best explanation; with the strut law refitted alone where there is none."""
+        """Fit of the best explanation; if there is none, of the strut law alone."""
         return self.base if self.best is None else self.fits[self.best]
 
     @property
     def after(self) -> FloatArray:
-        """(n,) residual of the best explanation; with the strut law refitted where there is none, or none is needed."""
+        """(n,) residuals of the best explanation; if there is none or none is needed, of the refitted strut law."""
         return self.base.residual if self.verdict == "adequate" else self.likeliest.residual
 
     @property
     def unconfirmed(self) -> Drawn | None:
-        """How an answer that is only `described` stands, under the noise model that confirms it least."""
+        """Status of an answer that is only `described`, under the noise model that confirms it least."""
         drawn = (judgement.drawn for judgement in self.judgements.values() if judgement.verdict == "described")
         return next(filter(None, drawn), None)
 
     @cached_property
     def rows(self) -> HypothesisRows:
-        """Every hypothesis with its figures, in shop units."""
+        """All hypotheses with their figures, in shop units."""
         main, likely = self.main, self.main.probability
-        error = percent_of(float(self.as_given.errors.mean()))  # nothing is fitted: leaving points out changes nothing
+        error = percent_of(float(self.as_given.errors.mean()))  # nothing fitted: leaving points out has no effect
         refitted = replace(_row(self, NONE, main.base.log_evidence), held_out_gain_in_se=None)
         families = sorted(main.families, key=lambda f: (-likely.get(f.name, 0.0), -f.log_evidence, f.name))
         candidates = [_candidate(self, family) for family in families]
@@ -293,7 +293,7 @@ class Diagnosis(FolderResult):
 
 
 def _row(diagnosis: Diagnosis, name: str, log_evidence: float) -> HypothesisRow:
-    """A hypothesis with its final fit; the model alone where the effect fits best when it is absent."""
+    """A hypothesis with its final fit; with that of the model alone if its effect fits best when absent."""
     main, base = diagnosis.main, diagnosis.held_out_base
     fit, held = diagnosis.fits.get(name, diagnosis.base), diagnosis.held_out.get(name, base)
     if not any(size.any() for size in fit.sizes):
@@ -320,7 +320,7 @@ def _row(diagnosis: Diagnosis, name: str, log_evidence: float) -> HypothesisRow:
 
 
 def _candidate(diagnosis: Diagnosis, family: Family) -> HypothesisRow:
-    """A single effect; where it fits best when it is absent, without sizes."""
+    """A single effect; without sizes if it fits best when absent."""
     name, alone = family.name, diagnosis.main.base_gate.probability > FALSE_ALARM
     row = replace(_row(diagnosis, name, family.log_evidence), title=family.effect.title)
     if not row.sizes:
@@ -331,7 +331,7 @@ def _candidate(diagnosis: Diagnosis, family: Family) -> HypothesisRow:
 
 
 def row_words(diagnosis: Diagnosis, name: str) -> str:
-    """How a hypothesis stands: by its odds against the likeliest, unless a gate has settled it."""
+    """Words on how a hypothesis stands: by its odds against the likeliest, unless a gate has settled it."""
     main = diagnosis.main
     probability = main.probability.get(name, 0.0)
     if main.base_gate.probability > FALSE_ALARM:
@@ -344,7 +344,7 @@ def row_words(diagnosis: Diagnosis, name: str) -> str:
 
 
 def odds_words(probability: float, best: float) -> str:
-    """How a hypothesis stands against the likeliest one, by twice the logarithm of the odds (RadVel's wording)."""
+    """Words on a hypothesis against the likeliest, by twice the logarithm of the odds (RadVel's wording)."""
     if probability < SHOWN:
         return "ruled out"
     twice = 2.0 * float(np.log(best / probability))
@@ -353,7 +353,7 @@ def odds_words(probability: float, best: float) -> str:
 
 
 def fitted_sizes(fit: Fit, family: Family | None = None, widening: float = 1.0) -> dict[str, dict[str, FittedSize]]:
-    """Effect -> key -> value, unit, 95 % interval of all effects of a fit, with standard deviations so much wider."""
+    """Effect -> key -> value, unit, 95 % interval for all effects of a fit; standard deviations times `widening`."""
     sizes: dict[str, dict[str, FittedSize]] = {candidate.name: {} for candidate in fit.candidates}
     owners = [candidate.name for candidate in fit.candidates for _ in candidate.components]
     for index, (owner, (component, size)) in enumerate(zip(owners, fit.parts, strict=True)):
@@ -387,16 +387,16 @@ def interval(
 
 
 def percent_of(share: float, digits: int = DIGITS) -> float | None:
-    """A share in per cent, rounded as documents have it."""
+    """A share in per cent, rounded as in documents."""
     return json_number(100.0 * share, digits)
 
 
 def rounded_errors(residual: FloatArray) -> dict[str, float | None]:
-    """`error_figures` as a document has them."""
+    """`error_figures`, rounded as in documents."""
     figures: Document = error_figures(residual)
     return {name: json_number(value) for name, value in figures.items()}
 
 
 def held_errors(held: HeldOut) -> dict[str, float | None]:
-    """Errors at left-out points."""
+    """Errors at left-out points, rounded as in documents."""
     return {"held_out_error_percent": percent_of(held.mean_error), "held_out_rms_percent": percent_of(held.rms)}

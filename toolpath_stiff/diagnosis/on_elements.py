@@ -1,4 +1,4 @@
-"""Which effect a machine of elements lacks, by pulls: displacements as vectors or along a dial, or stiffnesses."""
+"""Diagnosis of machines of elements by pulls: displacements as vectors or along a dial, or stiffnesses."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ NRAD = 1e9  # nrad/(N m) of rad/(N m)
 FEWEST = 6  # readings below which nothing is fitted
 SHOWN = 12  # explanations in the document
 NAMED = 4  # causes in a sentence
-FAR_OFF, SD_OF_MEDIAN = 8.0, 1.4826  # standard deviations, each of the median of what is off
-WORTHWHILE = 0.8  # of the error as given: what refitted joints have to leave to be spoken of
+FAR_OFF, SD_OF_MEDIAN = 8.0, 1.4826  # standard deviations; sd over median of absolute deviations (normal)
+WORTHWHILE = 0.8  # share of the error as given below which refitted joints must bring it to be mentioned
 NO_NAME = {
     "adequate": "nothing is missing that shows",
     "unexplained": "no effect of the catalogue by itself explains the readings",
@@ -51,7 +51,7 @@ NO_NAME = {
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ElementDiagnosis(FolderResult):
-    """Verdict on what a machine of elements lacks, with its errors and its joints fitted alone.
+    """Verdict on what a machine of elements lacks, with its errors and the joints fitted alone.
 
     Attributes
     ----------
@@ -79,31 +79,31 @@ class ElementDiagnosis(FolderResult):
 
     @property
     def labels(self) -> list[str]:
-        """Of the plausible explanations, effect and element: "joint_torsion, joint 3"."""
+        """Effect and element of each plausible explanation: "joint_torsion, joint 3"."""
         return [label_of(fit) for fit in self.plausible]
 
     @property
     def error_as_given(self) -> float:
-        """Root mean square of measured less modelled, in per cent of that of what was measured."""
+        """Root mean square of measured less modelled, in per cent of that of the measured values."""
         return self.counted(self.problem.observed)
 
     @cached_property
     def joints(self) -> Fit | None:
-        """The torsions of all joints that turn fitted in place of the file's; None without such joints."""
+        """Fit of the torsions of all turning joints in place of the file's; None without such joints."""
         return self.problem.joints_fitted if self.problem.torsions else None
 
     @cached_property
     def left_out(self) -> FloatArray:
-        """(m,) residuals at each pose of joints fitted to all others, of the size of each pull's displacement."""
+        """(m,) residuals at each pose with joints fitted to all other poses, relative to each pull's displacement."""
         return self.problem.observed if self.joints is None else held_out(self.joints, self.problem.point).residual
 
     @property
     def torsions(self) -> Mapping[str, float]:
-        """Joint -> rad/(N m) fitted."""
+        """Joint -> fitted rad/(N m)."""
         return {} if self.joints is None else fitted_torsions(self.problem, self.joints)
 
     def to_dict(self) -> Document:
-        """The content of diagnose.json: keys as of a hexapod's, and the joints fitted alone."""
+        """Content of diagnose.json: the keys of a hexapod's, and the joints fitted alone."""
         problem, fits = self.problem, self.ranked[:SHOWN]
         error = json_number(self.counted(self.left_out)) if self.joints else None
         return {
@@ -149,7 +149,7 @@ class ElementDiagnosis(FolderResult):
 
     @property
     def sentence(self) -> str:
-        """Verdict, cause, error, and what to do next."""
+        """Sentences on verdict, cause, error, and the next step."""
         causes, problem = [finding for fit in self.plausible for finding in fit.findings], self.problem
         more = [f"{len(causes) - NAMED} more"] if len(causes) > NAMED else []
         told = NO_NAME.get(self.verdict) or joined([*causes[:NAMED], *more])
@@ -168,7 +168,7 @@ class ElementDiagnosis(FolderResult):
 
     @cached_property
     def components(self) -> list[Document]:
-        """Of each component that was read: size and error of the model as given, root mean squares, mean error; um."""
+        """For each component read: rms of readings and of the error as given, and its mean error; um."""
         pulls, error = self.pulls, um_from_m(self.problem.predicted - self.pulls.value)
         chosen = {str(name): pulls.component == name for name in np.unique(pulls.component)}
         return [
@@ -182,7 +182,7 @@ class ElementDiagnosis(FolderResult):
         ]
 
     def vectors(self) -> dict[str, AnyArray]:
-        """Column of `vectors.csv` -> values, of each pull read in three directions: what moved, and the error."""
+        """Column of `vectors.csv` -> values, for each pull read in three directions: displacement and error."""
         pulls = self.pulls
         first = np.unique(pulls.pull, return_index=True)[1]
         whole = np.bincount(pulls.pull) == len("xyz")
@@ -197,26 +197,26 @@ class ElementDiagnosis(FolderResult):
 
     @cached_property
     def wild_rows(self) -> list[int]:
-        """Readings that the likeliest explanation takes for wild; else of pulls far off what refitted joints leave."""
+        """Readings that the likeliest explanation takes to be wild; without one, those far off the refitted joints."""
         if self.verdict != "unexplained":
             return sorted((self.plausible or [self.problem.none])[0].scatter.wild)
         pulls, error = self.pulls, (self.joints or self.problem.none).residual * self.pulls.size
         left, moved = (np.bincount(pulls.pull, part**2)[pulls.pull] for part in (error, pulls.value - error))
-        off = np.sqrt(left / np.maximum(moved, 1e-300))
+        off = np.sqrt(left / np.maximum(moved, pulls.least**2))
         return np.flatnonzero(off > FAR_OFF * SD_OF_MEDIAN * np.median(off)).tolist()
 
     @property
     def wild(self) -> list[str]:
-        """Of these "FILE:LINE x"."""
+        """Wild readings as "FILE:LINE x"."""
         pulls = self.pulls
         return [f"{pulls.file[i]}:{pulls.line[i]} {pulls.component[i]}" for i in self.wild_rows]
 
     def counted(self, residual: FloatArray) -> float:
-        """Error of (m,) residuals over all readings that are not wild, per cent."""
+        """Error of (m,) residuals over the readings that are not wild, per cent."""
         return self.problem.error_percent(residual, self.wild_rows)
 
     def to_frame(self) -> pd.DataFrame:
-        """One row a reading, as in `residuals.csv`."""
+        """One row per reading, as in `residuals.csv`."""
         return frame_of(self.columns())
 
     def columns(self) -> dict[str, AnyArray]:
@@ -228,13 +228,13 @@ class ElementDiagnosis(FolderResult):
 
 
 def errors_of(fit: Fit, diagnosis: ElementDiagnosis) -> Document:
-    """Errors of a fit relative to each displacement, per cent, and those at left-out poses."""
+    """Errors of a fit relative to each displacement, per cent, overall and at left-out poses."""
     held = held_out(fit, diagnosis.problem.point)
     return {"mean_abs_error_percent": percent_of(float(fit.errors.mean())), **held_errors(held)}
 
 
 def residual_columns(problem: PullProblem, further: Mapping[str, FloatArray]) -> dict[str, AnyArray]:
-    """Columns of `residuals.csv`; `further`: what other fits say, as residuals (m,)."""
+    """Columns of `residuals.csv`; `further`: residuals (m,) of other fits."""
     pulls = problem.pulls
     return {
         "file": pulls.file, "line": pulls.line, "component": pulls.component, "pose": pulls.pose + 1,
@@ -245,7 +245,7 @@ def residual_columns(problem: PullProblem, further: Mapping[str, FloatArray]) ->
 
 
 def fitted_torsions(problem: PullProblem, joints: Fit) -> dict[str, float]:
-    """Joint -> rad/(N m) of joints fitted in place of the file's, before whatever else the fit holds."""
+    """Joint -> rad/(N m) of joints fitted in place of the file's, the first parameters of the fit."""
     stated = problem.torsions.items()
     return {name: was + float(size[0]) for (name, (_, was)), size in zip(stated, joints.sizes, strict=False)}
 
@@ -258,7 +258,7 @@ def pull_problem(
     spread: float = 0.0,
     effect_files: Sequence[str] = (),
 ) -> tuple[PullProblem, bool]:
-    """Pulls with their scatter, and whether it is known: stated by rows or as a share of each pull's size, or repeats.
+    """Pulls with their scatter, and True if it is known: stated in rows or as a share of the displacement, or repeats.
 
     `noise` is the standard deviation of a displacement relative to the size of its pull's, `spread` that of the
     elements' compliances, relative. Repeats that scatter by more than is stated overrule it. Where neither tells, it is
@@ -289,7 +289,7 @@ def pull_problem(
 
 
 def diagnose_elements(problem: PullProblem, known: bool) -> ElementDiagnosis:
-    """The verdict on pulls; `known`: whether somebody states how they scatter."""
+    """Verdict on pulls; `known`: their scatter is known."""
     ranked = explanations(problem, problem.none)
     verdict, plausible = verdict_of(problem, problem.none, ranked, known)
     return ElementDiagnosis(problem, verdict, plausible, ranked)

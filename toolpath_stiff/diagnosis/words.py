@@ -1,4 +1,4 @@
-"""A diagnosis in sentences."""
+"""Sentences on a diagnosis."""
 
 from collections.abc import Sequence
 
@@ -8,6 +8,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Diagnosis
 from toolpath_stiff.hints import Asked, command_line, hint, options
+from toolpath_stiff.inference.adequacy import LEFT
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.discrepancies import RANGE_LENGTH
 from toolpath_stiff.inference.drawn import seen_readings
@@ -17,16 +18,14 @@ from toolpath_stiff.inference.judgement import (
     ADEQUATE,
     FALSE_ALARM,
     HELD,
-    LEFT,
     NONE,
     OUTSIDE,
     POSITIVE,
     STANDS,
-    TAKEN_UP,
     Judgement,
 )
 from toolpath_stiff.inference.noise import REST
-from toolpath_stiff.inference.nuisances import findings, nuisance_words
+from toolpath_stiff.inference.nuisances import TAKEN_UP, findings, nuisance_words
 from toolpath_stiff.inference.repeats import OUTLIERS
 from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
@@ -40,13 +39,13 @@ MOST_BESIDE = 3  # effects in a sentence on what is not excluded; a document has
 
 
 def verdict_text(diagnosis: Diagnosis) -> str:
-    """The verdict in one or two sentences, the cause first; then what may be wrong with the data."""
+    """The verdict in one or two sentences, the cause first; then possible faults of the data."""
     same = [alike_text(name, alike) for name, alike in diagnosis.alike.items()]
     return " ".join([_verdict_text(diagnosis), *same, *(f"{_capital(doubt)}." for doubt in doubts(diagnosis))])
 
 
 def doubts(diagnosis: Diagnosis) -> list[str]:
-    """What may be wrong with the data instead of the machine: the stated noise, single rows."""
+    """Possible faults of the data rather than the machine: the stated noise, single rows."""
     noise = dict.fromkeys(judgement.doubt for judgement in diagnosis.judgements.values() if judgement.doubt)
     nuisances = [f"{nuisance_words(entry)}, more than is assumed of any" for entry in findings(diagnosis.nuisances)[:1]]
     return [*noise, *([] if diagnosis.main.question else nuisances), *(suspect.words for suspect in diagnosis.suspects)]
@@ -81,7 +80,7 @@ def _verdict_text(diagnosis: Diagnosis) -> str:
     )
     if main.form:
         text += f" What is left forms a pattern {main.form}."
-    # What of the catalogue would explain them, were nothing outside it as likely.
+    # Best of the catalogue, had nothing outside it been as likely.
     named = {name: chance for name, chance in main.probability.items() if name in diagnosis.fits and chance >= STANDS}
     if named:
         best, outside = max(named, key=lambda name: named[name]), _percent(main.probability.get(OUTSIDE, 0.0))
@@ -90,7 +89,7 @@ def _verdict_text(diagnosis: Diagnosis) -> str:
 
 
 def _cause(diagnosis: Diagnosis, name: str) -> str:
-    """An explanation as an engineer says it, its effects and its probability after it."""
+    """An explanation in an engineer's words, followed by its effects and its probability."""
     chance = _percent(diagnosis.main.probability.get(name, 0.0))
     if name == NONE:
         return f"nothing is missing (probability {chance})"
@@ -100,18 +99,18 @@ def _cause(diagnosis: Diagnosis, name: str) -> str:
     unusual = f", more than is usual ({joined(sizes)}) " if (sizes := _unusual(fit)) else " "
     words = f"probability {chance}"
     if diagnosis.main.probability.get(name, 0.0) < SHOWN and name in diagnosis.main.votes:
-        words = f"less likely than {100 * SHOWN:g} %, but foretells pose after pose as well"
+        words = f"less likely than {100 * SHOWN:g} %, but predicts pose after pose as well"
     return f"{joined(fit.findings)}{unusual}({name}, {words})"
 
 
 def _unusual(fit: Fit) -> list[str]:
-    """Usual sizes of the parameters whose fitted ones are beyond them."""
+    """Usual sizes of the parameters whose fitted values lie outside them."""
     beyond = [component.parameter for component, size in fit.parts if abs(size) > component.typical()[1]]
     return [f"{p.name.replace('_', ' ')} {p.typical[0]:g} to {p.typical[1]:g} {p.unit}".rstrip() for p in beyond]
 
 
 def _outvoted(diagnosis: Diagnosis) -> str:
-    """The closest rival that a name has outvoted, a sentence with the space before it; "" without votes."""
+    """Sentence (with a leading space) on the closest rival that the named effect has outvoted; "" without votes."""
     rival, differences = next(iter(diagnosis.main.votes.items()), ("", np.zeros(0)))
     return f" Of all rivals of another part {vote_words(rival, differences)} (log probability)." if rival else ""
 
@@ -125,7 +124,7 @@ def _capital(text: str) -> str:
 
 
 def _rivals(diagnosis: Diagnosis) -> str:
-    """Explanations that stand beside each other."""
+    """Words on the explanations that stand beside each other."""
     causes = [f"{_cause(diagnosis, entry[0])}{_alike(entry)}" for entry in diagnosis.entries]
     if len(diagnosis.explanations) < 2:
         return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
@@ -151,14 +150,14 @@ def _alike(entry: Sequence[str]) -> str:
 
 
 def _most_left(diagnosis: Diagnosis) -> str:
-    """By how much the stiffness may differ by what is not excluded, a sentence with the space before it."""
+    """Sentence (with a leading space) on the largest change of stiffness that is not excluded; "" if there is none."""
     further = [hidden for hidden in diagnosis.unexcluded if hidden.effect.name not in TAKEN_UP]
     most = max(further, key=lambda hidden: round(hidden.left, 9), default=None)
     return "" if most is None else f" Up to {100.0 * most.left:.2g} % are not excluded ({most.effect.name})."
 
 
 def _hidden(diagnosis: Diagnosis) -> str:
-    """What an adequate model may still hide: beside the readings, between them; under a guessed noise the law."""
+    """Effects an adequate model may still hide: beside the readings, between them, in the law under a guessed noise."""
     text = _most_left(diagnosis) + _unread(diagnosis)
     if not diagnosis.noise.guess:
         return text
@@ -183,18 +182,18 @@ def _unread(diagnosis: Diagnosis) -> str:
 
 
 def _errors(diagnosis: Diagnosis, name: str = "") -> str:
-    """Mean errors as given, with the strut law refitted, with an explanation."""
+    """Mean errors as given, with the strut law refitted, and with an explanation."""
     rest = [(f"with {name}", 100.0 * float(diagnosis.fits[name].errors.mean()))] if name else []
     return f"Mean error: {errors_text(*_mean_errors(diagnosis), rest)}"
 
 
 def _mean_errors(diagnosis: Diagnosis) -> tuple[float, float]:
-    """Of the machine file as given and with its strut law refitted, %."""
+    """Mean errors of the machine file as given and with its strut law refitted, %."""
     return 100.0 * float(diagnosis.as_given.errors.mean()), 100.0 * float(diagnosis.base.errors.mean())
 
 
 def why(diagnosis: Diagnosis) -> list[str]:
-    """The reasons, most important first."""
+    """Reasons for the verdict, the most important first."""
     main, several = diagnosis.main, len(diagnosis.judgements) > 1
     reasons = [_base_text(judgement, several) for judgement in diagnosis.judgements.values()]
     if diagnosis.verdict == "identified" and main.drawn is not None:
@@ -210,7 +209,7 @@ def why(diagnosis: Diagnosis) -> list[str]:
 
 
 def _base_text(judgement: Judgement, several: bool) -> str:
-    """How the model alone fares under one noise model."""
+    """Words on how well the model alone fits under one noise model."""
     gate = judgement.base_gate
     under = f"under the {judgement.noise.name} noise " if several else ""
     if gate.probability > FALSE_ALARM:
@@ -228,7 +227,7 @@ def _base_text(judgement: Judgement, several: bool) -> str:
 
 
 def _not_told_apart(diagnosis: Diagnosis) -> list[str]:
-    """Why the plausible effects cannot be told apart."""
+    """Reasons why the plausible effects cannot be told apart."""
     rivals = [(name, votes) for name, votes in diagnosis.main.votes.items() if not outvoted(votes) and name != NONE]
     reasons = [f"{vote_words(*rival)} (log probability): not beyond chance" for rival in rivals[:MOST_BESIDE]]
     effects = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
@@ -243,11 +242,11 @@ def _not_told_apart(diagnosis: Diagnosis) -> list[str]:
 
 
 def next_steps(diagnosis: Diagnosis, request: Asked | None = None) -> list[str]:
-    """What to do next, as hints: commands run as they stand."""
+    """Next steps as hints, with commands that run as they stand."""
     request = request or diagnosis.asked or Asked(diagnosis.names)
     repeat = "repeat a few readings, re-clamped, or state --noise"
     plan, verdict = request.command("plan"), diagnosis.verdict
-    # Where there is no plan, the remark says why.
+    # Without a plan, the remark says why there is none.
     unplanned = diagnosis.remarks[0] if diagnosis.remarks and not diagnosis.next_measurements else ""
     if verdict in NAMING:
         names = diagnosis.explanations[0].split(" + ")
@@ -279,7 +278,7 @@ def next_steps(diagnosis: Diagnosis, request: Asked | None = None) -> list[str]:
 
 
 def _until_then(diagnosis: Diagnosis, request: Asked) -> list[str]:
-    """How the error falls before the explanations are told apart, where one of the machine lowers it."""
+    """Hint on lowering the error before the explanations are told apart, if an effect of the machine lowers it."""
     of_instrument = {f.name for f in diagnosis.main.families if f.effect.is_instrument} & {*diagnosis.plausible}
     if {*diagnosis.plausible} <= of_instrument or np.mean(
         diagnosis.as_given.errors - diagnosis.likeliest.errors
@@ -292,7 +291,7 @@ def _until_then(diagnosis: Diagnosis, request: Asked) -> list[str]:
 
 
 def assumptions(diagnosis: Diagnosis) -> list[str]:
-    """What was assumed, in sentences."""
+    """Sentences on what was assumed."""
     noise = diagnosis.noise
     sentences = [
         f"noise: {noise.origin}",
@@ -308,8 +307,8 @@ def assumptions(diagnosis: Diagnosis) -> list[str]:
         "stiffness, as far as these data could show them; typical sizes rank, bounds alone exclude: assumed",
         f"gates: {100 * FALSE_ALARM:g} % false alarms, explanations are dropped below {100 * ADEQUATE:g} %; "
         f"the plausible set holds {100 * HELD:g} %",
-        f"a name has foretold pose after pose better than every rival of another part, by {SMALL:g} of log probability "
-        f"and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, or by {SMALL:g} without the pose that "
+        f"a name has predicted pose after pose better than every rival of another part, by {SMALL:g} of log "
+        f"probability and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, or by {SMALL:g} without the pose that "
         "says most; else it is one of several",
         f"a model is adequate where its refitted strut law moves the stiffness by up to {100 * LEFT:g} % (95 %), or "
         "nothing else explains the readings as well beside the file's law; and where no effect may hide more (95 %) "
@@ -322,7 +321,7 @@ def assumptions(diagnosis: Diagnosis) -> list[str]:
 
 
 def beside_text(unexcluded: Sequence[Unexcluded]) -> str:
-    """What is neither shown nor excluded, and where an indicator would tell; "" where there is nothing."""
+    """Words on effects neither shown nor excluded, and where an indicator would tell; "" if there are none."""
     if not unexcluded:
         return ""
     named, more, effects = unexcluded[:MOST_BESIDE], len(unexcluded) - MOST_BESIDE, list[str]()

@@ -1,1 +1,1 @@
-"""From readings to a verdict: noise, candidates, fits, gates, probabilities."""
+"""Inference from readings to a verdict: noise, candidates, fits, gates, probabilities."""

@@ -1,4 +1,4 @@
-"""The candidates: each effect of the catalogue with what it may act on, and its compliance as a function of its size.
+"""Candidates: each effect of the catalogue with the elements it may act on, and its compliance as a function of size.
 
 A candidate is an effect with a choice (which strut, which set-up). Its compliance is added to that of the base model,
 c = c_0(law) + delta(size): exact for whatever gives way in series, a good local description of the rest. The model
@@ -27,10 +27,10 @@ from toolpath_stiff.stiffness.effects.joint_offset import JointOffset
 
 SMALLEST, LARGEST = 2e-3, 0.7  # rms change of ln stiffness between which sizes are tabulated
 POINTS = 9  # sizes a sign
-CROWDED = 2.5  # power by which they crowd towards large ones: delta / size is constant first and bends at the end
+CROWDED = 2.5  # power by which knots crowd towards large sizes: delta / size is constant at first and bends later
 MOST_COMPONENTS = 4  # effects with more real parameters are tried in full and one by one only
-MOST_TRIALS = 12  # of a size that makes a small change
-INVISIBLE = 1e-7  # rms change of ln stiffness below which a choice does nothing to these data
+MOST_TRIALS = 12  # trials for a size that makes a small change
+INVISIBLE = 1e-7  # rms change of ln stiffness below which a choice has no effect on these data
 Knots = tuple[FloatArray, FloatArray]  # ln size (g,), delta / size (g, n)
 Delta = Callable[[float], FloatArray | None]  # size -> (n,) m/N added; None where the model has no answer
 
@@ -69,7 +69,7 @@ class Component:
         return self.parameter.neutral * self.parameter.si + size
 
     def size(self, value: float) -> float:
-        """The size of an SI value: what `value` gives back."""
+        """Size of an SI value: the inverse of `value`."""
         if self.inverse:
             return 0.0 if np.isinf(value) else 1.0 / value
         return value - self.parameter.neutral * self.parameter.si
@@ -80,16 +80,16 @@ class Component:
         return tuple(sign for sign, bound in zip((-1.0, 1.0), self.bounds, strict=True) if sign * bound > 0.0)
 
     def reach(self, sign: float) -> float:
-        """Largest size in that direction, as a positive number."""
+        """Largest size in a direction, as a positive number."""
         return abs(self.bounds[0] if sign < 0.0 else self.bounds[1])
 
     def allows(self, size: float) -> bool:
-        """Whether a size that is not 0 lies within its bounds."""
+        """True if a nonzero size lies within its bounds."""
         sign = float(np.sign(size))
         return sign in self.signs and abs(size) <= self.reach(sign)
 
     def typical(self) -> tuple[float, float]:
-        """Usual sizes as positive numbers, smallest and largest; 0 and inf where nothing is said."""
+        """Smallest and largest usual size, as positive numbers; 0 and inf if none is stated."""
         low, high = self.parameter.typical
         ends = [abs(self.size(end * self.parameter.si)) if end or not self.inverse else np.inf for end in (low, high)]
         return 0.0 if low < self.parameter.neutral < high else min(ends), max(ends)
@@ -97,7 +97,7 @@ class Component:
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect with what it acts on.
+    """An effect with the elements it acts on.
 
     Attributes
     ----------
@@ -123,12 +123,12 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """For people: the effect's name and its choice."""
+        """Name and choice of the effect, for people."""
         chosen = ", ".join(choice_text(key, value) for key, value in self.choice if value not in ("", 0))
         return f"{self.name} ({chosen})" if chosen else self.name
 
     def subsets(self) -> Iterator[tuple[int, ...]]:
-        """Sets of components that are not neutral."""
+        """Sets of components that may differ from neutral together."""
         count = len(self.components)
         some = (count,) if self.effect.vector else (1, count)
         for size in range(1, count + 1) if count <= MOST_COMPONENTS and not self.effect.vector else some:
@@ -136,7 +136,7 @@ class Candidate:
 
 
 def testable_effects(predictor: Predictor) -> tuple[tuple[Effect, ...], dict[str, tuple[str, ...]]]:
-    """Effects of the catalogue and of the user's files that are not in the machine yet and that the data can test.
+    """Effects of the catalogue and of the user's files, not yet in the machine, that the data can test.
 
     And those that they cannot, with the columns that are missing.
     """
@@ -147,14 +147,14 @@ def testable_effects(predictor: Predictor) -> tuple[tuple[Effect, ...], dict[str
 
 
 def choice_text(key: str, value: Any) -> str:
-    """A choice for people: "strut 3", "direction Z"; the catalogue numbers directions 1, 2, 3."""
+    """A choice in words: "strut 3", "direction Z"; the catalogue numbers directions 1, 2, 3."""
     if key == "direction" and value in (1, 2, 3):
         return f"direction {'XYZ'[value - 1]}"
     return f"{key} {value}"
 
 
 def candidates_of(effect: Effect, data: Readings | Pulls, elements: Sequence[str] = ()) -> list[Candidate]:
-    """The candidates of an effect: one a choice. Of several discrete parameters one at a time leaves its default.
+    """Candidates of an effect, one for each choice. Of several discrete parameters only one leaves its default.
 
     `elements`: those of the machine that it may act on.
     """
@@ -171,7 +171,7 @@ def candidates_of(effect: Effect, data: Readings | Pulls, elements: Sequence[str
             choices += [{parameter.name: value} for value in range(low, high + 1) if alone or value != 0]
         elif parameter.name == ELEMENT:
             choices += [{ELEMENT: name} for name in elements]
-        elif alone or len(setups) > 1:  # a single set-up is all readings, which other choices cover
+        elif alone or len(setups) > 1:  # a single set-up covers all readings, as other choices do
             choices += [{parameter.name: name} for name in setups]
     return [Candidate(effect, tuple((defaults | choice).items()), real) for choice in choices]
 
@@ -195,7 +195,7 @@ def spline(knots: FloatArray, values: FloatArray) -> Callable[[FloatArray], Floa
 
 
 class CandidateTable:
-    """`delta`, (n,) m/N that a candidate adds to the compliance of each reading, as a function of its sizes.
+    """`delta`, (n,) m/N that a candidate adds to the compliance at each reading, as a function of its sizes.
 
     One component: tabulated over its size and interpolated (delta / size over ln size, which is almost constant).
     Several: linear in each, from one size of each.
@@ -215,7 +215,7 @@ class CandidateTable:
 
     @cached_property
     def knots(self) -> dict[float, Knots]:
-        """The tabulated sizes of each sign."""
+        """Tabulated sizes of each sign."""
         return self._knots()
 
     @cached_property
@@ -223,12 +223,12 @@ class CandidateTable:
         return {sign: spline(logs, ratio) for sign, (logs, ratio) in self.knots.items()}
 
     def reach(self, sign: float) -> float:
-        """Largest size tabulated in that direction."""
+        """Largest size tabulated in a direction."""
         return float(np.exp(self.knots[sign][0][-1]))
 
     def delta(self, sizes: FloatArray) -> FloatArray:
         """(..., n) for sizes (..., p)."""
-        size, out = sizes[..., 0], np.asarray(sizes @ self.columns.T)  # on a side without knots a line
+        size, out = sizes[..., 0], np.asarray(sizes @ self.columns.T)  # linear on a side without knots
         for sign, course in self._splines.items():
             logs = self.knots[sign][0]
             where = size * sign > 0.0
@@ -248,7 +248,7 @@ class CandidateTable:
 
 
 def table_of(candidate: Candidate, predictor: Predictor) -> CandidateTable | None:
-    """`tabulate` at the machine file's own strut law, once for a set of readings."""
+    """Table of a candidate at the machine file's own strut law, made once for a set of readings."""
     key = (candidate.name, candidate.choice)
     if key not in predictor.tables:
         joint = dict(candidate.choice).get("joint") if isinstance(candidate.effect, JointOffset) else None
@@ -259,7 +259,7 @@ def table_of(candidate: Candidate, predictor: Predictor) -> CandidateTable | Non
 
 
 def _of_joint(candidate: Candidate, predictor: Predictor, joint: int) -> CandidateTable:
-    """The table of a joint off its place: what the nuisance of the joints has worked out already."""
+    """Table of a displaced joint, from the columns already computed for the nuisance of the joints."""
     logs = predictor.joint_columns[:, 3 * (joint - 1) : 3 * joint]
     return CandidateTable(candidate, -np.exp(-predictor.log_stiffness())[:, None] * logs, dict)
 
@@ -267,7 +267,7 @@ def _of_joint(candidate: Candidate, predictor: Predictor, joint: int) -> Candida
 def tabulate(
     candidate: Candidate, predictor: Predictor, law: FloatArray, beside: Sequence[ActiveEffect] = ()
 ) -> CandidateTable | None:
-    """The candidate's table at a strut law, beside other effects; None where it does nothing to these data."""
+    """Table of a candidate at a strut law, beside other effects; None if it has no effect on these data."""
     compliance = np.exp(-predictor.log_stiffness(law, beside))
 
     def along(unit: FloatArray) -> Delta:
@@ -322,7 +322,7 @@ def _size_for(component: Component, sign: float, delta: Delta, compliance: Float
 
 
 def _knots(component: Component, sign: float, start: float, delta: Delta, compliance: FloatArray) -> Knots:
-    """Ln sizes and delta / size from a small size to a large effect or the bound."""
+    """Ln sizes and delta / size, from a small size up to a large effect or the bound."""
     end = min(start * LARGEST / SMALLEST, component.reach(sign))
     while end > 1.001 * start:
         added = delta(sign * end)

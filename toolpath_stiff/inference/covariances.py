@@ -1,4 +1,4 @@
-"""Covariances of readings that need no n x n matrix: own scatter, groups that scatter together, a few shared columns.
+"""Covariances of readings without n x n matrices: own scatter, groups that scatter together, a few shared columns.
 
     V = diag(own) + Z diag(common) Z^T + S^T S,
 
@@ -30,17 +30,17 @@ BLOCK = 512  # rows at a time, of which there may be thousands
 
 @dataclass(frozen=True)
 class Groups:
-    """Readings in groups: `of` (n,), the number of each reading's group, from 0 on without a gap."""
+    """Grouped readings: `of` (n,) is the number of each reading's group, from 0 without gaps."""
 
     of: Rows
 
     @classmethod
     def by(cls, labels: AnyArray) -> Groups:
-        """Readings with equal labels (n,) together."""
+        """Groups of readings with equal labels (n,)."""
         return cls(np.unique(labels, return_inverse=True)[1].reshape(-1).astype(np.int64))
 
     def spread(self, values: float | FloatArray) -> FloatArray:
-        """(n,) of each reading's group, of values of all groups or (groups,)."""
+        """(n,) value of each reading's group, from one value for all groups or from (groups,)."""
         return np.broadcast_to(values, self.count)[self.of]
 
     @cached_property
@@ -53,12 +53,12 @@ class Groups:
 
     @property
     def count(self) -> int:
-        """How many groups there are."""
+        """Number of groups."""
         return len(self._starts)
 
     @cached_property
     def alone(self) -> bool:
-        """Whether every reading is a group of its own."""
+        """True if every reading is a group of its own."""
         return self.count == len(self.of)
 
     def members(self) -> list[Rows]:
@@ -66,7 +66,7 @@ class Groups:
         return np.split(self._order, self._starts[1:])
 
     def by_size(self) -> Iterator[tuple[Rows, Rows]]:
-        """Groups of k readings together: the groups (m,), their readings (m, k)."""
+        """Groups of equal size k together: group numbers (m,), their readings (m, k)."""
         members = self.members()
         sizes = np.array([len(group) for group in members])
         for size in np.unique(sizes):
@@ -74,7 +74,7 @@ class Groups:
             yield which, np.array([members[k] for k in which])
 
     def sums(self, rows: FloatArray) -> FloatArray:
-        """(..., groups) of rows (..., n)."""
+        """(..., groups) sums over the groups of rows (..., n)."""
         return np.asarray(np.add.reduceat(rows[..., self._order], self._starts, axis=-1))
 
 
@@ -111,13 +111,13 @@ class Covariance:
         return np.asarray(unshared + ((rows @ self.shared.T) ** 2).sum(axis=-1))
 
     def widened(self, rows: Rows, variance: FloatArray) -> Covariance:
-        """With more scatter of their own for some readings."""
+        """Covariance with added scatter of some readings' own."""
         own_variance = self.own_variance.copy()
         own_variance[rows] += variance
         return replace(self, own_variance=own_variance)
 
     def draw(self, rng: np.random.Generator, draws: int) -> FloatArray:
-        """(draws, n) normal scatter that readings have in common, without that of each reading on its own."""
+        """(draws, n) normal scatter that readings share, without the scatter of each reading alone."""
         common = (np.sqrt(self.common) * rng.standard_normal((draws, self.groups.count)))[:, self.groups.of]
         return np.asarray(common + rng.standard_normal((draws, len(self.shared))) @ self.shared)
 
@@ -134,7 +134,7 @@ class Covariance:
 
     @property
     def log_determinant(self) -> float:
-        """Its logarithm, ln |V|."""
+        """Logarithm of the determinant, ln |V|."""
         return self._inverted[1]
 
     @cached_property
@@ -177,14 +177,14 @@ class Precision:
 
     @cached_property
     def pull(self) -> FloatArray:
-        """(groups,) by how much of its weighted sum a group moves each of its readings.
+        """(groups,) factor on a group's weighted sum by which each of its readings moves.
 
         (diag(d) + c 1 1^T)^-1 x = (x - 1 c sum(x / d) / (1 + c sum(1 / d))) / d   (Sherman and Morrison 1950).
         """
         return np.asarray(self.common / (1.0 + self.common * self.weights))
 
     def _of_blocks(self, rows: FloatArray) -> FloatArray:
-        """C^-1 x of rows (..., n)."""
+        """C^-1 x for rows x (..., n)."""
         if self.groups.alone:
             return rows / (self.own_variance + self.groups.spread(self.common))
         moved = self.pull * self.groups.sums(rows / self.own_variance)
@@ -197,7 +197,7 @@ class Precision:
         return np.asarray(self._of_blocks(rows) - shared.reshape(rows.shape))
 
     def squares(self, rows: FloatArray) -> FloatArray:
-        """(...,) of rows (..., n): each with itself."""
+        """(...,) quadratic form of each row (..., n) with itself."""
         flat = rows.reshape(-1, rows.shape[-1])
         squares = np.empty(len(flat))
         for start in range(0, len(flat), BLOCK):
@@ -209,12 +209,12 @@ class Precision:
 
     @cached_property
     def diagonal(self) -> FloatArray:
-        """(n,)."""
+        """(n,) diagonal."""
         blocks = (1.0 - self.pull[self.groups.of] / self.own_variance) / self.own_variance
         return np.asarray(blocks - (self.factors**2).sum(axis=0))
 
     def block(self, columns: Rows) -> FloatArray:
-        """(..., k, k) some of its columns, of the same rows, for rows (..., k)."""
+        """(..., k, k) submatrices of rows and columns `columns` (..., k)."""
         own_variance, of = self.own_variance[columns], self.groups.of[columns]
         factors = np.moveaxis(self.factors[:, columns], 0, -2)
         same = of[..., :, None] == of[..., None, :]
@@ -222,7 +222,7 @@ class Precision:
         return np.asarray(blocks / own_variance[..., :, None] - np.swapaxes(factors, -1, -2) @ factors)
 
     def beside(self, fitted: FloatArray, prior: FloatArray) -> Precision:
-        """P = A - A J (J^T A J + prior)^-1 J^T A: of what a fit of p unknowns leaves of the readings.
+        """P = A - A J (J^T A J + prior)^-1 J^T A, for the residuals of a fit with p unknowns.
 
         `fitted` (p, n): J^T, by how much each unknown moves each reading; `prior` (p, p) information.
         """
@@ -231,7 +231,7 @@ class Precision:
         return replace(self, factors=factors, fitted=np.concatenate([self.fitted, combined]))
 
     def widened(self, row: int, variance: float) -> tuple[Precision, FloatArray, float]:
-        """With more scatter of a reading's own: takes column x column^T share off; (n,) that column, and the share.
+        """Precision with added scatter of one reading, and its column (n,) and share: less column x column^T share.
 
         Share v / (1 + v c_row) of column c for the variance v (Sherman and Morrison 1950).
         """

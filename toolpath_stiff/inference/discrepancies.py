@@ -1,4 +1,4 @@
-"""Forms that a discrepancy may take which no effect describes: covariances, and a few features of each."""
+"""Forms of a discrepancy that no effect describes: covariances, and a few features of each."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from toolpath_stiff.arrays import AnyArray, FloatArray
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.error_model import RANGE_ANGLE, RANGE_POSITION, coordinates
 
-# Ranges over which a smooth discrepancy stays alike; assumed: a few turns of a screw, a third of a campaign.
+# Correlation lengths of a smooth discrepancy; assumed: a few turns of a screw, a third of a campaign.
 RANGE_LENGTH, RANGE_ORDER = 0.05, 0.3
-# Features of a form, and of the one that has one for each point and direction: what varies faster is left out.
+# Most features of a form, and of the form with one a point and direction: faster variation is left out.
 MOST_FEATURES, MOST_POINTS = 300, 2000
 FORMS = ("forms of discrepancy",)
 
 
 def discrepancy_forms(predictor: Predictor) -> dict[str, FloatArray]:
-    """What a discrepancy may look like, in words -> features (n, r) of its covariance; only forms that vary.
+    """Form of a discrepancy in words -> features (n, r) of its covariance; only forms that vary.
 
     Worked out once for a set of readings, and kept in `predictor.tables` under `FORMS`.
     """
@@ -37,7 +37,7 @@ POINT_TO_POINT = "from point to point, different by direction"
 
 
 def _kernels(predictor: Predictor) -> dict[str, Kernel]:
-    """Every form in words, and its covariance."""
+    """Every form in words -> its covariance."""
     data = predictor.data
     same_direction = linear_kernel(data.direction, 2)
     near = gaussian_kernel(coordinates(data.position, data.angles))
@@ -51,13 +51,13 @@ def _kernels(predictor: Predictor) -> dict[str, Kernel]:
         "smooth over the workspace, different by direction": near * same_direction,
         "linear over the workspace, different by direction": linear * same_direction,
         "curved over the workspace, different by direction": linear_kernel(place, 2) * same_direction,
-        # Point by point: the same pose and tool, whatever the repeat.
+        # By point: the same pose and tool, in all repeats.
         POINT_TO_POINT: same_kernel(data.point) * same_direction,
         "in the course of the campaign": in_order,
         "in the course of the campaign, different by direction": in_order * same_direction,
         "in the course of the campaign, over the workspace": in_order * linear * same_direction,
         "of single struts in the course of the campaign": struts * in_order,
-        # Each strut's own course, as far as the strut has a share in the compliance.
+        # Each strut's own variation, weighted by the strut's share of the compliance.
         "of single struts with their length": Kernel(
             lambda i: (share * share[i] * np.exp(-0.5 * (lengths - lengths[i]) ** 2)).sum(axis=1),
             (share**2).sum(axis=1),
@@ -91,18 +91,18 @@ LEFT = 1e-10  # share of a covariance's variance that its features may leave
 
 @dataclass(frozen=True)
 class Kernel:
-    """A covariance between n readings by its columns: `column(i)` (n,), and its `diagonal` (n,)."""
+    """A covariance of n readings, given by its columns `column(i)` (n,) and its `diagonal` (n,)."""
 
     column: Callable[[int], FloatArray]
     diagonal: FloatArray
 
     def __mul__(self, other: Kernel) -> Kernel:
-        """Element by element, which is a covariance again (Schur's product theorem)."""
+        """Elementwise product, which is a covariance too (Schur's product theorem)."""
         return Kernel(lambda i: self.column(i) * other.column(i), self.diagonal * other.diagonal)
 
     @property
     def varies(self) -> bool:
-        """Whether it is finite, and more than one number throughout."""
+        """True if it is finite and not the same number throughout."""
         values, scale = np.concatenate([self.column(0), self.diagonal]), float(self.diagonal.mean())
         off = np.abs(values - self.diagonal[0]).max()
         return bool(np.isfinite(values).all() and scale > 1e-12 and off > 1e-9 * scale)
@@ -120,7 +120,7 @@ class Kernel:
             pivot = int(np.argmax(left))
             if left.sum() <= LEFT * len(left) or left[pivot] <= 0.0:
                 return rows[:r].T
-            known = np.flatnonzero(rows[:r, pivot])  # few where readings of one point alone are alike
+            known = np.flatnonzero(rows[:r, pivot])  # few if only readings of one point correlate
             before = rows[:r] if len(known) == r else rows[known]
             rows[r] = (self.column(pivot) / scale - before[:, pivot] @ before) / np.sqrt(left[pivot])
             left = np.maximum(left - rows[r] ** 2, 0.0)
@@ -129,15 +129,15 @@ class Kernel:
 
 
 def gaussian_kernel(x: FloatArray) -> Kernel:
-    """Smooth in x (n, k), whose range is 1."""
+    """Smooth kernel in x (n, k), whose range is 1."""
     return Kernel(lambda i: np.exp(-0.5 * ((x - x[i]) ** 2).sum(axis=1)), np.ones(len(x)))
 
 
 def linear_kernel(x: FloatArray, power: int = 1) -> Kernel:
-    """Linear in x (n, k), or a power of that."""
+    """Kernel linear in x (n, k), or a power of it."""
     return Kernel(lambda i: (x @ x[i]) ** power, (x**2).sum(axis=1) ** power)
 
 
 def same_kernel(labels: AnyArray) -> Kernel:
-    """Alike for readings with the same label (n,)."""
+    """Kernel that is 1 between readings with the same label (n,), otherwise 0."""
     return Kernel(lambda i: (labels == labels[i]).astype(float), np.ones(len(labels)))

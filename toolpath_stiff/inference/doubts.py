@@ -1,4 +1,4 @@
-"""Doubts about the data: whether they are of this machine at all, and whether a stated noise fits what they leave."""
+"""Doubts about the data: are they of this machine at all, and does a stated noise fit their scatter."""
 
 import numpy as np
 
@@ -13,13 +13,13 @@ FACTOR = float(np.exp(4.0 * LAW_PRIOR))  # of the median reading to the model: f
 # Correlation of ln measured with ln modelled below which the readings do not follow the model. Hidden effects that
 # change the stiffness by 30 % leave 0.8 and more, readings of other machines or in another order 0.3 and less.
 FOLLOWS = 0.5
-NOTHING = 1e-6  # of the model's own variation: less is rounding
-TELLS = EXPECTED[1]  # sd of ln modelled over the readings from which it is asked: as large as the largest effect
-FEWEST_FOLLOWING = 6  # readings that differ in what mechanics sees
+NOTHING = 1e-6  # share of the model's variation below which a difference is rounding
+TELLS = EXPECTED[1]  # sd of ln modelled over the readings from which the test is made: as large as the largest effect
+FEWEST_FOLLOWING = 6  # readings at mechanically different poses and directions
 
 
 def question(predictor: Predictor) -> str:
-    """Whether these are readings of this machine, with the reason to ask; "" where there is none."""
+    """Reason to doubt that these are readings of this machine; "" if there is none."""
     tip, asked = predictor.data.tip, "Are these readings of this machine?"
     model, which = predictor.log_stiffness()[tip], np.unique(predictor.distinct[tip], return_inverse=True)[1]
     residual = np.log(predictor.data.stiffness[tip]) - model
@@ -43,14 +43,14 @@ def question(predictor: Predictor) -> str:
 
 
 TOO_QUIET = 0.005  # share of simulated campaigns that scatter as little or less
-TOO_LOUD = 0.025  # share of those that scatter as much or more, where nothing explains it
+TOO_LOUD = 0.025  # share of campaigns that scatter as much or more, if nothing explains it
 ROUNDS = 3  # of the search for the noise that the readings show
 LARGEST_FACTOR = 10.0
 ENOUGH = 0.05  # probability of the base model's gate, as in the verdict
 
 
 def noise_doubt(problem: Problem, noise: Noise, gate: Gate, verdict: str, seed: int) -> tuple[str, float]:
-    """That a stated noise does not fit the readings, in a sentence, and how many times as large it would have to be.
+    """Sentence on a stated noise that does not fit the readings, and the factor by which it would have to grow.
 
     "" and 1 where it may be right. Too large where the model leaves less than such a noise would. Too small where no
     explanation stands, or none is likelier than chance and the squares are as large in few campaigns, but the model
@@ -82,7 +82,7 @@ def noise_doubt(problem: Problem, noise: Noise, gate: Gate, verdict: str, seed: 
 
 
 def _gate_at(problem: Problem, noise: Noise, factor: float, seed: int) -> Gate:
-    """The absolute test of the model alone under a noise `factor` times as large."""
+    """Absolute test of the model alone under `factor` times the noise."""
     larger = noise.times(factor)
     scaled = Problem.of(problem.predictor, larger)
     base, draws = scaled.score_base(), simulate(larger, scaled.scatter.covariance, seed)

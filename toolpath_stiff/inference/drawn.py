@@ -1,4 +1,4 @@
-"""Effects whose form was read off measurements: the same measurements cannot confirm them.
+"""Effects whose form was read off measurements, which those same measurements cannot confirm.
 
 A form that was drawn through residuals fits them; that it does says nothing of other readings. So an effect carries the
 marks of the readings that it was drawn from (`Effect.described_from`), and where they are among the readings that are
@@ -34,7 +34,7 @@ FEWEST_POINTS = 2  # of new readings: one pose alone cannot confirm a form
 
 @dataclass(frozen=True)
 class Drawn:
-    """An explanation with effects that were drawn from some of the readings that judge it.
+    """An explanation with effects whose form was read off some of the readings that judge it.
 
     Attributes
     ----------
@@ -55,12 +55,12 @@ class Drawn:
 
     @property
     def confirmed(self) -> bool:
-        """Whether the new readings confirm them."""
+        """True if the new readings confirm them."""
         return self.gain > CONFIRMS
 
     @property
     def document(self) -> Document:
-        """The same for `diagnose.json`."""
+        """Entry for `diagnose.json`."""
         return {
             "effects": list(self.names),
             "readings_seen": self.seen,
@@ -72,7 +72,7 @@ class Drawn:
 
     @property
     def reason(self) -> str:
-        """Why it is confirmed or not, a sentence without its full stop."""
+        """Reason why it is confirmed or not, a sentence without its full stop."""
         form = f"the form of {joined(self.names)} was read off"
         if not self.new:
             return f"{form} these very readings, and that it fits them says nothing of others"
@@ -81,18 +81,18 @@ class Drawn:
             return f"{form}, and the {self.new} others are of fewer than {FEWEST_POINTS} points: too few to confirm it"
         return (
             f"{form}; the {self.new} others {'confirm' if self.confirmed else 'do not confirm'} it: their log "
-            f"probability, foretold, is {self.gain:.1f} above {self.rival} (more than {CONFIRMS:g} confirms it)"
+            f"probability, predicted, is {self.gain:.1f} above {self.rival} (more than {CONFIRMS:g} confirms it)"
         )
 
 
 def seen_readings(effects: Sequence[Effect], data: Readings) -> BoolArray:
-    """(n,) which readings any of these effects was drawn from."""
+    """(n,) True for readings from which the form of any of these effects was read off."""
     marks = {mark for effect in effects for mark in effect.described_from}
     return np.isin(reading_marks(data), sorted(marks)) if marks else np.zeros(len(data), dtype=bool)
 
 
 def drawn(fit: Fit, others: Mapping[str, Fit], data: Readings) -> Drawn | None:
-    """How an explanation stands if its effects are drawn from the readings; None if none of them is.
+    """Status of an explanation whose effects were read off the readings; None if none of them was.
 
     Parameters
     ----------

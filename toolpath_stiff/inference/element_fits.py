@@ -1,4 +1,4 @@
-"""Pulls on a machine of elements, as the fits of `fits` and the votes of `votes` take readings: no logarithms, no law.
+"""Pulls on a machine of elements in the form that `fits` and `votes` take: no logarithms, no strut law.
 
 A reading is y = sum_r c_r (s_r w)(s_r t) + noise, s_r the loads of the elements per wrench, w the pull, t what is read
 (unit dummy load; Castigliano). Components pass zero, so that a residual is measured less modelled over the size of its
@@ -29,29 +29,29 @@ from toolpath_stiff.stiffness.contract import ELEMENT, Effect, LoadPath
 from toolpath_stiff.stiffness.element_sum import added_by, stance_of
 from toolpath_stiff.stiffness.model import StiffnessModel, path_of_stance
 
-FEWEST = 6  # degrees of freedom that tell anything of the noise
+FEWEST = 6  # fewest degrees of freedom that tell anything about the noise
 NONE, JOINTS = "none", "joints refitted"
 ALIKE = 10.0  # chi-square: an explanation that leaves no more than this beside the best cannot be told from it
 GAIN = 16.0  # chi-square that a name must gain over no effect, with some thirty candidates: under 1 in 500 by chance
 PRICE = 4.0  # chi-square that a further parameter must gain (one degree of freedom: 5 % by chance)
-COARSE = 0.04  # scatter of the size of the displacements from which nothing is named that nobody stated it for
-COMMON = 0.01  # probability of so much in common in what is left of pulls alike, below which it is no scatter
+COARSE = 0.04  # scatter relative to the displacements from which nothing is named unless the scatter was stated
+COMMON = 0.01  # probability of so much in common among residuals of alike pulls, below which it is not scatter
 WRONG = 1e-3  # probability of so large a misfit, below which something else is missing
 REWEIGHTED = 8  # times that scatter is estimated
-OFF = 3.0  # standard deviations that one reading counts for at most in it
-LEAST = 1e-4  # relative sd of a reading: nobody measures better
-CLOSELY = 0.9  # the same from which nobody is asked
+OFF = 3.0  # standard deviations at which a reading is capped in that estimate
+LEAST = 1e-4  # smallest relative sd of a reading: nobody measures better
+CLOSELY = 0.9  # the same correlation, from which no question is raised
 FOLLOWS = 0.5  # correlation of measured with modelled components, joints refitted, below which it is another machine's
 OTHER_UNIT = 100.0  # measured over modelled, or the inverse, from which the unit is asked for
-INVISIBLE = 1e-6  # of the readings' size, rms: what a candidate of its largest usual size must change at least
-VISIBLE = 5e-3  # the same of the geometry, which pulls hardly show
-ALIKE_FREEDOM = 20  # degrees of freedom within pulls that are alike, from which these tell scatter from a misfit
-SAME_PULL = 0.02  # by which components of a direction, and a force, relative, may differ between repeats
+INVISIBLE = 1e-6  # share of the readings' size, rms, that a candidate at its largest usual size must change
+VISIBLE = 5e-3  # the same for effects of geometry, which pulls hardly show
+ALIKE_FREEDOM = 20  # degrees of freedom within alike pulls from which scatter can be told from a misfit
+SAME_PULL = 0.02  # largest difference of direction components and of relative force between repeats
 NO_LAW = np.zeros(2)
 
 
 class PullProblem(Problem):
-    """What a model says to m pulls, and how they scatter."""
+    """Model predictions for m pulls, and the scatter of the readings."""
 
     linear = True
 
@@ -60,7 +60,7 @@ class PullProblem(Problem):
         self.path, self.products, self.by_element = self._standing(model.effects)
         self.predicted = self.with_effects((*model.effects, *model.instruments), self.by_element.sum(axis=1))
         self.observed = (pulls.value - self.predicted) / pulls.size
-        self.freedom, self.together = np.inf, 0  # of a scatter that was estimated, and of what all candidates take away
+        self.freedom, self.together = np.inf, 0  # of an estimated scatter, and of all candidates together
         self.noise_of(np.full(len(pulls), LEAST))
 
     @property
@@ -69,7 +69,7 @@ class PullProblem(Problem):
         return self.pulls.point
 
     def _standing(self, effects: Sequence[ActiveEffect]) -> tuple[LoadPath, FloatArray, FloatArray]:
-        """Load paths; (m, r) products of what elements carry under pull and unit load; (m, e) m that each gives."""
+        """Load paths; (m, r) products of element loads under pull and unit load; (m, e) m, give of each element."""
         model, pulls = self.model, self.pulls
         seen = {"direction": pulls.along[:, :3], **model.conditions.columns(len(pulls))}
         force = np.linalg.norm(pulls.wrench[:, :3], axis=1)
@@ -85,7 +85,7 @@ class PullProblem(Problem):
         return path, np.concatenate(products, axis=1), np.stack(given, axis=1)
 
     def with_effects(self, effects: Sequence[ActiveEffect], moved: FloatArray) -> FloatArray:
-        """(m,) m that the readings show: what moved, what effects add, and what instruments make of it."""
+        """(m,) m shown by the readings: element displacements `moved`, plus effects, as instruments show them."""
         path, products = self.path, self.products
         if moving := [a for a in effects if "stands" in a.effect.hooks and a not in self.model.effects]:
             path, products, given = self._standing([*self.model.effects, *moving])
@@ -95,21 +95,21 @@ class PullProblem(Problem):
             moved = moved + np.einsum("ni,nij,nj->n", self.pulls.along, at_tip, self.pulls.wrench)
         if more is not None:
             moved = moved + (more * products).sum(axis=1)
-        for active in (active for active in effects if active.effect.is_instrument):  # they show what all others make
+        for active in (active for active in effects if active.effect.is_instrument):  # they act on what all others make
             stiffness = self.path.force / np.maximum(np.abs(moved), 1e-15)
             moved = moved * stiffness / active.reading(stiffness, self.path)
         return moved
 
     def residual(self, law: FloatArray, effects: Sequence[ActiveEffect]) -> FloatArray:
-        """(m,) measured less modelled, of the size of each pull's displacement."""
+        """(m,) measured less modelled, relative to the size of each pull's displacement."""
         return np.asarray((self.pulls.value - self.with_effects(effects, self.predicted)) / self.pulls.size)
 
     def law_columns(self, residual: FloatArray, law: FloatArray, effects: object) -> list[FloatArray]:
-        """Nothing: there is no strut law."""
+        """Zero columns: there is no strut law."""
         return [np.zeros(len(residual))] * 2
 
     def noise_of(self, relative: FloatArray, spread: float = 0.0, origin: str = "") -> None:
-        """Scatter of readings by (m,) of their sizes, of elements by a relative `spread` of what each gives."""
+        """Set the scatter of readings, (m,) relative to their sizes, and a relative `spread` of each element's give."""
         sd, every = np.maximum(relative, LEAST), np.arange(len(relative))
         self.noise = Noise("stated", sd, 0.0, spread, 0.0, OUTLIERS, OUTLIER_WIDTH, STATED_FREEDOM, origin, rest=0.0)
         shared = spread * self.by_element / self.pulls.size[:, None]
@@ -117,12 +117,12 @@ class PullProblem(Problem):
 
     @cached_property
     def none(self) -> Fit:
-        """The model as it stands."""
+        """Fit of the model as it stands, without effects."""
         return base_fit(self, law_free=False)
 
     @cached_property
     def torsions(self) -> dict[str, tuple[Candidate, float]]:
-        """Joint that turns -> its torsion in place of the file's, and rad/(N m) of that."""
+        """Turning joint -> its torsion as a candidate in place of the file's, and the file's rad/(N m)."""
         effect, torsions = find_effect("joint_torsion"), {}
         for element, load in zip(self.machine.elements, self.pulls.stance.loads, strict=True):
             if turns(element):
@@ -134,24 +134,24 @@ class PullProblem(Problem):
 
     @cached_property
     def joints_fitted(self) -> Fit:
-        """The torsions of all joints that turn fitted in place of the file's."""
+        """Fit of the torsions of all turning joints, in place of the file's."""
         candidates = [candidate for candidate, _ in self.torsions.values()]
         start, every = [np.zeros(1)] * len(candidates), range(len(candidates))
         return settled(self, fit_effects(self, candidates, start, every, NO_LAW, self.scatter, law_free=False))
 
     def candidates(self) -> list[Candidate]:
-        """Every effect with what it may act on that changes these readings: of joints that turn, what joints do."""
+        """All effects, with their elements, that change these readings; of turning joints, only effects of joints."""
         known = known_effects(self.files, self.machine.kind).values()
         cannot = self.pulls.cannot_test(known)
         every = [c for effect in known if effect.name not in cannot for c in self.candidates_of(effect)]
         return [candidate for candidate in every if self._seen(candidate)]
 
     def candidates_of(self, effect: Effect) -> list[Candidate]:
-        """An effect with each element that it may act on, or with each other choice."""
+        """An effect with each element it may act on, or with each other choice."""
         elements = [e.name for e in self.machine.elements if turns(e) == (effect.link == "joints")]
         carried = {active.values.get(ELEMENT) for active in self.model.effects if active.effect.name == effect.name}
         if carried & {None}:
-            return []  # a machine carries it once
+            return []  # a machine has such an effect only once
         return candidates_of(effect, self.pulls, [name for name in elements if name not in carried])
 
     def _seen(self, candidate: Candidate) -> bool:
@@ -163,17 +163,17 @@ class PullProblem(Problem):
 
     @property
     def typical(self) -> float:
-        """Scatter of the readings over their size, root mean squares."""
+        """Ratio of scatter to size of the readings, root mean squares."""
         return float(np.linalg.norm(self.noise.repeat * self.pulls.size) / np.linalg.norm(self.pulls.size))
 
     def error_percent(self, residual: FloatArray, wild: Sequence[int] = ()) -> float:
-        """Root mean square of (m,) residuals, of that of the readings, all components together, without the wild."""
+        """Root mean square of (m,) residuals in per cent of that of the readings, all components, without wild ones."""
         error, value = (np.delete(part, wild) for part in (residual * self.pulls.size, self.pulls.value))
         return float(100.0 * np.linalg.norm(error) / np.linalg.norm(value))
 
 
 def _says_more(fit: Fit, other: Fit, behind: Mapping[str, float]) -> bool:
-    """Whether an explanation has more parameters than another one of the same element, and gains too little by them."""
+    """True if an explanation has more parameters than another of the same element but gains too little by them."""
     element, same = (dict(each.candidates[-1].choice).get(ELEMENT) for each in (fit, other))
     more = len(fit.parts) - len(other.parts)
     gained = behind[label_of(other)] - behind[label_of(fit)]
@@ -181,7 +181,7 @@ def _says_more(fit: Fit, other: Fit, behind: Mapping[str, float]) -> bool:
 
 
 def question(problem: PullProblem) -> str:
-    """Whether these are pulls of this machine, as it is described, with the reason to ask; "" where there is none."""
+    """Reason to doubt that these are pulls of this machine as described; "" if there is none."""
     from scipy.spatial.transform import Rotation
 
     pulls, best = problem.pulls, problem.joints_fitted if problem.torsions else problem.none
@@ -197,7 +197,7 @@ def question(problem: PullProblem) -> str:
     if alike <= -FOLLOWS:
         return "Is this the force on the tool? What moved goes against it: reversed the two would fit."
     text = f"Are these pulls of this machine? Measured and modelled components correlate by {alike:.2f} only."
-    # Were the sensor's axes turned: the turn that brings it nearest to the model as given (Kabsch 1976, Acta
+    # If the sensor's axes were turned: the rotation that brings readings closest to the model (Kabsch 1976, Acta
     # Crystallographica A32, 922).
     read, modelled = pulls.vectors(pulls.value), pulls.vectors(problem.predicted)
     turn = Rotation.align_vectors(modelled, read)[0]
@@ -212,7 +212,7 @@ def question(problem: PullProblem) -> str:
 
 
 def _in_tip_axes(pulls: Pulls) -> str:
-    """That components stand in the tip's axes at each pose, where those would leave half the error; else ""."""
+    """Question whether components are in the tip's axes at each pose, if that would halve the error; otherwise ""."""
     turn, length = pulls.stance.rotation, np.linalg.norm(pulls.value)
     if turn is None:
         return ""
@@ -238,12 +238,12 @@ def label_of(fit: Fit) -> str:
 
 
 def chi_square(fit: Fit) -> float:
-    """Weighted squares of what a fit leaves."""
+    """Weighted squares of a fit's residuals."""
     return float(fit.scatter.precision.squares(fit.residual))
 
 
 def chance(problem: PullProblem, fit: Fit) -> float:
-    """Probability of so large a misfit by scatter: stated, of repeats, or of what all candidates together leave.
+    """Probability that scatter makes so large a misfit: as stated, of repeats, or what all candidates together leave.
 
     What these take away more is held against what they leave (Fisher's F of nested models), a misfit against repeats
     (F, too).
@@ -260,7 +260,7 @@ def chance(problem: PullProblem, fit: Fit) -> float:
 
 
 def lack_of_fit(problem: PullProblem, fit: Fit) -> float:
-    """Probability of so much in common in what a fit leaves of pulls that are alike; nan where these are too few.
+    """Probability of so much in common among a fit's residuals of alike pulls; nan if there are too few.
 
     Of pulls at one pose along one direction, of whatever size, scatter differs and a misfit does not (Fisher's test:
     Draper and Smith 1998, Applied Regression Analysis, 2.1). What elements scatter by is taken off before.
@@ -280,7 +280,7 @@ def lack_of_fit(problem: PullProblem, fit: Fit) -> float:
 
 
 def joints_say_more(problem: PullProblem, fit: Fit) -> bool:
-    """Whether the joints refitted all together foretell pose after pose better than an explanation, beyond chance."""
+    """True if refitting all joints together predicts pose after pose better than an explanation, beyond chance."""
     return bool(problem.torsions) and outvoted(-votes(problem, fit, {JOINTS: problem.joints_fitted})[JOINTS])
 
 
@@ -291,14 +291,14 @@ def explanations(problem: PullProblem, before: Fit) -> list[Fit]:
 
 
 def _alike(pulls: Pulls, *further: FloatArray) -> Groups:
-    """Readings of one pose and component under forces along one direction, and alike in what (m, ...) is given."""
+    """Groups of readings of one pose and component, with forces along one direction, and equal `further` (m, ...)."""
     along = pulls.wrench / np.linalg.norm(pulls.wrench[:, :3], axis=1, keepdims=True)
     labels = [pulls.pose, *(np.round(part / SAME_PULL) for part in (pulls.along, along, *further))]
     return Groups(np.unique(np.column_stack(labels), axis=0, return_inverse=True)[1].reshape(-1))
 
 
 def between_repeats(problem: PullProblem) -> tuple[FloatArray, int]:
-    """(m,) squared deviation, relative, of each reading from the mean of its repeats, and how many differences.
+    """(m,) squared relative deviation of each reading from the mean of its repeats, and the number of differences.
 
     Repeats are alike, their forces too. The squares of n count n / (n - 1) times; nan without repeats, or of copies.
     """
@@ -310,7 +310,7 @@ def between_repeats(problem: PullProblem) -> tuple[FloatArray, int]:
 
 
 def contradicted(problem: PullProblem) -> bool:
-    """Whether repeats scatter by more than is stated, beyond chance; by less they may: poses differ besides."""
+    """True if repeats scatter by more than stated, beyond chance; less is no contradiction, as poses differ besides."""
     squares, differences = between_repeats(problem)
     ratio = np.nanmean(np.minimum(squares / problem.noise.repeat**2, OFF**2)) if differences else 0.0
     chance = CONTRADICTED * np.sqrt(0.5 / STATED_FREEDOM + 0.5 / max(differences, 1))
@@ -318,7 +318,7 @@ def contradicted(problem: PullProblem) -> bool:
 
 
 def estimate_noise(problem: PullProblem) -> None:
-    """Take for scatter what repeats differ by; without enough of them what all candidates together leave.
+    """Estimate the scatter from repeats or, without enough of them, from what all candidates together leave.
 
     Each of these has at least its neutral size. A reading's variance is that of its component (an indicator's own) and
     a share of the squared size of its pull: both by weighted squares of what is left (iterated, Davidian and Carroll
@@ -356,7 +356,7 @@ def estimate_noise(problem: PullProblem) -> None:
 
 
 def _changes(problem: PullProblem) -> tuple[FloatArray, FloatArray]:
-    """(m, k) what each parameter of each candidate changes, of its usual size; (k,) the least that it may be."""
+    """(m, k) change of the readings by each candidate's parameters at usual size; (k,) their lower bounds."""
     parts = [(c, j, part) for c in problem.candidates() for j, part in enumerate(c.components)]
     units = [c.active(np.eye(len(c.components))[j] * part.signs[-1] * part.typical()[1]) for c, j, part in parts]
     changes = [problem.observed - problem.residual(NO_LAW, [active]) for active in units]
@@ -364,9 +364,9 @@ def _changes(problem: PullProblem) -> tuple[FloatArray, FloatArray]:
 
 
 def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool) -> tuple[str, list[Fit]]:
-    """The verdict as a diagnosis of a hexapod has it, and the explanations that it leaves.
+    """The verdict, in the terms of a hexapod's diagnosis, and the explanations that it leaves.
 
-    "adequate": nothing is missing that shows; "identified": one, which foretells pose after pose better than every
+    "adequate": nothing is missing that shows; "identified": one, which predicts pose after pose better than every
     other one beyond chance; "ambiguous": several; "unexplained": none. `known`: whether somebody states the noise; else
     nothing can be said to be missing from the candidates together, which are what it was estimated by, and nothing is
     named where they leave more than good readings scatter by.
@@ -388,7 +388,7 @@ def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool
     standing = [fit for fit in fits[1:] if fit not in alike and not outvoted(ballots[label_of(fit)])]
     more = [fit for fit in (*alike, *standing) if any(_says_more(fit, other, behind) for other in alike)]
     alike, standing = ([fit for fit in some if fit not in more] for some in (alike, standing))
-    # More is left than good readings scatter by, and nothing says that it is scatter; or so much that little shows.
+    # Residuals exceed the scatter of good readings, which nothing shows to be scatter; or they hide nearly everything.
     guessed = not known and problem.typical > (GUESSES["low"] if np.isnan(common) else COARSE)
     if guessed or len(alike) > 1 or standing or not outvoted(ballots[NONE]):
         return "ambiguous", [*alike, *standing]

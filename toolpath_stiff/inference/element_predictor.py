@@ -1,4 +1,4 @@
-"""What a machine of elements says that readings should show, and how that hangs on what each element gives."""
+"""Readings that a machine of elements predicts, and their dependence on the give of each element."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,14 +20,14 @@ from toolpath_stiff.stiffness.model import build_model
 
 
 def predictor_of(machine: MachineTool, data: Readings, effect_files: Sequence[str | Path] = ()) -> Predictor:
-    """The answer of a machine of any kind to n readings."""
+    """Predictor of n readings for a machine of any kind."""
     if isinstance(machine, Hexapod):
         return Predictor(machine, data, effect_files)
     return ElementPredictor(machine, data, effect_files)
 
 
 class ElementPredictor(Predictor):
-    """The answer of a machine of elements to n readings of the tip; it has no strut law that could change."""
+    """Predictor of n tip readings for a machine of elements; it has no strut law that could change."""
 
     def __init__(self, machine: MachineTool, data: Readings, effect_files: Sequence[str | Path] = ()) -> None:
         self.stated, self.effect_files = machine, tuple(effect_files)
@@ -38,12 +38,12 @@ class ElementPredictor(Predictor):
 
     @property
     def distinct(self) -> NDArray[np.int64]:
-        """(n,) numbers of the readings: each is worked out."""
+        """(n,) numbers of the readings: each is computed separately."""
         return np.arange(len(self.data))
 
     @cached_property
     def full_path(self) -> LoadPath:
-        """What instruments see of every row."""
+        """Load path with a row per reading, as instruments see it."""
         return measured_path(self.base, self.data)
 
     def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
@@ -60,13 +60,13 @@ class ElementPredictor(Predictor):
         return np.asarray(np.stack(shares, axis=1) * np.exp(self._base_log)[:, None])
 
     def strut_part_and_slopes(self, law: ArrayLike = NO_CHANGE) -> tuple[FloatArray, FloatArray]:
-        """Nothing hangs on a law."""
+        """Zeros: nothing depends on a strut law."""
         shape = (*np.shape(law)[:-1], len(self.data))
         return np.zeros(shape), np.zeros((*shape[:-1], 2, shape[-1]))
 
     @cached_property
     def joint_columns(self) -> FloatArray:
-        """(n, 0): the places of its joints are taken as the file has them."""
+        """(n, 0): the joints' positions are taken to be those of the file."""
         return np.empty((len(self.data), 0))
 
     @cached_property

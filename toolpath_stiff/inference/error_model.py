@@ -1,4 +1,4 @@
-"""How far a fitted model may be off at a pose: for bands that hold where nobody has measured.
+"""Error of a fitted model at a pose, for bands that hold where nobody has measured.
 
 The logarithm of the true stiffness differs from a fit's by three errors, whose sizes are read from the readings:
 
@@ -33,7 +33,7 @@ from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.machine.error_model import GEOMETRY, ErrorModel, alike, coordinates
 from toolpath_stiff.readings.measurements import Readings
 
-# Sizes that are weighed, and how they are expected; assumed. The scatter is known to the noise model's degrees of
+# Grid of sizes and their priors; assumed. The scatter is known to the noise model's degrees of
 # freedom (with Student's tails, for it may be wrong altogether); the geometry's tolerances are guesses, to a factor of
 # 2 or 3; the form is right with even odds, else off by a quarter of a per cent to 8 %, all orders alike.
 SCATTERS = np.geomspace(0.5, 3.0, 13)
@@ -42,7 +42,7 @@ FORMS = {0.0: 3.0, 0.0025: 0.5, 0.005: 0.5, 0.01: 0.5, 0.02: 0.5, 0.04: 0.5, 0.0
 # Share of what effects change by which their forms are expected to be off, and the factor of one standard deviation of
 # that; assumed: constants along axes stand for parts that are no springs.
 SHARE, SHARE_FACTOR = 0.05, 3.0
-FEWEST_PLACES, HALVINGS = 8, 2  # poses to be told from each other; regions are halved so often
+FEWEST_PLACES, HALVINGS = 8, 2  # fewest distinct poses; number of times regions are halved
 MOST_READINGS = 400  # spread over the campaign, from which the sizes are read
 MOST_DIRECTIONS, FORM_IN_AXES = 12, 0.01  # along which a region's errors may be other than scatter; by what form
 MOST_LEARNED = 20  # directions in which readings tell of struts and joints; what they tell of others is left out
@@ -121,7 +121,7 @@ def _learned(left: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 def _expected_forms(fit: Fit) -> FloatArray:
-    """(forms,) weights of `FORMS`, by how much the effects of the machine change."""
+    """(forms,) prior weights of `FORMS`, by the change that effects of the machine make."""
     owners = [candidate for candidate in fit.candidates for _ in candidate.components]
     sizes = [0.0 if owners[i].effect.is_instrument else fit.parts[i][1] for i in fit.free]
     change = float(np.sqrt(np.mean((fit.jacobian[:, 2:] @ np.array(sizes)) ** 2)))
@@ -133,7 +133,7 @@ def _expected_forms(fit: Fit) -> FloatArray:
 
 
 def _apart(fit: Fit, given: Fit) -> FloatArray:
-    """(q,) by how much law and free sizes of two fits with the same effects differ."""
+    """(q,) difference of law and free sizes between two fits with the same effects."""
     both = [np.concatenate([each.law, *each.sizes])[[0, 1, *(2 + i for i in fit.free)]] for each in (fit, given)]
     return np.asarray(both[0] - both[1])
 
@@ -153,7 +153,7 @@ def regions(place: FloatArray, point: TextArray) -> Iterator[IntArray]:
 
 
 def _estimator(jacobian: FloatArray, covariance: FloatArray, law_free: bool) -> FloatArray:
-    """(q, n) by how much each reading moves the unknowns of a least-squares fit."""
+    """(q, n) change of a least-squares fit's unknowns by each reading."""
     weighted = np.linalg.solve(covariance, jacobian).T
     return np.asarray(scaled_inverse(weighted @ jacobian + law_prior(len(weighted), law_free)) @ weighted)
 
@@ -175,14 +175,14 @@ def _left_out(
 
 
 def _log_likelihoods(error: FloatArray, parts: Sequence[FloatArray], squares: FloatArray) -> FloatArray:
-    """(g,) of errors (m,) whose covariance is the three parts (m, m), times `squares` (g, 3)."""
+    """(g,) log likelihoods of errors (m,) whose covariance is the sum of three parts (m, m) times `squares` (g, 3)."""
     lower = np.linalg.cholesky(parts[0])
 
     def white(part: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.solve(lower, np.linalg.solve(lower, part).T))
 
     geometry, form, whitened = white(parts[1]), white(parts[2]), np.linalg.solve(lower, error)
-    # Along all other directions there is nothing but scatter to speak of.
+    # Along all other directions scatter dominates.
     axes = np.linalg.eigh(geometry + FORM_IN_AXES**2 * form)[1][:, -MOST_DIRECTIONS:]
     along = axes.T @ whitened
     whitened_parts = np.stack([np.eye(len(along)), axes.T @ geometry @ axes, axes.T @ form @ axes])
@@ -194,7 +194,7 @@ def _log_likelihoods(error: FloatArray, parts: Sequence[FloatArray], squares: Fl
 
 
 def _root(covariance: FloatArray) -> FloatArray:
-    """(q, q) lower R with R R^T a covariance in very different units; of what was not fitted, 0."""
+    """(q, q) lower R with R R^T a covariance in very different units; 0 for unknowns that were not fitted."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     safe = np.where(scale > 0.0, scale, 1.0)
     correlation = covariance / np.outer(safe, safe)
@@ -202,7 +202,7 @@ def _root(covariance: FloatArray) -> FloatArray:
 
 
 def _coverage_factor(weights: FloatArray, variances: FloatArray) -> float:
-    """Factor on the root of the mean variance at which 95 % of a mixture of normal errors lie within 1.96 of it."""
+    """Factor on the root mean variance at which 95 % of a mixture of normal errors lie within 1.96 of it."""
     sd, mean = np.sqrt(variances), float(np.sqrt(weights @ variances))
     likely, low, high = weights > weights.max() * ROUNDING, 0.5, 3.0
     for _ in range(BISECTIONS):

@@ -1,4 +1,4 @@
-"""Errors of a model over some readings, in figures and in words."""
+"""Errors of a model over some readings, in figures and words."""
 
 from collections.abc import Sequence
 
@@ -10,12 +10,12 @@ AS_GIVEN, LAW_REFITTED = "as given", "strut law refitted"
 
 
 def deviation_percent(residual: FloatArray) -> FloatArray:
-    """ln(measured / modelled) as (measured - modelled) / modelled in per cent, minus: softer than modelled."""
+    """(measured - modelled) / modelled in per cent from ln(measured / modelled); negative: softer than modelled."""
     return np.asarray(100.0 * np.expm1(residual))
 
 
 def error_figures(residual: FloatArray) -> dict[str, float]:
-    """Errors of a model in per cent, of residuals ln(measured / modelled).
+    """Errors of a model in per cent from residuals ln(measured / modelled).
 
     Mean and rms of |modelled - measured| / measured, as the paper counts it; `bias_percent` is the mean of
     (measured - modelled) / modelled, minus: softer than modelled.
@@ -35,14 +35,14 @@ def errors_text(as_given: float, refitted: float | None, rest: Sequence[tuple[st
 
 
 def scatter_text(floor: float, error: float, guess: str = "") -> str:
-    """How much of a mean error (%) is scatter; where a `guess` would leave more than there is, that nobody knows."""
+    """Words on the part of a mean error (%) that is scatter, or that it is unknown if a `guess` exceeds the error."""
     if guess and floor > error:
         return f"these data do not tell how much of it is scatter (the {guess} guess alone would leave {floor:.2f} %)"
     return f"scatter alone leaves {floor:.2f} %" + (f" ({guess} guess)" if guess else "")
 
 
 def raised_text(as_given: float, refitted: float) -> str:
-    """Why refitting the strut law raised the mean error (%), a sentence; "" where it did not."""
+    """Sentence on why refitting the strut law raised the mean error (%); "" if it did not."""
     if f"{refitted:.2f}" == f"{as_given:.2f}" or not refitted > as_given:
         return ""
     return (

@@ -1,4 +1,4 @@
-"""How well candidates explain the data: bounded fits under the noise model, and their marginal likelihoods.
+"""Evidence for candidates: bounded fits under the noise model, and their marginal likelihoods.
 
 Residuals of ln k are multivariate normal with the covariance of `noise`; a wild reading has its own scatter widened, at
 the price of its rarity. The strut law's two logarithms are refitted along with every candidate (prior sd
@@ -30,7 +30,7 @@ LAW_PRIOR = 0.2  # sd of the strut law's logarithms; assumed: a catalogue's stif
 
 
 def law_prior(unknowns: int, law_free: bool = True) -> FloatArray:
-    """(q, q) information of the strut law's prior about q unknowns, of which the law's two are the first.
+    """(q, q) information of the strut law's prior on q unknowns, the first two of which are the law's.
 
     Of a law that is not fitted, that it does not change.
     """
@@ -40,12 +40,12 @@ def law_prior(unknowns: int, law_free: bool = True) -> FloatArray:
 
 
 MOST_ROUNDS = 3  # searches for wild readings
-TABLE_STEPS, TABLE_TOLERANCE = 12, 1e-4  # of a fit on tables; standard deviations
+TABLE_STEPS, TABLE_TOLERANCE = 12, 1e-4  # steps of a fit on tables; its tolerance in standard deviations
 BEYOND = 0.05  # share of a bound by which a search may overshoot it
 
 
 def relative_errors(residual: FloatArray, linear: bool) -> FloatArray:
-    """(n,) (modelled - measured) / measured of residuals, logarithms unless `linear`."""
+    """(n,) (modelled - measured) / measured from residuals, which are logarithms unless `linear`."""
     return np.asarray(-residual if linear else np.expm1(-residual))
 
 
@@ -106,7 +106,7 @@ class Fit:
 
     @property
     def name(self) -> str:
-        """Of an effect, or of several: "a + b"."""
+        """Name of the effect, or "a + b" for several."""
         return " + ".join(sorted(self.names))
 
     @property
@@ -137,17 +137,17 @@ class Fit:
 
     @property
     def projected(self) -> Precision:
-        """Inverse covariance of what the fit leaves, under the scatter that it found."""
+        """Inverse covariance of the fit's residuals, under the scatter that it found."""
         return self.scatter.precision.beside(self.jacobian.T, law_prior(self.jacobian.shape[1]))
 
     @property
     def log_likelihood(self) -> float:
-        """Of the residuals, the price of wild readings included."""
+        """Log likelihood of the residuals, including the price of wild readings."""
         return float(self.scatter.log_likelihood(self.residual))
 
     @property
     def log_posterior(self) -> float:
-        """Log likelihood with the law's prior: what the fit has made largest; -inf where the model has no answer."""
+        """Log likelihood plus the law's log prior, which the fit maximises; -inf if the model has no stiffness."""
         penalty = 0.5 * float(self.law @ self.law) / LAW_PRIOR**2 if self.law_free else 0.0
         posterior = self.log_likelihood - penalty
         return posterior if np.isfinite(posterior) else -np.inf
@@ -160,7 +160,7 @@ class Fit:
         return float(np.sqrt(max(self.covariance[row, row], 0.0)))
 
     def at_upper_bound(self) -> list[str]:
-        """Parameters whose size has run into its bound: such a fit is no explanation."""
+        """Parameters whose size has run into its bound, with which a fit is no explanation."""
         reaches = ((component, size, component.reach(float(np.sign(size)))) for component, size in self.parts if size)
         return [c.parameter.name for c, size, reach in reaches if np.isfinite(reach) and abs(size) >= 0.999 * reach]
 
@@ -194,11 +194,11 @@ class Problem:
 
     @classmethod
     def of(cls, predictor: Predictor, noise: Noise) -> Problem:
-        """From the model's answers and a noise model."""
+        """Problem made of a predictor and a noise model."""
         return cls(predictor, Scatter.of(noise, covariance(noise, predictor)))
 
     def projected(self, jacobian: FloatArray) -> Precision:
-        """P = A - A J (J^T A J + prior)^-1 J^T A: the inverse covariance of what a refit leaves.
+        """P = A - A J (J^T A J + prior)^-1 J^T A: the inverse covariance of residuals after a refit.
 
         `jacobian` (n, 2 + p) of ln k to the strut law and p sizes.
         """
@@ -206,7 +206,7 @@ class Problem:
 
     @property
     def point(self) -> TextArray:
-        """(n,) label of each reading's point: what is left out together."""
+        """(n,) label of each reading's point; the readings of a point are left out together."""
         return self.predictor.data.point
 
     def residual(self, law: FloatArray, effects: Sequence[ActiveEffect]) -> FloatArray:
@@ -214,27 +214,27 @@ class Problem:
         return np.asarray(self.observed - self.predictor.log_stiffness(law, effects))
 
     def law_columns(self, residual: FloatArray, law: FloatArray, effects: Iterable[Effect]) -> list[FloatArray]:
-        """(n,) d ln k to each of the law's logarithms, where these follow from the struts' forces; else none."""
+        """(n,) d ln k / d each of the law's logarithms, if they follow from the strut forces; otherwise none."""
         if not (np.isfinite(residual).all() and self.predictor.struts_carry_all(effects)):
             return []
         return list(self.predictor.law_columns(self.observed - residual, law).T)
 
     def _prior(self, table: CandidateTable, j: int) -> SizePrior:
-        """Prior of a component's size, worked out once."""
+        """Prior of a component's size, computed once."""
         return SizePrior.of(table, j, self.sight)
 
     def compliance(self, law: FloatArray, delta: FloatArray) -> FloatArray:
-        """(..., n) for laws (..., 2) and added compliances (..., n)."""
+        """(..., n) m/N for laws (..., 2) and added compliances (..., n)."""
         return self._held(self.predictor.strut_part(law) + delta)
 
     def _held(self, compliance: FloatArray) -> FloatArray:
-        """(..., n) with the machine file's own effects; above a tenth of the base model's."""
+        """(..., n) m/N with the machine file's own effects, kept above a tenth of the base model's."""
         return np.maximum(compliance + self.rest, 0.1 * self.base_compliance)
 
     def score_base(self) -> Fit:
-        """The model without any further effect."""
+        """Fit of the model without any further effect."""
         fit = self.score_subset((), ())
-        assert fit is not None  # the law's prior holds it
+        assert fit is not None  # the law's prior keeps it from failing
         return fit
 
     def score_subset(
@@ -244,7 +244,7 @@ class Problem:
         start: Fit | None = None,
         sizes: FloatArray | None = None,
     ) -> Fit | None:
-        """Candidates with these components free (counted over all of them); None if one ends at zero or at its bound.
+        """Fit of candidates with these components free (counted over all); None if one ends at zero or its bound.
 
         Gauss-Newton from the law of `start`, else the machine file's, then Laplace's approximation. `sizes`: where to
         begin, with the scatter of `start`; else at 0.
@@ -266,11 +266,11 @@ class Problem:
             scatter = again
         components = [every[i][0].candidate.components[every[i][1]] for i in free]
         bounded = dict(zip(unknowns[2:], components, strict=True))
-        # Of a parameter by itself; where tables of two effects, which describe neither exactly, bring it little beyond.
+        # A parameter alone; or one only little beyond its bound, by tables of two effects, which are inexact.
         near = np.inf if len(every) == 1 else 1.0 + BEYOND if len(tables) > 1 else 1.0
         reach = {i: component.reach(float(np.sign(x[i]))) for i, component in bounded.items()}
         beyond = [i for i in bounded if 0.0 < reach[i] < abs(x[i]) <= near * reach[i]]
-        if beyond:  # put onto their bounds, the others once more beside them
+        if beyond:  # set to their bounds, the others fitted again beside them
             for i in beyond:
                 x[i] = np.clip(x[i], *bounded[i].bounds)
             rest = [i for i in unknowns if i not in beyond]
@@ -288,7 +288,7 @@ class Problem:
         return replace(fit, log_evidence=self._integrated(fit, chosen, equations.information))
 
     def _integrated(self, fit: Fit, chosen: Sequence[tuple[CandidateTable, int]], information: FloatArray) -> float:
-        """The log posterior of law and free sizes (p,) at its peak integrated over them.
+        """Log evidence: posterior of law and free sizes (p,), integrated over them about its peak.
 
         `chosen`: table and component of each free size; `information` (2 + p, 2 + p).
         """
@@ -296,14 +296,14 @@ class Problem:
         deviations = np.array([fit.deviation(i) for i in fit.free])
         peak = fit.log_posterior - 2.0 * np.log(LAW_PRIOR)
         if len(chosen) == 1:
-            # By quadrature, which holds for sizes next to nothing as well, with the profile as a parabola.
+            # By quadrature, valid also for sizes near zero, with a parabolic profile.
             mean = self.prior(*chosen[0]).log_mean_likelihood(float(sizes[0]), float(deviations[0]))
             return float(peak - 0.5 * np.linalg.slogdet(information[:2, :2])[1] + mean)
         evidence = peak - 0.5 * float(np.linalg.slogdet(information)[1]) + 0.5 * len(chosen) * np.log(2.0 * np.pi)
         around = np.sign(sizes) * np.maximum(np.abs(sizes), deviations)
         for table in fit.tables:
             rows = [i for i, (owner, _) in enumerate(chosen) if owner is table]
-            # The strongest component by itself, the others comparable to it.
+            # The strongest component has its own prior; the others are comparable to it.
             units = {i: around[i] * np.eye(len(table.candidate.components))[chosen[i][1]] for i in rows}
             changes = {i: float(np.sqrt(np.mean(self.sight.change(table.delta(u)) ** 2))) for i, u in units.items()}
             first = max(rows, key=lambda i: changes[i], default=-1)
@@ -317,7 +317,7 @@ class Problem:
     def _gauss_newton(
         self, tables: Sequence[CandidateTable], start: FloatArray, unknowns: Sequence[int], precision: Precision
     ) -> tuple[FloatArray, FloatArray, NormalEquations] | None:
-        """Law and all sizes (2 + p,) with the `unknowns` among them fitted, the residual, the last equations.
+        """Law and all sizes (2 + p,) after fitting the `unknowns` among them, the residual, the last equations.
 
         None where that fails.
         """
@@ -351,7 +351,7 @@ class Problem:
 
 
 def split(tables: Sequence[CandidateTable], sizes: FloatArray) -> Iterator[tuple[CandidateTable, FloatArray]]:
-    """Each table with its own of the sizes (p,)."""
+    """Each table with its part of the sizes (p,)."""
     ends = np.cumsum([len(table.candidate.components) for table in tables])
     return zip(tables, np.split(sizes, ends)[:-1], strict=True)
 
@@ -359,7 +359,7 @@ def split(tables: Sequence[CandidateTable], sizes: FloatArray) -> Iterator[tuple
 def normal_equations(
     jacobian: FloatArray, residual: FloatArray, law: FloatArray, precision: Precision, law_free: bool = True
 ) -> NormalEquations:
-    """With the prior of the strut law, whose two logarithms are the first unknowns."""
+    """Normal equations with the prior of the strut law, whose two logarithms are the first unknowns."""
     weighted, prior = precision.times(jacobian.T), law_prior(jacobian.shape[1], law_free)
     gradient = weighted @ residual
     gradient[:2] -= prior[0, 0] * law

@@ -1,4 +1,4 @@
-"""Rivals in fair forms: other links as freely as the named one may give.
+"""Rivals in fair forms: other links with as much freedom to give as the named one.
 
 The catalogue gives the table three axes of its own, and a spindle one across and one along: whoever compares the two as
 they stand finds in favour of the freer one wherever X and Y differ. So each link stands against a name in the most
@@ -14,7 +14,7 @@ from toolpath_stiff.inference.rivals import part_of
 from toolpath_stiff.stiffness.term_effect import TermEffect, size_parameter
 from toolpath_stiff.stiffness.terms import Term
 
-# Effect of the catalogue that stands for it -> link, and actions with directions.
+# Effect of the catalogue that represents the link -> the link, and its actions with directions.
 FORMS = {
     "spindle_compliance": ("tool", (("give", "X"), ("give", "Y"), ("give", "axial"))),
     "platform_flexibility": ("platform", (("tilting", "X"), ("tilting", "Y"), ("give", "axial"))),
@@ -23,7 +23,7 @@ FORMS = {
 
 
 def _form(name: str, link: str, ways: tuple[tuple[str, str], ...]) -> Candidate:
-    """A link that gives constantly in several ways."""
+    """Candidate for a link with constant give in several ways."""
     entries = [
         (
             Term(link, direction, "constant", "offset", action),
@@ -39,7 +39,7 @@ CANDIDATES = {name: _form(name, *form) for name, form in FORMS.items()}
 
 
 def fair_rivals(problem: Problem, fit: Fit, base: Fit) -> dict[str, Fit]:
-    """Fits with one effect of an explanation replaced by another link's fair form, by the names that stand for them."""
+    """Fits with one effect of an explanation replaced by another link's fair form, by names of representing effects."""
     rivals = {}
     for member in fit.candidates:
         others = [other for other in fit.candidates if other is not member]
@@ -53,7 +53,7 @@ def fair_rivals(problem: Problem, fit: Fit, base: Fit) -> dict[str, Fit]:
 
 
 def _beside(problem: Problem, form: Candidate, others: list[Candidate], base: Fit) -> Fit | None:
-    """The fit with a form beside other effects; None where it fits best when it is absent."""
+    """Fit of a form beside other effects; None if it fits best when absent."""
     tables = [table for candidate in (form, *others) if (table := table_of(candidate, problem.predictor)) is not None]
     if len(tables) <= len(others):
         return None

@@ -19,11 +19,11 @@ from toolpath_stiff.inference.noise import Scatter
 STEPS = 8
 TOLERANCE = 1e-3  # of a standard deviation
 LAW_STEP = 1e-4  # of the law's logarithms, for differences
-HALVINGS = 10  # of a step that makes the fit worse
+HALVINGS = 10  # halvings of a step that makes the fit worse
 
 
 class _Model:
-    """The model as a function of the strut law's logarithms and of all sizes, in one array x (2 + p,).
+    """The model as a function of the strut law's logarithms and all sizes, in one array x (2 + p,).
 
     `low`, `high` (2 + p,): bounds of x. A law that is not fitted is held by its prior, and not moved.
     """
@@ -35,7 +35,7 @@ class _Model:
         self.low, self.high = np.array(bounds, dtype=float).T
 
     def sizes(self, x: FloatArray) -> tuple[FloatArray, ...]:
-        """Of each candidate."""
+        """Sizes of each candidate."""
         ends = 2 + np.cumsum([0, *(len(candidate.components) for candidate in self.candidates)])
         return tuple(x[start:end].copy() for start, end in pairwise(ends))
 
@@ -47,14 +47,14 @@ class _Model:
     def equations(
         self, x: FloatArray, residual: FloatArray, unknowns: Sequence[int], scatter: Scatter
     ) -> NormalEquations:
-        """Of the `unknowns` among x, the law's two always the first of them."""
+        """Normal equations of the `unknowns` among x, the first two of which are always the law's."""
         columns = self.problem.law_columns(residual, x[:2], [candidate.effect for candidate in self.candidates])
         for i in unknowns[len(columns) :]:
             moved, step = x.copy(), LAW_STEP
             if i > 1:
                 component = self.components[i - 2]
                 step = 1e-4 * max(abs(x[i]), 1e-2 * max(component.typical()[0], 1e-30))
-                # Towards zero where a step outwards would leave the bounds.
+                # Step towards zero if a step outwards would leave the bounds.
                 step = -step if x[i] > 0.0 and x[i] + step > component.bounds[1] else step
             moved[i] += step
             columns.append((residual - self.residual(moved)) / step)
@@ -62,7 +62,7 @@ class _Model:
         return normal_equations(jacobian, residual, x[:2], scatter.precision, self.law_free)
 
     def newton_step(self, x: FloatArray, unknowns: Sequence[int], equations: NormalEquations) -> FloatArray:
-        """Step of the unknowns to the least quadratic model within the bounds.
+        """Step of the unknowns to the minimum of the quadratic model within the bounds.
 
         Cutting off a step that leaves them leads uphill where sizes trade off against each other.
         """
@@ -72,7 +72,7 @@ class _Model:
     def moved(
         self, x: FloatArray, residual: FloatArray, unknowns: Sequence[int], step: FloatArray, scatter: Scatter
     ) -> tuple[FloatArray, FloatArray] | None:
-        """Unknowns and residual after the step, halved until the fit gets no worse; None where nothing helps."""
+        """Unknowns and residual after the step, halved until the fit is no worse; None if no step helps."""
 
         def misfit(x: FloatArray, residual: FloatArray) -> float:
             return float(scatter.precision.squares(residual) + (x[:2] @ x[:2]) / LAW_PRIOR**2)
@@ -90,7 +90,7 @@ class _Model:
 
 
 def refine(problem: Problem, fit: Fit, law_free: bool = True) -> Fit:
-    """Gauss-Newton with the model itself from the searches' result, within the bounds."""
+    """Fit refined by Gauss-Newton with the model itself, within the bounds, from the searches' result."""
     return fit_effects(problem, fit.candidates, fit.sizes, fit.free, fit.law, fit.scatter, law_free)
 
 
@@ -134,7 +134,7 @@ def fit_effects(
     start = x, residual
     (x, residual), _ = gauss_newton(start, lambda at: model.equations(*at, unknowns, noise), move, STEPS, TOLERANCE)
     last, absent = model.equations(x, residual, unknowns, noise), {}
-    if len(unknowns) < len(x):  # where the data would pull the others, were all sizes free
+    if len(unknowns) < len(x):  # where the data would pull the other sizes if all were free
         every = model.equations(x, residual, range(len(x)), noise)
         inverse = scaled_inverse(every.information)
         pulled, sd = x + inverse @ every.gradient, np.sqrt(np.maximum(np.diag(inverse), 0.0))
@@ -146,14 +146,14 @@ def fit_effects(
 
 
 # Shares of the largest usual size to start from: at zero itself some effects have no slope to follow, and from far
-# away others (a platform's bars) have only a slope outwards. What instruments show is all but straight in their sizes.
+# away others (a platform's bars) have only a slope outwards. Instrument readings are nearly linear in their sizes.
 STARTS = (0.03, 0.5)
 ROUNDS = 5  # searches for wild readings
-BEHIND = 30.0  # of log posterior: further behind, no reading taken for wild makes up for it
+BEHIND = 30.0  # of log posterior: a start further behind cannot catch up by taking readings to be wild
 
 
 def base_fit(problem: Problem, law_free: bool) -> Fit:
-    """The model without any further effect."""
+    """Fit of the model without any further effect."""
     return settled(problem, fit_effects(problem, (), (), (), np.zeros(2), problem.scatter, law_free))
 
 
@@ -178,7 +178,7 @@ def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], l
 
 
 def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: bool) -> Iterator[Fit]:
-    """The fits that a candidate comes to from its starts."""
+    """Fits that a candidate reaches from its starting sizes."""
     together = (*before.candidates, candidate)
     free = tuple(range(sum(len(c.components) for c in together)))
     seen: list[FloatArray] = []
@@ -187,7 +187,7 @@ def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: 
         fit = fit_effects(problem, together, (*before.sizes, start), free, before.law, problem.scatter, law_free)
         x = np.concatenate([fit.law, *fit.sizes])
         last = normal_equations(fit.jacobian, fit.residual, fit.law, fit.scatter.precision, law_free)
-        # Two starts mostly end in one place, and go on from there alike.
+        # Two starts usually end at the same point, from where one continuation is enough.
         if not any((np.abs(x - other) * last.scale < TOLERANCE).all() for other in seen):
             yield fit
         seen.append(x)
@@ -201,7 +201,7 @@ def _start(component: Component, share: float) -> float:
 
 
 def settled(problem: Problem, fit: Fit) -> Fit:
-    """The fit with the readings taken for wild that it finds wild itself, continued where it was still moving."""
+    """Fit continued until converged, with the readings that it finds to be wild taken as such."""
     for _ in range(ROUNDS):
         scatter = problem.scatter.with_wild(fit.residual, known=fit.scatter)
         again = fit_effects(problem, fit.candidates, fit.sizes, fit.free, fit.law, scatter, fit.law_free)
@@ -212,13 +212,13 @@ def settled(problem: Problem, fit: Fit) -> Fit:
 
 
 def _without_zeros(fit: Fit) -> Fit:
-    """The fit with sizes that have run into zero no longer counted as free."""
+    """Fit whose sizes at zero no longer count as free."""
     sizes = np.concatenate([np.zeros(0), *fit.sizes])
     kept = [k for k, index in enumerate(fit.free) if sizes[index] != 0.0]
     if len(kept) == len(fit.free):
         return fit
     columns = [0, 1, *(2 + k for k in kept)]
-    # Where the data would pull them, could they go below zero: what an upper limit is counted from.
+    # Where the data would pull them if they could go below zero: the origin of upper limits.
     gradient = fit.scatter.precision.times(fit.jacobian.T) @ fit.residual
     gradient[:2] -= fit.law / LAW_PRIOR**2 if fit.law_free else 0.0
     step, sd = fit.covariance @ gradient, np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
@@ -233,11 +233,11 @@ def _without_zeros(fit: Fit) -> Fit:
 
 
 def with_given_law(problem: Problem, fit: Fit) -> Fit:
-    """The same effects, fitted beside the strut law of the machine file."""
+    """Fit of the same effects beside the strut law of the machine file."""
     given = fit_effects(problem, fit.candidates, fit.sizes, fit.free, np.zeros(2), fit.scatter, law_free=False)
     return _without_zeros(settled(problem, given))
 
 
 def baseline(problem: Problem) -> tuple[Fit, Fit]:
-    """The first two models of every report: the machine file as it stands, and with its strut law refitted."""
+    """The first two models of every report: the machine file as it stands, and the same with its strut law refitted."""
     return base_fit(problem, law_free=False), base_fit(problem, law_free=True)

@@ -1,4 +1,4 @@
-"""How readings vote between explanations, pose after pose: a name needs more than a probability.
+"""Votes of readings between explanations, pose after pose: a name needs more than a probability.
 
 A probability holds the price of an explanation's parameters (Occam's factor). Of two explanations that foretell the
 readings equally well it prefers the one with fewer, and so names a part for its bookkeeping. So each pose is foretold
@@ -23,7 +23,7 @@ from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.rivals import lowers_error
 from toolpath_stiff.inference.votes import CERTAIN, closest, outvoted
 
-FORM, MOST_FEATURES = "smooth over the workspace, different by direction", 60  # the first of them hold nearly all
+FORM, MOST_FEATURES = "smooth over the workspace, different by direction", 60  # the first hold nearly all
 
 
 def votes(
@@ -42,13 +42,13 @@ def votes(
             covariance = replace(covariance, shared=np.concatenate([covariance.shared, inexact]))
         squares = _squares_by_point(np.stack([fit.residual, rival.residual]), covariance, points)
         gain = 0.5 * (squares[1] - squares[0]) + (_price(rival) - _price(fit)) / points.count
-        # Rounded: which of two rivals that do the same is the closer would be the processor's.
+        # Rounded: otherwise the processor would decide which of two equal rivals is the closer.
         against[name] = np.round(gain, CERTAIN) + 0.0
     return closest(against)
 
 
 def carried(problem: Problem, fits: Mapping[str, Fit], singles: Sequence[str], name: str) -> str:
-    """What readings carry of an explanation: one of its effects where more foretells no better, else the whole.
+    """Name of the part of an explanation that the readings support: one of its effects if more predicts no better.
 
     What a second effect adds may be no more than what constants along axes leave of the first, `SHARE` of its change.
     """
@@ -66,12 +66,12 @@ def carried(problem: Problem, fits: Mapping[str, Fit], singles: Sequence[str], n
 
 
 def _price(fit: Fit) -> float:
-    """1 for each fitted size and constant of the law (Akaike 1973), and the law's distance from the machine file."""
+    """Number of fitted sizes and constants of the law (Akaike 1973), plus the law's distance from the machine file."""
     return len(fit.free) + (2.0 + 0.5 * float(fit.law @ fit.law) / LAW_PRIOR**2 if fit.law_free else 0.0)
 
 
 def _squares_by_point(residuals: FloatArray, covariance: Covariance, points: Groups) -> FloatArray:
-    """(k, points) weighted squares that each point adds to those before it, of residuals (k, n).
+    """(k, points) weighted squares that each point adds to those of earlier points, for residuals (k, n).
 
     Of r^T V^-1 r = r^T C^-1 r - h^T (1 + S C^-1 S^T)^-1 h, h = S C^-1 r (`covariances`), each sum up to a point.
     """

@@ -1,4 +1,4 @@
-"""Two gates: is a model good enough, and is a candidate better than the best of many would be by chance.
+"""Two gates: a model must be good enough, and a candidate better than the best of many would be by chance.
 
 Both by parametric bootstrap: readings are simulated from the noise model at the fit, wild ones and the uncertainty of
 the noise itself included, and go through the same linearised refit and the same search for wild readings as the real
@@ -24,17 +24,17 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.noise import Noise, Scatter
 
 DRAWS = 400
-RIDGE = 1e-12  # on the diagonal where readings are set aside: two that a fit explains entirely are not told apart
+RIDGE = 1e-12  # added to the diagonal for readings set aside: two that a fit explains entirely would make it singular
 # Squared deleted residual beyond which a reading is set aside, and share of readings that may be: what pays the price
 # of `scatter` where one reading in fifty is wild.
 WILD_SQUARED, MOST_WILD = 11.3, 0.05
 CHANCE = 0.05  # share of campaigns in which the best of all candidates gains as much by chance
-HOPELESS = 1.3  # times the largest simulated sum of squares
+HOPELESS = 1.3  # factor on the largest simulated sum of squares beyond which a model is hopeless
 
 
 @dataclass(frozen=True)
 class Gate:
-    """Outcome of the absolute test of one fit.
+    """Result of the absolute test of one fit.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ def simulate(noise: Noise, covariance: Covariance, seed: int, draws: int = DRAWS
 def set_wild_aside(
     pulls: FloatArray, projected: Precision, scatter: Scatter | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Pulls P r (s, n) without the readings that are far off what all others say of them, as `scatter` has it.
+    """Pulls P r (s, n) without readings that are far off the prediction of all others, and the change of residuals.
 
     Pulls as if the wild readings had not been taken, and what that takes off the residuals r of s sets of n readings:
     nothing but at wild readings.
@@ -91,7 +91,7 @@ def set_wild_aside(
 
 
 class Forms:
-    """Forms of discrepancy as the scatter sees them, worked out once for all fits to the same readings.
+    """Forms of discrepancy under the scatter, prepared once for all fits to the same readings.
 
     A form is a covariance K = L L^T between readings with features L (n, r). Under the inverse covariance P = A - G^T G
     of what a fit leaves, G = X A, all that is asked of it are L^T P L = L^T A L - (G L)^T (G L), and L^T P r of
@@ -115,7 +115,7 @@ class Forms:
 
 
 class FormStatistics:
-    """Fit statistics of the forms of discrepancy for one fit, as surprises: normal deviates.
+    """Statistics of the forms of discrepancy for one fit, as surprises: normal deviates.
 
     r^T P K P r is a weighted sum of chi-squares; its tail is that of one scaled chi-square with the same mean tr(P K)
     and variance 2 tr(P K P K) (Satterthwaite 1946). The bootstrap corrects what the approximation gets wrong.
@@ -139,7 +139,7 @@ class FormStatistics:
         return np.asarray(residuals @ self.forms.solved - residuals @ self.removed.T @ self.reached)
 
     def surprises(self, loads: FloatArray) -> FloatArray:
-        """(s, forms) of loads (s, all features)."""
+        """(s, forms) normal deviates from loads (s, all features)."""
         if not self.forms.names:
             return np.zeros((len(loads), 1))
         value = np.stack([(loads[:, part] ** 2).sum(axis=1) for part in self.forms.slices], axis=1)
@@ -175,20 +175,20 @@ def absolute_gate(
     projected, scatter = problem.projected(jacobian), problem.scatter
 
     def squares_of(pulls: FloatArray, taken: FloatArray) -> FloatArray:
-        """(s,) r^T P r from the pulls P r, wild readings at their price; P V P = P but for the law's small prior."""
+        """(s,) r^T P r from the pulls P r, with the price of wild readings; P V P = P up to the law's small prior."""
         return np.asarray(scatter.covariance.squares(pulls) + scatter.beyond * (taken != 0.0).sum(axis=1))
 
-    # What the linearised refit leaves of the data is their residual; the law's prior pulls as in the simulation.
+    # The data's residual is that of the linearised refit, with the law's prior as in the simulation.
     observed = set_wild_aside(projected.times(residual[None]), projected, scatter)
     pulls, taken = set_wild_aside(projected.times(draws), projected, scatter)
     observed_squares, squares = float(squares_of(*observed)[0]), squares_of(pulls, taken)
     structure = FormStatistics(forms, projected)
     seen = structure.surprises(structure.loads(residual[None] - observed[1]))
-    # Squares far beyond all simulated ones settle it; what the structure would look like by chance matters no more.
+    # Squares far beyond all simulated ones settle it without the structure test.
     simulated = np.zeros((len(squares), seen.shape[1]))
     if signatures or observed_squares <= HOPELESS * squares.max():
         simulated = structure.surprises(structure.loads(draws - taken))
-    # Rows: the data, then every draw; columns: what may look bad, larger is worse.
+    # Rows: the data, then every draw; columns: statistics, larger is worse.
     looks = [np.concatenate([[observed_squares], squares]), np.concatenate([seen, simulated]).max(axis=1)]
     if signatures:
         looks.append(np.concatenate([[gain], largest_gain(pulls, projected, signatures)]))
@@ -208,14 +208,14 @@ def absolute_gate(
 def gain_threshold(
     problem: Problem, jacobian: FloatArray, draws: FloatArray, signatures: Sequence[Sequence[FloatArray]]
 ) -> float:
-    """Twice-log-likelihood gain that the best of all candidates reaches by chance in one campaign of twenty."""
+    """Gain in twice the log likelihood that the best of all candidates reaches by chance in one campaign of twenty."""
     projected = problem.projected(jacobian)
     pulls, _ = set_wild_aside(projected.times(draws), projected, problem.scatter)
     return float(np.quantile(largest_gain(pulls, projected, signatures), 1.0 - CHANCE))
 
 
 def _tail(values: FloatArray, simulated: FloatArray) -> FloatArray:
-    """(s,) share of the simulated values at or above each value; half of one where none is."""
+    """(s,) share of simulated values at or above each value; half of one count if there are none."""
     ordered = np.sort(simulated)
     count = len(ordered) - np.searchsorted(ordered, values - 1e-12 * np.abs(values))
     return np.asarray(np.maximum(count, 0.5) / len(ordered))

@@ -11,12 +11,12 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.gates import Forms, FormStatistics, set_wild_aside
 from toolpath_stiff.stiffness.contract import Effect
 
-NOTHING = -1e9  # log evidence of what cannot be
+NOTHING = -1e9  # log evidence of an impossible hypothesis
 
 
 @dataclass(frozen=True)
 class Family:
-    """One effect with everything that it may act on.
+    """One effect with all its choices.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Family:
 
 
 def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
-    """Search one effect; None if it does nothing to these data."""
+    """Search of one effect; None if it has no effect on these data."""
     tables, evidences = tables_of(problem, effect), []
     best: Fit | None = None
     subsets: tuple[tuple[Fit, float], ...] = ()
@@ -63,26 +63,26 @@ def score_family(problem: Problem, effect: Effect, base: Fit) -> Family | None:
 
 
 def _fits_of_subsets(problem: Problem, table: CandidateTable, base: Fit) -> list[tuple[Fit, float]]:
-    """Fits of one candidate with the log prior weight of each subset of components."""
+    """Fits of one candidate, with the log prior weight of each subset of components."""
     subsets, fits = list(table.candidate.subsets()), []
     start, sizes = base, None
     for free in subsets:
         fit = problem.score_subset([table], free, start, sizes)
         if fit is not None:
             fits.append((fit, -float(np.log(len(subsets)))))
-            # The next subset begins where this one has ended, with the readings that it takes for wild.
+            # The next subset starts from this one's result and its wild readings.
             start, sizes = fit, fit.sizes[0]
     return fits
 
 
 def score_families(problem: Problem, effects: Iterable[Effect], base: Fit) -> list[Family]:
-    """All effects that do something to these data, the most likely first."""
+    """All effects that change these data, the most likely first."""
     families = filter(None, (score_family(problem, effect, base) for effect in effects))
     return sorted(families, key=lambda family: (-family.log_evidence, family.name))
 
 
 def tables_of(problem: Problem, effect: Effect) -> list[CandidateTable]:
-    """The tables of an effect, one a choice that does something to these data."""
+    """Tables of an effect, one for each choice that changes these data."""
     tables = (table_of(candidate, problem.predictor) for candidate in candidates_of(effect, problem.predictor.data))
     return list(filter(None, tables))
 
@@ -101,7 +101,7 @@ def signatures(problem: Problem, tables: Iterable[CandidateTable]) -> list[list[
 
 
 def probabilities(log_evidence: Mapping[str, float], prior: Mapping[str, float]) -> dict[str, float]:
-    """Posterior of hypotheses from log evidences and prior weights (which need not sum to 1); none if all are out."""
+    """Posterior probabilities from log evidences and prior weights (need not sum to 1); empty if all are excluded."""
     names = [name for name in log_evidence if prior.get(name, 0.0) > 0.0]
     logs = np.array([log_evidence[name] + np.log(prior[name]) for name in names])
     if not names or logs.max() <= 0.5 * NOTHING:
@@ -112,7 +112,7 @@ def probabilities(log_evidence: Mapping[str, float], prior: Mapping[str, float])
 
 
 TAILS = (0.025, 0.975)  # of a 95 % interval
-POINTS = 2000  # by which a normal distribution is held
+POINTS = 2000  # points that represent a normal distribution
 
 
 def averaged_interval(family: Family, j: int) -> FloatArray | None:
@@ -135,7 +135,7 @@ def averaged_interval(family: Family, j: int) -> FloatArray | None:
 
 
 AMPLITUDES = np.geomspace(0.003, 0.3, 9)  # rms of a discrepancy of ln k; as wide as the effects' own prior
-FORMS = 5  # forms of discrepancy that are weighed, those that stick out most
+FORMS = 5  # forms of discrepancy that are weighed: the most conspicuous
 
 
 def discrepancy_evidence(problem: Problem, score: Fit, forms: Forms) -> tuple[float, str]:

@@ -1,4 +1,4 @@
-"""From readings to a verdict: the whole way on this page, a function and a type a step.
+"""The steps from readings to a verdict, all on this page, a function and a type for each.
 
 | step | function | gives |
 | --- | --- | --- |
@@ -32,21 +32,22 @@ from math import comb
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.inference.adequacy import LEFT, instead_of_law, is_small, may_leave
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.doubts import noise_doubt, question
 from toolpath_stiff.inference.drawn import Drawn, drawn
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fair_forms import fair_rivals
-from toolpath_stiff.inference.fits import refine, with_given_law
+from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.foretold import carried, votes
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.inference.nuisances import findings, fitted_nuisances, mean_left_by_nuisances
-from toolpath_stiff.inference.rivals import ONE_BODY, SERIES, entries, lowers_error, rivals_of, rivals_of_law
+from toolpath_stiff.inference.nuisances import TAKEN_UP, not_told
+from toolpath_stiff.inference.rivals import entries, lowers_error, rivals_of
 from toolpath_stiff.inference.several import search_pairs
-from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded, rooms
+from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
 from toolpath_stiff.inference.votes import Votes, closest, outvoted
 from toolpath_stiff.stiffness.contract import Effect
 
@@ -54,9 +55,9 @@ NONE = "none"
 OUTSIDE = "outside the catalogue"
 # What is expected before anything is measured; assumed. Whoever measures has a reason, but most machines are sound.
 PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.10
-FALSE_ALARM = 0.05  # of the base model's gate
+FALSE_ALARM = 0.05  # false alarms of the base model's gate
 ADEQUATE = 0.005  # below this probability an explanation does not explain the data
-MOST_OPEN = 3  # entries that an ambiguous verdict lists; all votes are in the document
+MOST_OPEN = 3  # most entries that an ambiguous verdict lists; the document has all votes
 NAMED = 0.90  # probability from which a single name is the answer
 HELD = 0.95  # probability that the plausible set adds up to where it is not a single name
 STANDS = 0.05  # probability from which something outside the catalogue, or another pair, is not ruled out
@@ -66,15 +67,11 @@ SURVIVES = 3.0  # log evidence by which a pair must beat each of its members alo
 # Odds below which a second effect is not considered where one suffices: "positive" evidence begins at 3 (Kass and
 # Raftery 1995, Bayes factors).
 POSITIVE = 3.0
-# Share of the stiffness that `adequate` may leave along a path; assumed: a third of what cutting forces are known to.
-LEFT = 0.03
-ONE_SIDED = 1.645  # normal quantile of 95 %
-TAKEN_UP = {"joint_offset": "joint", "weak_strut": "strut"}  # effects that nuisances take up, of which kind
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the data say under one noise model.
+    """Verdict of the data under one noise model, with its grounds.
 
     Attributes
     ----------
@@ -138,7 +135,7 @@ class Judgement:
 
     @property
     def likeliest(self) -> Fit:
-        """The fit of the likeliest hypothesis: of those left standing, else the closest."""
+        """Fit of the likeliest hypothesis left standing; if none is, of the closest."""
         for name in self.explanations:
             if name == NONE or name in self.fits:
                 return self.fits.get(name, self.base)
@@ -176,7 +173,7 @@ def judge(problem: Problem, noise: Noise, effects: Sequence[Effect], seed: int) 
 
 @dataclass(frozen=True)
 class Candidates:
-    """Everything that was searched, on tables of added compliance.
+    """All effects searched, on tables of added compliance.
 
     Attributes
     ----------
@@ -196,23 +193,26 @@ class Candidates:
     within: tuple[str, ...] = ()
 
     @property
+    def hidden(self) -> list[Family]:
+        """Effects that may be there unseen, beside what the nuisances assume."""
+        return [family for family in self.families if family.name not in self.within]
+
+    @property
     def offered(self) -> list[tuple[Family, Fit]]:
         """Effects that fit best when they are there, with that fit."""
-        return [(f, f.best) for f in self.families if f.best is not None and f.name not in self.within]
+        return [(family, family.best) for family in self.hidden if family.best is not None]
 
 
 def find_candidates(problem: Problem, noise: Noise, effects: Sequence[Effect]) -> Candidates:
     """Fit every effect with each of its choices beside the strut law."""
     base = problem.score_base()
     forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
-    told = {entry["nuisance"] for entry in findings(fitted_nuisances(base, noise))}
-    within = tuple(name for name, nuisance in TAKEN_UP.items() if nuisance not in told)
-    return Candidates(base, tuple(score_families(problem, effects, base)), forms, within)
+    return Candidates(base, tuple(score_families(problem, effects, base)), forms, not_told(base, noise))
 
 
 @dataclass
 class Gates:
-    """Which explanations leave no more than noise would.
+    """Explanations that leave no more than noise would.
 
     Attributes
     ----------
@@ -238,16 +238,16 @@ class Gates:
 
     @property
     def enough(self) -> bool:
-        """Whether the model explains the data without a further effect."""
+        """True if the model explains the data without a further effect."""
         return self.base.probability > FALSE_ALARM
 
 
 def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: int) -> Gates:
-    """The model alone, then single effects, then pairs: of the likeliest those that beat each of their two and pass."""
+    """Test the model alone, then single effects, then pairs; of likely pairs, those that beat both members and pass."""
     draws = simulate(noise, problem.scatter.covariance, seed)
     base, families, forms = candidates.base, candidates.families, candidates.forms
     signs = signatures(problem, (table for family in families for table in family.tables))
-    # With the law's prior, as in the simulations: a law dragged far by what is missing is no fit.
+    # With the law's prior, as in the simulations: a law dragged far off by a missing effect is no fit.
     gain = max((2.0 * (f.best.log_posterior - base.log_posterior) for f in families if f.best), default=0.0)
     gates = Gates(absolute_gate(problem, base.residual, base.jacobian, draws, forms, signs, gain))
     if gates.enough:
@@ -266,29 +266,33 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: in
             singles.append(family)
     gates.singles = tuple(family.name for family in singles)
     evidence, tried = {family.name: family.log_evidence for family in families}, []
-    for k, fit in enumerate(search_pairs(problem, [f for f in families if f.name not in candidates.within], base)):
+    # What stands out beside no effect may do so beside one.
+    within = {*candidates.within}.intersection(*(not_told(fit, noise) for fit in gates.fits.values()))
+    found = search_pairs(problem, [f for f in families if f.name not in within], base)
+    for k, fit in enumerate(found):
         pair = fit
-        if k < TESTED and fit.log_evidence > max(evidence[name] for name in fit.names) + SURVIVES:
+        matters = k < TESTED or fit.log_evidence > found[0].log_evidence - FAR
+        if matters and fit.log_evidence > max(evidence[name] for name in fit.names) + SURVIVES:
             passed = passes(fit.name, fit)
-            # What two effects do to each other is not in their tables: the final fit says by how much it is likelier.
+            # Tables omit the interaction of two effects; the final fit gives its gain in likelihood.
             more = gates.fits[fit.name].log_posterior - fit.log_posterior
             pair = replace(fit, log_evidence=fit.log_evidence + more)
             gates.pairs += (pair,) if passed else ()
         tried.append(pair)
     gates.tried = tuple(sorted(tried, key=lambda fit: (-fit.log_evidence, fit.name)))
-    # The base model stays in the running if only the gain of the best candidate counts against it, not its residuals.
+    # The base model stays in the running if only the best candidate's gain speaks against it, not its residuals.
     gates.none_stands = min(gates.base.squares_probability, gates.base.structure_probability) > ADEQUATE
     return gates
 
 
 def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) -> tuple[dict[str, float], str]:
-    """Probabilities of the explanations that pass, a further effect at odds of 3 to 1 only; 0 of those kept out.
+    """Probabilities of the explanations that pass, 0 for those kept out; a further effect only at odds of 3 to 1.
 
     Where no single effect passes, something outside the catalogue is weighed, too: then with the form of discrepancy
     that stands out, in words, else "".
     """
     if gates.enough:
-        return _posterior(problem, noise, candidates, True, [f.name for f in candidates.families]), ""
+        return _posterior(problem, noise, candidates, True, [f.name for f in candidates.hidden]), ""
     outside, form = (-np.inf, "") if gates.singles else _outside(problem, candidates)
 
     def posterior(standing: Sequence[Fit]) -> dict[str, float]:
@@ -305,7 +309,7 @@ def weigh(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates) 
 
 
 def _sparing(gates: Gates, posterior: Callable[[Sequence[Fit]], dict[str, float]]) -> dict[str, float]:
-    """Probabilities without pairs that add to the best effect, unless pairs are likelier enough; others are rivals."""
+    """Probabilities without pairs that contain the best effect, unless pairs are likely enough; other pairs stay."""
     weights = posterior(gates.pairs)
     best = max(gates.singles, key=lambda name: weights[name], default="")
     if not best or sum(weights[pair.name] for pair in gates.pairs) >= POSITIVE * weights[best]:
@@ -314,7 +318,7 @@ def _sparing(gates: Gates, posterior: Callable[[Sequence[Fit]], dict[str, float]
 
 
 def _outside(problem: Problem, candidates: Candidates) -> tuple[float, str]:
-    """Log evidence that something outside the catalogue is missing, and the likeliest form of it.
+    """Log evidence for something missing that is outside the catalogue, and its likeliest form.
 
     Alone, or beside one of the two best effects. That a further one is missing beside an effect is as rare as of two
     effects, and it may be any of them: who picks the best of fifteen without that price makes the unknown too likely.
@@ -351,7 +355,7 @@ def _prior(families: Sequence[Family], count: int) -> float:
 
 
 def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit: Fit) -> float:
-    """Log evidence when the size of the noise is itself known to `noise.freedom` degrees of freedom only.
+    """Log evidence if the size of the noise is itself known only to `noise.freedom` degrees of freedom.
 
     Integrated over it, the normal likelihood exp(-q / 2) of the weighted squares q of n readings becomes Student's,
     (1 + q / freedom)^(-(freedom + n) / 2): many readings that fit badly say as much of the noise as of the model.
@@ -364,13 +368,13 @@ def _with_unknown_noise(problem: Problem, noise: Noise, log_evidence: float, fit
 
 
 def decide(gates: Gates, posterior: Mapping[str, float]) -> tuple[str, tuple[str, ...]]:
-    """The verdict, and the hypotheses that hold the truth with 95 % probability, the most likely first."""
+    """Verdict, and hypotheses that hold the truth with 95 % probability, the most likely first."""
     if gates.enough:
         likely = _smallest_set(posterior)
         return "adequate", likely if NONE in likely else (*likely, NONE)
     if gates.singles:
         named = "identified" if max(posterior.values()) >= NAMED else "ambiguous"
-        # Above a half, what counts against the model is likelier chance than any effect.
+        # Above one half, the evidence against the model is more likely chance than any effect.
         return "adequate" if posterior[NONE] > 0.5 else named, _smallest_set(posterior)
     if OUTSIDE in posterior:
         return "unexplained", ()
@@ -386,17 +390,19 @@ def put_to_vote(
 
     What lowers no error at left-out points is no answer, nor is a second effect that lowers none, or that the form of
     the first may stand for. A name that has not outvoted every rival of another part is one of several: beside it stand
-    those that outvote it, then those that are likely, then the closest of the others and of what a strut law that had
-    to move may stand for. A model that passes is not the only explanation where its nuisances have taken up more than
+    those that are likely, the others and what a strut law that had to move may stand for, the closest votes first. A
+    model that passes is not the only explanation where its nuisances have taken up more than
     they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would hide is
     told instead.
     """
     verdict, explanations = decide(gates, probability)
-    base, ballots, ahead = candidates.base, dict[str, FloatArray](), list[str]()
-    fits = {NONE: base} | {family.name: best for family, best in candidates.offered} | gates.fits
+    base, ballots, lost = candidates.base, dict[str, FloatArray](), set[str]()
+    fits = {NONE: base} | {family.name: best for family, best in candidates.offered}
+    fits |= {pair.name: pair for pair in gates.tried if pair.possible} | gates.fits
     if verdict == "adequate":
-        open_ones = explanations if noise.guess != "high" and _may_leave(problem, noise, candidates) > LEFT else ()
-        likely = standing = [*dict.fromkeys([NONE, *(name for name in TAKEN_UP if name in fits), *open_ones])]
+        settled = noise.guess == "high" or may_leave(problem, noise, candidates.hidden, base) <= LEFT
+        taken_up = [name for name in TAKEN_UP if name in fits]
+        likely = standing = [*dict.fromkeys([NONE, *taken_up, *(() if settled else explanations)])]
     elif verdict in ("identified", "ambiguous"):
         left_out = {name: held_out(fits[name], problem.point) for name in {NONE, *explanations}}
         found = [n for n in explanations if n == NONE or lowers_error(left_out[NONE], left_out[n])]
@@ -410,88 +416,61 @@ def put_to_vote(
             standing = likely
         else:
             rivals = {name: fit for name, fit in fits.items() if name != NONE or gates.none_stands}
-            ballots = votes(problem, fits[top], rivals_of(fits[top], rivals))
+            ballots = _votes_of_few(problem, candidates.families, fits[top], rivals_of(fits[top], rivals))
             ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
-            open_rivals = [name for name, differences in ballots.items() if not outvoted(differences)]
-            # Likeliest first, but for those that are outvoted: differences of votes below that are chance.
-            likely = sorted(standing, key=lambda name: (name != top, name in ballots and name not in open_rivals))
-            ahead = [name for name in open_rivals if outvoted(-ballots[name])]
-            verdict, standing = "ambiguous" if open_rivals else verdict, [top, *ahead, *likely, *open_rivals]
-            if verdict == "ambiguous" and gates.none_stands and _is_small(problem, base, [fits[n] for n in likely]):
+            lost = {name for name, differences in ballots.items() if outvoted(differences)}
+            open_rivals = [name for name in ballots if name not in lost]
+            open_pairs = [pair for pair in gates.tried if pair.name in open_rivals and pair.name not in gates.fits]
+            gates.fits |= {pair.name: refine(problem, pair) for pair in open_pairs}
+            fits |= gates.fits
+            likely = standing
+            verdict, standing = "ambiguous" if open_rivals else verdict, [top, *standing, *open_rivals]
+            if verdict == "ambiguous" and gates.none_stands and is_small(problem, base, [fits[n] for n in likely]):
                 standing.append(NONE)
     else:
         return verdict, explanations, {}
-    instead, of_law = _instead_of_law(problem, fits[likely[0]])
+    instead, of_law = instead_of_law(problem, fits[likely[0]])
     gates.fits |= instead
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
     ballots = closest(ballots, of_law)
-    sure = [name for name in standing if name in {standing[0], *ahead} or probability.get(name, 0.0) >= STANDS]
+    first, *others = dict.fromkeys([*standing, *instead])
+
+    def behind(name: str) -> tuple[bool, float]:
+        """Sort key: votes; without votes (part of the first) the odds; beside a model that passes, chance alone."""
+        if name in ballots:
+            return name in lost, float(ballots[name].sum())
+        if verdict == "adequate":
+            return False, -np.inf if name in TAKEN_UP else np.inf
+        return False, float(np.log(max(probability.get(first, 0.0), 1e-300) / max(probability.get(name, 0.0), 1e-300)))
+
+    order = [first, *sorted(others, key=behind)]
     return (
         "ambiguous" if instead or verdict == "adequate" else verdict,
-        shortened(problem, fits | instead, (*sure, *(n for n in ballots if n in {*standing, *instead}), *standing)),
+        shortened(problem, fits | instead, order),
         ballots,
     )
 
 
+def _votes_of_few(problem: Problem, families: Sequence[Family], fit: Fit, rivals: Mapping[str, Fit]) -> Votes:
+    """Votes for an explanation; a rival of more effects is one of so many more, whose prior weight counts, too."""
+    own = _prior(families, len(fit.names))
+    return {
+        name: gain + np.log(max(own / _prior(families, max(len(rivals[name].names), 1)), 1.0)) / len(gain)
+        for name, gain in votes(problem, fit, rivals).items()
+    }
+
+
 def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
-    """Explanations without those beyond the `MOST_OPEN` entries that come first; the model alone stays."""
+    """Explanations in the first `MOST_OPEN` entries; the model alone stays in any case."""
     groups = entries(problem, fits, tuple(dict.fromkeys(names)))
     kept = groups[:MOST_OPEN]
     kept[-1:] = [group for group in groups[MOST_OPEN:] if NONE in group] or kept[-1:]
     return tuple(name for group in kept for name in group)
 
 
-def _may_leave(problem: Problem, noise: Noise, candidates: Candidates) -> float:
-    """Mean error (relative) at the readings' poses up to which a model that passes may still be off.
-
-    What an effect may hide there beside the refitted law (95 %), of all the one that hides most, and what struts,
-    joints and links that are not quite those of the model leave on average. Where the scatter is only guessed, at least
-    what it does not account for of the error of the model as given: whether that is scatter, too, nobody knows.
-    """
-    families = [family for family in candidates.families if family.name not in candidates.within]
-    hidden = max((room.left for room, _ in rooms(problem, families, candidates.base)), default=0.0)
-    tip = problem.predictor.data.tip
-    error = float(np.abs(np.expm1(-problem.residual(np.zeros(2), ())[tip])).mean()) if noise.guess else 0.0
-    beyond = float(max(error**2 - (noise.floor_percent / 100.0) ** 2, 0.0) ** 0.5)
-    return max(beyond, hidden + mean_left_by_nuisances(candidates.base, tip))
-
-
-def _moved_by_law(problem: Problem, fit: Fit) -> float:
-    """Mean change (relative, 95 %) of the stiffness at the readings by the refitted strut law."""
-    columns = fit.jacobian[problem.predictor.data.tip, :2]
-    spread = np.sqrt(np.einsum("ni,ij,nj->n", columns, fit.covariance[:2, :2], columns))
-    return float(np.mean(np.abs(columns @ fit.law) + ONE_SIDED * spread))
-
-
-def _is_small(problem: Problem, base: Fit, explanations: Sequence[Fit]) -> bool:
-    """Whether the model alone would be off by no more (95 %) than an adequate one, were any of these true."""
-    tip, most = problem.predictor.data.tip, _moved_by_law(problem, base)
-    for fit in explanations:
-        deviates = np.sqrt(max(2.0 * (fit.log_posterior - base.log_posterior), 1e-12))
-        change = float(np.abs(fit.residual - base.residual)[tip].mean())
-        most = max(most, change * (1.0 + ONE_SIDED / deviates) + mean_left_by_nuisances(fit, tip))
-    return most <= LEFT
-
-
-def _instead_of_law(problem: Problem, fit: Fit) -> tuple[dict[str, Fit], Votes]:
-    """Explanations beside the file's strut law that hold as well as one with a law that had to move; all their votes.
-
-    The closest first. None where the law has moved the stiffness by less than an adequate model may leave along a path,
-    beyond chance.
-    """
-    if _moved_by_law(problem, fit) <= LEFT:
-        return {}, {}
-    given = with_given_law(problem, fit)
-    if not outvoted(votes(problem, fit, {NONE: given})[NONE]):
-        return {}, {}
-    rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (SERIES, *ONE_BODY)).values()}
-    ballots = votes(problem, fit, rivals)
-    return {name: rivals[name] for name in ballots if not outvoted(ballots[name])}, ballots
-
-
 def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
-    """How far each further effect may go beside the likeliest explanation.
+    """Largest size of each further effect that may go unseen beside the likeliest explanation.
 
     A further effect is as likely beforehand as one effect is beside none, or a pair beside one of its effects. Where
     the readings say nothing of it, it keeps that probability: a few per cent. So it is in no set that holds the truth
@@ -506,7 +485,7 @@ def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:
 
 
 def _smallest_set(posterior: Mapping[str, float], named: float = NAMED) -> tuple[str, ...]:
-    """The one hypothesis that holds `named`, else the fewest that hold `HELD`."""
+    """The one hypothesis that holds `named` of the probability; otherwise the fewest that hold `HELD`."""
     ranked = sorted(posterior.items(), key=lambda item: (-item[1], item[0]))
     if ranked and ranked[0][1] >= named:
         return (ranked[0][0],)

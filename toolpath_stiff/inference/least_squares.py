@@ -1,4 +1,4 @@
-"""Least squares: normal equations, Gauss-Newton steps, and the least quadratic within bounds."""
+"""Least squares: normal equations, Gauss-Newton steps, and bounded quadratic minimisation."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 
-At = TypeVar("At")  # where a fit stands
+At = TypeVar("At")  # the point at which a fit stands
 
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """At one point: jacobian (n, q) of ln k to q unknowns, information (q, q) and gradient (q,), priors included."""
+    """Normal equations at a point: jacobian (n, q) of ln k, information (q, q), gradient (q,), priors included."""
 
     jacobian: FloatArray
     information: FloatArray
@@ -21,7 +21,7 @@ class NormalEquations:
 
     @property
     def scale(self) -> FloatArray:
-        """(q,) of the unknowns, whose units may be very different."""
+        """(q,) scales of the unknowns, whose units may be very different."""
         return np.sqrt(np.maximum(np.diag(self.information), 1e-300))
 
 
@@ -32,7 +32,7 @@ def gauss_newton(
     steps: int,
     tolerance: float,
 ) -> tuple[At, NormalEquations]:
-    """Least squares step by step: on tables (`evidence`) and with the model itself (`fits`).
+    """Iterate least squares step by step, on tables (`evidence`) or with the model itself (`fits`).
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def scaled_inverse(matrix: FloatArray) -> FloatArray:
 
 
 def bounded_step(information: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """(p,) x between `low` <= 0 and `high` >= 0 at which x^T H x / 2 - g^T x is least.
+    """(p,) x between `low` <= 0 and `high` >= 0 that minimises x^T H x / 2 - g^T x.
 
     Bounded-variable least squares by active sets (Stark and Parker 1995, Computational Statistics 10, 129): what the
     free unknowns want is gone towards until the first of them meets its bound; a bound is left where that helps.

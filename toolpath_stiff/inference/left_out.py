@@ -1,4 +1,4 @@
-"""Residuals at points that are left out of a fit in turn."""
+"""Residuals at points left out of a fit in turn."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray, TextArray
 from toolpath_stiff.inference.covariances import Groups, Precision
 from toolpath_stiff.inference.evidence import Fit, law_prior, relative_errors
 
-SAME_ERROR = 1e-10  # of a stiffness; rounding makes 1e-14
+SAME_ERROR = 1e-10  # relative, of a stiffness; rounding makes 1e-14
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class HeldOut:
         return np.abs(relative_errors(self.residual, self.linear))
 
     def of_readings(self, rows: BoolArray) -> HeldOut:
-        """Of some of the readings."""
+        """Held-out residuals of some of the readings."""
         return HeldOut(self.residual[rows], self.moves, self.point[rows], self.linear)
 
     @property
@@ -56,12 +56,12 @@ class HeldOut:
 
 
 def of_readings(fit: Fit, rows: BoolArray) -> Fit:
-    """A fit with the residuals of some of its readings alone: for counting errors, no longer for fitting."""
+    """A fit with the residuals of some of its readings only: for counting errors, not for further fitting."""
     return fit if rows.all() else replace(fit, residual=fit.residual[rows], jacobian=fit.jacobian[rows])
 
 
 def held_out(fit: Fit, point: TextArray) -> HeldOut:
-    """Leave each point out in turn; with fewer than three points nothing can be left out and all is nan."""
+    """Residuals with each point left out in turn; all nan with fewer than three points."""
     points = Groups.by(point)
     residual = np.full(len(fit.residual), np.nan)
     moves = np.zeros((points.count, fit.jacobian.shape[1]))
@@ -81,7 +81,7 @@ def held_out(fit: Fit, point: TextArray) -> HeldOut:
 def products_without(
     precision: Precision, columns: FloatArray, residual: FloatArray, points: Groups
 ) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
-    """For points left out in turn, those of k readings together: the points (m,), their readings (m, k), products.
+    """Products with each point left out in turn, by point size k: the points (m,), their readings (m, k), products.
 
     The products are (m, p, p + 1) J^T A [J, r] of the readings that stay. Their inverse covariance is the Schur
     complement A_ss - A_so A_oo^-1 A_os of the inverse covariance of all, of which the products need the readings that
@@ -95,7 +95,7 @@ def products_without(
 
 
 def error_falls(before: HeldOut, after: HeldOut) -> FloatArray:
-    """(n,) fall of each reading's held-out error; 0 where rounding makes it, whose sign is the processor's."""
+    """(n,) fall of each reading's held-out error; 0 if it is within rounding, whose sign depends on the processor."""
     falls = before.errors - after.errors
     return np.asarray(np.where(np.abs(falls) < SAME_ERROR, 0.0, falls))
 

@@ -1,12 +1,12 @@
-"""How far readings scatter for reasons that no model should explain.
+"""Scatter of readings for reasons that no model should explain.
 
 The logarithm of a reading carries, beside what the machine does,
 
     repeat noise      of every reading on its own,
     clamping          common to the readings of one clamping,
-    strut spread      six struts are never quite alike: a nuisance with one column a strut,
-    joint positions   never quite where the machine file has them: one column a coordinate,
-    the rest          frame, table, platform, tool are never quite as the model has them: one column an axis,
+    strut spread      six struts are never quite alike: a nuisance with one column per strut,
+    joint positions   never quite where the machine file has them: one column per coordinate,
+    the rest          frame, table, platform, tool are never quite as the model has them: one column per axis,
 
 the last three the same for all readings of a machine. Now and then a reading is wild. Who takes all of this for
 independent scatter finds effects that are not there: in dense data, in every second campaign.
@@ -27,18 +27,26 @@ from toolpath_stiff.defaults import CLAMPING, MEAN_OVER_SD, STRUT_SPREAD
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.covariances import Covariance, Groups, Precision
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS, Repeats, copied, from_repeats, scatter_apart
+from toolpath_stiff.inference.repeats import (
+    OUTLIER_WIDTH,
+    OUTLIERS,
+    Repeats,
+    clampings_of,
+    copied,
+    from_repeats,
+    scatter_apart,
+)
 from toolpath_stiff.readings.measurements import Readings
 
-# Sd of what the links that the model takes for rigid change ln stiffness by along each axis, rms; assumed. Twice as
-# much hides a spindle that gives way by 4 % of the tip; without any, sound machines of beams and mounts are called ill.
+# Sd of the rms change of ln stiffness, along each axis, by links that the model takes to be rigid; assumed. Twice as
+# much hides a spindle that gives way by 4 % of the tip; with none, sound machines of beams and mounts fail.
 REST = 0.003
 JOINT_ERROR = 0.5e-3  # m, sd of each coordinate; assumed
 # Relative sd of one reading where nothing is known. The paper reports deviations of 44 to 2944 N/mm for readings of
 # 30 to 90 kN/mm: 0.1 to 5 %. Its model fits within 10 %.
 GUESSES = {"low": 0.02, "high": 0.10}
 LARGEST = 0.5  # relative sd that a user may state
-# Relative sd of a reading below which nobody measures: the paper's best readings, not clamped anew, scatter by 44 N/mm,
+# Smallest relative sd of a reading: the paper's best readings, not clamped anew, scatter by 44 N/mm,
 # 0.1 %. With less, the last digit of the readings would decide.
 LEAST = 1e-3
 # Degrees of freedom that a standard deviation is worth: one that is right within 10 % (1 / sqrt(2 x 50)) where a person
@@ -78,6 +86,8 @@ class Noise:
         (n,) readings of the tip among those of other loops, which are what is told of; None: all.
     rest
         Rms change of ln stiffness by each axis of the links that the model takes for rigid, sd.
+    apart
+        Whether each axis of a clamping scatters for itself.
     """
 
     name: str
@@ -93,10 +103,11 @@ class Noise:
     tip: BoolArray | None = None
     rest: float = REST
     clampings: FloatArray | None = None
+    apart: bool = False
 
     @property
     def guess(self) -> str:
-        """Which guess it is, "low" or "high"; "" where it is none."""
+        """Kind of guess, "low" or "high"; "" if the noise is not guessed."""
         return self.name if self.name in GUESSES else ""
 
     @property
@@ -123,13 +134,13 @@ class Noise:
         return values if self.tip is None or not self.tip.any() else values[self.tip]
 
     def select(self, rows: BoolArray | IntArray) -> Noise:
-        """The noise of some of the readings."""
+        """Noise of some of the readings."""
         clampings = None if self.clampings is None else self.clampings[rows]
         tip = None if self.tip is None else self.tip[rows]
         return replace(self, repeat=self.repeat[rows], tip=tip, clampings=clampings)
 
     def times(self, factor: float) -> Noise:
-        """A noise so many times as large."""
+        """Noise `factor` times as large."""
         clampings = None if self.clampings is None else factor * self.clampings
         return replace(self, repeat=factor * self.repeat, clamping=factor * self.clamping, clampings=clampings)
 
@@ -140,7 +151,7 @@ def noise_models(
     strut_spread: float = STRUT_SPREAD,
     joint_error: float = JOINT_ERROR,
 ) -> tuple[Noise, ...]:
-    """The noise of the data: one model, or a low and a high guess where nothing is known.
+    """Noise of the data: one model, or a low and a high guess if nothing is known.
 
     Parameters
     ----------
@@ -159,7 +170,7 @@ def noise_models(
     models = _noise_of_tip(data.of_tip, stated, strut_spread, joint_error)
     if data.beside is None:
         return models
-    # Each loop beside the tip scatters on its own. Its reading is a clamping of its own (`measurements.with_offsets`),
+    # Loops beside the tip scatter on their own. Each reading is a clamping of its own (`measurements.with_offsets`),
     # whose scatter is counted beside this one.
     relative, with_loops = data.sd / data.stiffness, []
     for noise in models:
@@ -204,7 +215,7 @@ def _noise_of_tip(
         remark = "" if repeats is None else _disagreement(repeats, *both, "noise stated with --noise")
         if not remark:
             return (model("stated", *both, STATED_FREEDOM, f"stated: {_percent(*both)}"),)
-    known = np.isfinite(relative) & (stated is None)  # readings that state how far they scatter
+    known = np.isfinite(relative) & (stated is None)  # readings that state their scatter
     total = float(np.sqrt(np.mean(relative[known] ** 2))) if known.any() else np.nan
     if repeats is not None:
         if known.any():
@@ -212,8 +223,10 @@ def _noise_of_tip(
         origin = f"estimated from {repeats.differences} differences between repeats: "
         origin += _percent(repeats.repeat, repeats.clamping)
         origin += "" if repeats.clamps else " (clamping assumed: no point was clamped twice)"
+        origin += ", each axis of it for itself" if repeats.apart else ""
         repeat, clamping, words = scatter_apart(data, repeats)
-        return (model("measured", repeat, clamping, repeats.freedom, origin + words, remark),)
+        measured = model("measured", repeat, clamping, repeats.freedom, origin + words, remark)
+        return (replace(measured, apart=repeats.apart),)
     if known.any():
         repeat, each, origin = _of_stated(np.where(known, relative, total), data, total)
         if not known.all():
@@ -232,7 +245,7 @@ def _noise_of_tip(
 
 
 def _of_stated(relative: FloatArray, data: Readings, total: float) -> tuple[FloatArray, float | FloatArray, str]:
-    """Repeat noise (n,) and clamping, (n,) where it differs, of readings that scatter by (n,) in all; and the origin.
+    """Repeat noise (n,), clamping ((n,) if it differs) and origin for readings that state their total scatter (n,).
 
     At most half the variance of a clamping's best reading is clamping, so that it counts once in each of them.
     """
@@ -247,7 +260,7 @@ def _of_stated(relative: FloatArray, data: Readings, total: float) -> tuple[Floa
 
 
 def _hidden(repeat: float, clamping: float, readings: int, clampings: int) -> float:
-    """Relative rms change that so many readings in so many clampings do not show: of whitened length `SHOWS`.
+    """Relative rms change that readings and clampings of this number do not reveal: of whitened length `SHOWS`.
 
     Of a change that differs from reading to reading; strut law and the struts' and joints' own scatter hide more.
     """
@@ -255,7 +268,7 @@ def _hidden(repeat: float, clamping: float, readings: int, clampings: int) -> fl
 
 
 def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str) -> str:
-    """That repeats contradict a stated noise, in a sentence; "" where they do not.
+    """Sentence on repeats that contradict a stated noise; "" if they do not.
 
     Both are estimates: the stated one to `STATED_FREEDOM`, the repeats' to theirs (sd of a ratio's logarithm).
     """
@@ -270,7 +283,7 @@ def _disagreement(repeats: Repeats, repeat: float, clamping: float, what: str) -
 
 
 def _shared(total: float) -> tuple[float, float]:
-    """A total relative sd as repeat noise and clamping."""
+    """A total relative sd split into repeat noise and clamping."""
     clamping = min(CLAMPING, total / np.sqrt(2.0))
     return float(np.sqrt(max(total**2 - clamping**2, 0.0))), float(clamping)
 
@@ -280,25 +293,25 @@ def _percent(repeat: float, clamping: float) -> str:
 
 
 def covariance(noise: Noise, predictor: Predictor) -> Covariance:
-    """Of ln readings."""
+    """Covariance of ln readings."""
     shared = [noise.strut_spread * predictor.strut_columns(), noise.joint_error * predictor.joint_columns]
     shared.append(noise.rest * predictor.rest_columns())
     rows = np.ascontiguousarray(np.concatenate(shared, axis=1).T)
-    clamps = Groups.by(predictor.data.clamp)
+    clamps = clampings_of(predictor.data, noise.apart)
     common: float | FloatArray = noise.clamping**2
     if noise.clampings is not None:
         common = clamps.sums(noise.clampings**2) / np.bincount(clamps.of)
     return Covariance(noise.repeat**2, clamps, common, rows)
 
 
-MOST_WILD = 0.05  # share of readings that may be taken for wild; more where more of them are
-OFTEN_WILD = 2.0  # times the expected share
+MOST_WILD = 0.05  # largest share of readings taken to be wild, unless more are expected
+OFTEN_WILD = 2.0  # factor on the expected share, if that allows more
 NEVER = 1e12  # price of a wild reading where there are none
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """The scatter of ln readings, with some readings taken for wild.
+    """Scatter of ln readings, some of which are taken to be wild.
 
     Attributes
     ----------
@@ -325,7 +338,7 @@ class Scatter:
 
     @classmethod
     def of(cls, noise: Noise, covariance: Covariance) -> Scatter:
-        """From a noise model and its covariance."""
+        """Scatter from a noise model and its covariance."""
         wide = noise.outlier_width**2
         price = np.log((1.0 - noise.outliers) / noise.outliers) if noise.outliers > 0.0 else NEVER
         beyond = float((2.0 * price + np.log(wide)) * wide / (wide - 1.0))
@@ -339,11 +352,11 @@ class Scatter:
 
     @property
     def log_price(self) -> float:
-        """What a log likelihood loses by the width of the scatter and by the readings taken for wild."""
+        """Change of a log likelihood by the width of the scatter and by the readings taken to be wild."""
         return -0.5 * self.covariance.log_determinant - len(self.wild) * self.price
 
     def with_wild(self, residual: FloatArray, known: Scatter | None = None) -> Scatter:
-        """With those readings taken for wild whose widening pays its price at these residuals (n,).
+        """Scatter in which readings are taken to be wild where widening pays its price at these residuals (n,).
 
         Where these are the wild readings of `known`, that is the answer: nothing is worked out again. One by one, the
         most wild first, each beside those before it.
@@ -368,5 +381,5 @@ class Scatter:
         return replace(self, covariance=self.covariance.widened(rows, self.widening[rows]), wild=tuple(wild))
 
     def log_likelihood(self, residual: FloatArray) -> FloatArray:
-        """(...,) of residuals (..., n), the price of wild readings included, without the constant n ln(2 pi) / 2."""
+        """(...,) log likelihoods of residuals (..., n), with the price of wild readings, without n ln(2 pi) / 2."""
         return np.asarray(-0.5 * self.precision.squares(residual) + self.log_price)

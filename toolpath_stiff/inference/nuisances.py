@@ -1,4 +1,4 @@
-"""What the nuisances of a fit have taken up: struts unlike the others, joints off their places.
+"""Nuisances taken up by a fit: struts unlike the others, displaced joints.
 
 Strut spread and joint errors are counted as scatter that all readings share, so a joint that is far off its place can
 leave a model that passes. Given the readings, their values are the best linear predictions b = S P r (Henderson 1975),
@@ -18,12 +18,13 @@ from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.units import mm_from_m
 
 FINDING = 3.0  # standard deviations from which a nuisance is a finding
+TAKEN_UP = {"joint_offset": "joint", "weak_strut": "strut"}  # effects that nuisances take up, of which kind
 STRUTS = 6
 ENDS = ("frame", "platform")
 
 
 def fitted_nuisances(fit: Fit, noise: Noise) -> list[Document]:
-    """Each strut and joint with its fitted deviation, the one that stands out most first.
+    """Each strut and joint with its fitted deviation, the most conspicuous first.
 
     `sigma` is the normal deviate of the chance that the most deviant of all of them would deviate as much (Bonferroni);
     `times_assumed` the largest fitted deviation in assumed standard deviations.
@@ -56,7 +57,7 @@ def fitted_nuisances(fit: Fit, noise: Noise) -> list[Document]:
 
 
 def mean_left_by_nuisances(fit: Fit, rows: BoolArray) -> float:
-    """Mean error (relative) that struts, joints and links which are not quite the model's leave at some readings.
+    """Mean relative error at some readings due to struts, joints and links that differ from the model's.
 
     As they are known from the readings: fitted ones, and what stays open of each.
     """
@@ -68,8 +69,14 @@ def mean_left_by_nuisances(fit: Fit, rows: BoolArray) -> float:
 
 
 def findings(entries: Sequence[Document]) -> list[Document]:
-    """Those that deviate farther than chance would have it, and than is assumed of them."""
+    """Entries that deviate further than chance and than is assumed."""
     return [entry for entry in entries if entry["sigma"] > FINDING and entry["times_assumed"] > 1.0]
+
+
+def not_told(fit: Fit, noise: Noise) -> tuple[str, ...]:
+    """Effects of which there is no more beside a fit than the nuisances assume."""
+    told = {entry["nuisance"] for entry in findings(fitted_nuisances(fit, noise))}
+    return tuple(name for name, nuisance in TAKEN_UP.items() if nuisance not in told)
 
 
 def nuisance_words(entry: Document) -> str:

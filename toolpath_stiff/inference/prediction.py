@@ -1,4 +1,4 @@
-"""What the model says each reading should show, and how that hangs on strut law, struts and joints.
+"""Readings that the model predicts, and their dependence on strut law, struts and joints.
 
 Everything is on the logarithm of stiffness: effects are factors of a few to thirty per cent, and so is the noise. The
 strut law enters as the logarithms of the factors on its two stiffnesses, `law`, which are dimensionless: a
@@ -28,7 +28,7 @@ from toolpath_stiff.stiffness.trial import failures, own_effects
 
 NO_CHANGE = (0.0, 0.0)  # of the strut law
 ANSWERS_KEPT = 64
-JOINT_STEP = 0.5e-3  # m, for differences: the size of the joint errors that the columns are used for
+JOINT_STEP = 0.5e-3  # m, step of differences: about the size of the joint errors for which the columns are used
 
 
 def scaled_law(law: StrutLaw, logs: ArrayLike) -> StrutLaw:
@@ -39,7 +39,7 @@ def scaled_law(law: StrutLaw, logs: ArrayLike) -> StrutLaw:
 
 @dataclass(frozen=True)
 class _Prepared:
-    """Rows without those that are mechanically the same, what effects see of them, the strut forces per unit load.
+    """Mechanically distinct rows, the load path that effects see, and strut forces per unit load.
 
     `products` (m, 6): what each strut's own compliance counts in a reading, at the tip the squared force.
     """
@@ -52,7 +52,7 @@ class _Prepared:
 
 
 class Predictor:
-    """The model's answer to a set of measurements, for any strut law and any effects.
+    """Model predictions for a set of measurements, for any strut law and any effects.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Predictor:
 
     @property
     def distinct(self) -> NDArray[np.int64]:
-        """(n,) number of what mechanics sees of each reading: repeats share it."""
+        """(n,) number of each reading's mechanically distinct row; repeats share it."""
         return self._timeless.which
 
     @property
@@ -101,7 +101,7 @@ class Predictor:
         return [active.effect.name for active in every if active.effect.name not in idle]
 
     def log_stiffness(self, law: ArrayLike = NO_CHANGE, effects: Sequence[ActiveEffect] = ()) -> FloatArray:
-        """(n,) ln(N/m) that the readings should show; nan where the model has no answer.
+        """(n,) ln(N/m) that the readings should show; nan where the model has no stiffness.
 
         `effects` come on top of those of the machine file; instruments among them change the readings only. The last
         answers are kept: a fit begins where the one before it ended, and asks for the same again.
@@ -117,19 +117,19 @@ class Predictor:
     def _solved(self, law: ArrayLike, effects: Sequence[ActiveEffect]) -> FloatArray:
         machine = self.machine.with_changes(strut_law=scaled_law(self.machine.strut_law, law))
         own = [active for active in effects if active.effect.is_instrument]
-        if own and not self.base.instruments:  # they read the same mechanics at every size of theirs
+        if own and not self.base.instruments:  # instruments read the same mechanics whatever their sizes
             logs = self.log_stiffness(law, [active for active in effects if not active.effect.is_instrument])
             return self._read(np.exp(logs), own, build_model(machine, self.effect_files, effects).machine)
         model = build_model(machine, self.effect_files, effects)
         prepared = self._timed if any("time_min" in a.effect.needs for a in model.effects) else self._timeless
         try:
             stiffness = self._mechanics(model, prepared)[prepared.which]
-        except InputError:  # no pose, or no stiffness left: a fit walks away from there
+        except InputError:  # unreachable pose or no stiffness: a fit turns away from there
             return np.full(len(self.data), np.nan)
         return self._read(stiffness, model.instruments, model.machine)
 
     def _read(self, stiffness: FloatArray, instruments: Sequence[ActiveEffect], machine: MachineTool) -> FloatArray:
-        """(n,) ln of what the instruments show of stiffnesses (n,)."""
+        """(n,) ln of the stiffnesses that the instruments show for true ones (n,)."""
         if instruments:
             path = replace(self.full_path, machine_tool=machine)
             for active in instruments:
@@ -147,7 +147,7 @@ class Predictor:
 
     @cached_property
     def full_path(self) -> LoadPath:
-        """What instruments see of every row."""
+        """Load path with a row per reading, as instruments see it."""
         data, missing = self.data, self.data.missing
         return replace(
             self._timeless.path.take(self._timeless.which),
@@ -170,13 +170,13 @@ class Predictor:
         return np.asarray((prepared.products * softness * np.exp(self._base_log)[:, None])[prepared.which])
 
     def struts_carry_all(self, effects: Iterable[Effect]) -> bool:
-        """Whether these effects and the machine file's leave geometry, equilibrium and readings as they are."""
+        """True if neither these effects nor the machine file's change geometry, equilibrium or readings."""
         every = (*effects, *(active.effect for active in (*self.base.effects, *self.base.instruments)))
         hooks = ("geometry", "parallel_stiffness", "reading")
         return not any(hook in effect.hooks for effect in every for hook in hooks)
 
     def law_columns(self, log_stiffness: FloatArray, law: ArrayLike = NO_CHANGE) -> FloatArray:
-        """(n, 2) d ln k / d law where the model says `log_stiffness` (n,).
+        """(n, 2) d ln k / d law where the model predicts `log_stiffness` (n,).
 
         The struts' forces are those of equilibrium, so this is exact unless a stiffness parallel to the struts
         shares the load or the geometry differs; good enough there for a Gauss-Newton step.
@@ -198,7 +198,7 @@ class Predictor:
         return part[..., which], -np.stack([by_first, part - by_first], axis=-2)[..., which]
 
     def _law_terms(self, law: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """(..., 6, m) N/m each: what the law's two constants, scaled by laws (..., 2), give each strut."""
+        """(..., 6, m) N/m each: contributions of the law's two constants, scaled by laws (..., 2), to each strut."""
         logs = np.asarray(law, dtype=float)
         rule, (first, second) = self.machine.strut_law, self._law_shares
         return (
@@ -218,7 +218,7 @@ class Predictor:
 
     @cached_property
     def joint_columns(self) -> FloatArray:
-        """(n, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control does not know of the error.
+        """(n, 36) d ln k / d (coordinate of a frame or platform joint), 1/m; the control is unaware of the error.
 
         The platform stands where struts of the commanded lengths put the true joints.
         """
@@ -234,7 +234,7 @@ class Predictor:
         return np.stack(columns, axis=1)
 
     def rest_columns(self) -> FloatArray:
-        """(n, 7) d ln k to the links that the model takes for rigid, each of rms 1: what a little give of them changes.
+        """(n, 7) changes of ln k, each of rms 1, by a little give of the links that the model takes to be rigid.
 
         Of work and frame along X, Y, Z and in rocking, of platform and tool along their own three axes. Readings of
         loops beside the tip are left out.
@@ -253,12 +253,12 @@ class Predictor:
 
 
 def idle_on(model: StiffnessModel, data: Readings) -> dict[str, str]:
-    """Effects of the model that add nothing to these readings -> a sentence for people."""
+    """Effects of the model that add nothing to these readings -> a sentence."""
     return idle_on_readings(model, data.missing, set(data.setup.tolist()))
 
 
 def _prepare(model: StiffnessModel, data: Readings, timed: bool) -> _Prepared:
-    """Rows that differ in nothing that mechanics sees are solved once: repeats cost nothing."""
+    """Mechanically distinct rows, each solved once, so that repeats cost nothing."""
     setups = np.unique(data.setup, return_inverse=True)[1]
     columns = [data.angles, data.direction, data.force, data.tool_extension, setups]
     columns += [np.nan_to_num(data.temperature, nan=-1e3)]

@@ -1,8 +1,10 @@
-"""What repeats tell of the noise: repeat noise, clamping, and the share of wild readings.
+"""Noise from repeats: repeat noise, clamping, and the share of wild readings.
 
 By restricted maximum likelihood of the differences between repeats (Patterson and Thompson 1971), in which what the
 machine does cancels.
 """
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,19 +16,20 @@ from toolpath_stiff.defaults import CLAMPING
 from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.readings.measurements import Readings
 
-# Share of wild readings where repeats do not tell, and how much wider they scatter; assumed. Where repeats tell, their
+# Share of wild readings if repeats do not tell, and how much wider they scatter; assumed. If repeats tell, their
 # share is expected about the assumed one (sd of its logarithm), within the ends.
 OUTLIERS, OUTLIER_WIDTH = 0.02, 4.0
 OUTLIER_SPREAD, OUTLIER_ENDS = 1.5, (0.005, 0.20)
-# The grid on which scatter and share are weighed: factors on the first estimate of the scatter, shares.
+# Grid over which scatter and share are weighed: factors on the first estimate of the scatter, shares.
 FACTORS, SHARES = np.geomspace(0.3, 3.3, 61), np.geomspace(*OUTLIER_ENDS, 16)
-# Degrees of freedom that a difference is worth for the scatter when it may be wild: what 300 simulations each of 6 to
+# Degrees of freedom that a difference is worth for the scatter if it may be wild: from 300 simulations each of 6 to
 # 71 differences, 2 % of the readings wild, give (0.74 to 0.62).
 WORTH = 0.63
 FEWEST_CONTRASTS = 6  # differences between repeats from which a noise is estimated
 MOST_TRIMS = 8
+MOST_APART = 600  # clampings along axes: of more only those of a clamping as a whole are looked at
 LARGEST_RATIO, ZOOMS = 5.0, 6  # of clamping to repeat noise; ever finer grids on which it is looked for
-# Standard deviations as which a larger deviation counts: how far off the wildest is tells nothing of the others.
+# Standard deviations at which larger deviations are capped: the wildest tells nothing about the others.
 FARTHEST = 1.5 * OUTLIER_WIDTH
 ALIKE = ("position", "angles", "direction", "force", "tool_extension", "setup", "loop")  # columns of repeats
 # Normal deviate, of 0.01 %, at which scatters that are the same would be told apart by axis or by set-up: were their
@@ -36,7 +39,7 @@ WILD = 3.0  # standard deviations beyond which a difference between repeats is s
 
 
 def repeat_groups(data: Readings, apart: Sequence[str] = ()) -> IntArray:
-    """(n,) number of each reading's group: the same pose, direction, load, tool, set-up and loop.
+    """(n,) number of each reading's group: same pose, direction, load, tool, set-up and loop.
 
     `apart`: those of `ALIKE` in which the readings of a group may differ.
     """
@@ -48,7 +51,7 @@ def repeat_groups(data: Readings, apart: Sequence[str] = ()) -> IntArray:
 
 
 def copied(data: Readings) -> bool:
-    """Whether every repeat is the same number as the reading that it repeats: that tells nothing of any scatter."""
+    """True if every repeat is the same number as the reading it repeats, which tells nothing about scatter."""
     groups = repeat_groups(data)
     _, first = np.unique(groups, return_index=True)
     again = np.bincount(groups)[groups] > 1
@@ -57,7 +60,7 @@ def copied(data: Readings) -> bool:
 
 @dataclass(frozen=True)
 class Repeats:
-    """What repeats tell.
+    """Noise estimated from repeats.
 
     Attributes
     ----------
@@ -69,6 +72,8 @@ class Repeats:
         Whether clamping was estimated.
     wild
         Share of wild readings.
+    apart
+        Whether each axis of a clamping scatters for itself, as where gauge and indicator are set anew along each.
     """
 
     repeat: float
@@ -76,34 +81,39 @@ class Repeats:
     differences: int
     clamps: bool
     wild: float
+    apart: bool = False
 
     @property
     def total(self) -> float:
-        """What a reading scatters, clamped anew if that was."""
+        """Relative sd of a reading, including clamping if readings were clamped anew."""
         return float(np.hypot(self.repeat, self.clamping)) if self.clamps else self.repeat
 
     @property
     def freedom(self) -> float:
-        """Degrees of freedom that the scatter is worth: fewer than differences, as any of them may be wild."""
+        """Degrees of freedom of the scatter: fewer than the differences, as any of them may be wild."""
         return WORTH * self.differences
 
 
 def from_repeats(data: Readings) -> Repeats | None:
-    """Noise from repeats, or None without enough of them.
+    """Noise from repeats; None if there are too few.
 
     What differs between repeats beside chance, the time since zeroing and the order, is projected out first, so that
-    a drift is not taken for noise. Differences beyond `WILD` standard deviations are set aside as wild for a first
-    estimate; scatter and share of wild readings are then weighed together over all differences.
+    a drift is not taken for noise; where too few differences would be left, it counts as noise, on the safe side.
+    Differences beyond `WILD` standard deviations are set aside as wild for a first estimate; scatter and share of wild
+    readings are then weighed together over all differences.
     """
+    return _from_repeats(data, drifts=True) or _from_repeats(data, drifts=False)
+
+
+def _from_repeats(data: Readings, *, drifts: bool) -> Repeats | None:
     groups = repeat_groups(data)
     every, result = np.bincount(groups)[groups] > 1, None
     kept = every
     for _ in range(MOST_TRIMS):
-        contrasts = _Contrasts(data.select(kept), groups[kept]) if kept.any() else None
-        if contrasts is None or contrasts.count < FEWEST_CONTRASTS:
+        some = data.select(kept)
+        if not kept.any() or _Contrasts(some, groups[kept], Groups.by(some.clamp), drifts).count < FEWEST_CONTRASTS:
             break
-        repeat, clamping, clamps = _maximum_likelihood(contrasts)
-        result = Repeats(repeat, clamping if clamps else min(CLAMPING, repeat), contrasts.count, clamps, OUTLIERS)
+        contrasts, result = _likeliest(some, groups[kept], drifts)
         wild = contrasts.deviations(result.repeat, result.clamping) > WILD
         if not wild.any():
             break
@@ -111,13 +121,36 @@ def from_repeats(data: Readings) -> Repeats | None:
         kept = np.isin(np.arange(len(data)), left) & (np.bincount(groups[left], minlength=groups.max() + 1)[groups] > 1)
     if result is None:
         return None
-    deviations = _Contrasts(data.select(every), groups[every]).deviations(result.repeat, result.clamping)
+    some = data.select(every)
+    contrasts = _Contrasts(some, groups[every], clampings_of(some, result.apart), drifts)
+    deviations = contrasts.deviations(result.repeat, result.clamping)
     factor, share = _mixture(deviations, np.bincount(groups)[groups[every]])
     return replace(result, repeat=factor * result.repeat, wild=share)
 
 
+def clampings_of(data: Readings, apart: bool) -> Groups:
+    """Readings that a clamping moves alike: all of it, or of each axis by itself."""
+    clamps = Groups.by(data.clamp)
+    return Groups.by(3 * clamps.of + np.abs(data.direction).argmax(axis=1)) if apart else clamps
+
+
+def _likeliest(data: Readings, groups: IntArray, drifts: bool) -> tuple[_Contrasts, Repeats]:
+    """Contrasts and the scatter that makes them likeliest: of clampings as a whole, or of each axis for itself."""
+    ways = []
+    for apart in (False, True):
+        clamps = clampings_of(data, apart)
+        if not apart or clamps.count <= MOST_APART:
+            contrasts = _Contrasts(data, groups, clamps, drifts)
+            if not apart or contrasts.tells:
+                repeat, clamping, likelihood = _maximum_likelihood(contrasts)
+                clamping = clamping if contrasts.tells else min(CLAMPING, repeat)
+                found = Repeats(repeat, clamping, contrasts.count, contrasts.tells, OUTLIERS, apart)
+                ways.append((likelihood, contrasts, found))
+    return max(ways, key=lambda way: way[0])[1:]
+
+
 def scatter_apart(data: Readings, every: Repeats) -> tuple[float | FloatArray, float | FloatArray, str]:
-    """Repeat noise and clamping, (n,) where repeats scatter otherwise along other axes or in other set-ups; and words.
+    """Repeat noise and clamping, (n,) if repeats scatter differently along axes or between set-ups; and words.
 
     Beyond chance: the logarithms of their scatters differ by more than their degrees of freedom allow (chi-squared,
     `DIFFERENT`). Readings of one clamping along different axes share no more scatter than the quietest axis has.
@@ -137,11 +170,12 @@ def scatter_apart(data: Readings, every: Repeats) -> tuple[float | FloatArray, f
             continue
         total = np.exp(logs)
         clamping = np.array([part.clamping for part in known])
-        if kind == "along":
+        own_clampings = kind == "in set-up" or every.apart
+        if not own_clampings:
             clamping = np.full(len(known), min(every.clamping, float(total.min()) / np.sqrt(2.0)))
         repeat = np.array([np.sqrt(p.total**2 - c**2 * p.clamps) for p, c in zip(known, clamping, strict=True)])
         each = ", ".join(f"{100 * t:.2g} % {kind} {name}" for t, name in zip(total, names, strict=True))
-        return repeat[which], clamping[which] if kind == "in set-up" else float(clamping[0]), f"; {each}"
+        return repeat[which], clamping[which] if own_clampings else float(clamping[0]), f"; {each}"
     return every.repeat, every.clamping, ""
 
 
@@ -167,7 +201,7 @@ def _mixture(deviations: FloatArray, size: IntArray) -> tuple[float, float]:
 
 
 class _Contrasts:
-    """Differences between repeats: what is left of n ln readings y beside group means, time and order, M y.
+    """Differences between repeats: residuals M y of n ln readings y beside group means, time and order.
 
     M takes least squares' residuals. Their covariance is M (repeat^2 + clamping^2 Z Z^T) M, Z with a column of ones and
     noughts a clamping; all that a likelihood asks of it are the eigenvalues of Z^T M Z, as many as there are
@@ -188,15 +222,16 @@ class _Contrasts:
         Whether every reading was clamped by itself: the differences then hold clamping too.
     """
 
-    def __init__(self, data: Readings, groups: IntArray) -> None:
-        means, clamps = Groups.by(groups), Groups.by(data.clamp)
+    def __init__(self, data: Readings, groups: IntArray, clamps: Groups, drifts: bool) -> None:
+        means = Groups.by(groups)
         sizes = np.bincount(means.of)
 
         def centred(columns: FloatArray) -> FloatArray:
             return np.asarray(columns - (means.sums(columns.T) / sizes)[:, means.of].T)
 
         logs = np.log(data.stiffness)[:, None]
-        axes, size, _ = np.linalg.svd(centred(_drifts(data, np.exp(logs - centred(logs))[:, 0])), full_matrices=False)
+        moved = centred(_drifts(data, np.exp(logs - centred(logs))[:, 0])) * drifts
+        axes, size, _ = np.linalg.svd(moved, full_matrices=False)
         fixed = axes[:, size > 1e-9 * max(float(size[0]), np.sqrt(sizes.max()))]
 
         def left(columns: FloatArray) -> FloatArray:
@@ -206,7 +241,7 @@ class _Contrasts:
         n, self.alone = len(groups), clamps.alone
         clamped = np.zeros((n, 0)) if clamps.alone else left((clamps.of[:, None] == np.arange(clamps.count)) * 1.0)
         values, vectors = np.linalg.eigh(clamped.T @ clamped)
-        largest = np.bincount(clamps.of).max(initial=0)  # of the eigenvalues, if nothing were projected out
+        largest = np.bincount(clamps.of).max(initial=0)  # largest eigenvalue if nothing were projected out
         kept = values > largest * n * np.finfo(float).eps
         self.left, self.reached, self.values = left(logs)[:, 0], clamped @ vectors[:, kept], values[kept]
         self.redundancy = 1.0 - 1.0 / sizes[means.of] - (fixed**2).sum(axis=1)
@@ -215,13 +250,13 @@ class _Contrasts:
 
     @property
     def tells(self) -> bool:
-        """Whether the differences tell clamping from repeat noise."""
+        """True if the differences tell clamping from repeat noise."""
         rank = len(self.values)
         spread = float(np.ptp(self.values)) if rank == self.count else float(self.values.max(initial=0.0))
         return spread > 1e-6 and rank >= 3
 
     def deviations(self, repeat: float, clamping: float) -> FloatArray:
-        """(n,) how far each reading is off, in standard deviations, where it is left out itself."""
+        """(n,) deviation of each reading from the others, in standard deviations."""
         repeat = max(repeat, 1e-12)
         ratio, variance = (clamping / repeat) ** 2, repeat**2 + (clamping**2 if self.alone else 0.0)
         weights = ratio / (1.0 + ratio * self.values)
@@ -231,7 +266,7 @@ class _Contrasts:
 
 
 def _drifts(data: Readings, stiffness: FloatArray) -> FloatArray:
-    """(n, 1 or 4) what repeats differ by beside chance: the order, and a drift since zeroing.
+    """(n, 1 or 4) systematic differences between repeats: order, and a drift since zeroing.
 
     `stiffness` (n,) is the mean of each reading's repeats: a reading's own would carry its noise into the regressor,
     which then takes that very noise away.
@@ -245,8 +280,8 @@ def _drifts(data: Readings, stiffness: FloatArray) -> FloatArray:
     return np.stack(regressors, axis=1)
 
 
-def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
-    """Repeat noise and clamping that make the contrasts most likely, and whether they tell of clamping at all.
+def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, float]:
+    """Repeat noise and clamping that make the contrasts most likely, and the logarithm of how likely.
 
     With the logarithm of clamping as penalty: the likelihood of a few clampings is often largest at none, however much
     there is, and what readings share would be taken for the machine's. It moves an estimate by a standard error at most
@@ -262,4 +297,5 @@ def _maximum_likelihood(contrasts: _Contrasts) -> tuple[float, float, bool]:
         volume = 0.5 * np.log(widths).sum(axis=1) - np.log(np.maximum(ratios, 1e-12))
         best = int(np.argmin((contrasts.count - 1) * np.log(np.maximum(repeat, 1e-12)) + volume))
         low, high = ratios[max(best - 1, 0)], ratios[min(best + 1, len(ratios) - 1)]
-    return float(repeat[best]), float(ratios[best] * repeat[best]), contrasts.tells
+    likelihood = -contrasts.count * np.log(max(repeat[best], 1e-12)) - 0.5 * np.log(widths[best]).sum()
+    return float(repeat[best]), float(ratios[best] * repeat[best]), float(likelihood)

@@ -1,4 +1,4 @@
-"""Which explanations a name must outvote, and whether one lowers the error at left-out points at all."""
+"""Rivals that a named explanation must outvote, and the test that it lowers the error at left-out points."""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,33 +15,38 @@ from toolpath_stiff.stiffness.contract import SETUP, Effect
 INSTRUMENT = "instrument"
 # Effects that carry the tip's whole force to the floor as one body on springs (`contract.body_on_springs`).
 ONE_BODY = ("table_compliance", "frame_sway")
-SERIES = "joint_compliance"  # what a strut law that is off may be, in series with every strut
-TWINS = 0.05  # votes of one against another below which two explanations are the same to these readings
+SERIES = "joint_compliance"  # the effect that a wrong strut law may stand for, in series with every strut
+TWINS = 0.05  # votes below which two explanations are the same to these readings
 UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
 
 
 def part_of(effect: Effect) -> str:
-    """The link that an effect sits on; what belongs to one set-up is a part of its own."""
+    """Link of an effect; an effect of one set-up is a part of its own."""
     return SETUP if SETUP in effect.needs else effect.link
 
 
 def parts_of(fit: Fit) -> tuple[str, ...]:
-    """Of all effects of a fit, in order; none of the model alone."""
+    """Links of all effects of a fit, sorted; empty for the model alone."""
     return tuple(sorted(part_of(candidate.effect) for candidate in fit.candidates))
 
 
 def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
-    """Explanations that one must outvote beside the model alone: those of other parts, those with less of itself.
+    """Explanations to outvote besides the model alone: those of other parts, and those with fewer of the same effects.
 
-    `fits`: all explanations by name; of those with more effects the search has its own price.
+    `fits`: all explanations by name. Of those with more effects, that add to its own part the search has its own price.
     """
     own, names = parts_of(fit), {*fit.names}
-    others = {name: other for name, other in fits.items() if {*other.names} != names and len(other.names) <= len(names)}
-    return {name: o for name, o in others.items() if parts_of(o) != own or {*o.names} < names}
+
+    def rival(other: Fit) -> bool:
+        if len(other.names) > len(names):
+            return {*parts_of(other)}.isdisjoint(own)
+        return {*other.names} != names and (parts_of(other) != own or {*other.names} < names)
+
+    return {name: other for name, other in fits.items() if rival(other)}
 
 
 def rivals_of_law(problem: Problem, given: Fit, machine: Sequence[str] = ()) -> dict[str, Fit]:
-    """The instrument's effects, and some of the `machine`, each beside a fit with the file's strut law, by name.
+    """Instrument effects, and the `machine` effects named, each fitted beside the file's strut law, by name.
 
     What a refitted law may stand for: under one load a law that is softer by a share is at the tip the same as a load
     cell that reads too little by it.
@@ -54,21 +59,21 @@ def rivals_of_law(problem: Problem, given: Fit, machine: Sequence[str] = ()) -> 
 
 
 def _gain(problem: Problem, fit: Fit, table: CandidateTable) -> float:
-    """Twice the log likelihood that a small size of a candidate gains beside a fit, linearised."""
+    """Gain in twice the log likelihood by a small size of a candidate beside a fit, linearised."""
     columns = -table.columns.T / problem.base_compliance
     pull = fit.scatter.precision.times(columns)
     return float(pull @ fit.residual @ np.linalg.pinv(pull @ columns.T, hermitian=True) @ pull @ fit.residual)
 
 
 def place_of(effect: Effect) -> str:
-    """Where a user would look for an effect: its link, of what is measured by itself the effect."""
+    """Place where a user would look for an effect: its link; of instruments and geometry, the effect itself."""
     if effect.name in ONE_BODY:
         return "body on springs"
     return effect.name if effect.link in (INSTRUMENT, "geometry") else part_of(effect)
 
 
 def entries(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Explanations that sit at the same places and that votes on these readings could not tell apart, together.
+    """Explanations grouped where they sit at the same places and votes on these readings could not tell them apart.
 
     In the order of `names`; one that is in no `fits` stands alone. The votes between two that differ by d in whitened
     residuals come to d^2 / 2 where one of them is true. A refitted law sits where `SERIES` does beside the file's.
@@ -94,5 +99,5 @@ def _alike(problem: Problem, fit: Fit, other: Fit) -> bool:
 
 
 def lowers_error(before: HeldOut, after: HeldOut) -> bool:
-    """Whether an explanation lowers the mean error at left-out points: one that does not is no answer."""
+    """True if an explanation lowers the mean error at left-out points; one that does not is no answer."""
     return not before.mean_error - after.mean_error <= UNSEEN

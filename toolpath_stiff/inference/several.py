@@ -1,4 +1,4 @@
-"""Two effects at once: all pairs of the catalogue searched.
+"""Two effects at once: a search of all pairs of the catalogue.
 
 The search is linear. With c the measured compliance, c_0 the model's and d_j what effect j adds per unit of its size,
 c = c_0 + sum_j x_j d_j is exact for whatever gives way in series, however large: divided by c, the relative error of
@@ -20,15 +20,16 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.inference.candidates import CandidateTable, tabulate
 from toolpath_stiff.inference.evidence import Fit, Problem, law_prior
 from toolpath_stiff.inference.hypotheses import Family
+from toolpath_stiff.inference.size_priors import FADES, VISIBLE
 
 SCORED = 8  # sets of effects whose tables are scored
 SWEEPS = 60  # of the coordinate descent
-ROUNDS = 2  # searches, each without the readings that the best set of the one before takes for wild
+ROUNDS = 2  # searches, each without the readings that the best set before it takes to be wild
 NEGLIGIBLE = 1e-3  # whitened length of a component below which it counts as absent
 # Laplace's term for a size under a prior that is flat in its logarithm from 0.5 to 30 %: ln(ln(60) / sqrt(2 pi)).
 PER_SIZE = float(np.log(np.log(60.0) / np.sqrt(2.0 * np.pi)))
 LARGE = (0.05, 0.15)  # rms change of ln stiffness at which an effect is large
-STRAIGHT = 0.999  # correlation of what an effect adds at two sizes above which it grows in proportion
+STRAIGHT = 0.999  # correlation of an effect's contributions at two sizes above which it counts as linear
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class TableSet:
 
 
 def search_pairs(problem: Problem, families: Sequence[Family], base: Fit) -> list[Fit]:
-    """The pairs worth looking at, the most likely first, each pair of effects once."""
+    """Pairs of effects worth a closer look, the most likely first, each pair once."""
     search = LinearSearch(problem, families, base)
     owner = np.array(search.owner)
     pairs = np.stack(np.triu_indices(len(owner), 1), axis=1)
@@ -58,7 +59,7 @@ def search_pairs(problem: Problem, families: Sequence[Family], base: Fit) -> lis
 
 
 class LinearSearch:
-    """All tables' columns and the residual of the model, prepared once.
+    """Columns of all tables and the model's residual, prepared once.
 
     Attributes
     ----------
@@ -81,8 +82,7 @@ class LinearSearch:
         pieces = [
             (table, columns, bounds)
             for family in families
-            # Of a vector, whose every choice could stand for much, the likeliest alone; it pays for all of them.
-            for table in (family.best.tables if family.best and family.effect.vector else family.tables)
+            for table in family.tables
             for columns, bounds in _linear_pieces(table, problem.base_compliance)
         ]
         self.tables = tuple(table for table, _, _ in pieces)
@@ -92,18 +92,18 @@ class LinearSearch:
         self.low, self.high, self.columns = np.zeros(shape), np.zeros(shape), np.zeros((*shape, len(measured)))
         for k, (table, columns, bounds) in enumerate(pieces):
             count = columns.shape[1]
-            # An instrument reads a factor on the model's compliance: at the law as refitted, like the law's columns.
+            # An instrument is a factor on the model's compliance: at the refitted law, as are the law's columns.
             refitted = problem.base_compliance * np.exp(-base.residual)
             whole = refitted if table.candidate.effect.is_instrument else measured
             self.columns[k, :count] = -columns.T / whole
             self.low[k, :count], self.high[k, :count] = bounds.T
 
     def search(self, sets: IntArray) -> None:
-        """Rank sets of tables (k, m), one a set of effects: in `ranked`."""
+        """Rank sets of tables (k, m), one for each set of effects, into `ranked`."""
         self.ranked = []
         if not len(sets):
             return
-        # Of the model with its law refitted, at the measured compliance.
+        # Residual of the model with its law refitted, at the measured compliance.
         residual = np.expm1(self.base.residual)
         law = self.base.jacobian[:, :2] * np.exp(self.base.residual)[:, None]
         prior, flat = law_prior(2), self.columns.reshape(-1, self.columns.shape[-1])
@@ -122,7 +122,7 @@ class LinearSearch:
             scatter = again
 
     def _ranked(self, sets: IntArray, information: FloatArray, pull: FloatArray) -> list[TableSet]:
-        """The best set of tables for each set of effects, the best first."""
+        """Best set of tables for each set of effects, the best first."""
         best: dict[tuple[str, ...], TableSet] = {}
         p = self.columns.shape[1]
         rows = (sets[:, :, None] * p + np.arange(p)).reshape(len(sets), -1)  # columns of each set
@@ -137,7 +137,7 @@ class LinearSearch:
         return sorted(best.values(), key=lambda ranked: (-ranked.score, ranked.tables))
 
     def _bounded(self, rows: IntArray, information: FloatArray, pull: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Sizes (k, q) within their bounds that gain most, and scores (k,), of sets of columns (k, q)."""
+        """Sizes (k, q) of sets of columns (k, q) that gain most within their bounds, and scores (k,)."""
         scale = np.sqrt(np.maximum(np.diag(information), 0.0))
         visible = scale > 0.0
         scale = np.where(visible, scale, np.inf)
@@ -154,19 +154,21 @@ class LinearSearch:
                 rest -= matrix[:, :, j] * move[:, None]
         present = np.abs(sizes) > NEGLIGIBLE
         gains = (sizes * (wanted + rest)).sum(axis=1)
-        # Of two columns that are alike the readings tell the sum alone: each is then known no better than its own size.
+        # Of two equal columns the readings tell only the sum: each is then known no better than its own size.
         known, extent = np.where(present[:, :, None] & present[:, None, :], matrix, eye), np.maximum(np.abs(sizes), 1.0)
         volume = np.linalg.slogdet(known + eye * (present / extent**2)[:, None])[1]
         price = np.where(present, np.log(extent) + PER_SIZE, 0.0).sum(axis=1)
         p = self.columns.shape[1]
         price += np.log(2.0) * (high > low).sum(axis=1)  # of subsets of components, then of choices
         price += np.log([self.choices[name] for name in self.owner])[rows[:, ::p] // p].sum(axis=1)
+        strongest = np.abs(sizes).reshape(len(rows), -1, p).max(axis=2)  # too faint to be seen: none of its own
+        price += 0.5 * ((np.maximum(VISIBLE - strongest, 0.0) / FADES) ** 2).sum(axis=1)
         # A set with an absent effect is a smaller set.
         whole = np.all(present.reshape(len(rows), -1, p).any(axis=2), axis=1)
         return sizes / scale[rows], np.where(whole, 0.5 * gains - 0.5 * volume - price, -np.inf)
 
     def scored(self) -> list[Fit]:
-        """The first of what the search found, fitted on tables; the most likely first, what is on offer paid for."""
+        """The best sets found, fitted on tables; the most likely first, after the price for the number on offer."""
         fits = []
         for ranked in self.ranked[:SCORED]:
             fit = self._likeliest_subset(*self._side_by_side(ranked)) if np.isfinite(ranked.score) else None
@@ -176,7 +178,7 @@ class LinearSearch:
         return sorted(fits, key=lambda fit: (-fit.log_evidence, fit.name))
 
     def _side_by_side(self, ranked: TableSet) -> tuple[list[CandidateTable], FloatArray]:
-        """Tables that may be added up, with their sizes: an instrument's acts on what the others before it have added.
+        """Tables that can be added up, with their sizes: an instrument's is made on top of the effects before it.
 
         Sizes are held to 0.9 of their bounds: at a bound the model may have no answer.
         """
@@ -191,7 +193,7 @@ class LinearSearch:
         return [table for table, _ in known], np.concatenate([sizes for _, sizes in known])
 
     def _likeliest_subset(self, tables: Sequence[CandidateTable], sizes: FloatArray) -> Fit | None:
-        """The tables with those of their components that make the data most likely: from all, the faintest dropped."""
+        """Fit of the tables with the likeliest subset of components: from all, the faintest dropped one by one."""
         weight = -sum(float(np.log(len(list(table.candidate.subsets())))) for table in tables)
         owners = np.repeat(np.arange(len(tables)), [len(table.candidate.components) for table in tables]).tolist()
         columns = np.concatenate([table.columns for table in tables], axis=1)
@@ -208,7 +210,7 @@ class LinearSearch:
             droppable = [i for i in free if counts[owners[i]] > 1]
             if not droppable:
                 return best
-            if fit is not None:  # which would be missed least
+            if fit is not None:  # drop the component that would be missed least
                 faint = {abs(fit.parts[i][1]) / max(fit.deviation(i), 1e-300): i for i in reversed(droppable)}
             else:
                 changes = np.abs(columns * sizes / self.problem.base_compliance[:, None]).mean(axis=0)
@@ -217,7 +219,7 @@ class LinearSearch:
 
 
 def _linear_pieces(table: CandidateTable, compliance: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Columns (n, p) and bounds (p, 2) that stand for a table: small sizes, and what it adds per size at large ones.
+    """Columns (n, p) and bounds (p, 2) that linearise a table: at small sizes, and secants at large ones.
 
     Where what an effect adds is not in proportion to its size, the second differs from the first.
     """

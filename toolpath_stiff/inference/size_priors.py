@@ -1,4 +1,4 @@
-"""Priors of sizes: flat in the logarithm of the change that a size makes, as far as it is expected and would show."""
+"""Priors of sizes: flat in the logarithm of the change they make, over the expected and visible range."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from toolpath_stiff.inference.covariances import Precision
 # Rms change of ln stiffness between which an effect's size is expected, flat in its logarithm; assumed: effects are
 # "a few to thirty per cent", smaller ones do no harm, larger ones are seen with the naked eye.
 EXPECTED = (0.005, 0.30)
-TAIL = 1.0  # sd of ln size beyond them
+TAIL = 1.0  # sd in ln of the rms change beyond these limits
 USUAL = np.log(10.0)  # distance in ln size from the typical range at which the prior has halved
 # Mean and sd of ln(change by a component / change by the strongest): what gives way along X gives way along Y, too, by
 # an amount of the same order; assumed.
 COMPARABLE = (-0.7, 0.9)
-VISIBLE = 3.0  # whitened length of a signature from which on it can be seen
+VISIBLE = 3.0  # whitened length from which a signature is visible
 FADES = 0.7  # sd by which visibility fades below
 LIKELY = 3.84  # 95 % quantile of chi-square with one degree of freedom
 
 
 @dataclass(frozen=True)
 class Sight:
-    """What these data can see: the base model's compliance (n,) and the inverse covariance of what its refit leaves."""
+    """Visibility in these data: base model compliance (n,) and inverse covariance of its refit's residuals."""
 
     compliance: FloatArray
     projected: Precision
@@ -40,7 +40,7 @@ class Sight:
 
 
 def log_expected(rms: FloatArray) -> FloatArray:
-    """Log prior density of ln rms change, not normalised: flat between `EXPECTED`, normal tails."""
+    """Log prior density of ln rms change, not normalised: flat within `EXPECTED`, normal tails."""
     logs = np.log(np.maximum(rms, 1e-9))
     low, high = np.log(EXPECTED[0]), np.log(EXPECTED[1])
     beyond = np.maximum(0.0, np.maximum(low - logs, logs - high))
@@ -48,7 +48,7 @@ def log_expected(rms: FloatArray) -> FloatArray:
 
 
 def log_usual(sizes: FloatArray, typical: tuple[float, float]) -> FloatArray:
-    """Log weight for being far from the typical range: a tenth of it or ten times it counts half."""
+    """Log weight for distance from the typical range: at a tenth or ten times of it the weight is one half."""
     logs = np.log(np.maximum(np.abs(sizes), 1e-300))
     low = np.log(typical[0]) if typical[0] > 0.0 else -np.inf
     high = np.log(typical[1]) if 0.0 < typical[1] < np.inf else np.inf
@@ -80,7 +80,7 @@ class SizePrior:
 
     @classmethod
     def of(cls, table: CandidateTable, j: int, sight: Sight) -> SizePrior:
-        """Of component `j` of a table."""
+        """Prior of component `j` of a table."""
         component = table.candidate.components[j]
         logs, density, lengths = {}, {}, {}
         for sign in component.signs:
@@ -92,7 +92,7 @@ class SizePrior:
             lengths[sign], rms = sight.length(change), np.sqrt(np.mean(change**2, axis=1))
             density[sign] = log_expected(rms) + log_usual(sizes[:, j], component.typical())
         longest = max(float(length.max()) for length in lengths.values())
-        if longest >= VISIBLE:  # else all sizes are alike: even the longest is not visible
+        if longest >= VISIBLE:  # otherwise no size is visible and all are alike
             for sign, length in lengths.items():
                 density[sign] = density[sign] - 0.5 * (np.maximum(VISIBLE - length, 0.0) / FADES) ** 2
         mass = max(sum(_trapezoid(np.exp(density[sign]), logs[sign]) for sign in logs), 1e-300)
@@ -108,7 +108,7 @@ class SizePrior:
         return out
 
     def log_mean_likelihood(self, peak: float, sd: float) -> float:
-        """Ln of the prior mean of exp(-(size - peak)^2 / (2 sd^2)), which is 1 at its peak, wherever that lies."""
+        """Ln of the prior mean of exp(-(size - peak)^2 / (2 sd^2)), for a peak at any size."""
         total = 0.0
         for sign, logs in self.log_sizes.items():
             fine = sign * (peak + sd * np.linspace(-6.0, 6.0, 241))
@@ -120,7 +120,7 @@ class SizePrior:
         return float(np.log(max(total, 1e-300)))
 
     def log_density_around(self, size: float, sd: float) -> float:
-        """Log density at a size; where the posterior is wide, at its width."""
+        """Log density at a size, or at its standard deviation `sd` if that is larger."""
         return float(max(self.log_at(np.array([np.sign(size) * max(abs(size), sd)]))[0], -60.0))
 
 
@@ -129,11 +129,11 @@ def _trapezoid(values: FloatArray, x: FloatArray) -> float:
 
 
 def _sizes(table: CandidateTable, j: int, sign: float, sight: Sight) -> FloatArray:
-    """Sizes of one sign to tabulate the prior at."""
+    """Sizes of one sign at which the prior is tabulated."""
     if table.knots:
         logs = table.knots[sign][0]
         return np.exp(np.linspace(logs[0], logs[-1], 96))
-    # Linear in its components: the rms change of a unit tells which sizes make a few per cent.
+    # Linear in its components: the rms change of a unit gives the sizes that change a few per cent.
     unit = sign * np.eye(len(table.candidate.components))[j]
     scale = max(float(np.sqrt(np.mean((table.delta(unit) / sight.compliance) ** 2))), 1e-300)
     largest = min(20.0 * EXPECTED[1] / scale, table.candidate.components[j].reach(sign))

@@ -1,4 +1,4 @@
-"""Rows that look mistyped: a row, or all rows of one clamping, held against the slips that people make in writing.
+"""Rows that look mistyped: a row, or all rows of one clamping, tested against common slips of writing.
 
 They are named; nothing is changed.
 """
@@ -20,15 +20,15 @@ from toolpath_stiff.readings.measurements import Readings, model_stiffness
 from toolpath_stiff.stiffness.model import build_model
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg
 
-AS_WELL = 3.0  # log odds behind the best way of slipping within which another is said as well
-SLIPPED = 0.5  # chance that a campaign holds a slip; assumed
-CLEAR = float(np.log(1000.0))  # log odds from which its rows are left out of the judgement
-FAR_OFF = 16.0  # squared deviation of a row from which on it is looked at
+AS_WELL = 3.0  # log odds behind the best slip within which another is reported too
+SLIPPED = 0.5  # probability that a campaign contains a slip; assumed
+CLEAR = float(np.log(1000.0))  # log odds from which the rows are left out of the judgement
+FAR_OFF = 16.0  # squared deviation from which a row is examined
 MOST_ROWS, MOST_CLAMPS, MOST_SLIPS = 12, 6, 3
-NEAR = 3.0  # standard deviations within which the mended rows must lie, root mean square
+NEAR = 3.0  # standard deviations within which the corrected rows must lie, root mean square
 # A digit typed wrongly; mm and degrees, assumed. Each further one costs all others a little: more is tried by chance.
 STEPS_MM, STEPS_DEG = (10.0,), (1.0, 5.0)
-# What a stiffness may have been written in -> written over true; an inch is 25.4 mm, a pound-force 4.448... N.
+# Unit in which a stiffness may have been written -> written over true; an inch is 25.4 mm, a pound-force 4.448... N.
 UNITS = {"lbf/in": 25.4 / 4.4482216152605, "N/um": 1e-3}
 TINY = 1e-9
 SET_ASIDE = 1e2  # variance of ln k of a row that is left out
@@ -43,7 +43,7 @@ POSE_STEPS = (
 
 @dataclass(frozen=True, eq=False)
 class Slip:
-    """Rows (k,) in which one thing was mistyped.
+    """Rows (k,) with one and the same typing slip.
 
     Attributes
     ----------
@@ -65,13 +65,13 @@ class Slip:
 
     @property
     def clear(self) -> bool:
-        """Whether the rows are better left out, where nothing else is missing."""
+        """True if the rows are better left out, provided nothing else is missing."""
         return self.log_odds > CLEAR
 
 
 @dataclass(frozen=True)
 class SuspectEntry:
-    """A suspect in a document: rows counted from 1 in their file, and its lines."""
+    """A suspect as a document entry: its rows, counted from 1 in their file, and its lines."""
 
     file: str
     row: int
@@ -85,7 +85,7 @@ class SuspectEntry:
 
 
 def mended(data: Readings, suspects: Sequence[Slip]) -> Readings:
-    """The readings with the likeliest slip of each suspect mended."""
+    """Readings with the likeliest slip of each suspect corrected."""
     columns = {name: getattr(data, name).copy() for name in MENDED}
     for suspect in suspects:
         for name, values in suspect.mended.items():
@@ -94,7 +94,7 @@ def mended(data: Readings, suspects: Sequence[Slip]) -> Readings:
 
 
 def alone(data: Readings, suspects: Sequence[Slip]) -> tuple[Slip, ...]:
-    """Those whose rows are, with the other suspects' rows, all that there is of a tool, a set-up, a loop or a load.
+    """Suspects whose rows (with other suspects' rows) are the only ones of a tool, a set-up, a loop or a load.
 
     An effect of that tool, set-up or load would look like their slip, and no other reading says which of the two it is.
     """
@@ -110,7 +110,7 @@ def alone(data: Readings, suspects: Sequence[Slip]) -> tuple[Slip, ...]:
 
 
 def suspect_entries(suspects: Sequence[Slip], data: Readings, left_out: Sequence[Slip] | None) -> list[SuspectEntry]:
-    """Suspects for a document; `left_out`: those that were left out of the judgement, None where there was none."""
+    """Suspects for a document; `left_out`: those left out of the judgement, None if there was none."""
     entries = []
     for slip in suspects:
         words, out = slip.words, left_out is not None and slip in left_out
@@ -125,7 +125,7 @@ def suspect_entries(suspects: Sequence[Slip], data: Readings, left_out: Sequence
 
 
 def suspect_rows(problem: Problem, fit: Fit) -> tuple[Slip, ...]:
-    """Rows of which one typical slip, mended, brings the readings back into the noise; the clearest first.
+    """Rows that one typical slip, corrected, brings back into the noise; the clearest first.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Slip, ...]:
     suspects: list[Slip] = []
     data = problem.predictor.data
     taken = np.zeros(len(data), dtype=bool)
-    tried = len(data) * len(list(_slips_of_row(data, np.array([0]))))  # slips of single rows that there may be
+    tried = len(data) * len(list(_slips_of_row(data, np.array([0]))))  # possible slips of single rows
     for _ in range(MOST_SLIPS):
         slips = list(_slips(data, *_looked_at(problem, fit, taken)))
         if not slips:
@@ -147,7 +147,7 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Slip, ...]:
         for k in np.argsort(-odds, kind="stable").tolist():
             if np.isfinite(odds[k]):
                 together[tuple(slips[k].rows.tolist())].append(k)
-        # A row may have slipped in any way: what counts is all of them, what is said are those that fit about as well.
+        # A row may be wrong in any way: all ways count, those that fit about as well are reported.
         totals = {rows: float(np.logaddexp.reduce(odds[ways])) for rows, ways in together.items()}
         rows = max(totals, key=lambda rows: (totals[rows], rows), default=())
         if not rows or totals[rows] <= 0.0:
@@ -160,7 +160,7 @@ def suspect_rows(problem: Problem, fit: Fit) -> tuple[Slip, ...]:
 
 
 def _words(data: Readings, ways: Sequence[Slip]) -> str:
-    """Where rows are, and what may be wrong with them."""
+    """Sentence on where the rows are and what may be wrong with them."""
     rows = ways[0].rows
     either = " or ".join(f"{way.column} {way.meant} instead of {way.stands}" for way in ways)
     lines = ", ".join(str(line) for line in data.line[rows])
@@ -168,7 +168,7 @@ def _words(data: Readings, ways: Sequence[Slip]) -> str:
 
 
 def _looked_at(problem: Problem, fit: Fit, taken: BoolArray) -> tuple[list[Rows], list[Rows]]:
-    """Rows that are far off, and clampings whose rows together are; the furthest of them."""
+    """Single rows that are far off, and clampings whose rows together are; only the furthest."""
     projected, inflated = problem.projected(fit.jacobian), _inflation(fit)
     pulls = projected.times(fit.residual)
     squared = np.where(taken, 0.0, pulls**2 / np.maximum(projected.diagonal, 1e-300)) / inflated
@@ -185,7 +185,7 @@ def _looked_at(problem: Problem, fit: Fit, taken: BoolArray) -> tuple[list[Rows]
 
 
 def _inflation(fit: Fit) -> float:
-    """By how much more than noise the fit leaves: where the machine is not understood, rows are not to blame."""
+    """Factor by which a fit's residuals exceed noise: if the machine is not understood, rows are not to blame."""
     freedom = max(len(fit.residual) - fit.jacobian.shape[1], 1)
     return float(max(1.0, fit.projected.squares(fit.residual) / freedom))
 
@@ -195,7 +195,7 @@ def _slips(data: Readings, rows: Sequence[Rows], clampings: Sequence[Rows]) -> I
         yield from _slips_of_row(data, row)
     for members in clampings:
         yield from _slips_of_pose(data, members)
-        # Two readings of a clamping under one load that stand under each other's direction.
+        # Two readings of one clamping and load with their directions swapped.
         for first, second in combinations(members.tolist(), 2):
             apart = np.abs(data.direction[first] - data.direction[second]).max() > TINY
             if apart and data.force[first] == data.force[second]:
@@ -217,7 +217,7 @@ def _slips_of_row(data: Readings, row: Rows) -> Iterator[Slip]:
 
 
 def _slips_of_pose(data: Readings, rows: Rows) -> Iterator[Slip]:
-    """A coordinate or an angle with the wrong sign, or off by a usual slip; the same in all rows."""
+    """Slips in a coordinate or an angle: wrong sign or a usual offset, the same in all rows."""
     for names, field, steps, si in POSE_STEPS:
         values = getattr(data, field)[rows]
         for k, name in enumerate(names):
@@ -232,12 +232,12 @@ def _slips_of_pose(data: Readings, rows: Rows) -> Iterator[Slip]:
 
 
 def _axis(direction: FloatArray) -> str:
-    """X, Y or Z where a unit vector lies along an axis, to either side; else ""."""
+    """X, Y or Z if a unit vector lies along that axis, either way; otherwise ""."""
     return next((name for name, v in AXES.items() if abs(abs(float(direction @ np.array(v))) - 1.0) < TINY), "")
 
 
 def _changes(problem: Problem, fit: Fit, slips: Sequence[Slip]) -> list[FloatArray]:
-    """By how much modelled over measured ln k of its rows rises when a slip is mended; nan where there is no answer."""
+    """Change of ln(modelled / measured) of a slip's rows when it is corrected; nan where the model has no stiffness."""
     predictor = problem.predictor
     data, rows = predictor.data, np.concatenate([slip.rows for slip in slips])
 
@@ -250,14 +250,14 @@ def _changes(problem: Problem, fit: Fit, slips: Sequence[Slip]) -> list[FloatArr
     model = build_model(predictor.machine.with_changes(strut_law=law), predictor.effect_files, fit.effects)
     try:
         logs = np.log(model_stiffness(model, taken))
-    except InputError:  # one of the poses is none that the machine can take
+    except InputError:  # the machine cannot take one of the poses
         logs = np.full(len(rows), np.nan)
     moved = logs - np.log(taken.stiffness) + fit.residual[rows]
     return np.split(moved, np.cumsum([len(slip.rows) for slip in slips])[:-1])
 
 
 def _log_odds(problem: Problem, fit: Fit, slips: Sequence[Slip], taken: BoolArray) -> FloatArray:
-    """(slips,) log likelihood of each slip over that of its rows as they stand, plain or wild; -inf for none."""
+    """(slips,) log likelihood ratio of each slip to its rows as they stand, plain or wild; -inf if impossible."""
     scatter, inflated = problem.scatter, _inflation(fit)
     known: dict[tuple[int, ...], tuple[Precision, FloatArray]] = {}
     odds = np.full(len(slips), -np.inf)
@@ -265,7 +265,7 @@ def _log_odds(problem: Problem, fit: Fit, slips: Sequence[Slip], taken: BoolArra
         if not np.isfinite(change).all():
             continue
         wild = tuple(sorted(set(fit.scatter.wild) - set(slip.rows.tolist())))
-        if wild not in known:  # what the fit leaves, wild rows widened and taken ones set aside
+        if wild not in known:  # residuals of the fit, wild rows widened and taken ones set aside
             rows, gone = np.array(wild, dtype=np.int64), np.flatnonzero(taken)
             wider = scatter.covariance.widened(rows, scatter.widening[rows])
             wider = wider.widened(gone, np.full(len(gone), SET_ASIDE))
@@ -281,7 +281,7 @@ def _log_odds(problem: Problem, fit: Fit, slips: Sequence[Slip], taken: BoolArra
 
 
 def _gain_of_wild(scatter: Scatter, rows: Rows, block: FloatArray, pull: FloatArray) -> float:
-    """Log likelihood gained by taking those of the rows that are far off for wild, their price paid."""
+    """Gain in log likelihood by taking those of the rows that are far off to be wild, less their price."""
     far = pull**2 > scatter.beyond * np.diag(block)
     if not far.any():
         return 0.0

@@ -1,4 +1,4 @@
-"""Effects that readings neither show nor exclude beside an explanation."""
+"""Effects that the readings neither show nor exclude beside an explanation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from toolpath_stiff.stiffness.contract import Effect, Parameter
 # Rms change of ln stiffness from which an effect matters; assumed: at 5 % of its stiffness the tip's deflection is off
 # by less than the 10 % to which a cutting force is known.
 MATTERS = 0.05
-SIZES = 20  # a sign, between those that are tabulated
+SIZES = 20  # number of sizes for each sign, over the tabulated range
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class Unexcluded:
 
     @property
     def matters(self) -> bool:
-        """Whether it changes the stiffness by so much that it should be known."""
+        """True if it changes the stiffness enough that it should be known."""
         return self.rms >= MATTERS
 
 
 def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_odds: float) -> list[Unexcluded]:
-    """How far each further effect may go beside an explanation, the likeliest first.
+    """Largest size of each further effect that may go unseen beside an explanation, the likeliest effect first.
 
     Parameters
     ----------
@@ -70,13 +70,13 @@ def not_excluded(problem: Problem, families: Sequence[Family], fit: Fit, prior_o
 
 
 def rooms(problem: Problem, families: Sequence[Family], fit: Fit) -> list[tuple[Unexcluded, float]]:
-    """How far each effect may go beside an explanation, and the mean of its likelihood over sizes and choices."""
+    """Largest unseen size of each effect beside an explanation, and its mean likelihood over sizes and choices."""
     beside = _Beside(problem, fit)
     widest = []
     for family in families:
         seen = ((table, np.flatnonzero(table.columns.any(axis=0)).tolist()) for table in family.tables)
         each, means = zip(*(beside.room(table, j) for table, components in seen for j in components), strict=True)
-        # Of choices that are alike the first, whatever the last digits: a set-up stiffer is the other one softer.
+        # Of equivalent choices the first, whatever the last digits: one set-up stiffer is the other one softer.
         widest_of = max(each, key=lambda room: round(room.rms, 9))
         room = replace(widest_of, left=max(room.left for room in each))
         widest.append((room, float(np.mean(means))))
@@ -84,7 +84,7 @@ def rooms(problem: Problem, families: Sequence[Family], fit: Fit) -> list[tuple[
 
 
 class _Beside:
-    """An explanation whose law and sizes move along with a further effect, within their bounds."""
+    """An explanation whose law and sizes readjust, within their bounds, to a further effect."""
 
     def __init__(self, problem: Problem, fit: Fit) -> None:
         self.problem, self.fit = problem, fit
@@ -100,7 +100,7 @@ class _Beside:
         self.high = np.array([np.inf] * 2 + [max(component.bounds[1] - size, 0.0) for component, size in free])
 
     def room(self, table: CandidateTable, j: int) -> tuple[Unexcluded, float]:
-        """How far component `j` of a table may go: of both signs the one at which it changes more.
+        """Largest unseen size of component `j` of a table: of both signs, the one with the larger change.
 
         And the mean of the likelihood over the prior of the size, 1 where the readings say nothing.
         """
@@ -114,7 +114,7 @@ class _Beside:
             squares, stays = self._fitted(self.fit.residual + change)
             changes = np.sqrt(np.mean(change[:, self.tip] ** 2, axis=1))
             sides.append((sizes, changes, stays, squares))
-            # Of the prior, as far as sizes are expected; whether the readings would show them does not matter here.
+            # The prior of expected sizes only: whether the readings would show them does not matter here.
             weights = np.exp(log_expected(changes) + log_usual(sizes, component.typical()))
             weights *= np.abs(np.gradient(np.log(np.abs(sizes))))
             gain, mass = gain + float(weights @ np.exp(0.5 * (none - squares))), mass + float(weights.sum())
@@ -124,7 +124,7 @@ class _Beside:
         return room, gain / mass
 
     def _fitted(self, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(g,) squares that are left of residuals (g, n) once law and sizes have moved to fit them best.
+        """(g,) weighted squares left of residuals (g, n) once law and sizes have readjusted to them.
 
         And the mean change (g,) at the tip that stays then, beside the explanation as it is.
         """
@@ -138,7 +138,7 @@ class _Beside:
 
 
 def _widest(side: tuple[FloatArray, ...], none: float, most: float) -> tuple[float, float, float]:
-    """Size, rms and mean change left at the largest size whose squares are at most `most`; between two by a line.
+    """Size, rms and mean change left at the largest size whose squares are at most `most`, interpolated linearly.
 
     `side`: the same and the squares of sizes (g,) of one sign; `none`: the squares at size 0.
     """

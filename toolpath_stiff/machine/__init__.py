@@ -1,1 +1,1 @@
-"""Machines of six struts: files, model, kinematics with symmetry, limits."""
+"""Machines of every kind: files, models, kinematics, limits."""

@@ -1,4 +1,4 @@
-"""Bodies of a chain that give way: a spring in one of its frames, or a beam between two of them."""
+"""Compliant bodies of a chain: a spring in one of its frames, or a beam between two of them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from toolpath_stiff.machine.elements import Element, Spring, beam_axes, beam_com
 
 @dataclass(frozen=True)
 class Body:
-    """A spring that stands still in a frame.
+    """A spring fixed in a frame.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Body:
         return self.frame
 
     def spring(self, frames: Sequence[Frame]) -> Spring:
-        """It at n poses, given by the frames of its side."""
+        """The spring at n poses, from the frames of its side."""
         frame = frames[self.frame]
         return Spring(frame.point(self.place.origin), frame.turn(self.place.axes), self.compliance)
 
@@ -63,7 +63,7 @@ class SpanningBeam:
         return max(self.frames)
 
     def spring(self, frames: Sequence[Frame]) -> Spring:
-        """It at n poses, at its middle."""
+        """The beam as a spring at its middle, at n poses."""
         first, second = (frames[i] for i in self.frames)
         start, end = np.atleast_2d(first.point(self.start)), np.atleast_2d(second.point(self.end))
         along = end - start

@@ -1,4 +1,4 @@
-"""Chains of joints: frames of all links at n poses, from descriptions by Denavit-Hartenberg rows or by origin and axis.
+"""Chains of joints: frames of all links at n poses, described by Denavit-Hartenberg rows or by origin and axis.
 
 Every joint turns about, or slides along, the z axis of its own frame, whose place in the frame before is constant.
 Within, arrays are columns: rotations (3, 3, n), vectors (3, n), joint values (j, n); n = 1 while nothing has moved.
@@ -20,52 +20,52 @@ TINY = 1e-15  # entries of a rotation matrix below it are the rounding of a righ
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame in base axes at n poses: axes (3, 3, n), columns of the rotation matrix in the middle; origin (3, n)."""
+    """A frame in base axes at n poses: axes (3, 3, n), the middle index is the column; origin (3, n)."""
 
     axes: FloatArray
     origin: FloatArray
 
     def moved(self, place: FixedFrame) -> Frame:
-        """A frame that stands still in this one."""
+        """Frame fixed in this one at a placement."""
         return Frame(turned(self.axes, place.axes), self.origin + applied(self.axes, place.origin))
 
     def point(self, place: FloatArray) -> FloatArray:
-        """(n, 3) in base axes of a point (3,) of this frame; (3,) where the frame is the same at all poses."""
+        """(n, 3) a point (3,) of this frame in base axes; (3,) if the frame is the same at all poses."""
         return rows_of(self.origin + applied(self.axes, place) if place.any() else self.origin)
 
     @property
     def placement(self) -> FixedFrame:
-        """It in the base, where it is the same at all poses."""
+        """Placement in the base, for a frame that is the same at all poses."""
         return FixedFrame(self.axes[..., 0], self.origin[:, 0])
 
     def turn(self, axes: FloatArray) -> FloatArray:
-        """(n, 3, 3) in base axes of axes (3, 3) in this frame; (3, 3) where the frame is the same at all poses."""
+        """(n, 3, 3) axes (3, 3) of this frame in base axes; (3, 3) if the frame is the same at all poses."""
         return rows_of(turned(self.axes, axes))
 
 
 @dataclass(frozen=True)
 class FixedFrame:
-    """Where one body stands in another: axes (3, 3), its axes as columns; origin (3,) m."""
+    """Constant placement of one body in another: axes (3, 3), its axes as columns; origin (3,) m."""
 
     axes: FloatArray
     origin: FloatArray
 
     def then(self, other: FixedFrame) -> FixedFrame:
-        """The placement of what stands so in this one."""
+        """Composition with `other`, a placement given in this one's frame."""
         return FixedFrame(self.axes @ other.axes, self.axes @ other.origin + self.origin)
 
     def longer(self, by: float) -> FixedFrame:
-        """Further away by so many m; one at the origin stays there."""
+        """Placement moved further away by this many m; one at the origin stays there."""
         length = float(np.linalg.norm(self.origin))
         return FixedFrame(self.axes, self.origin * (1.0 + by / length)) if length else self
 
     def inverse(self) -> FixedFrame:
-        """The placement of the other body in this one."""
+        """Placement of the other body in this one."""
         return FixedFrame(self.axes.T, -self.axes.T @ self.origin)
 
 
 def placement(xyz: ArrayLike = (0.0, 0.0, 0.0), rpy: ArrayLike = (0.0, 0.0, 0.0)) -> FixedFrame:
-    """From m and roll, pitch, yaw in rad, R = Rz(yaw) Ry(pitch) Rx(roll), as URDF has origins; right angles exact."""
+    """Placement from m and roll, pitch, yaw in rad, R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF; right angles exact."""
     axes = rotation_matrices(np.asarray(rpy, dtype=float))
     return FixedFrame(np.where(np.abs(axes) < TINY, 0.0, axes), np.asarray(xyz, dtype=float))
 
@@ -75,7 +75,7 @@ STILL = placement()
 
 @dataclass(frozen=True)
 class ChainJoint:
-    """One joint.
+    """One joint of a chain.
 
     Attributes
     ----------
@@ -91,6 +91,8 @@ class ChainJoint:
         The axes that its description gave the frame, in the frame.
     speed
         m/s or rad/s that it reaches; inf: nobody says.
+    stands
+        m or rad: where it stands on a machine whose poses do not take it.
     """
 
     name: str
@@ -100,6 +102,7 @@ class ChainJoint:
     high: float = np.inf
     given: FixedFrame = STILL
     speed: float = np.inf
+    stands: float = 0.0
 
 
 def modified_dh(alpha: float, a: float, offset: float, d: float) -> FixedFrame:
@@ -108,7 +111,7 @@ def modified_dh(alpha: float, a: float, offset: float, d: float) -> FixedFrame:
 
 
 def standard_dh(alpha: float, a: float, offset: float, d: float) -> FixedFrame:
-    """What follows a joint by standard DH: Rz(offset) Tz(d) Tx(a) Rx(alpha) (Denavit and Hartenberg, 1955)."""
+    """FixedFrame after a joint by standard DH: Rz(offset) Tz(d) Tx(a) Rx(alpha) (Denavit and Hartenberg, 1955)."""
     return placement((0.0, 0.0, d), (0.0, 0.0, offset)).then(placement((a, 0.0, 0.0), (alpha, 0.0, 0.0)))
 
 
@@ -124,7 +127,7 @@ def aligned(axis: ArrayLike) -> FixedFrame:
 
 
 def chain_frames(joints: Sequence[ChainJoint], values: FloatArray) -> list[Frame]:
-    """The base and the frame of every joint, moved, at joint values (j, n) m or rad."""
+    """Frames of the base and of every joint, moved, at joint values (j, n) m or rad."""
     frames = [Frame(np.eye(3)[..., None], np.zeros((3, 1)))]
     for joint, value in zip(joints, values, strict=True):
         before = frames[-1]
@@ -161,7 +164,7 @@ def turned_from_left(by: FloatArray, axes: FloatArray) -> FloatArray:
 
 
 def applied(axes: FloatArray, vector: FloatArray) -> FloatArray:
-    """(3, n) product of rotations (3, 3, n) and a constant vector (3,); by 0 and 1 nothing is multiplied."""
+    """(3, n) product of rotations (3, 3, n) and a constant vector (3,); 0 and 1 cost no multiplication."""
     total = None
     for k, factor in enumerate(vector.tolist()):
         if factor:
@@ -176,5 +179,5 @@ def columns_of(rows: FloatArray) -> FloatArray:
 
 
 def rows_of(columns: FloatArray) -> FloatArray:
-    """Columns (..., n) as rows (n, ...), a view; without the axis where n is 1."""
+    """Columns (..., n) as rows (n, ...), a view; without that axis if n is 1."""
     return columns[..., 0] if columns.shape[-1] == 1 else np.moveaxis(columns, -1, 0)

@@ -1,4 +1,4 @@
-"""Joint values of chains that have no closed form: Newton's method from many starts, followed from pose to pose."""
+"""Joint values of chains without a closed form: Newton's method from many starts, followed from pose to pose."""
 
 from collections.abc import Callable, Sequence
 
@@ -11,13 +11,13 @@ from toolpath_stiff.machine.newton import newton
 
 STARTS = 96  # over the joints' ranges; of a general six-joint arm, which has up to 16 solutions, few are missed
 LARGEST_STEP = 0.5  # rad and m
-MOST_SEARCHES = 8  # poses from which a path is followed anew where the one before was lost
-SAME = 1e-6  # rad and m between solutions that count as one
+MOST_SEARCHES = 8  # most poses from which a lost path is searched anew
+SAME = 1e-6  # rad and m within which solutions count as one
 Frames = Callable[[FloatArray], Sequence[Frame]]
 
 
 def all_solutions(joints: Sequence[ChainJoint], frames: Frames, tip: FloatArray, axes: FloatArray) -> FloatArray:
-    """(s, j) solutions for one tip (3,) with axes (3, 3), in base axes, the one farthest from the limits first.
+    """(s, j) solutions for one tip (3,) with axes (3, 3), in base axes, those farthest from the limits first.
 
     `frames` gives base, joints and tip at joint values (j, n). Those within the limits if there are any.
     """
@@ -41,7 +41,7 @@ def all_solutions(joints: Sequence[ChainJoint], frames: Frames, tip: FloatArray,
 def solve_from(
     joints: Sequence[ChainJoint], frames: Frames, tip: FloatArray, axes: FloatArray, start: FloatArray
 ) -> FloatArray:
-    """(n, j) joint values near a start (n, j) for tips (3, n) with axes (3, 3, n) in base axes; nan where none."""
+    """(n, j) joint values near a start (n, j) for tips (3, n) with axes (3, 3, n) in base axes; nan if none."""
 
     def equations(values: FloatArray) -> tuple[FloatArray, FloatArray]:
         stand = frames(values.T)
@@ -56,7 +56,7 @@ def solve_from(
 
     values = newton(equations, start, LARGEST_STEP)
     end = frames(values.T)[-1]
-    # Half a turn away the sine vanishes too.
+    # The sine also vanishes half a turn away.
     same = np.nan_to_num((axes * end.axes).sum(axis=(0, 1))) > 2.0
     return np.where(same[:, None], values, np.nan)
 
@@ -64,7 +64,7 @@ def solve_from(
 def follow(
     joints: Sequence[ChainJoint], frames: Frames, tip: FloatArray, axes: FloatArray, start: FloatArray | None
 ) -> FloatArray:
-    """(n, j) joint values over poses, from a start (j,) or the best solution of the first pose that has one."""
+    """(n, j) joint values over poses, from a start (j,) or the best solution of the first pose with one."""
     n = tip.shape[1]
     values = np.full((n, len(joints)), np.nan)
     tried = np.zeros(n, dtype=bool)
@@ -82,6 +82,6 @@ def follow(
             missing = np.flatnonzero(np.isnan(values[:, 0]))
             if not len(solved) or len(missing) in (0, len(lost)):
                 break
-            # Where the step from one pose was too long, from the next pose that is solved.
+            # If the step from one pose was too long, continue from the next pose that is solved.
             lost, seeds = missing, values[solved[np.searchsorted(solved, missing).clip(max=len(solved) - 1)]]
     return values

@@ -1,4 +1,4 @@
-"""Sections that a machine file of any kind may have: names, `[setup]`, effects, `[uncertainty]`."""
+"""Sections that any kind of machine file may have: names, `[setup]`, effects, `[uncertainty]`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,7 +16,7 @@ from toolpath_stiff.units import m_per_s_from_mm_per_min
 
 
 def common_fields(toml: MachineToml, values: Sections, parameters: Sequence[str] = ()) -> dict[str, Any]:
-    """Arguments of a `MachineTool`; `parameters` are those that `[uncertainty]` may name besides those of effects."""
+    """Arguments of a `MachineTool`; `parameters`: names that `[uncertainty]` may use besides those of effects."""
     top, setup = {"title": values[""]["name"], "source": "", **values[""]}, values.get("setup", {})
     effects, instruments = (_entries(toml, kind) for kind in ("effect", "instrument"))
     return {
@@ -35,7 +35,7 @@ def common_fields(toml: MachineToml, values: Sections, parameters: Sequence[str]
 
 
 def _entries(toml: MachineToml, kind: str) -> tuple[EffectEntry, ...]:
-    """`[[effect]]` and `[[instrument]]`: a name, the parameters in SI, the provenance if there is one.
+    """`[[effect]]` and `[[instrument]]`: name, parameters in SI, provenance if given.
 
     What the parameters mean, and their bounds, is known to the effects themselves (the room above).
     """

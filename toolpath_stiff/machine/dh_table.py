@@ -12,7 +12,7 @@ COLUMNS = Columns((*DH, "min_deg", "max_deg", "min_mm", "max_mm"), ("name", "typ
 
 
 def machine_from_dh(file: str, name: str, convention: str) -> tuple[str, list[str]]:
-    """A machine file and notes from a table with a row a joint, base first.
+    """A machine file and notes, from a table with one row per joint, base first.
 
     Columns name, type (R or P), alpha_deg, a_mm, offset_deg (0 unless there), d_mm, and the limits min_deg, max_deg, of
     sliding joints min_mm, max_mm. `convention` is "modified DH" or "standard DH"; rows do not show it.

@@ -1,4 +1,4 @@
-"""Elements of a load path: what gives way between work and tool, and what each carries under a wrench at the tip.
+"""Elements of a load path: the compliant parts between work and tool, and their loads under a wrench at the tip.
 
 A wrench w = (force, moment about the tip), base axes, puts the loads S w on an element; its compliances c turn them
 into the tip's motion C w, C = sum S^T diag(c) S over all elements, whether they carry the tool or the work. A body that
@@ -23,7 +23,7 @@ SIX = ("along x", "along y", "along z", "about x", "about y", "about z")
 
 @dataclass(frozen=True)
 class Element:
-    """What gives way, the same at every pose.
+    """A compliant part of the load path, the same at every pose.
 
     Attributes
     ----------
@@ -41,18 +41,18 @@ class Element:
 
 
 def joint_element(joint: str) -> str:
-    """Name of the element that a joint that turns is: "joint 3" of J3, "joint A" of A."""
+    """Name of the element of a turning joint: "joint 3" for J3, "joint A" for A."""
     return f"joint {joint[1:]}" if joint[:1] in "Jj" and joint[1:].isdigit() else f"joint {joint}"
 
 
 def turns(element: Element) -> bool:
-    """Whether it is a joint that turns: its last load is the moment about its axis."""
+    """True for a joint that turns: its last load is the moment about its axis."""
     return element.link == "joints" and element.directions == SIX
 
 
 @dataclass(frozen=True)
 class Spring:
-    """A body that gives way at a place, at n poses; what does not change with the pose has no leading axis.
+    """A compliant body at a place, at n poses; quantities constant over poses have no leading axis.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Spring:
         return rows
 
     def take(self, rows: IntArray | BoolArray | slice) -> Spring:
-        """Some of the poses."""
+        """Spring at some of the poses."""
         axes = self.axes if self.axes is None or self.axes.ndim == 2 else self.axes[rows]
         place, compliance = (array if array.ndim == 1 else array[rows] for array in (self.place, self.compliance))
         return Spring(place, axes, compliance)
@@ -86,7 +86,7 @@ class Spring:
 
 @dataclass(frozen=True)
 class LoadRows:
-    """Loads that are given directly, at n poses: of a strut, a rod, a carriage of rods.
+    """Loads given directly, at n poses: of a strut, a rod, a carriage of rods.
 
     Attributes
     ----------
@@ -100,17 +100,17 @@ class LoadRows:
     compliance: FloatArray
 
     def rows(self, tip: FloatArray) -> FloatArray:
-        """(n, k, 6) as of `Spring.rows`."""
+        """(n, k, 6) loads per unit wrench at the tip."""
         return np.broadcast_to(self.loads, (len(tip), *self.loads.shape[1:]))
 
     def take(self, rows: IntArray | BoolArray | slice) -> LoadRows:
-        """Some of the poses."""
+        """Loads at some of the poses."""
         return LoadRows(self.loads[rows], self.compliance if self.compliance.ndim == 1 else self.compliance[rows])
 
 
 @dataclass(frozen=True)
 class Stance(ArrayColumns):
-    """How a machine stands at n poses.
+    """Stance of a machine at n poses.
 
     Attributes
     ----------
@@ -138,8 +138,13 @@ class Stance(ArrayColumns):
     def __len__(self) -> int:
         return len(self.joints)
 
+    @property
+    def axes(self) -> FloatArray:
+        """(n, 3, 3) tool axes in base axes."""
+        return np.broadcast_to(np.eye(3) if self.rotation is None else self.rotation, (len(self), 3, 3))
+
     def take(self, rows: IntArray | BoolArray | slice) -> Stance:
-        """Some of the poses."""
+        """Stance at some of the poses."""
         return replace(super().take(rows), loads=tuple(load.take(rows) for load in self.loads))
 
     def tip_compliance(self) -> FloatArray:
@@ -152,7 +157,7 @@ class Stance(ArrayColumns):
 
 
 def cross_form(vector: FloatArray) -> FloatArray:
-    """(..., 3, 3) matrices that take the cross product of vectors (..., 3) with what they multiply."""
+    """(..., 3, 3) matrices of the cross product with vectors (..., 3) from the left."""
     form = np.zeros((*vector.shape, 3))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         form[..., i, j], form[..., j, i] = -vector[..., k], vector[..., k]
@@ -160,7 +165,7 @@ def cross_form(vector: FloatArray) -> FloatArray:
 
 
 def beam_compliance(length: FloatArray | float, stiffness: Sequence[float]) -> FloatArray:
-    """(..., 6) of an Euler-Bernoulli beam as a spring at its middle, local x along it.
+    """(..., 6) compliance of an Euler-Bernoulli beam as a spring at its middle, local x along it.
 
     There its couplings vanish: L/EA, L^3/12EIz, L^3/12EIy, L/GJ, L/EIy, L/EIz; moved to the loaded end they are the
     cantilever's (Gere and Timoshenko, Mechanics of Materials, appendix G). `stiffness` is EA (N), EIy, EIz, GJ (N m2).
@@ -172,7 +177,7 @@ def beam_compliance(length: FloatArray | float, stiffness: Sequence[float]) -> F
 
 
 def beam_axes(along: FloatArray, near_z: FloatArray) -> FloatArray:
-    """(..., 3, 3) columns: x along vectors (..., 3), z nearest to others (..., 3) or (3,), y = z cross x."""
+    """(..., 3, 3) columns: x along vectors (..., 3), z closest to others (..., 3) or (3,), y = z cross x."""
     x = along / np.linalg.norm(along, axis=-1, keepdims=True)
     z = near_z - (x * near_z).sum(axis=-1, keepdims=True) * x
     z = z / np.linalg.norm(z, axis=-1, keepdims=True)

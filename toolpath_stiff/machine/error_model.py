@@ -1,4 +1,4 @@
-"""How far a fitted model may be off at a pose, as `[uncertainty.errors]` of a machine file states it."""
+"""Error of a fitted model at a pose, as stated by `[uncertainty.errors]` of a machine file."""
 
 from __future__ import annotations
 
@@ -8,34 +8,34 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 
-# Over which what a model lacks stays alike; assumed: about half a workspace, half a tilting range.
+# Correlation lengths of a model's form error; assumed: about half a workspace, half a tilting range.
 RANGE_POSITION, RANGE_ANGLE = 0.25, np.radians(15.0)  # m, rad
 GEOMETRY = 42  # six struts, three coordinates each of twelve joints
-COMMON = 0.5  # share of what a model lacks that is alike at all poses; assumed
-BLOCK = 4096  # poses whose distances to the measured ones are worked out at a time
+COMMON = 0.5  # share of the form error that is common to all poses; assumed
+BLOCK = 4096  # poses whose distances to the measured ones are computed at a time
 FEW = 0.5  # nearness below which a pose counts as away from the measured ones: 1.18 ranges
 
 
 def coordinates(position: FloatArray, angles: FloatArray) -> FloatArray:
-    """(n, 6) places (n, 3) m and angles (n, 3) rad in ranges over which the stiffness stays alike."""
+    """(n, 6) places (n, 3) m and angles (n, 3) rad in units of the correlation lengths."""
     return np.concatenate([position / RANGE_POSITION, angles / RANGE_ANGLE], axis=1)
 
 
 def nearness(here: FloatArray, there: FloatArray) -> FloatArray:
-    """(n, m) 1 for the same `coordinates` (n, 6) and (m, 6), falling to 0 with the distance."""
-    # Differences, not squares that nearly cancel: the same pose is exactly 1.
+    """(n, m) nearness of `coordinates` (n, 6) and (m, 6): 1 where equal, falling to 0 with distance."""
+    # Differences rather than squares, which nearly cancel: equal poses give exactly 1.
     distance = sum((here[:, None, axis] - there[None, :, axis]) ** 2 for axis in range(here.shape[1]))
     return np.asarray(np.exp(-0.5 * distance))
 
 
 def alike(place: FloatArray, direction: FloatArray) -> FloatArray:
-    """(n, n) correlation of what a model lacks at `coordinates` (n, 6) along unit vectors (n, 3)."""
+    """(n, n) correlation of the form error at `coordinates` (n, 6) along unit vectors (n, 3)."""
     return np.asarray((direction @ direction.T) ** 2 * (COMMON + (1.0 - COMMON) * nearness(place, place)))
 
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """Errors of the logarithm of a model's stiffness: relative, normal, independent of each other.
+    """Errors of the logarithm of a model's stiffness: relative, normal, mutually independent.
 
     Attributes
     ----------
@@ -71,16 +71,16 @@ class ErrorModel:
         return self.places[:, :3] * RANGE_POSITION, self.places[:, 3:] * RANGE_ANGLE
 
     def nearness(self, place: FloatArray) -> FloatArray:
-        """(n,) of `coordinates` (n, 6) to the nearest measured pose."""
+        """(n,) nearness of `coordinates` (n, 6) to the nearest measured pose."""
         blocks = np.split(place, range(BLOCK, len(place), BLOCK))
         return np.concatenate([nearness(block, self.places).max(axis=1) for block in blocks])
 
     def form(self, near: FloatArray) -> FloatArray:
-        """(n,) relative standard deviation of what the model lacks, by `nearness` (n,)."""
+        """(n,) relative standard deviation of the form error, by `nearness` (n,)."""
         return np.asarray(np.sqrt(self.away**2 - (self.away**2 - self.near**2) * near))
 
     def of(self, rows: IntArray | BoolArray | list[int]) -> ErrorModel:
-        """Of some of the parameters."""
+        """Error model of some of the parameters."""
         return replace(self, loadings=self.loadings[rows])
 
     def beside(self, later: ErrorModel) -> ErrorModel:

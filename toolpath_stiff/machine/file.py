@@ -4,37 +4,35 @@ A key that is not known is an error, so that a typing mistake cannot fall back t
 key, value and bound.
 """
 
-from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 from toolpath_stiff import defaults
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import is_file, read_bytes
 from toolpath_stiff.hints import command_line
-from toolpath_stiff.machine import delta, hexaglide, hexapod_file, pentapod, serial_file
 from toolpath_stiff.machine.limits import upright_middle
 from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.machine.schema import MachineToml
 from toolpath_stiff.toml_reader import LARGEST_BYTES, shortened
 
-# What `kind` of a machine file may say -> the reader of such files.
-KINDS: dict[str, Callable[[MachineToml], MachineTool]] = {
-    "hexapod": hexapod_file.read,
-    "serial": serial_file.read,
-    "delta": delta.read,
-    "pentapod": pentapod.read,
-    "hexaglide": hexaglide.read,
+# Value of `kind` in a machine file -> module whose `read` reads such files, imported when needed.
+KINDS = {
+    "hexapod": "hexapod_file",
+    "serial": "serial_file",
+    "delta": "delta",
+    "rotary_delta": "rotary_delta",
+    "pentapod": "pentapod",
+    "hexaglide": "hexaglide",
 }
-
-
 ALIASES = {"linear_delta": "delta"}
 
 
 def packaged_machines() -> dict[str, Path]:
-    """Name -> file of the machines that ship with the package."""
+    """Name -> file of each machine that ships with the package."""
     folder = Path(__file__).parent.parent / "data" / "machines"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
@@ -62,7 +60,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> MachineTool:
     """
     known = packaged_machines()
     if str(name_or_file) in known:
-        return deepcopy(_packaged(known[str(name_or_file)]))  # its arrays are the caller's own
+        return deepcopy(_packaged(known[str(name_or_file)]))  # a copy: the arrays belong to the caller
     path = Path(name_or_file)
     if not is_file(path):
         template = command_line("machine", "new", path.with_suffix(".toml") if path.name else "mine.toml")
@@ -92,7 +90,7 @@ def parse_machine(text: str, file: str = "machine.toml") -> MachineTool:
     kind = ALIASES.get(str(kind), kind)
     if not isinstance(kind, str) or kind not in KINDS:
         raise toml.fault("", "kind", f" = {shortened(kind)}", expected=f"one of {', '.join(KINDS)}")
-    machine = KINDS[kind](toml)
+    machine: MachineTool = import_module(f"toolpath_stiff.machine.{KINDS[kind]}").read(toml)
     if isinstance(machine, Hexapod):
         return machine
     if "setup" not in toml.data:

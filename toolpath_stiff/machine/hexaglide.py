@@ -10,37 +10,26 @@ from typing import ClassVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.machine import parallel_file
 from toolpath_stiff.machine.elements import Element, Stance, beam_axes
 from toolpath_stiff.machine.parallel import Carriage, Legs, Parallel
-from toolpath_stiff.machine.parallel_file import (
-    GIVE,
-    LENGTH,
-    OPTIONAL,
-    PER_ROD,
-    SHARED,
-    TOP,
-    axial,
-    give_of,
-    shared_fields,
-    span,
-)
 from toolpath_stiff.machine.schema import Key, MachineToml, read_sections
 from toolpath_stiff.units import m_from_mm, m_from_nm
 
 DIRECTIONS = Key(shape=(6, 3), low=-1.0, high=1.0)
 SCHEMA = {
-    "": TOP,
+    "": parallel_file.TOP,
     "feet": {
         "mm": Key(unit="mm", shape=(6, 3)),
         "rails": DIRECTIONS,
         "sides": Key(shape=(6,), low=-1.0, high=1.0),
         "min_mm": Key(unit="mm"),
         "max_mm": Key(unit="mm"),
-        **GIVE,
+        **parallel_file.GIVE,
     },
     "platform_joints": {"mm": Key(unit="mm", shape=(6, 3))},
-    "strut": {"length_mm": LENGTH, "compliance_nm_per_N": PER_ROD},
-    **SHARED,
+    "strut": {"length_mm": parallel_file.LENGTH, "compliance_nm_per_N": parallel_file.PER_ROD},
+    **parallel_file.SHARED,
 }
 
 
@@ -81,14 +70,13 @@ class Hexaglide(Parallel):
 
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
         """(n, 6, 3) m each: feet and platform joints."""
-        axes = np.eye(3)[None] if stance.rotation is None else stance.rotation
         begin = self.feet + stance.joints[..., None] * self.rails
-        return begin, stance.position[:, None] + self.platform_joints @ np.swapaxes(axes, 1, 2)
+        return begin, stance.position[:, None] + self.platform_joints @ np.swapaxes(stance.axes, 1, 2)
 
 
 def read(toml: MachineToml) -> Hexaglide:
     """A hexaglide of a machine file. Raises `InputError`."""
-    values = read_sections(toml, SCHEMA, OPTIONAL, stated=False)
+    values = read_sections(toml, SCHEMA, parallel_file.OPTIONAL, stated=False)
     feet, strut = values["feet"], values["strut"]
     sizes = np.linalg.norm(feet["rails"], axis=1)
     if not (np.abs(sizes - 1.0) < 0.01).all():
@@ -96,16 +84,16 @@ def read(toml: MachineToml) -> Hexaglide:
     if not (np.abs(feet["sides"]) == 1.0).all():
         raise toml.fault("feet", "sides", f" = {feet['sides'].tolist()}", expected="6 numbers, 1 or -1")
     rails = feet["rails"] / sizes[:, None]
-    compliance = give_of(feet)
+    compliance = parallel_file.give_of(feet)
     carriages = []
     for i, rail in enumerate(rails):
         # x along the rail (the drive), z nearest to the machine's Z; of an upright rail to its X.
         axes = beam_axes(rail, np.eye(3)[0 if abs(rail[2]) > 0.9 else 2])
         carriages.append(Carriage(Element(f"foot {i + 1}", "frame"), (i,), axes, compliance, np.zeros((1, 3))))
     return Hexaglide(
-        **shared_fields(toml, values),
-        joint_range=span(toml, "feet", ("min_mm", "max_mm"), feet["min_mm"], feet["max_mm"]),
-        legs=axial("strut", 6),
+        **parallel_file.shared_fields(toml, values),
+        joint_range=parallel_file.span(toml, "feet", ("min_mm", "max_mm"), feet["min_mm"], feet["max_mm"]),
+        legs=parallel_file.axial("strut", 6),
         carriages=tuple(carriages),
         feet=m_from_mm(feet["mm"]),
         rails=rails,

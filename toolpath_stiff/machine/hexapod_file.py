@@ -1,4 +1,4 @@
-"""Files of six-strut machines to `Hexapod`.
+"""Reader of machine files of six-strut machines, as `Hexapod`.
 
 Each section names the origin of its figures ("published", "recovered", "assumed", "fitted").
 """
@@ -17,13 +17,13 @@ from toolpath_stiff.machine.schema import OPTIONAL_SECTIONS, SECTIONS, MachineTo
 from toolpath_stiff.poses import pose_in_si
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_m_from_n_per_um, rad_from_deg
 
-CLOSEST_LENGTHS = 1e-6  # m, of a strut law: nobody measures closer, and the slope between them stays a number
-# Smallest singular value of the six strut screws (arms in units of the platform's size) that is no singularity.
+CLOSEST_LENGTHS = 1e-6  # m, of a strut law: nobody measures closer, and the slope between them stays finite
+# Smallest singular value of the six strut screws (arms in units of the platform's size) that is not singular.
 SINGULAR = 1e-6
 
 
 def read(toml: MachineToml) -> Hexapod:
-    """The machine of a file. Raises `InputError`."""
+    """Machine from a file. Raises `InputError`."""
     values = read_sections(toml, SECTIONS, OPTIONAL_SECTIONS)
     law = _strut_law(toml, values["strut_law"], values["limits.strut_length"])
     machine = Hexapod(
@@ -42,7 +42,7 @@ def read(toml: MachineToml) -> Hexapod:
 
 
 def _check_law(toml: MachineToml, machine: Hexapod) -> None:
-    """The struts must keep some stiffness over their whole travel."""
+    """Refuse a law under which struts lose all stiffness within their travel."""
     for key, length in zip(("min_mm", "max_mm"), machine.limits.strut_length, strict=True):
         intercept, slope = machine.strut_law.line_at(length)
         if np.isfinite(length) and intercept + slope * length <= 0.0:
@@ -52,7 +52,7 @@ def _check_law(toml: MachineToml, machine: Hexapod) -> None:
 
 
 def _check_neutral_pose(toml: MachineToml, machine: Hexapod) -> None:
-    """Margins are counted from the neutral pose, so the machine must not be singular there."""
+    """Refuse a machine that is singular at its neutral pose, from which margins are counted."""
     struts = solve_struts_at(machine, machine.limits.neutral_pose)
     directions, arms = struts.directions[0], struts.arms[0] - struts.arms[0].mean(axis=0)
     size = max(float(np.linalg.norm(arms, axis=1).mean()), 1e-9)
@@ -64,7 +64,7 @@ def _check_neutral_pose(toml: MachineToml, machine: Hexapod) -> None:
 
 
 def _joints(toml: MachineToml, section: str, values: Document) -> FloatArray:
-    """(6, 3) m from whichever of the two forms is given."""
+    """(6, 3) m from either form of the section."""
     cartesian, cylindrical = (values.get(key) for key in ("mm", "cylindrical_mm_deg"))
     if (cartesian is None) == (cylindrical is None):
         mistake = " is missing" if cartesian is None else " and cylindrical_mm_deg are both given"
@@ -77,13 +77,13 @@ def _joints(toml: MachineToml, section: str, values: Document) -> FloatArray:
 
 
 def _as_built(values: Document) -> FloatArray:
-    """(42,) ln and m."""
+    """(42,) offsets of struts (ln) and joints (m)."""
     joints = np.concatenate([values["frame_joints_mm"], values["platform_joints_mm"]])
     return np.concatenate([np.log1p(0.01 * values["struts_percent"]), m_from_mm(joints).ravel()])
 
 
 def _strut_law(toml: MachineToml, values: Document, travel: Document) -> StrutLaw:
-    """Linear by two lengths, a table by more, constant by one stiffness without a length."""
+    """Strut law: linear by two lengths, a table by more, constant by one stiffness without a length."""
 
     def fault(key: str, mistake: str, expected: str) -> InputError:
         return toml.fault("strut_law", key, mistake, expected)
@@ -115,7 +115,7 @@ def _limits(toml: MachineToml, values: Sections) -> Limits:
     low, high = (values["limits.strut_length"][key] for key in ("min_mm", "max_mm"))
     if not low < high:
         raise toml.fault("limits.strut_length", "max_mm", f" = {high:g}", expected=f"more than min_mm = {low:g}")
-    # Joints without limits: the neutral pose only serves the singularity index.
+    # Joints without limits: the neutral pose serves only the singularity index.
     neutral = pose_in_si(values.get("setup", {}).get("default_origin_mm", np.zeros(3)))
     limits = Limits(strut_length=(m_from_mm(low), m_from_mm(high)), neutral_pose=neutral)
     if box := values.get("limits.workspace"):

@@ -1,4 +1,4 @@
-"""Joint values against their limits: turns of rotary joints, and how far from the limits they are."""
+"""Joint values and their limits: turns of rotary joints, and distance from the limits."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ TURN = 2.0 * np.pi
 
 
 def wound(values: FloatArray, limits: FloatArray, linear: Sequence[bool], start: FloatArray | None) -> FloatArray:
-    """Values (j, n) with whole turns added to rotary joints, so that they lie within limits (j, 2) where they can.
+    """Values (j, n) with whole turns added to rotary joints, to lie within limits (j, 2) where possible.
 
     Without a start each is as near to the middle of its limits as it can be. With a start (j,) the poses are a path:
     a joint goes on from pose to pose by less than half a turn, and the whole path lies within the limits if it can;
@@ -35,7 +35,7 @@ def wound(values: FloatArray, limits: FloatArray, linear: Sequence[bool], start:
 
 
 def _turns_back(path: FloatArray, low: float, high: float) -> FloatArray:
-    """(n,) whole turns that keep a path (n,) within limits where they can: others from where the ones before fail."""
+    """(n,) whole turns that keep a path (n,) within limits where possible; they change where the previous ones fail."""
     least, most = np.ceil((low - path) / TURN), np.floor((high - path) / TURN)
     turns, start, kept = np.zeros(len(path)), 0, 0.0
     while (beyond := (least <= most) & ((kept < least) | (kept > most)))[start:].any():
@@ -46,7 +46,7 @@ def _turns_back(path: FloatArray, low: float, high: float) -> FloatArray:
 
 
 def joint_margin(values: FloatArray, limits: FloatArray) -> FloatArray:
-    """(n,) distance of values (j, n) from the nearest limit as a share of its span; -inf where there are no values."""
+    """(n,) distance of values (j, n) from the nearest limit as a share of its span; -inf without values."""
     low, high = limits[:, :1], limits[:, 1:]
     span = np.where(np.isfinite(high - low), high - low, 1.0)
     margin = np.minimum(values - low, high - values) / span

@@ -21,7 +21,7 @@ from toolpath_stiff.machine.newton import newton
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
-# Farthest step of Newton's method, m and rad: beyond some tenths of a radian its linear model of a turn is worthless.
+# Largest step of Newton's method, m and rad: beyond some tenths of a radian its linear model of a turn fails.
 LARGEST_STEPS = np.array([0.5, 0.5, 0.5, 0.3, 0.3, 0.3])
 
 
@@ -45,7 +45,7 @@ class Struts(ArrayColumns):
 
     @property
     def joints(self) -> FloatArray:
-        """(n, 6) m, what the control moves: the lengths."""
+        """(n, 6) m, joint values that the control moves: the lengths."""
         return self.lengths
 
     @cached_property
@@ -54,7 +54,7 @@ class Struts(ArrayColumns):
         r, u = self.arms, self.directions
         rows = np.empty((*u.shape[:-1], 6))
         rows[..., :3] = u
-        # On a few poses `np.cross` takes several times as long; the digits are the same.
+        # For few poses `np.cross` takes several times as long; the digits are the same.
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
             rows[..., 3 + i] = r[..., j] * u[..., k] - r[..., k] * u[..., j]
         return rows
@@ -108,7 +108,7 @@ def solve_struts_at(machine: Hexapod, pose: ArrayLike) -> Struts:
 
 
 def neutral_axes(machine: Hexapod) -> tuple[FloatArray, FloatArray]:
-    """Neutral axes of the frame joints (base axes) and of the platform joints (platform axes), (6, 3) each.
+    """Neutral axes of the frame joints (base axes) and platform joints (platform axes), (6, 3) each.
 
     They lie along the struts at the machine's neutral pose.
     """
@@ -122,7 +122,7 @@ def neutral_axes(machine: Hexapod) -> tuple[FloatArray, FloatArray]:
 
 
 def joint_angles(machine: Hexapod, struts: Struts, rotation: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
-    """Swing of the frame joints and of the platform joints from their neutral axes.
+    """Swing of the frame joints and platform joints from their neutral axes.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def singularity_index(machine: Hexapod, struts: Struts) -> FloatArray:
     The determinant of the six strut screws does not depend on the point that moments are taken about, so
     neither tool length nor the choice of units enters the ratio.
     """
-    with np.errstate(divide="ignore", invalid="ignore"):  # singular at the neutral pose too: nan is out of reach
+    with np.errstate(divide="ignore", invalid="ignore"):  # nan, if singular at the neutral pose, is out of reach
         return np.asarray(np.abs(np.linalg.det(struts.jacobian)) / neutral_determinant(machine))
 
 
@@ -164,7 +164,7 @@ def neutral_determinant(machine: Hexapod) -> float:
 def forward_kinematics(
     machine: Hexapod, lengths: ArrayLike, start: ArrayLike | None = None, tool_length: ArrayLike = np.nan
 ) -> FloatArray:
-    """Poses at which the struts have the given lengths.
+    """Poses at which the struts have given lengths.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def forward_kinematics(
 
 
 def _turning(poses: FloatArray) -> FloatArray:
-    """(n, 3, 3) axes about which roll, pitch and yaw turn the platform, in columns (R = Rz Ry Rx)."""
+    """(n, 3, 3) axes about which roll, pitch and yaw turn the platform, as columns (R = Rz Ry Rx)."""
     axes, yaw = rotation_matrices(poses[:, 3:]), poses[:, 5]
     axes[..., 1] = np.column_stack([-np.sin(yaw), np.cos(yaw), np.zeros_like(yaw)])
     axes[..., 2] = [0.0, 0.0, 1.0]

@@ -1,4 +1,4 @@
-"""Reach: how far each pose is from each limit of the machine, and which limit is nearest."""
+"""Reach: distance of each pose from each limit of the machine, and the nearest limit."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,15 +21,15 @@ from toolpath_stiff.poses import Pose
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
-# What limits bound: strut lengths, swing of the joints at frame and platform, the tool tip, the singularity index.
+# Quantities with limits: strut lengths, swing of frame and platform joints, tool tip, singularity index.
 STRUT, FRAME, PLATFORM, SINGULARITY, JOINTS = "strut", "frame", "platform", "singularity", "joints"
 AXES = ("x", "y", "z")
-WIDEST, ROUNDS, DRAWN = 4.0, 9, 500  # m, rounds, draws in each, by which the middle of a workspace is sought
+WIDEST, ROUNDS, DRAWN = 4.0, 9, 500  # m, rounds, draws in each, in the search for the middle of a workspace
 
 
 @dataclass(frozen=True)
 class Limit:
-    """One bound: its name, the bound, whether it is a lower one, the span that margins are counted in.
+    """One limit: its name, the bound, True if it is a lower bound, the span in which margins are counted.
 
     `span` is max - min where there are two bounds, else the distance of the bound from the value's natural
     end (0 for angles, 1 for the singularity index). `quantity` is what it bounds (`STRUT` and so on); the limits of
@@ -49,12 +49,12 @@ class Limit:
 
 
 def machine_limits(machine: MachineTool) -> tuple[Limit, ...]:
-    """The finite limits of a machine, in the order of `reach`'s columns."""
+    """Finite limits of a machine, in the order of `reach`'s columns."""
     return _finite_limits(machine)[0]
 
 
 def _finite_limits(machine: MachineTool) -> tuple[tuple[Limit, ...], list[int]]:
-    """The finite limits, and which they are of all."""
+    """Finite limits, and their numbers among all limits."""
 
     def finite() -> tuple[tuple[Limit, ...], list[int]]:
         everything = _all_limits(machine) if isinstance(machine, Hexapod) else _joint_limits(machine)
@@ -92,7 +92,7 @@ def _both_ends(name: str, quantity: str, low: float, high: float, unit: str) -> 
 
 
 def _joint_limits(machine: MachineTool) -> list[Limit]:
-    """Of a machine of any kind: its joints, the workspace, singularities, and that there are joint values at all."""
+    """Limits of a machine of any kind: joints, workspace, singularities, and existence of joint values."""
     bounds: list[Limit] = []
     for name, kind, (low, high) in zip(machine.joint_names, machine.joint_kinds, machine.joint_limits, strict=True):
         bounds += _both_ends(name, name, float(low), float(high), "mm" if kind == "linear" else "deg")
@@ -104,7 +104,7 @@ def _joint_limits(machine: MachineTool) -> list[Limit]:
 
 @dataclass(frozen=True)
 class Reach:
-    """How n poses stand to the limits.
+    """Margins of n poses to the limits.
 
     Attributes
     ----------
@@ -125,11 +125,11 @@ class Reach:
 
     @property
     def reachable(self) -> BoolArray:
-        """(n,) whether every limit is kept."""
+        """(n,) True where every limit is kept."""
         return np.asarray(self.margin >= 0.0)
 
     def describe(self, i: int) -> str:
-        """Which limit pose i meets or breaks, and by how much, in words and shop units."""
+        """Words on the limit that pose i meets or breaks, and by how much, in shop units."""
         if not self.limits:
             return "no limit"
         limit = self.limits[int(self.limit[i])]
@@ -198,27 +198,27 @@ def reach(
 def _bounded(
     machine: MachineTool, tip: FloatArray, stance: Struts | Stance, rotation: ArrayLike | None
 ) -> list[FloatArray]:
-    """(n,) values of each of the machine's limits, those that are infinite too."""
+    """(n,) values for each of the machine's limits, including infinite ones."""
     joints, tips = ([column for column in values.T for _ in range(2)] for values in (stance.joints, tip))
     if isinstance(stance, Struts):
         hexapod = as_hexapod(machine, "a pose of struts")
         angles = [column for values in joint_angles(hexapod, stance, rotation) for column in values.T]
         return [*joints, *angles, *tips, singularity_index(hexapod, stance)]
-    beyond = np.where(np.isnan(stance.joints).any(axis=1), -np.inf, np.inf)  # nan is nearer to no other limit
+    beyond = np.where(np.isnan(stance.joints).any(axis=1), -np.inf, np.inf)  # where nan, no other limit is nearer
     return [*joints, *tips, *machine.singularities(stance).T, beyond]
 
 
 def solved(
     machine: MachineTool, position: FloatArray, rotation: FloatArray | None = None, tool_length: ArrayLike = np.nan
 ) -> Struts | Stance:
-    """How a machine stands at n poses; arguments as of `MachineTool.solve`."""
+    """Stance of a machine at n poses; arguments as for `MachineTool.solve`."""
     if isinstance(machine, Hexapod):
         return solve_struts(machine, position, rotation, tool_length)
     return machine.solve(np.atleast_2d(position), rotation, tool_length)
 
 
 def stand(machine: MachineTool, pose: ArrayLike) -> tuple[FloatArray, Struts | Stance, Reach]:
-    """A pose (6,), m and rad, how the machine stands there, and how that is to the limits."""
+    """Tip of a pose (6,), m and rad, the machine's stance there, and its margins to the limits."""
     values = np.asarray(pose, dtype=float)
     turn = rotation_matrices(values[None, 3:])
     stance = solved(machine, values[None, :3], turn)
@@ -226,7 +226,7 @@ def stand(machine: MachineTool, pose: ArrayLike) -> tuple[FloatArray, Struts | S
 
 
 def upright_middle(machine: MachineTool) -> Pose:
-    """The place farthest from all limits with the tool upright, by draws in ever smaller boxes around the best."""
+    """Place farthest from all limits with the tool upright, by random draws in shrinking boxes around the best."""
     rng, best = np.random.default_rng(0), np.zeros(3)
     for half in WIDEST * 0.5 ** np.arange(ROUNDS):
         places = best + half * rng.uniform(-1.0, 1.0, (DRAWN, 3))
@@ -237,7 +237,7 @@ def upright_middle(machine: MachineTool) -> Pose:
 
 
 def working_box(machine: MachineTool) -> FloatArray:
-    """(2, 3) m, lower and upper corner of where program zero may sit: the stated workspace, else the reach from it."""
+    """(2, 3) m, corners of the box where program zero may sit: the stated workspace, otherwise the reach from it."""
     stated, origin = machine.limits.workspace, np.array(machine.default_origin[:3])
     if isinstance(machine, Hexapod) or np.isfinite(stated).all():
         return stated
@@ -245,11 +245,11 @@ def working_box(machine: MachineTool) -> FloatArray:
     return np.where(np.isfinite(stated), stated, origin + ends * [[-1.0], [1.0]])
 
 
-RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and how many: each goes on where the one before found a limit
+RAY_STEPS = ((0.05, 100), (1e-3, 50), (5e-5, 20))  # m, and number: each series continues from the step before the limit
 
 
 def reach_along(machine: MachineTool, start: FloatArray, directions: FloatArray, turn: FloatArray) -> FloatArray:
-    """(n,) m that the tool tip can go from a place (3,) along unit vectors (n, 3) before the first limit.
+    """(n,) m that the tool tip can move from a place (3,) along unit vectors (n, 3) before the first limit.
 
     `turn` (3, 3) is the orientation, which is kept. 0 where the place itself is out of reach.
     """
@@ -263,13 +263,13 @@ def reach_along(machine: MachineTool, start: FloatArray, directions: FloatArray,
     return length
 
 
-# A cosine above this is no measure of an angle: rounding moves the arc cosine by more than 1e-15 rad.
+# Above this a cosine does not determine its angle: rounding moves the arc cosine by more than 1e-15 rad.
 NEARLY_ONE = 0.98
 
 
 @dataclass
 class Extremes:
-    """The values of n poses that come nearest to a limit, found once for each kind of limit.
+    """Values of n poses closest to a limit, found once for each kind of limit.
 
     It gives what `reach` gives of poses whose strut lengths and determinants are known already: a kernel of the
     stiffness has both, and reach by itself takes ten times as long.
@@ -300,7 +300,7 @@ class Extremes:
 
     @cached_property
     def kinds(self) -> list[tuple[Limit, IntArray]]:
-        """Of each quantity and side one limit, and the columns of the machine's limits that are of its kind."""
+        """One limit for each quantity and side, and the columns of the machine's limits of that kind."""
 
         def kinds() -> list[tuple[Limit, IntArray]]:
             limits = machine_limits(self.machine)
@@ -327,7 +327,7 @@ class Extremes:
 
     @cached_property
     def margin(self) -> FloatArray:
-        """(n,) smallest margin to any limit, inf without limits."""
+        """(n,) smallest margin to any limit; inf without limits."""
         n = self.position.shape[1]
         margin, nearest, apart = np.full(n, np.inf), np.empty(n), np.empty(n)
         for span in dict.fromkeys(limit.span for limit, _ in self.kinds):  # as `Limit.margin`, but divided once
@@ -341,7 +341,7 @@ class Extremes:
         return margin
 
     def reach(self) -> tuple[Reach, BoolArray]:
-        """As of `reach`; (n,) false where an angle too small for its cosine decides, and `reach` must be asked."""
+        """`Reach` of the poses; (n,) False where an angle too small for its cosine decides, and `reach` is needed."""
         n = self.position.shape[1]
         margin, value, which = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, dtype=np.int64)
         for number, (limit, _) in enumerate(self.kinds):
@@ -361,7 +361,7 @@ class Extremes:
         return Reach(margin, column, value, machine_limits(self.machine)), sure
 
     def of(self, limit: Limit) -> FloatArray:
-        """(n,) the extreme values of a limit's quantity."""
+        """(n,) extreme values of a limit's quantity."""
         if limit.quantity == STRUT:
             return self.shortest if limit.lower else self.longest
         if limit.quantity in (FRAME, PLATFORM):
@@ -371,14 +371,14 @@ class Extremes:
         return np.asarray(self.position[AXES.index(limit.quantity)])
 
     def _strut(self, limit: Limit, rows: IntArray) -> IntArray:
-        """(k,) the strut or joint that has the extreme value, of some poses; the first of several."""
+        """(k,) strut or joint that has the extreme value, at some poses; the first of several."""
         values = self.lengths if limit.quantity == STRUT else self._joints(limit.quantity)[0]
         some = np.ascontiguousarray(values[:, rows].T)
         lowest = limit.lower or limit.quantity != STRUT  # the smallest cosine is the largest angle
         return np.asarray(some.argmin(axis=1) if lowest else some.argmax(axis=1))
 
     def _joints(self, quantity: str) -> tuple[FloatArray, FloatArray]:
-        """(6, n) cosines of the angles of the frame's or the platform's joints, and (n,) rad, the largest angle."""
+        """(6, n) cosines of the angles of the frame or platform joints, and (n,) rad, the largest angle."""
         frame, platform = neutral_axes(self.machine)
         name = FRAME if self.rotation is None and bool((frame == platform).all()) else quantity
         if name not in self.joints:

@@ -1,102 +1,34 @@
-"""Machines of LinuxCNC's kinematics modules besides genhexkins: pins of HAL files, limits and units of ini files.
+"""Machines of LinuxCNC's kinematics modules besides genhexkins: files whose compliances are left to fill in.
 
-trivkins(9), 5axiskins(9), xyzac-trt-kins(9), xyzbc-trt-kins(9), genserkins(9), pumakins(9), pentakins(9) and
-lineardeltakins(9); their units are those of the machine, angles of genserkins' rows in rad, limits in degrees.
+trivkins(9), 5axiskins(9), xyzac-trt-kins(9), xyzbc-trt-kins(9), genserkins(9), pumakins(9), pentakins(9),
+lineardeltakins(9) and rotarydeltakins(9); their units are those of the machine, angles of genserkins' rows in rad,
+limits in degrees.
 """
 
-import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.machine.linuxcnc import read_pins
+from toolpath_stiff.machine.linuxcnc_files import ControlFiles
 from toolpath_stiff.machine.unfilled import EXPERIENCE, JOINTS, SPINDLE, axis_row, carriages, file_text, section
-from toolpath_stiff.units import deg_from_rad, m_from_mm, mm_from_m, rad_from_deg
+from toolpath_stiff.units import deg_from_rad, mm_from_m
 
-PIN = re.compile(r"(?m)^\s*setp\s+([\w-]+)\.")
 GIVE = dict.fromkeys(("translation_nm_per_N", "rotation_nrad_per_Nm"))
 STRUT = f"# A strut with both joints has typically 10 to 30 nm/N ({EXPERIENCE}).\n"
 TABLE = '# The files do not say which axes carry the work: an element with moves_with = ["-X"] does, of X'
 RADIANS = 2.0 * np.pi + 0.01
 
 
-@dataclass(frozen=True)
-class ControlFiles:
-    """What HAL and ini files of one machine say: pins of its kinematics in mm, limits by joint in mm or degrees.
-
-    `coordinates` are the letters of the joints, "" where nobody says.
-    """
-
-    file: str
-    module: str
-    scale: float
-    pins: dict[str, float]
-    limits: dict[int, FloatArray]
-    coordinates: str = ""
-
-    def pin(self, name: str, default: float | None = None) -> float:
-        """The value of a pin. Raises `InputError` where it must be set and is not."""
-        if name not in self.pins and default is None:
-            raise InputError(f"{self.module}.{name} is not set", expected=f"setp {self.module}.{name}", file=self.file)
-        return self.pins.get(name, default or 0.0)
-
-    def length(self, name: str, default: float | None = None) -> float:
-        """Mm of a pin."""
-        return self.pin(name, default) * self.scale
-
-    def bounds(self, joint: int, linear: bool) -> FloatArray | None:
-        """M or rad; None: nobody says."""
-        if joint not in self.limits:
-            return None
-        return m_from_mm(self.limits[joint] * self.scale) if linear else rad_from_deg(self.limits[joint])
-
-    def limits_of(self, axes: str, letters: str) -> Document:
-        """Keys of [limits] by letter, None where nobody says; `letters` are the joints' unless the files name them."""
-        letters = self.coordinates or letters
-        keys: dict[str, FloatArray | None] = {}
-        for axis in axes:
-            linear = axis in "XYZ"
-            bounds = self.bounds(letters.index(axis), linear) if axis in letters else None
-            shop = mm_from_m if linear else deg_from_rad
-            keys[f"{axis}_{'mm' if linear else 'deg'}"] = None if bounds is None else shop(bounds)
-        return keys
-
-
-def control_files(hal: str, ini: str, module: str, scale: float, file: str) -> ControlFiles:
-    """From the texts of both. Raises `InputError` for a pin that is no number."""
-    limits: dict[int, dict[str, float]] = {}
-    joint = -1
-    for line in ini.splitlines():
-        if heading := re.match(r"\s*\[(\w+)\]", line):
-            number = re.fullmatch(r"JOINT_(\d+)", heading[1])
-            joint = int(number[1]) if number else -1
-        elif joint >= 0 and (bound := re.match(r"\s*(MIN|MAX)_LIMIT\s*=\s*([-+.\deE]+)", line)):
-            limits.setdefault(joint, {})[bound[1]] = float(bound[2])
-    both = {n: np.array([ends["MIN"], ends["MAX"]]) for n, ends in limits.items() if len(ends) == 2}
-    letters = re.search(r"(?im)^\s*KINEMATICS\s*=.*coordinates\s*=\s*([A-Z]+)", ini)
-    letters = letters or re.search(r"(?m)^\s*COORDINATES\s*=\s*([A-Z ]+)", ini)
-    pins = read_pins(hal, module, file)
-    return ControlFiles(file, module, scale, pins, both, letters[1].replace(" ", "") if letters else "")
-
-
-def module_of(hal: str, ini: str) -> str:
-    """The kinematics module that the files load; "" where they load none that is known."""
-    named = re.search(r"(?m)^\s*KINEMATICS\s*=\s*([\w-]+)", ini)
-    words = [named[1]] if named else re.findall(r"(?m)^\s*loadrt\s+([\w-]+)", hal) + PIN.findall(hal)
-    return next((word for word in words if word in (*KINDS, "genhexkins", "rotarydeltakins")), "")
-
-
 def machine_from_control(files: ControlFiles, name: str) -> tuple[str, list[str]]:
     """A machine file and notes. Raises `InputError` for pins that are missing and modules without a kind."""
-    if files.module not in KINDS:
-        known = ", ".join(("genhexkins", *KINDS))
+    if files.module not in MODULES:
+        known = ", ".join(("genhexkins", *MODULES))
         raise InputError(f"no machine of {files.module or 'a kinematics module'}", expected=known, file=files.file)
-    kind, parts = KINDS[files.module](files)
+    kind, parts = MODULES[files.module](files)
     notes = [f"Made from {files.file}: {files.module}."]
+    notes += [f"{pin} is not set: 0, as {files.module} has it then" for pin in files.unset]
     return file_text(name, kind, f"{files.module} pins of {files.file}", notes, parts), notes
 
 
@@ -135,7 +67,7 @@ def _head(files: ControlFiles) -> tuple[str, list[str]]:
 
 
 def _rows(files: ControlFiles, rows: list[tuple[float, float, float]]) -> tuple[str, list[str]]:
-    """Modified DH rows of alpha in rad, a and d in mm."""
+    """`[[axis]]` rows by modified DH, from alpha in rad, a and d in mm."""
     parts = []
     for i, (alpha, a, d) in enumerate(rows):
         if abs(alpha) > RADIANS:
@@ -183,7 +115,18 @@ def _delta(files: ControlFiles) -> tuple[str, list[str]]:
     return "delta", [note + section("", {"rod_length_mm": files.length("L"), **joints, **rest}), *parts, SPINDLE]
 
 
-KINDS: dict[str, Callable[[ControlFiles], tuple[str, list[str]]]] = {
+def _rotary_delta(files: ControlFiles) -> tuple[str, list[str]]:
+    radii = {"hip_radius_mm": files.length("platformradius"), "effector_joint_radius_mm": files.length("footradius")}
+    rest = {"rod_length_mm": files.length("shinlength"), "rod_spacing_mm": None, "effector_joint_height_mm": None}
+    limits = section("[limits]", {"arm_deg": files.limits.get(0)})
+    parts = [
+        section("[rod]", {"compliance_nm_per_N": None}),
+        section("[arm]", {"length_mm": files.length("thighlength"), **GIVE}),
+    ]
+    return "rotary_delta", [section("", {**radii, **rest}), limits, *parts, SPINDLE]
+
+
+MODULES: dict[str, Callable[[ControlFiles], tuple[str, list[str]]]] = {
     "trivkins": _mill,
     "5axiskins": _head,
     "xyzac-trt-kins": _trunnion,
@@ -192,4 +135,5 @@ KINDS: dict[str, Callable[[ControlFiles], tuple[str, list[str]]]] = {
     "pumakins": _puma,
     "pentakins": _penta,
     "lineardeltakins": _delta,
+    "rotarydeltakins": _rotary_delta,
 }

@@ -1,4 +1,4 @@
-"""What a machine is; a six-strut one: joints, tool, strut law, platform bars, limits. SI units.
+"""Machine models: any machine, and the hexapod with joints, tool, strut law, platform bars, limits. SI units.
 
 Every quantity carries its origin: "published", "recovered" (from published figures), "assumed", or "fitted" (to
 measurements, by `tps update`). How well fitted parameters are known is `Uncertainty`: standard deviations in the units
@@ -30,7 +30,7 @@ ORIGINS = ("published", "recovered", "assumed", "fitted")
 
 STRUT_LAW = ("strut_law.stiffness_1_N_per_um", "strut_law.stiffness_2_N_per_um")
 CONSTANT_LAW = ("strut_law.stiffness_N_per_um",)
-NO_END = 1e3  # m, the room of a law that holds at every length: finite, because a search takes differences of it
+NO_END = 1e3  # m, room of a law valid at every length: finite, as a search takes differences of it
 
 
 @dataclass(frozen=True)
@@ -62,13 +62,13 @@ class StrutLaw:
     constant: bool = False
 
     def __post_init__(self) -> None:
-        """One stiffness at both ends of a constant law, also after `dataclasses.replace`."""
+        """Set one stiffness at both ends of a constant law, also after `dataclasses.replace`."""
         if self.constant:
             object.__setattr__(self, "stiffness_2", self.stiffness_1)
 
     @classmethod
     def table(cls, lengths: FloatArray, stiffnesses: FloatArray) -> StrutLaw:
-        """Through three or more points: (p,) m, rising, and (p,) N/m, more than 0."""
+        """Law through three or more points: (p,) m, rising, and (p,) N/m, more than 0."""
         ends = cls(float(lengths[0]), float(stiffnesses[0]), float(lengths[-1]), float(stiffnesses[-1]))
         factors = stiffnesses / ends.stiffness(lengths)
         factors[[0, -1]] = 1.0
@@ -86,7 +86,7 @@ class StrutLaw:
 
     @property
     def points(self) -> list[tuple[float, float]]:
-        """Length in m and stiffness in N/m of each point that the law runs through; of a constant law one."""
+        """Length in m and stiffness in N/m of each point of the law; one point for a constant law."""
         if self.constant:
             return [(self.length_1, self.stiffness_1)]
         if not self.shape:
@@ -107,7 +107,7 @@ class StrutLaw:
         return self.stiffness_1 - self.slope * self.length_1
 
     def stiffness(self, length: FloatArray) -> FloatArray:
-        """Stiffness k(L) in N/m, of any shape. At or below 0 the law has been carried too far."""
+        """Stiffness k(L) in N/m, of any shape. At or below 0, extrapolation has gone too far."""
         if not self.shape:
             return self._straight(length)
         lengths, stiffnesses = np.array(self.points).T
@@ -126,7 +126,7 @@ class StrutLaw:
         return float(stiffnesses[i]) - slope * float(lengths[i]), slope
 
     def weights(self, length: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What each of its two constants counts in the stiffness: k(L) = k1 first + k2 second.
+        """Weights of the two constants in the stiffness: k(L) = k1 first + k2 second.
 
         Of a table both share a point as on the straight line between the ends, times the shape: they do not change
         when the ends do. Of a constant law the first is all.
@@ -141,25 +141,25 @@ class StrutLaw:
         return _piecewise(length, lengths, factors * (1.0 - second)), _piecewise(length, lengths, factors * second)
 
     def room(self, length: FloatArray) -> FloatArray:
-        """How far lengths lie inside the range that the law was given for, m; negative outside; `NO_END`: no range."""
+        """Distance of lengths inside the range of the law, m; negative outside; `NO_END` without a range."""
         return self.room_of(length, length)
 
     def room_of(self, shortest: FloatArray, longest: FloatArray) -> FloatArray:
-        """How far the shortest and the longest of some lengths lie inside that range, m."""
+        """Distance of the shortest and longest of some lengths inside the range of the law, m."""
         if self.constant:
             return np.asarray(NO_END + 0.0 * (shortest + longest))  # nan stays nan
-        # Half a micrometre: a pose that lands on an end of the range by construction is not outside it.
+        # Half a micrometre, so that a pose on an end of the range by construction is not outside it.
         slack = 5e-7
         low, high = sorted((self.length_1, self.length_2))
         return np.asarray(np.minimum(shortest - (low - slack), (high + slack) - longest))
 
     def extrapolates(self, length: FloatArray) -> BoolArray:
-        """Whether a length lies outside the range that the law was given for."""
+        """True where a length lies outside the range of the law."""
         return np.asarray(self.room(length) < 0.0)
 
 
 def _piecewise(position: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
-    """Linear between values (p,) at rising knots (p,), at positions of any shape; the end pieces go on outside."""
+    """Linear interpolation of values (p,) at rising knots (p,), at positions of any shape; end pieces go on outside."""
     i = _segment(position, knots)
     slope = (values[1:] - values[:-1]) / (knots[1:] - knots[:-1])
     return np.asarray(values[i] + slope[i] * (position - knots[i]))
@@ -171,7 +171,7 @@ def _segment(position: FloatArray, knots: FloatArray) -> IntArray:
 
 @dataclass(frozen=True)
 class Limits:
-    """What the machine can reach. Lengths in m, angles in rad; inf or -inf: no limit.
+    """Limits of the machine's reach. Lengths in m, angles in rad; inf or -inf: no limit.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class EffectEntry:
-    """One `[[effect]]` or `[[instrument]]` of a machine file: its name, parameters in their own units, provenance.
+    """One `[[effect]]` or `[[instrument]]` of a machine file: name, parameters in their own units, provenance.
 
     `file` and `lines` (key -> line, "" for the heading) say where it stands; they do not make entries differ.
     """
@@ -210,7 +210,7 @@ class EffectEntry:
     lines: Mapping[str, int] = field(default_factory=dict, compare=False)
 
     def error(self, mistake: str, key: str = "", expected: str = "", hint: str = "", where: str = "") -> InputError:
-        """An error at one of its keys, or at its heading; `where` names an entry that no file holds."""
+        """Error at one of its keys, or at its heading; `where` names an entry that is in no file."""
         line = self.lines.get(key, self.lines.get(""))
         text = mistake if self.file or not where else f"{where}: {mistake}"
         return EffectError(text, expected=expected, hint=hint, file=self.file or None, line=line)
@@ -218,7 +218,7 @@ class EffectEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class MachineTool:
-    """What every machine has, whatever holds its tool, SI units.
+    """Base of all kinds of machines, SI units.
 
     A kind is a subclass: `Hexapod`, or one whose file describes what of its load path gives way (`elements`).
 
@@ -271,7 +271,7 @@ class MachineTool:
     text: str = field(default="", repr=False)
 
     def once(self, key: object, make: Callable[[], Derived]) -> Derived:
-        """What `make` computes of this machine, computed once: it never changes, `with_changes` makes another."""
+        """Result of `make` for this machine, computed once: machines never change, `with_changes` makes another."""
         known: dict[object, Any] = self.__dict__.setdefault("_derived", {})
         if key not in known:
             known[key] = make()
@@ -279,37 +279,42 @@ class MachineTool:
         return derived
 
     def with_changes(self, **changes: Any) -> Self:
-        """A copy with some attributes replaced."""
+        """Copy with some attributes replaced."""
         return replace(self, **changes)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Of the j joints that the control moves."""
+        """Names of the j joints that the control moves."""
         raise NotImplementedError
 
     @property
     def joint_kinds(self) -> tuple[str, ...]:
-        """Of each joint "linear" or "rotary"."""
+        """Kind of each joint, "linear" or "rotary"."""
         return ("linear",) * len(self.joint_names)
 
     @property
     def joint_limits(self) -> FloatArray:
-        """(j, 2) m or rad, low and high; -inf and inf: none."""
+        """(j, 2) m or rad, low and high; -inf and inf: none, or a joint that stands."""
         return np.tile([-np.inf, np.inf], (len(self.joint_names), 1))
 
     @property
+    def standing_joints(self) -> dict[str, float]:
+        """Joint that no pose takes, such as a rail -> m or rad where it stands."""
+        return {}
+
+    @property
     def joint_speeds(self) -> FloatArray:
-        """(j,) m/s or rad/s that the joints reach; inf: nobody says."""
+        """(j,) m/s or rad/s, largest speed of the joints; inf if not stated."""
         return np.full(len(self.joint_names), np.inf)
 
     @property
     def configurations(self) -> tuple[str, ...]:
-        """Names of the ways to hold the same pose, one where there is no choice."""
+        """Names of the ways to reach the same pose; a single one if there is no choice."""
         return ("",)
 
     @property
     def singularity_names(self) -> tuple[str, ...]:
-        """Of the s measures that vanish where the machine is singular."""
+        """Names of the s measures that vanish where the machine is singular."""
         return ()
 
     @property
@@ -318,20 +323,20 @@ class MachineTool:
         return ()
 
     def singularities(self, stance: Stance) -> FloatArray:
-        """(n, s) the measures at n poses."""
+        """(n, s) measures at n poses."""
         return np.empty((len(stance.joints), 0))
 
     @property
     def elements(self) -> tuple[Element, ...]:
-        """What gives way, in the order of `Stance.loads`."""
+        """Compliant elements, in the order of `Stance.loads`."""
         raise NotImplementedError
 
     def rotation_of(self, abc: FloatArray) -> FloatArray:
-        """(n, 3, 3) orientation of the tool in work axes of programmed angles (n, 3) rad: roll, pitch, yaw."""
+        """(n, 3, 3) orientation of the tool in work axes for programmed angles (n, 3) rad: roll, pitch, yaw."""
         return rotation_matrices(abc)
 
     def angles_of(self, abc: FloatArray) -> FloatArray:
-        """(n, 3) rad, roll, pitch, yaw of the tool in work axes of programmed angles (n, 3) rad."""
+        """(n, 3) rad, roll, pitch, yaw of the tool in work axes for programmed angles (n, 3) rad."""
         plain = type(self).rotation_of is MachineTool.rotation_of or not abc.any()
         return abc if plain else roll_pitch_yaw(self.rotation_of(abc))
 
@@ -343,7 +348,7 @@ class MachineTool:
         configuration: int | None = None,
         start: FloatArray | None = None,
     ) -> Stance:
-        """How the machine stands at n poses, the inverse kinematics.
+        """Stance at n poses, by inverse kinematics.
 
         Parameters
         ----------
@@ -361,27 +366,27 @@ class MachineTool:
     def stances(
         self, position: FloatArray, rotation: FloatArray | None = None, tool_length: ArrayLike = np.nan
     ) -> Iterable[Stance]:
-        """Of each configuration in turn how the machine stands; what elements carry may be left out."""
+        """Stance in each configuration in turn; the loads of elements may be left out."""
         return (self.solve(position, rotation, tool_length, i) for i in range(len(self.configurations)))
 
     def forward(self, joints: FloatArray, tool_length: ArrayLike = np.nan) -> tuple[FloatArray, FloatArray]:
-        """(n, 3) m, the tip, and (n, 3, 3), the tool's axes, in work axes, of joints (n, j) m or rad."""
+        """(n, 3) m, the tip, and (n, 3, 3), the tool's axes, in work axes, for joints (n, j) m or rad."""
         raise NotImplementedError
 
     def weight_loads(self, stance: Stance) -> FloatArray:
-        """(n, r) N and N m, all loads of the elements, one after the other, under the machine's own weight."""
+        """(n, r) N and N m, loads of all elements, one after the other, under the machine's own weight."""
         return np.zeros((len(stance), sum(load.compliance.shape[-1] for load in stance.loads)))
 
     def standing(self, joints: FloatArray, tool_length: ArrayLike = np.nan) -> Stance:
-        """How the machine stands at joint values (n, j) m or rad, with tools of a length, m."""
+        """Stance at joint values (n, j) m or rad, with tools of a length, m."""
         return self.solve(*self.forward(joints, tool_length), tool_length)
 
     def joint_of(self, element: str) -> int:
-        """Number of the joint that an element is. Raises `InputError` where it is none."""
+        """Number of the joint that an element is. Raises `InputError` if it is none."""
         raise InputError(f"machine {self.name}: element {element!r} is no joint that turns")
 
     def with_longer_link(self, joint: int, by: float) -> Self:
-        """The machine with a joint further from the one before it, m."""
+        """Machine with a joint moved further from the previous one, m."""
         return self
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
@@ -389,7 +394,7 @@ class MachineTool:
         raise NotImplementedError
 
     def extension(self, tool_length: ArrayLike) -> FloatArray:
-        """M by which tools are longer than the reference tool; nan of either, the reference tool's: 0."""
+        """Length in m of tools beyond the reference tool; 0 if either length is nan."""
         return np.nan_to_num(np.asarray(tool_length, dtype=float) - self.reference_tool_length)
 
 
@@ -423,17 +428,17 @@ class Hexapod(MachineTool):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """The struts."""
+        """Names of the struts."""
         return tuple(f"strut{i}" for i in range(1, 7))
 
     def platform_joints_for(self, tool_length: ArrayLike) -> FloatArray:
-        """(6, 3) m, or (n, 6, 3) for n lengths: platform joints relative to the tip of such a tool, nan: of reference.
+        """(6, 3) m, or (n, 6, 3) for n lengths: platform joints relative to a tool's tip; nan: the reference tool.
 
         A longer tool puts the joints further above the tip, along the spindle axis.
         """
         length = np.asarray(tool_length, dtype=float)
         if length.size and (np.isnan(length).all() or np.ptp(length) == 0.0):
-            length = length.flat[0]  # one for all: the kinematics is then cheaper
+            length = length.flat[0]  # the same for all poses: kinematics are then cheaper
         if np.ndim(length) == 0 and np.isnan(length):
             return self.platform_joints
         extension = np.where(np.isnan(length), 0.0, length - self.reference_tool_length)
@@ -441,7 +446,7 @@ class Hexapod(MachineTool):
 
 
 def as_hexapod(machine: MachineTool, asking: str) -> Hexapod:
-    """The machine of six struts. Raises `InputError` of another kind: `asking` begins the sentence."""
+    """The machine as a hexapod. Raises `InputError` for another kind; `asking` begins the sentence."""
     if isinstance(machine, Hexapod):
         return machine
     mistake = f"{asking} knows machines of six struts only: {machine.name} is of kind {machine.kind}"
@@ -471,7 +476,7 @@ class Uncertainty:
 
     @classmethod
     def of(cls, names: Sequence[str], covariance: FloatArray) -> Uncertainty:
-        """From a covariance (p, p) in the units of the keys."""
+        """Uncertainty from a covariance (p, p) in the units of the keys."""
         sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         scale = np.where(sd > 0.0, sd, 1.0)
         correlation = np.clip(covariance / np.outer(scale, scale), -1.0, 1.0)
@@ -480,18 +485,18 @@ class Uncertainty:
 
     @property
     def covariance(self) -> FloatArray:
-        """(p, p) in the units of the keys."""
+        """(p, p) covariance in the units of the keys."""
         return np.asarray(np.outer(self.sd, self.sd) * self.correlation)
 
     def without(self, names: Sequence[str]) -> Uncertainty:
-        """The same without some parameters."""
+        """Uncertainty without some parameters."""
         kept = [i for i, name in enumerate(self.names) if name not in names]
         errors = None if self.errors is None else self.errors.of(kept)
         correlation = self.correlation[np.ix_(kept, kept)]
         return Uncertainty(tuple(self.names[i] for i in kept), self.sd[kept], correlation, errors)
 
     def beside(self, other: Uncertainty) -> Uncertainty:
-        """Both, independent of each other; errors are known where both state them."""
+        """Uncertainty of both, independent of each other; errors are kept if both state them."""
         count = len(self.names)
         correlation = np.eye(count + len(other.names))
         correlation[:count, :count] = self.correlation

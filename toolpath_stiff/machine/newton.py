@@ -8,11 +8,11 @@ from toolpath_stiff.arrays import FloatArray
 
 Equations = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 TOLERANCE, MOST_STEPS = 1e-12, 60  # of the residuals, m and rad; steps
-DAMPING = 1e-9  # of the squared size of a jacobian: steps stay finite where it is singular, and do not slow down else
+DAMPING = 1e-9  # of the squared size of a jacobian: keeps steps finite where it is singular, without slowing others
 
 
 def newton(equations: Equations, start: FloatArray, largest: FloatArray | float) -> FloatArray:
-    """(n, k) unknowns at which residuals vanish, from a start (n, k); nan where no step leads there.
+    """(n, k) unknowns at which residuals vanish, from a start (n, k); nan where it does not converge.
 
     `equations` gives residuals (n, m) and their slopes (n, m, k); a step is at most `largest`, in all or (k,).
     """
@@ -20,7 +20,7 @@ def newton(equations: Equations, start: FloatArray, largest: FloatArray | float)
     residual = np.empty((len(start), 0))
     for _ in range(MOST_STEPS):
         residual, slopes = equations(values)
-        last = not (np.abs(residual).max(axis=1) > TOLERANCE).any()  # one step more reaches the last digits
+        last = not (np.abs(residual).max(axis=1) > TOLERANCE).any()  # one more step reaches the last digits
         transposed = np.swapaxes(slopes, 1, 2)
         normal = transposed @ slopes
         size = np.trace(normal, axis1=1, axis2=2)[:, None, None]

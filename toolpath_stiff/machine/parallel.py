@@ -1,4 +1,4 @@
-"""Machines whose tool is held by six rods, struts or constraint wrenches, whatever moves their other ends.
+"""Machines whose tool is held by six rods, struts or constraint wrenches, whatever moves their far ends.
 
 The platform's equilibrium gives the six forces, the rods' feet and carriages carry them on.
 """
@@ -52,12 +52,15 @@ class Legs:
         (n, 6, 3) m from the tip to a point of each line of force.
     compliance
         (n, 6) m/N.
+    turns
+        (n, c, 3, 3) axes of the bodies that carry legs, in base axes, of which their own are given; None: the base's.
     """
 
     joints: FloatArray
     directions: FloatArray
     arms: FloatArray
     compliance: FloatArray
+    turns: FloatArray | None = None
 
     @cached_property
     def determinant(self) -> FloatArray:
@@ -69,7 +72,7 @@ class Legs:
 
 @dataclass(frozen=True, kw_only=True)
 class Parallel(MachineTool):
-    """What machines of six legs share.
+    """Base of machines with six legs.
 
     Attributes
     ----------
@@ -86,7 +89,7 @@ class Parallel(MachineTool):
     """
 
     beyond: ClassVar[str] = "no lengths of the legs reach the pose"
-    turns: ClassVar[int] = 3  # how many of roll, pitch and yaw the tool takes
+    turns: ClassVar[int] = 3  # number of the angles roll, pitch, yaw that the tool can take
 
     joint_range: tuple[float, float]
     legs: tuple[Element, ...]
@@ -96,25 +99,25 @@ class Parallel(MachineTool):
 
     @abstractmethod
     def legs_at(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> Legs:
-        """The legs at tips (n, 3) m and tool axes (n, 3, 3), of tools (n,) m longer than the reference tool."""
+        """Legs at tips (n, 3) m and tool axes (n, 3, 3), for tools (n,) m longer than the reference tool."""
 
     @abstractmethod
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
-        """(n, 6, 3) m each, base axes: where the legs begin and end, for pictures."""
+        """(n, 6, 3) m each, base axes: beginnings and ends of the legs, for pictures."""
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the carriages that move, or of the struts that change their length."""
+        """Names of the carriages that move, or of the struts that change length."""
         return tuple(part.element.name for part in self.carriages) or tuple(leg.name for leg in self.legs[:5])
 
     @property
     def joint_limits(self) -> FloatArray:
-        """(j, 2) m."""
+        """(j, 2) m, low and high."""
         return np.tile(self.joint_range, (len(self.joint_names), 1))
 
     @property
     def elements(self) -> tuple[Element, ...]:
-        """What gives way: legs, carriages, other bodies."""
+        """Compliant elements: legs, carriages, other bodies."""
         others = [part.element for part in (*self.carriages, *self.bodies)]
         return (*self.legs, *others)
 
@@ -126,7 +129,7 @@ class Parallel(MachineTool):
         configuration: int | None = None,
         start: ArrayLike | None = None,
     ) -> Stance:
-        """How the machine stands with its tip at (n, 3) m and tool axes (n, 3, 3); None: along z.
+        """Stance with the tip at (n, 3) m and tool axes (n, 3, 3); None: along z.
 
         There is no choice: `configuration` and `start` are there as of other kinds.
         """
@@ -137,15 +140,16 @@ class Parallel(MachineTool):
         loads: list[Spring | LoadRows] = [
             LoadRows(forces[:, i : i + 1], legs.compliance[:, i : i + 1]) for i in range(len(self.legs))
         ]
-        for carriage in self.carriages:
-            rods = list(carriage.rods)
-            carried = body_under_rods(forces[:, rods], legs.directions[:, rods], carriage.to_joints, carriage.axes)
+        for i, carriage in enumerate(self.carriages):
+            rods, turn = list(carriage.rods), np.eye(3) if legs.turns is None else legs.turns[:, i]
+            to_joints = carriage.to_joints @ np.swapaxes(turn, -1, -2)
+            carried = body_under_rods(forces[:, rods], legs.directions[:, rods], to_joints, turn @ carriage.axes)
             loads.append(LoadRows(carried, carriage.compliance))
         frames = [Frame(np.eye(3)[..., None], np.zeros((3, 1))), Frame(columns_of(axes), tip.T)]
         return Stance(
             joints=legs.joints,
             position=tip,
-            rotation=None if rotation is None else axes,
+            rotation=axes,
             work_axes=None,
             configuration=np.zeros(len(tip), dtype=np.int64),
             loads=(*loads, *(body.spring(frames) for body in self.bodies)),
@@ -159,7 +163,7 @@ class Parallel(MachineTool):
     def forward(
         self, joints: ArrayLike, tool_length: ArrayLike = np.nan, start: ArrayLike | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Tip (n, 3) m and tool axes (n, 3, 3) of joints (n, j) m, near the neutral pose or a start.
+        """Tip (n, 3) m and tool axes (n, 3, 3) for joints (n, j) m, near the neutral pose or a start.
 
         A start is x, y, z and the angles that the tool takes, m and rad. Raises `InputError` where no pose near it has
         such joints.
@@ -185,7 +189,7 @@ class Parallel(MachineTool):
 
     @property
     def singularity_names(self) -> tuple[str, ...]:
-        """One measure, of all legs together."""
+        """Name of the one measure, of all legs together."""
         return ("legs",)
 
     @property
@@ -200,12 +204,11 @@ class Parallel(MachineTool):
             pose = np.array(self.limits.neutral_pose)
             return float(self._legs(pose[None, :3], rotation_matrices(pose[None, 3:]), np.nan).determinant[0])
 
-        axes = np.eye(3) if stance.rotation is None else stance.rotation
-        axes = np.broadcast_to(axes, (len(stance), 3, 3))
-        return self._legs(stance.position, axes, np.nan).determinant[:, None] / self.once("neutral legs", neutral)
+        legs = self._legs(stance.position, stance.axes, np.nan)
+        return legs.determinant[:, None] / self.once("neutral legs", neutral)
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
-        """What a picture draws: names and polylines (n, p, 3) m, base axes."""
+        """Lines of a picture: names and polylines (n, p, 3) m, base axes."""
         begin, end = self.leg_ends(stance)
         legs = [
             (leg.name, np.stack([first, second], axis=1))

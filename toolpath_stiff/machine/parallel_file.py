@@ -1,4 +1,4 @@
-"""What files of machines with six legs share: limits, tool, bodies at base and tip."""
+"""Sections shared by files of machines with six legs: limits, tool, bodies at base and tip."""
 
 from dataclasses import replace
 from typing import Any
@@ -15,7 +15,7 @@ from toolpath_stiff.machine.serial_elements import ELEMENT, read_elements
 from toolpath_stiff.poses import pose_in_si
 from toolpath_stiff.units import m_from_mm, m_from_nm
 
-STILL: tuple[tuple[()], tuple[()]] = ((), ())  # no joints on either side: base and tip alone
+STILL: tuple[tuple[()], tuple[()]] = ((), ())  # no joints on either side, only base and tip
 LENGTH = Key(unit="mm", low=0.0, open_low=True)
 HEIGHT, PER_ROD = Key(unit="mm"), Key(unit="nm/N", low=0.0, high=1e7)
 CORNER = Key(unit="mm", shape=(3,), required=False)
@@ -33,7 +33,7 @@ TOP = {**NAMES, "convention": Key(text=True, required=False)}
 
 
 def shared_fields(toml: MachineToml, values: Sections) -> dict[str, Any]:
-    """Arguments of a machine of six legs that its own sections do not give."""
+    """Arguments of a machine of six legs that do not come from its own sections."""
     common = common_fields(toml, values)
     singularity, box = values.get("singularity", {}), values.get("workspace", {})
     corners = np.array([box.get("min_mm", np.full(3, -np.inf)), box.get("max_mm", np.full(3, np.inf))])
@@ -53,17 +53,17 @@ def shared_fields(toml: MachineToml, values: Sections) -> dict[str, Any]:
 
 
 def axial(name: str, count: int) -> tuple[Element, ...]:
-    """Struts or rods of this name, from 1 on."""
+    """Struts or rods of this name, numbered from 1."""
     return tuple(Element(f"{name} {i + 1}", "struts", ("axial",)) for i in range(count))
 
 
 def give_of(section: Document) -> FloatArray:
-    """(6,) m/N and rad/(N m) of the keys of `GIVE`."""
+    """(6,) m/N and rad/(N m) from the keys of `GIVE`."""
     return m_from_nm(np.concatenate([section[key] for key in GIVE]))
 
 
 def span(toml: MachineToml, section: str, keys: tuple[str, str], low: float, high: float) -> tuple[float, float]:
-    """M of two limits in mm, the first below the second."""
+    """Two limits given in mm, in m; the first must be below the second."""
     if not low < high:
         raise toml.fault(section, keys[1], f": {high:g} is not above {low:g}", expected="min below max, in mm")
     return m_from_mm(float(low)), m_from_mm(float(high))

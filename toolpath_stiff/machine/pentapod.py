@@ -74,12 +74,12 @@ class Pentapod(Parallel):
     hinge: float
 
     def rotation_of(self, abc: FloatArray) -> FloatArray:
-        """(n, 3, 3) Ry(B) Rx(A) of words A, B, C (n, 3) rad; C must be 0."""
+        """(n, 3, 3) Ry(B) Rx(A) for words A, B, C (n, 3) rad; C must be 0."""
         refuse_words(self.name, abc, "AB")
         return rotation_matrices(abc)
 
     def _rings(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n, 5, 3) m from the tip, base axes: base joints, and where the struts meet their rings."""
+        """(n, 5, 3) m each, from the tip, base axes: base joints, and points where the struts meet their rings."""
         to_base = self.base_joints - tip[:, None]
         local = to_base @ axes
         outwards = local[..., :2] / np.linalg.norm(local[..., :2], axis=-1, keepdims=True)
@@ -102,10 +102,8 @@ class Pentapod(Parallel):
         return Legs(lengths, directions, arms, np.concatenate([axial, turning[:, None]], axis=1))
 
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
-        """(n, 5, 3) m each: base joints, and where the struts meet their rings."""
-        n = len(stance)
-        axes = np.broadcast_to(np.eye(3) if stance.rotation is None else stance.rotation, (n, 3, 3))
-        to_base, rings = self._rings(stance.position, axes, np.zeros(n))
+        """(n, 5, 3) m each: base joints, and points where the struts meet their rings."""
+        to_base, rings = self._rings(stance.position, stance.axes, np.zeros(len(stance)))
         return stance.position[:, None] + to_base, stance.position[:, None] + rings
 
 

@@ -9,16 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.arrays import BoolArray, FloatArray
 from toolpath_stiff.machine.chain import turned, turned_from_left
 
-ON_AXIS = 1e-9  # sine of the angle between tool and first axis below which that axis only turns the tool about itself
-ASIDE = 1e-6  # rad by which the tool may point elsewhere: what rounding of words to some decimals leaves is less
+ON_AXIS = 1e-9  # sine of the angle between tool and first axis below which that axis only spins the tool
+ASIDE = 1e-6  # rad by which the tool's direction may be off: more than the rounding of words leaves
 
 
 @dataclass(frozen=True)
 class RotaryAxes:
-    """At most two rotary axes from the work to the tool.
+    """At most two rotary axes, from the work to the tool.
 
     Attributes
     ----------
@@ -41,18 +41,17 @@ class RotaryAxes:
             total = turned_about(axis, angle, total)
         return total
 
-    def angles(self, rotation: FloatArray) -> FloatArray:
-        """(k, n) rad that point the tool as (3, 3, n); nan where none do."""
+    def angles(self, rotation: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """(k, n) rad that point the tool as (3, 3, n), and (n,) whether any do."""
         best, *others = self._pairs(rotation)
         stand = self.rotation(best)
         for pair in others:
             other = self.rotation(pair)
-            # The trace of R^T R(angles) is 3 where the turn about the tool's axis is met too.
+            # The trace of R^T R(angles) is 3 where the turn about the tool's axis agrees too.
             better = (rotation * other).sum(axis=(0, 1)) > (rotation * stand).sum(axis=(0, 1)) + ASIDE
             best, stand = np.where(better, pair, best), np.where(better, other, stand)
         pointing = (rotation[:, 2] * stand[:, 2]).sum(axis=0)
-        # 1 - cos of the angle is half its square.
-        return np.where(pointing > 1.0 - 0.5 * ASIDE**2, best, np.nan)
+        return best, np.asarray(pointing > 1.0 - 0.5 * ASIDE**2)  # 1 - cos of the angle is half its square
 
     def _pairs(self, rotation: FloatArray) -> list[FloatArray]:
         n = rotation.shape[2]
@@ -85,7 +84,7 @@ class RotaryAxes:
 def turned_about(axis: FloatArray, angle: FloatArray, axes: FloatArray) -> FloatArray:
     """(3, 3, n) axes (3, 3, n) turned about a constant unit vector (Rodrigues' formula)."""
     cosine, sine = np.cos(angle), np.sin(angle)
-    if np.count_nonzero(axis) == 1:  # about x, y or z two rows mix
+    if np.count_nonzero(axis) == 1:  # about x, y or z only two rows mix
         i = int(np.flatnonzero(axis)[0])
         j, k, sine = (i + 1) % 3, (i + 2) % 3, sine * axis[i]
         out = np.empty((3, 3, len(angle)))
@@ -100,14 +99,14 @@ def turned_about(axis: FloatArray, angle: FloatArray, axes: FloatArray) -> Float
 
 
 def angle_about(axis: FloatArray, rotation: FloatArray) -> FloatArray:
-    """(n,) rad about a unit vector that comes nearest to rotations (3, 3, n)."""
+    """(n,) rad, angle of the turn about a unit vector closest to rotations (3, 3, n)."""
     twice_sine = sum(axis[i] * (rotation[k, j] - rotation[j, k]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)))
     trace = rotation[0, 0] + rotation[1, 1] + rotation[2, 2]
     return np.asarray(np.arctan2(twice_sine, trace - np.einsum("i,ijn,j->n", axis, rotation, axis)))
 
 
 def _turn_between(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """(n,) rad about a unit vector that turns vectors (3, n) into others."""
+    """(n,) rad, angle about a unit vector that turns vectors (3, n) into others."""
     sine = _dot(axis, np.cross(start, end, axis=0))
     return np.asarray(np.arctan2(sine, (start * end).sum(axis=0) - _dot(axis, start) * _dot(axis, end)))
 

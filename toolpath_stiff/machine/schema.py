@@ -1,4 +1,4 @@
-"""What a machine file may hold: sections, keys, units, bounds; and values held against it, one fault a message."""
+"""Schema of machine files: sections, keys, units, bounds; values are checked against it, one fault a message."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -15,19 +15,19 @@ from toolpath_stiff.toml_reader import TomlReader, is_number, is_text, shortened
 
 
 class MachineToml(TomlReader):
-    """The text of a machine file, and errors at its sections and keys."""
+    """Text of a machine file, and errors at its sections and keys."""
 
     def fault(self, section: str, key: str, mistake: str, expected: str = "", hint: str = "") -> InputError:
-        """An error at a key of a section, or at the section itself."""
+        """Error at a key of a section, or at the section itself."""
         label = f"[{section}] {key}".strip() if section else key
         line = self.line_of(section, key)
-        if section.endswith("]"):  # a row of a list of tables
+        if section.endswith("]"):  # section is a row of a list of tables
             name, _, number = section[:-1].partition("[")
             label, line = f"[[{name}]] {number} {key}".strip(), line or self.line_at(section)
         return InputError(f"{label}{mistake}", expected=expected, hint=hint, file=self.file, line=line)
 
     def rows(self, name: str) -> list[Document]:
-        """The tables `[[name]]`. Raises `InputError` where it is something else."""
+        """Tables `[[name]]`. Raises `InputError` if the key is something else."""
         rows = self.data.get(name, [])
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             raise self.fault("", name, f" is not a list of tables; write [[{name}]]")
@@ -36,10 +36,10 @@ class MachineToml(TomlReader):
 
 @dataclass(frozen=True)
 class Key:
-    """What a key of a machine file may hold.
+    """Values that a key of a machine file may have.
 
-    `shape` () for a number, (3,) or (6, 3) for lists; `also_length` admits a second length, `many` any greater one,
-    `or_one` a single number instead of a list.
+    `shape` () for a number, (3,) or (6, 3) for lists, (1, 0) for rows of any length; `also_length` admits a second
+    length, `many` any greater one, `or_one` a single number instead of a list. Texts are `shape[0]` or more.
     Bounds are inclusive unless `open_low`.
     """
 
@@ -57,7 +57,7 @@ class Key:
 
     @property
     def expected(self) -> str:
-        """What the key may hold, in words."""
+        """Values allowed, in words."""
         if self.text:
             return "a text"
         count = " rows of ".join(map(str, self.shape))
@@ -71,9 +71,11 @@ class Key:
         return f"{f'{count} numbers' if self.shape else 'a number'}{unit}, {low}{high}"
 
     def fits(self, shape: tuple[int, ...]) -> bool:
-        """Whether numbers of a shape will do."""
-        if self.many and len(shape) == 1:
-            return shape[0] >= self.shape[0]
+        """True if numbers of this shape are allowed."""
+        if self.many and len(shape) == len(self.shape):
+            return shape[0] >= self.shape[0] and all(
+                n in (0, m) for m, n in zip(shape[1:], self.shape[1:], strict=True)
+            )
         return shape in (self.shape, (self.also_length,)) or (self.or_one and not shape)
 
 
@@ -85,7 +87,7 @@ JOINTS = {
 OFFSETS = Key(unit="mm", shape=(6, 3), low=-30.0, high=30.0)
 ANGLE = Key(unit="deg", low=0.0, high=180.0, open_low=True, infinite=True)
 CORNER = Key(unit="mm", shape=(3,))
-# Sections of every kind of machine.
+# Sections common to all kinds of machines.
 NAMES = {"name": Key(text=True), **dict.fromkeys(("kind", "title", "source"), Key(text=True, required=False))}
 SETUP = {
     "default_origin_mm": Key(unit="mm[, deg]", shape=(3,), also_length=6),
@@ -120,14 +122,14 @@ SECTIONS: dict[str, dict[str, Key]] = {
     "setup": SETUP,
 }
 OPTIONAL_SECTIONS = ("limits.joint_angle", "limits.workspace", "limits.singularity", "platform", "as_built", "setup")
-BESIDE = ("effect", "instrument", "uncertainty")  # sections that others read
+BESIDE = ("effect", "instrument", "uncertainty")  # sections read elsewhere
 
 Schema = Mapping[str, Mapping[str, Key]]
 Sections = dict[str, Document]  # section -> key -> value in the units of the file; lists as arrays
 
 
 def read_sections(toml: MachineToml, schema: Schema, optional: Collection[str], stated: bool = True) -> Sections:
-    """The sections of a file, each key checked; unknown and missing ones are errors.
+    """Sections of a file, each key checked; unknown and missing ones are errors.
 
     `schema` is section -> keys, "" the keys above all sections, `[]` after the name of a list of tables, which
     `read_rows` reads; sections that may be missing are `optional`. `stated`: each says where its figures come from.
@@ -154,10 +156,13 @@ def read_sections(toml: MachineToml, schema: Schema, optional: Collection[str], 
         if name not in sections and name not in optional and name[-2:] != "[]":
             hint = "`tps machine new template.toml` writes a template with every section"
             raise InputError(f"section [{name}] is missing", hint=hint, file=toml.file)
-    return {name: _section(toml, name, content, schema[name], stated) for name, content in sections.items()}
+    return {name: read_section(toml, name, content, schema[name], stated) for name, content in sections.items()}
 
 
-def _section(toml: MachineToml, name: str, content: Document, keys: Mapping[str, Key], stated: bool) -> Document:
+def read_section(
+    toml: MachineToml, name: str, content: Document, keys: Mapping[str, Key], stated: bool = False
+) -> Document:
+    """One section, as of `read_sections`."""
     allowed = [*keys, *(("origin", "remark") if name else ())]
     for key in content:
         if key not in allowed:
@@ -173,14 +178,15 @@ def _section(toml: MachineToml, name: str, content: Document, keys: Mapping[str,
 
 
 def read_rows(toml: MachineToml, name: str, keys: Mapping[str, Key]) -> list[Document]:
-    """The tables `[[name]]` of a file, each key checked as of a section; errors name the row."""
-    return [_section(toml, f"{name}[{nth}]", row, keys, stated=False) for nth, row in enumerate(toml.rows(name), 1)]
+    """Tables `[[name]]` of a file, each key checked as in a section; errors name the row."""
+    return [read_section(toml, f"{name}[{nth}]", row, keys) for nth, row in enumerate(toml.rows(name), 1)]
 
 
 def _value(toml: MachineToml, section: str, key: str, raw: Any, rule: Key) -> Any:
     if rule.text:
         names = raw if rule.shape else [raw]
-        if not isinstance(names, list) or not all(map(is_text, names)) or len(set(names)) < len(names):
+        fits = isinstance(names, list) and all(map(is_text, names)) and len(names) >= sum(rule.shape)
+        if not fits or len(set(names)) < len(names):
             expected = "a list of names, each once" if rule.shape else "a text that is not empty"
             raise toml.fault(section, key, f" = {shortened(raw)}", expected)
         return tuple(names) if rule.shape else raw
@@ -195,7 +201,7 @@ def _value(toml: MachineToml, section: str, key: str, raw: Any, rule: Key) -> An
 
 
 def as_array(raw: Any) -> FloatArray | None:
-    """A float array of TOML numbers and lists of them; None for anything else (booleans too)."""
+    """Float array of TOML numbers and lists of them; None for anything else (booleans too)."""
 
     def numeric(item: Any) -> bool:
         return all(map(numeric, item)) if isinstance(item, list) else is_number(item)

@@ -1,4 +1,4 @@
-"""Machines in series: one chain of joints carries the tool, another one may carry the work.
+"""Serial machines: one chain of joints carries the tool, another may carry the work.
 
 Three- and five-axis mills (tables, heads, both), robots of six joints, on a rail or beside a rotary table. Inverse
 kinematics in closed form where the joints allow it: a spherical wrist (`wrist`), or three linear axes and up to two
@@ -81,7 +81,7 @@ class Serial(MachineTool):
 
     @property
     def joints(self) -> tuple[ChainJoint, ...]:
-        """All joints, as results have them."""
+        """All joints, in the order of results."""
         joints = (*self.tool_joints, *self.work_joints)
         return tuple(joints[i] for i in self.order) or joints
 
@@ -97,22 +97,29 @@ class Serial(MachineTool):
 
     @property
     def joint_kinds(self) -> tuple[str, ...]:
-        """Of each joint "linear" or "rotary"."""
+        """Kind of each joint, "linear" or "rotary"."""
         return tuple("linear" if joint.linear else "rotary" for joint in self.joints)
 
     @property
     def joint_limits(self) -> FloatArray:
-        """(j, 2) m or rad; inf: none."""
-        return np.array([(joint.low, joint.high) for joint in self.joints])
+        """(j, 2) m or rad; inf: none, or a joint that stands."""
+        stand = self.standing_joints
+        return np.array([(-np.inf, np.inf) if j.name in stand else (j.low, j.high) for j in self.joints])
+
+    @property
+    def standing_joints(self) -> dict[str, float]:
+        """Joints beyond the last six of a chain with the tool -> where they stand; a mill has none."""
+        beyond = () if self.rotary_axes else (*self.tool_joints[:-6], *self.work_joints)
+        return {joint.name: joint.stands for joint in beyond}
 
     @property
     def joint_speeds(self) -> FloatArray:
-        """(j,) m/s or rad/s that the joints reach; inf: nobody says."""
+        """(j,) m/s or rad/s, largest speed of the joints; inf if not stated."""
         return np.array([joint.speed for joint in self.joints])
 
     @property
     def elements(self) -> tuple[Element, ...]:
-        """What gives way, from the base to the tool, then to the work."""
+        """Compliant elements, from the base to the tool, then to the work."""
         return tuple(body.element for body in (*self.tool_bodies, *self.work_bodies))
 
     @property
@@ -124,12 +131,12 @@ class Serial(MachineTool):
 
     @property
     def wrist(self) -> SphericalWrist | None:
-        """The closed form of its last six joints, if they have one."""
+        """Closed form of its last six joints, if they have one."""
         return self.once("wrist", lambda: SphericalWrist.of(self.tool_joints[-6:], self.tip))
 
     @property
     def rotary_axes(self) -> RotaryAxes | None:
-        """Its rotary axes between work and tool where all other joints are three linear ones."""
+        """Rotary axes between work and tool, if all other joints are three linear ones."""
         return self.once("rotary axes", self._rotary_axes)
 
     def _rotary_axes(self) -> RotaryAxes | None:
@@ -145,12 +152,12 @@ class Serial(MachineTool):
         return RotaryAxes([int(self.chain[i]) for i in loop], tuple(z[i] for i in loop), base @ tool[-1].axes[..., 0])
 
     def motion_at_zero(self, name: str) -> FloatArray:
-        """(3,) base axes: the way an axis moves the tool against the work, or turns it, at joint values of 0."""
+        """(3,) base axes: how an axis moves the tool against the work, or turns it, at joint values of 0."""
         number = int(np.flatnonzero(self.chain == self.joint_names.index(name))[0])
         return _directions(*self.frames(np.zeros((len(self.joints), 1))))[number][:, 0]
 
     def frames(self, values: FloatArray) -> tuple[list[Frame], list[Frame]]:
-        """Frames of both chains at joint values (j, n): the base, one a joint, then the tip and the work."""
+        """Frames of both chains at joint values (j, n): base, one a joint, then tip or work."""
         count, values = len(self.tool_joints), values[self.chain]
         work = chain_frames(self.work_joints, values[count:])
         return self.tool_frames(values[:count]), [*work, work[-1].moved(self.work)]
@@ -161,7 +168,7 @@ class Serial(MachineTool):
         return [*tool, tool[-1].moved(self.tip)]
 
     def rotation_of(self, abc: FloatArray) -> FloatArray:
-        """(n, 3, 3) tool axes in work axes of a program's words A, B, C (n, 3) rad.
+        """(n, 3, 3) tool axes in work axes for a program's words A, B, C (n, 3) rad.
 
         On a machine with three linear axes they are the values of the axes of these letters; else roll, pitch, yaw.
         Raises `InputError` for a word whose axis is missing.
@@ -191,7 +198,7 @@ class Serial(MachineTool):
         configuration: int | None = None,
         start: ArrayLike | None = None,
     ) -> Stance:
-        """How the machine stands with its tip at (n, 3) m and tool axes (n, 3, 3), both in work axes.
+        """Stance with the tip at (n, 3) m and tool axes (n, 3, 3), both in work axes.
 
         Parameters
         ----------
@@ -212,7 +219,7 @@ class Serial(MachineTool):
     def stances(
         self, position: ArrayLike, rotation: ArrayLike | None = None, tool_length: ArrayLike = np.nan
     ) -> Iterator[Stance]:
-        """Of each configuration how it stands, without what elements carry: what the limits ask."""
+        """Stance in each configuration, without the loads of elements: enough for limits."""
         target, linear = self._target(position, rotation, tool_length), [joint.linear for joint in self.joints]
         for number, solution in self._solutions(*target, self.only, None):
             joints = wound(solution, self.joint_limits, linear, None).T
@@ -229,7 +236,7 @@ class Serial(MachineTool):
     def joint_values(
         self, tip: FloatArray, axes: FloatArray, configuration: int | None, start: FloatArray | None
     ) -> tuple[FloatArray, IntArray]:
-        """(j, n) values with the reference tool's tip (3, n) and axes (3, 3, n) in work axes, (n,) configurations.
+        """(j, n) values for the reference tool's tip (3, n) and axes (3, 3, n) in work axes, (n,) configurations.
 
         Arguments as of `solve`.
         """
@@ -255,32 +262,34 @@ class Serial(MachineTool):
         if self.rotary_axes:
             yield 0, self._of_linear_axes(self.rotary_axes, tip, axes)
             return
-        held = np.zeros(len(self.joints)) if start is None else start
-        held = np.clip(held, *self.joint_limits.T)[:, None]
+        held = (np.array([joint.stands for joint in self.joints]) if start is None else start)[:, None]
         tool, work = self.frames(held)
         joints = np.repeat(held, tip.shape[1], axis=1)
+        first = len(self.tool_joints) - 6
+        moving, still = self.chain[first : first + 6], held[self.chain[:first]]
         if self.wrist is None:
-            count, in_base = len(self.tool_joints), turned_from_left(work[-1].axes[..., 0], axes)
+            in_base = turned_from_left(work[-1].axes[..., 0], axes)
             target = turned_from_left(work[-1].axes[..., 0], tip[:, None])[:, 0] + work[-1].origin
             in_base = np.broadcast_to(in_base, (3, 3, tip.shape[1]))
-            mine = self.chain[:count]
-            joints[mine] = follow(
-                self.tool_joints, self.tool_frames, target, in_base, None if start is None else start[mine]
-            ).T
+
+            def frames(values: FloatArray) -> list[Frame]:
+                return self.tool_frames(np.concatenate([np.repeat(still, values.shape[1], 1), values]))[first:]
+
+            before = None if start is None else start[moving]
+            joints[moving] = follow(self.tool_joints[first:], frames, target, in_base, before).T
             yield 0, joints
             return
-        first = len(self.tool_joints) - 6
         base = tool[first].placement.inverse().then(work[-1].placement)
         local = turned_from_left(base.axes, tip[:, None])[:, 0] + base.origin[:, None]
         local_axes = turned_from_left(base.axes, np.broadcast_to(axes, (3, 3, tip.shape[1])))
         for number, values in self.wrist.solutions(local_axes, local, configuration):
-            joints[self.chain[first : first + 6]] = values
+            joints[moving] = values
             yield number, joints.copy()
 
     def _of_linear_axes(self, rotary: RotaryAxes, tip: FloatArray, axes: FloatArray) -> FloatArray:
         """(j, n) values of three linear axes and the rotary ones: angles first, then the linear axes meet the tip."""
         values = np.zeros((len(self.joints), tip.shape[1]))
-        angles = rotary.angles(axes)
+        angles, pointed = rotary.angles(axes)
         for i, angle in zip(rotary.joints, angles, strict=True):
             values[i] = angle
         tool, work = self.frames(values)
@@ -291,10 +300,10 @@ class Serial(MachineTool):
         volume = (a * np.cross(b, c, axis=0)).sum(axis=0)
         for i, (second, third) in zip(linear, ((b, c), (c, a), (a, b)), strict=True):  # Cramer's rule
             values[i] = (missing * np.cross(second, third, axis=0)).sum(axis=0) / volume
-        return np.where(np.isfinite(angles).all(axis=0), values, np.nan)
+        return np.where(pointed, values, np.nan)
 
     def standing(self, joints: FloatArray, tool_length: ArrayLike = np.nan) -> Stance:
-        """How it stands at joint values (n, j)."""
+        """Stance at joint values (n, j)."""
         return self._stance(joints.T, np.zeros(len(joints), dtype=np.int64), self.extension(tool_length))
 
     def joint_of(self, element: str) -> int:
@@ -303,7 +312,7 @@ class Serial(MachineTool):
         return names.index(element) if element in names else super().joint_of(element)
 
     def with_longer_link(self, joint: int, by: float) -> Self:
-        """With the joint's origin further from that of the joint before, in the frame of that."""
+        """Machine with the joint's origin moved further from that of the previous joint, in the latter's frame."""
         sides = {"tool_joints": self.tool_joints, "work_joints": self.work_joints}
         chosen = self.joints[joint]
         longer = replace(chosen, place=chosen.place.longer(by))
@@ -312,7 +321,7 @@ class Serial(MachineTool):
         )
 
     def _stance(self, joints: FloatArray, chosen: IntArray, extension: FloatArray) -> Stance:
-        """The stance at joint values (j, n) with tools so much longer than the reference tool."""
+        """Stance at joint values (j, n) with tools longer than the reference tool by `extension`."""
         tool, work = self.frames(joints)
         reference = tool[-1]
         tool[-1] = Frame(reference.axes, reference.origin - reference.axes[:, 2] * extension)
@@ -329,7 +338,7 @@ class Serial(MachineTool):
         )
 
     def weight_loads(self, stance: Stance) -> FloatArray:
-        """(n, r) N and N m on the elements under the masses that they carry; gravity along -z of the base."""
+        """(n, r) N and N m, loads of the elements under the masses they carry; gravity along -z of the base."""
         loads, springs = [], iter(stance.loads)
         sides = ((self.tool_bodies, self.tool_masses), (self.work_bodies, self.work_masses))
         for frames, (bodies, masses) in zip(self.frames(stance.joints.T), sides, strict=True):
@@ -354,14 +363,14 @@ class Serial(MachineTool):
         return tuple(self.least.get(name, LEAST) for name in self.singularity_names)
 
     def singularities(self, stance: Stance) -> FloatArray:
-        """(n, s) how far from singular: 1 far, 0 singular. The compliance of a serial machine does not show it."""
+        """(n, s) distance from singularity: 1 far, 0 singular. A serial machine's compliance does not show it."""
         if self.wrist is None:
             return np.empty((len(stance), 0))
         first = len(self.tool_joints) - 6
         return self.wrist.singularities(stance.joints.T[self.chain[first : first + 6]]).T
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
-        """What a picture draws: names and polylines (n, p, 3) m, base axes.
+        """Lines of a picture: names and polylines (n, p, 3) m, base axes.
 
         From joint to joint where joints turn on the tool's side, else from body to body; to the tip, to the work.
         """
@@ -383,7 +392,7 @@ class Serial(MachineTool):
 
 
 def _directions(tool: list[Frame], work: list[Frame]) -> list[FloatArray]:
-    """(3, n) base axes, along or about which each joint of the chains moves the tool against the work."""
+    """(3, n) base axes: direction along or about which each joint of the chains moves the tool against the work."""
     return [frame.axes[:, 2] for frame in tool[1:-1]] + [-frame.axes[:, 2] for frame in work[1:-1]]
 
 

@@ -50,7 +50,7 @@ Mass = tuple[float, int, FloatArray]  # kg, number of the frame that it moves wi
 
 
 class ElementReader:
-    """Reads one row after the other to `bodies` and `masses`, those of the tool's side and those of the work's.
+    """Reader of rows, one by one, into `bodies` and `masses` of the tool's side and of the work's.
 
     Frames of each side are numbered from the base, the last one tip or work.
     """
@@ -69,11 +69,11 @@ class ElementReader:
             self.homes.append([*homes, homes[-1].then(end)])
 
     def fault(self, key: str, mistake: str, expected: str = "") -> InputError:
-        """An error at a key of the row."""
+        """Error at a key of the row."""
         return self.toml.fault(self.section, key, mistake, expected)
 
     def element(self, nth: int, row: Document) -> None:
-        """Adds what gives way by one row."""
+        """Add the compliant bodies of one row."""
         self.section, self.row = f"element[{nth}]", row
         kind, side = row["type"], row.get("side", "tool")
         if row["name"] in self.names:
@@ -95,17 +95,17 @@ class ElementReader:
             self.bodies[work].append(self._beam(work) if kind == "beam" else self._spring(work))
 
     def needed(self, key: str) -> FloatArray:
-        """The value of a key that must be there."""
+        """Value of a required key."""
         if key not in self.row:
             raise self.fault(key, " is missing", ELEMENT[key].expected)
         return np.asarray(self.row[key])
 
     def _element(self, link: str) -> Element:
-        """Its name as results show it, and its link unless the file names one."""
+        """Element named as results show it, with its link, or the file's."""
         return Element(self.row["name"].replace("_", " "), self.row.get("link", link))
 
     def _joints(self) -> None:
-        """Torsion about the axis of each rotary joint, and the same bending about both others."""
+        """Add each rotary joint: torsion about its axis, and equal bending about the two others."""
         rotary = [(work, i) for work in (False, True) for i, j in enumerate(self.chains[work]) if not j.linear]
         given = {}
         for key in USED["joint"]:
@@ -141,7 +141,7 @@ class ElementReader:
         return Body(self._element("tool" if tip else "table" if work else "frame"), frame, place, compliance)
 
     def _centre(self, work: bool) -> tuple[int, FixedFrame]:
-        """On the axis of a rotary joint, in the frame that carries it: machine axes with all joints at 0."""
+        """Placement on a rotary joint's axis, in the frame that carries it: machine axes with all joints at 0."""
         names = [joint.name for joint in self.chains[work]]
         if self.row["centre"] not in names:
             raise self.fault("centre", f" = {self.row['centre']!r}", f"one of {', '.join(names)}")
@@ -150,7 +150,7 @@ class ElementReader:
         return carrier, homes[carrier].inverse().then(FixedFrame(np.eye(3), homes[carrier + 1].origin))
 
     def _placed(self, key: str, moving: str, work: bool) -> tuple[int, FixedFrame]:
-        """A point in a joint's frame, or in machine axes with all joints at 0 and moving with some of the axes."""
+        """Point in a joint's frame, or in machine axes with all joints at 0, moving with some of the axes."""
         point = FixedFrame(np.eye(3), m_from_mm(self.needed(key)))
         joints = self.chains[work]
         if "frame" in self.row:
@@ -188,7 +188,7 @@ class ElementReader:
         return Body(element, first, place, beam_compliance(float(np.linalg.norm(along)), stiffness))
 
     def mass(self, nth: int, row: Document) -> None:
-        """Adds the mass of one row."""
+        """Add the mass of one row."""
         self.section, self.row, work = f"mass[{nth}]", row, row.get("side") == "work"
         frame, place = self._placed("centre_mm", "moves_with", work)
         self.masses[work].append((float(row["kg"]), frame, place.origin))
@@ -197,7 +197,7 @@ class ElementReader:
 def read_elements(
     toml: MachineToml, chains: Sequence[Sequence[ChainJoint]], ends: Sequence[FixedFrame] = (STILL, STILL)
 ) -> ElementReader:
-    """What gives way, and the masses, each on the tool's and on the work's side."""
+    """Reader with the compliant bodies and the masses of the tool's and the work's side."""
     reader = ElementReader(toml, chains, ends)
     for name, keys, read in (("element", ELEMENT, reader.element), ("mass", MASS, reader.mass)):
         for nth, row in enumerate(read_rows(toml, name, keys), 1):

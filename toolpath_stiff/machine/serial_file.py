@@ -1,4 +1,4 @@
-"""Files of serial machines: joints by Denavit-Hartenberg rows, by origin and axis, or a mill's axes by their limits."""
+"""Files of serial machines: joints by Denavit-Hartenberg rows, by origin and axis, or as a mill's axes with limits."""
 
 from collections.abc import Sequence
 
@@ -28,6 +28,8 @@ MODIFIED, STANDARD, XYZAC, XYZBC = "modified DH", "standard DH", "linuxcnc xyzac
 LENGTH, ANGLE = Key(unit="mm", required=False), Key(unit="deg", required=False, low=-3600.0, high=3600.0)
 POINT, DIRECTION = Key(unit="mm", shape=(3,), required=False), Key(shape=(3,), low=-1.0, high=1.0, required=False)
 TEXT = Key(text=True, required=False)
+ENDS = ("min", "max", "stands")
+UNITS = {"mm": m_from_mm, "deg": rad_from_deg}
 AXIS = {
     "name": Key(text=True),
     "type": Key(text=True),
@@ -38,13 +40,12 @@ AXIS = {
     "rpy_deg": Key(unit="deg", shape=(3,), low=-360.0, high=360.0, required=False),
     "axis": DIRECTION,
     **{
-        f"{side}_{unit}": Key(unit=unit, required=False, infinite=True, low=-np.inf, high=np.inf)
-        for side in ("min", "max")
-        for unit in ("mm", "deg")
+        f"{key}_{unit}": Key(unit=unit, required=False, infinite=True, low=-np.inf, high=np.inf)
+        for key in ENDS
+        for unit in UNITS
     },
     **{
-        f"speed_{unit}_per_s": Key(unit=f"{unit}/s", low=0.0, open_low=True, high=1e5, required=False)
-        for unit in ("mm", "deg")
+        f"speed_{unit}_per_s": Key(unit=f"{unit}/s", low=0.0, open_low=True, high=1e5, required=False) for unit in UNITS
     },
 }
 DH = ("a_mm", "d_mm", "alpha_deg", "offset_deg")
@@ -67,15 +68,15 @@ SCHEMA = {
     "pose[]": {},
 }
 SECTIONS_BESIDE = [name for name in SCHEMA if name]
-# Limits of all rotary axes within a turn of 2 pi: such degrees are radians. Angles of a row that are multiples of a
+# Rotary limits that are all within 2 pi are radians, not degrees. Angles of a row that are multiples of a
 # right angle in radians, to the digits that people write.
 RADIANS, RIGHT_ANGLE, WRITTEN = 6.29, np.pi / 2.0, 1e-3
-PARALLEL = 1e-3  # sine of the angle, or volume, of directions that are taken for one
-SHORTEST_ARM = 0.05  # m from the first joint to the tip: less is a description in metres
+PARALLEL = 1e-3  # sine of the angle, or volume, below which directions count as dependent
+SHORTEST_ARM = 0.05  # m from the first joint to the tip: less means a description in metres
 
 
 def read(toml: MachineToml) -> Serial:
-    """A serial machine of a machine file. Raises `InputError`."""
+    """Serial machine from a machine file. Raises `InputError`."""
     values = read_sections(toml, SCHEMA, SECTIONS_BESIDE, stated=False)
     if rows := read_rows(toml, "axis", AXIS):
         names, convention = [row["name"] for row in rows], values[""].get("convention", MODIFIED)
@@ -111,11 +112,11 @@ def read(toml: MachineToml) -> Serial:
 def _of_rows(
     toml: MachineToml, rows: Sequence[Document], values: Sections, convention: str
 ) -> tuple[tuple[ChainJoint, ...], tuple[ChainJoint, ...], FixedFrame, FixedFrame]:
-    """Joints of tool and work, the tip in the last frame of the one, the work in that of the other."""
+    """Joints of tool and work; placements of the tip and of the work in the last frame of each."""
     if convention not in (MODIFIED, STANDARD):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{MODIFIED!r} or {STANDARD!r}")
     sides: dict[str, list[ChainJoint]] = {"tool": [], "work": []}
-    rests = {"tool": STILL, "work": STILL}  # what follows the last joint of each side
+    rests = {"tool": STILL, "work": STILL}  # placement after the last joint of each side
     for nth, row in enumerate(rows, 1):
         section, side = f"axis[{nth}]", row.get("side", "tool")
         if side not in sides:
@@ -126,9 +127,8 @@ def _of_rows(
         before, after = _placements(toml, section, row, convention)
         given = STILL if any(key in row for key in DH) else after
         place = rests[side].then(before)
-        unit, si = ("mm", m_from_mm) if linear else ("deg", rad_from_deg)
-        speed = si(row.get(f"speed_{unit}_per_s", np.inf))
-        sides[side].append(ChainJoint(row["name"], linear, place, *_bounds(toml, section, row, linear), given, speed))
+        travel = _travel(toml, section, row, linear)
+        sides[side].append(ChainJoint(row["name"], linear, place, given=given, **travel))
         rests[side] = after
     _check_units(toml, sides["tool"] + sides["work"])
     tip, work = values.get("tool"), values.get("work", {})
@@ -150,7 +150,7 @@ def _is_linear(toml: MachineToml, section: str, row: Document) -> bool:
 
 
 def _placements(toml: MachineToml, section: str, row: Document, convention: str) -> tuple[FixedFrame, FixedFrame]:
-    """What stands between the joint before and this one, and what follows this one."""
+    """Placements between the previous joint and this one, and after this one."""
     dh, free = [key for key in DH if key in row], [key for key in ("xyz_mm", "rpy_deg", "axis") if key in row]
     if dh and free:
         raise toml.fault(section, free[0], f": the row has {dh[0]} too", expected="a DH row, or an origin and an axis")
@@ -173,25 +173,30 @@ def _placements(toml: MachineToml, section: str, row: Document, convention: str)
     return modified_dh(angles[0], lengths[0], angles[1], lengths[1]), STILL
 
 
-def _bounds(toml: MachineToml, section: str, row: Document, linear: bool) -> tuple[float, float]:
-    """M or rad; every joint has both, so that none is without limits by mistake."""
+def _travel(toml: MachineToml, section: str, row: Document, linear: bool) -> dict[str, float]:
+    """Limits, speed and place of a joint, SI; every joint has both limits, so that none is without them by mistake."""
     unit, other = ("mm", "deg") if linear else ("deg", "mm")
+    if strange := [key for key in row if key in (*(f"{k}_{other}" for k in ENDS), f"speed_{other}_per_s")]:
+        kind = "linear" if linear else "rotary"
+        raise toml.fault(section, strange[0], f": the axis is {kind}", expected=strange[0].replace(other, unit))
     for side in ("min", "max"):
-        for key in (f"{side}_{other}", f"speed_{other}_per_s"):
-            if key in row:
-                expected, kind = key.replace(other, unit), "linear" if linear else "rotary"
-                raise toml.fault(section, key, f": the axis is {kind}", expected=expected)
         if f"{side}_{unit}" not in row:
             expected = f"its limit in {unit}; {'-' if side == 'min' else ''}inf where it has none"
             raise toml.fault(section, f"{side}_{unit}", " is missing", expected)
     low, high = row[f"min_{unit}"], row[f"max_{unit}"]
+    stands = row.get(f"stands_{unit}", float(np.clip(0.0, low, high)))
     if not low < high:
         raise toml.fault(section, f"max_{unit}", f" = {high:g}", expected=f"more than min_{unit} = {low:g}")
-    return (m_from_mm(low), m_from_mm(high)) if linear else (rad_from_deg(low), rad_from_deg(high))
+    if not low <= stands <= high:
+        raise toml.fault(
+            section, f"stands_{unit}", f" = {stands:g}", expected=f"{low:g} to {high:g}, as its limits are"
+        )
+    figures = {"low": low, "high": high, "stands": stands, "speed": row.get(f"speed_{unit}_per_s", np.inf)}
+    return {name: UNITS[unit](value) for name, value in figures.items()}
 
 
 def _check_units(toml: MachineToml, joints: Sequence[ChainJoint]) -> None:
-    """Refuse what is most likely written in radians, and linear axes X, Y, Z that are left-handed."""
+    """Refuse limits most likely written in radians."""
     ends = [abs(np.rad2deg(end)) for joint in joints if not joint.linear for end in (joint.low, joint.high)]
     if ends and max(ends) < RADIANS and max(ends) > 0.0:
         mistake = f": no rotary axis turns by more than {max(ends):.4g} deg; are these radians?"
@@ -199,7 +204,7 @@ def _check_units(toml: MachineToml, joints: Sequence[ChainJoint]) -> None:
 
 
 def _tip(toml: MachineToml, tool: Document) -> FixedFrame:
-    """The tip in the flange; its axes by two columns, the third checked if it is there."""
+    """Placement of the tip in the flange; its axes by two columns, the third checked if given."""
     given = {name: tool[name] for name in ("x_axis", "y_axis", "z_axis") if name in tool}
     if not given:
         return FixedFrame(np.eye(3), m_from_mm(tool["tip_mm"]))
@@ -215,7 +220,7 @@ def _tip(toml: MachineToml, tool: Document) -> FixedFrame:
 
 
 def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
-    """`[[axis]]` rows of X, Y, Z by limits: the work's side where an element moves against one; and of a trunnion."""
+    """`[[axis]]` rows of X, Y, Z from limits, on the work's side if an element moves against one; also a trunnion's."""
     convention = values[""].get("convention")
     if convention not in (None, XYZAC, XYZBC):
         raise toml.fault("", "convention", f" = {convention!r}", expected=f"{XYZAC!r}, {XYZBC!r}, or [[axis]] rows")
@@ -226,7 +231,7 @@ def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
     moved = [name for row in read_rows(toml, "element", ELEMENT) for name in row.get("moves_with", ())]
     side = {axis: "work" if f"-{axis}" in moved else "tool" for axis in "XYZ"}
     rows: list[Document] = []
-    # The axis that most elements move with is nearest the base; rows do not cross sides, so the order serves both.
+    # The axis with which most elements move is nearest the base; rows keep to a side, so one order serves both.
     for axis in sorted("XYZ", key=lambda axis: -moved.count(axis) - moved.count(f"-{axis}")):
         direction = np.eye(3)["XYZ".index(axis)] * (1.0 if side[axis] == "tool" else -1.0)
         row = {"name": axis, "type": "linear", "side": side[axis], "axis": direction}
@@ -252,7 +257,7 @@ def _rows_of_mill(toml: MachineToml, values: Sections) -> list[Document]:
 
 
 def _ends(toml: MachineToml, values: Sections, axis: str) -> Document:
-    """Keys of the limits of a mill's axis; a rotary one without limits turns without end."""
+    """Keys of the limits of a mill's axis; a rotary axis without limits turns endlessly."""
     unit = "mm" if axis in "XYZ" else "deg"
     ends = values.get("limits", {}).get(f"{axis}_{unit}", None if unit == "mm" else np.array([-np.inf, np.inf]))
     if ends is None:
@@ -263,7 +268,7 @@ def _ends(toml: MachineToml, values: Sections, axis: str) -> Document:
 
 
 def _check_solvable(toml: MachineToml, machine: Serial) -> None:
-    """A pose needs three linear axes that span space and up to two rotary ones, named by words; or six joints."""
+    """Refuse machines other than three linear axes that span space with up to two named rotary ones, or six joints."""
     linear = [joint.name for joint in machine.joints if joint.linear]
     rotary = [joint.name for joint in machine.joints if not joint.linear]
     expected = "three linear axes and up to two rotary ones, or six joints"

@@ -1,4 +1,4 @@
-"""Machine files from descriptions that know no stiffness: geometry and limits as read, compliances left to fill in."""
+"""Machine files from descriptions without stiffness: geometry and limits as read, compliances left to fill in."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from toolpath_stiff.rotations import roll_pitch_yaw
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 EXPERIENCE = "engineering experience, no source"
-# What is typical, and who says so: comments of the file, never figures of the machine.
+# Typical values with their sources: comments in the file, never figures of the machine.
 JOINTS = f"""[[element]]
 name = "joints"
 type = "joint"
@@ -35,13 +35,13 @@ rotation_nrad_per_Nm = [0.0, 0.0, 0.0]"""
 
 
 def section(heading: str, values: Document) -> str:
-    """A section of a machine file, "[name]" or "[[name]]", "" for the keys above all; None is to be filled in."""
+    """Section of a machine file, "[name]" or "[[name]]", "" for the keys above all; None marks values to fill in."""
     rows = [f"# {key} =" if value is None else f"{key} = {value_text(value)}" for key, value in values.items()]
     return "\n".join([heading, *rows] if heading else rows)
 
 
 def file_text(name: str, kind: str, source: str, notes: Sequence[str], parts: Sequence[str]) -> str:
-    """The text of a machine file."""
+    """Text of a machine file."""
     top = [
         *(f"# {note}" for note in notes),
         "# Fill in what is commented out below: no stiffness is known, nor what is missing.",
@@ -51,7 +51,7 @@ def file_text(name: str, kind: str, source: str, notes: Sequence[str], parts: Se
 
 
 def axis_row(name: str, linear: bool, place: Document, limits: FloatArray | None, side: str = "tool") -> str:
-    """One `[[axis]]`, its limits in m or rad; None: they are to be filled in, -inf and inf where it has none."""
+    """One `[[axis]]`, with limits in m or rad; None: to be filled in; -inf and inf: none."""
     unit, kind = ("mm", "linear") if linear else ("deg", "rotary")
     ends = (None, None) if limits is None else (mm_from_m if linear else deg_from_rad)(np.asarray(limits)).tolist()
     keys = {"name": name, "type": kind, **({"side": side} if side != "tool" else {}), **place}
@@ -59,20 +59,20 @@ def axis_row(name: str, linear: bool, place: Document, limits: FloatArray | None
 
 
 def place_keys(place: FixedFrame, axis: FloatArray) -> Document:
-    """Keys of an axis that stands so in the frame before."""
+    """Keys of an axis with this placement in the previous frame."""
     angles = roll_pitch_yaw(place.axes)
     turned = {"rpy_deg": deg_from_rad(angles)} if angles.any() else {}
     return {"xyz_mm": mm_from_m(place.origin), **turned, "axis": axis}
 
 
 def tool_section(tip: FixedFrame) -> str:
-    """`[tool]` of a tip in the last frame."""
+    """`[tool]` section for a tip in the last frame."""
     keys = {"tip_mm": mm_from_m(tip.origin), "x_axis": tip.axes[:, 0], "z_axis": tip.axes[:, 2]}
     return "# z_axis runs from the tip to the shank: check it.\n" + section("[tool]", keys)
 
 
 def carriages(names: Sequence[tuple[str, str]]) -> list[str]:
-    """A spring of each axis (name, side), to be filled in."""
+    """Springs of the axes (name, side), to be filled in."""
     parts = []
     for name, side in names:
         keys = {"name": f"{name} axis", "type": "spring", "side": side, "frame": name}

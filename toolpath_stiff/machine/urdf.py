@@ -20,7 +20,7 @@ MOVING = {"revolute": False, "continuous": False, "prismatic": True}
 
 
 def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
-    """A machine file and notes from the text of a URDF file, with the tool at the link `tip`.
+    """A machine file and notes, from the text of a URDF file, with the tool at the link `tip`.
 
     Raises `InputError` for what is no chain, limits that are missing, and units that cannot be.
     """
@@ -37,7 +37,7 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
     except expat.ExpatError as error:
         raise InputError(f"not XML: {expat.ErrorString(error.code)}", file=file, line=error.lineno) from None
     for element in robot.iter():
-        if "}" in element.tag:  # of a namespace: xacro's
+        if "}" in element.tag or any("${" in value for value in element.attrib.values()):  # xacro's
             raise fault(*macros, at=element)
     chain = _chain(robot, tip, fault)
     rows, rest, notes, masses, frame = [], STILL, [], [], ""
@@ -61,6 +61,8 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
     if not rows:
         raise fault("no joint moves on the way to the tip", expected="a chain of joints")
     notes.insert(0, f"Made from {file}: {len(rows)} joints; limits of effort are left out.")
+    if not rest.axes[:, 2] @ rest.origin < 0.0:
+        notes.append(f"z of {tip} does not run back to the arm, as that of a tool's tip does: turn it in [tool]")
     name = robot.get("name", "robot")
     return file_text(
         name, "serial", f"URDF {file}", notes, [*rows, tool_section(rest), JOINTS, SPINDLE, *masses]
@@ -68,7 +70,7 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
 
 
 def _parsed(text: str) -> tuple[ET.Element, dict[ET.Element, int]]:
-    """The root of a tree, and the line of each of its elements."""
+    """Root of the tree, and the line of each element."""
     builder, lines, parser = ET.TreeBuilder(), {}, expat.ParserCreate(namespace_separator="}")
 
     def start(tag: str, attributes: dict[str, str]) -> None:
@@ -80,10 +82,10 @@ def _parsed(text: str) -> tuple[ET.Element, dict[ET.Element, int]]:
 
 
 def _chain(robot: ET.Element, tip: str, fault: Fault) -> list[ET.Element]:
-    """The joints from the root link to the tip."""
+    """Joints from the root link to the tip."""
     above: dict[str, ET.Element] = {}
     named: dict[tuple[str, str], ET.Element] = {}
-    for element in (*robot.findall("link"), *robot.findall("joint")):  # those of transmissions and plug-ins lie deeper
+    for element in (*robot.findall("link"), *robot.findall("joint")):  # others, of plug-ins, lie deeper
         if named.setdefault((element.tag, name := element.get("name", "")), element) is not element or not name:
             raise fault(f"{element.tag} {name!r} is there twice", expected="a name of its own", at=element)
     for joint in robot.findall("joint"):
@@ -112,7 +114,7 @@ def _chain(robot: ET.Element, tip: str, fault: Fault) -> list[ET.Element]:
 
 
 def _row(joint: ET.Element, name: str, kind: str, rest: FixedFrame, fault: Fault) -> str:
-    """The `[[axis]]` of a joint that moves."""
+    """`[[axis]]` of a joint that moves."""
     axis, linear = _numbers(joint.find("axis"), "xyz", "1 0 0", fault), MOVING[kind]
     if not np.linalg.norm(axis) > 0.0:
         raise fault(f"joint {name}: axis 0 0 0", expected="a direction", at=joint.find("axis"))
@@ -123,7 +125,7 @@ def _row(joint: ET.Element, name: str, kind: str, rest: FixedFrame, fault: Fault
 
 
 def _number(element: ET.Element | None, key: str, where: str, unit: str, fault: Fault) -> float:
-    """A number of 0 or more; 0 where there is none."""
+    """A number of 0 or more; 0 if there is none."""
     word, (number, *_) = _words(element, key, "0", 1)
     if not 0.0 <= number < np.inf:
         raise fault(f'{where}: {key}="{word}"', expected=f"a number, {unit}", at=element)
@@ -138,7 +140,7 @@ def _numbers(element: ET.Element | None, key: str, default: str, fault: Fault) -
 
 
 def _words(element: ET.Element | None, key: str, default: str, count: int) -> tuple[str, list[float]]:
-    """An attribute, and so many numbers of it; nan where it has others."""
+    """An attribute, and the `count` numbers in it; nan if it does not hold these."""
     text = default if element is None else element.get(key, default)
     with suppress(ValueError):
         values = [float(word) for word in text.split()]

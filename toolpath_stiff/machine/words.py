@@ -1,4 +1,4 @@
-"""Words A, B, C of a program on machines that do not have all three axes."""
+"""Words A, B, C of a program on machines without all three axes."""
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.errors import InputError
@@ -8,7 +8,7 @@ LETTERS = ("A", "B", "C")
 
 
 def refuse_words(machine: str, abc: FloatArray, axes: str) -> None:
-    """Raise `InputError` where words A, B, C (n, 3) rad of an axis that is not among `axes` are not 0."""
+    """Raise `InputError` if words A, B, C (n, 3) rad of an axis that is not among `axes` are not 0."""
     for letter, words in zip(LETTERS, abc.T, strict=True):
         if letter not in axes and words.any():
             turned = deg_from_rad(float(words[abs(words).argmax()]))

@@ -18,7 +18,7 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine.chain import STILL, ChainJoint, FixedFrame, applied, turned, turned_from_left
 
-# Of the arm's reach, and of 1: what rounding and the digits of a file leave between axes that meet or are square.
+# Of the arm's reach, and of 1: deviation by rounding and a file's digits of axes that should meet or be square.
 SQUARE = 1e-6
 CONFIGURATIONS = tuple(
     f"shoulder {shoulder}, elbow {elbow}, wrist {wrist}"
@@ -31,7 +31,7 @@ SINGULARITIES = ("shoulder", "elbow", "wrist")
 
 @dataclass(frozen=True)
 class SphericalWrist:
-    """Six rotary joints of which the last three meet at a point, 2 and 3 are parallel, and all others are square.
+    """Six rotary joints: the last three meet at a point, 2 and 3 are parallel, all other neighbours perpendicular.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class SphericalWrist:
 
     @classmethod
     def of(cls, joints: Sequence[ChainJoint], tip: FixedFrame) -> SphericalWrist | None:
-        """The closed form of six joints and the tip's frame in the last one; None where they have none."""
+        """Closed form of six joints and the tip's frame in the last one; None if they have none."""
         if len(joints) != 6 or any(joint.linear for joint in joints):
             return None
         homes, home = [], STILL
@@ -123,7 +123,7 @@ class SphericalWrist:
                 q1 = round_z - np.arctan2(self.lateral, radius)
                 real, imaginary = z - self.shoulder.real, radius - self.shoulder.imag
                 cosine = (real * real + imaginary * imaginary - upper**2 - lower**2) / (2.0 * upper * lower)
-                # Up is where the elbow lies above the line from shoulder to wrist, whichever way the arm leans.
+                # Up means the elbow above the line from shoulder to wrist, whichever way the arm leans.
                 gamma = np.arccos(cosine) if front == up else -np.arccos(cosine)
                 bend = np.arctan2(lower * np.sin(gamma), upper + lower * cosine)
                 q2 = np.arctan2(imaginary, real) - bend - np.angle(self.upper)
@@ -134,7 +134,7 @@ class SphericalWrist:
                         yield number + i, np.stack([q1, q2, q3, *wrist_angles])
 
     def _wrist(self, rest: FloatArray) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
-        """q4, q5, q6 of both turns of the wrist that make the rest (3, 3, n): Rz(q4) Ry(q5 + bend) Rz(q6)."""
+        """q4, q5, q6 of both wrist solutions for the rest (3, 3, n): Rz(q4) Ry(q5 + bend) Rz(q6)."""
         euler = turned_from_left(self.before, rest)
         sine = np.hypot(euler[0, 2], euler[1, 2])
         q4, q5 = np.arctan2(euler[1, 2], euler[0, 2]), np.arctan2(sine, euler[2, 2])
@@ -143,7 +143,7 @@ class SphericalWrist:
         return (q4, q5 - self.bend, q6), (q4 + np.pi, -q5 - self.bend, q6 + np.pi)
 
     def singularities(self, joints: FloatArray) -> FloatArray:
-        """(3, n) how far from singular at joint values (6, n): 1 far, 0 singular.
+        """(3, n) distance from singularity at joint values (6, n): 1 far, 0 singular.
 
         Wrist centre's distance from axis 1 over the arm's length; sine of the elbow's bend; sine of the wrist's.
         """
@@ -155,7 +155,7 @@ class SphericalWrist:
 
 
 def _meeting_point(origins: Sequence[FloatArray], axes: Sequence[FloatArray], most: float) -> FloatArray | None:
-    """(3,) the point nearest to three lines; None where it is farther than `most` from one of them."""
+    """(3,) point nearest to three lines; None if it is farther than `most` from one of them."""
     across = [np.eye(3) - np.outer(axis, axis) for axis in axes]
     offset = np.sum([part @ origin for part, origin in zip(across, origins, strict=True)], axis=0)
     point = np.linalg.lstsq(np.sum(across, axis=0), offset)[0]
@@ -164,12 +164,12 @@ def _meeting_point(origins: Sequence[FloatArray], axes: Sequence[FloatArray], mo
 
 
 def _cleaned(axes: FloatArray) -> FloatArray:
-    """A constant rotation without the rounding of right angles, which would only be multiplied."""
+    """A constant rotation without the rounding of right angles, which would only cost multiplications."""
     return np.where(np.abs(axes) < 1e-14, 0.0, axes)
 
 
 def _unturned(axes: FloatArray, about_z: FloatArray, about_y: FloatArray) -> FloatArray:
-    """Ry^T Rz^T R, (3, 3, n)."""
+    """Product Ry^T Rz^T R, (3, 3, n)."""
     cosine, sine = np.cos(about_z), np.sin(about_z)
     x, y, z = cosine * axes[0] + sine * axes[1], cosine * axes[1] - sine * axes[0], axes[2]
     cosine, sine = np.cos(about_y), np.sin(about_y)

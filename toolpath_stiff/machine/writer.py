@@ -1,4 +1,4 @@
-"""Machines to commented machine files; what `parse_machine` reads back is the same machine."""
+"""Machines as commented machine files; `parse_machine` reads the same machine back."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_s, n_per_um_from_n_per_m
 
-# `tps machine new` puts it in every section; what still has it was not replaced.
+# `tps machine new` puts it in every section; where it is still present, nothing was replaced.
 TEMPLATE_REMARK = "value of the template, not of this machine"
 HEADINGS = {
     "frame_joints": "Base frame: Z up. Row i is strut i + 1: x, y, z in mm\n"
@@ -45,7 +45,7 @@ HEADINGS = {
 
 
 def machine_toml(machine: Hexapod, preamble: str = "") -> str:
-    """The text of a machine file. `preamble` lines are put before it as comments."""
+    """Text of a machine file, with `preamble` lines as comments before it."""
     limits, law = machine.limits, machine.strut_law
     stiffnesses = [n_per_um_from_n_per_m(stiffness) for _, stiffness in law.points]
     lengths = [mm_from_m(length) for length, _ in law.points]
@@ -96,7 +96,7 @@ FITTED = "# Effects, and what was fitted to measurements, follow; they are writt
 
 
 def elements_toml(machine: MachineTool, torsions: Sequence[float]) -> str:
-    """The text of a machine of elements with the torsions of its joints (none: the file's), effects and uncertainty.
+    """Text of a machine of elements with torsions of its joints (none: the file's), effects and uncertainty.
 
     Torsions in nrad/(N m), in the order of the joints. Raises `InputError` where the file does not hold them once.
     """
@@ -112,7 +112,7 @@ def elements_toml(machine: MachineTool, torsions: Sequence[float]) -> str:
 
 
 def fitted_lines(machine: MachineTool) -> list[str]:
-    """Lines of effects, instruments, and what is known of fitted parameters."""
+    """Lines of effects, instruments, and the uncertainty of fitted parameters."""
     lines: list[str] = []
     for kind, entries in (("effect", machine.effects), ("instrument", machine.instruments)):
         for entry in entries:
@@ -140,7 +140,7 @@ def _rows(values: Document) -> list[str]:
 
 
 def _number(value: float) -> str:
-    """The shortest text that reads back as the same number to 14 digits: 304.77, not 304.77000000000004."""
+    """Shortest text that reads back as the same number to 14 digits: 304.77, not 304.77000000000004."""
     return str(value) if math.isinf(value) else repr(float(f"{value:.14g}") + 0.0)
 
 

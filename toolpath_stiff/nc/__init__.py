@@ -1,1 +1,1 @@
-"""NC programs and cutter-location files, from file or text, to `Program`, whose moves know no machine."""
+"""NC programs and cutter-location files, read from file or text to `Program`, whose moves depend on no machine."""

@@ -1,4 +1,4 @@
-"""What a program uses, and what the reader has to say about it: it goes on where `read_program` would stop.
+"""Check of a program: codes used, and findings of the reader, which goes on where `read_program` would stop.
 
 With `--interpreter linuxcnc`, what LinuxCNC's interpreter says of the program, in the words of the built-in check.
 """
@@ -59,14 +59,14 @@ class Finding:
 
 @dataclass(frozen=True)
 class UsedCode(Finding):
-    """A G or M code of the program: where it stands first, how often, and what it is taken for."""
+    """A G or M code of the program: its first place, its count, and its meaning to the reader."""
 
     count: int
 
 
 @dataclass(frozen=True)
 class Checked:
-    """What was found without a machine.
+    """Findings about a program without a machine.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Checked:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The options without which the program is refused, each with the first line that needs it."""
+        """Options without which the program is refused, each with the first line that needs it."""
         needed = dict[str, int]()
         for finding in self.findings:
             for option in NEEDED.findall(finding.text) if finding.severity == ERROR else ():
@@ -104,7 +104,7 @@ class Checked:
 
 
 def findings_of(errors: Iterable[InputError], program: ReadProgram) -> tuple[Finding, ...]:
-    """All findings about a program, in the order of lines."""
+    """Findings about a program, in order of lines."""
     return in_order(
         [
             *(finding_of(error) for error in errors),
@@ -115,19 +115,19 @@ def findings_of(errors: Iterable[InputError], program: ReadProgram) -> tuple[Fin
 
 
 def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Findings in the order of lines."""
+    """Findings in order of lines."""
     return tuple(sorted(findings, key=lambda finding: (finding.line, finding.column)))
 
 
 def finding_of(error: InputError) -> Finding:
-    """What could not be read."""
+    """Finding on something that could not be read."""
     text = error.found + (f"; expected {error.expected}" if error.expected else "")
     text += f". {error.hint[0].upper()}{error.hint[1:]}" if error.hint else ""
     return Finding(error.line or 0, error.column or 0, "not read", text, ERROR)
 
 
 def check(request: Request) -> Checked:
-    """Check a program by the interpreter that is asked for.
+    """Check a program with the requested interpreter.
 
     "auto" is the built-in check where that reads the whole program, or LinuxCNC's interpreter cannot. Raises
     `InputError` for an empty program, or where "linuxcnc" is asked for and cannot be had.
@@ -179,21 +179,13 @@ def _check_built_in(request: Request, run: ProgramRun) -> Checked:
         program = on_the_part(program, request, state) if len(program.moves) else program
     except InputError as error:
         errors = [*errors, error]
-        program = replace(
-            program,
-            moves=Recorder().moves(),
-            kinematics=request.controller.kinematics.label if request.controller.kinematics else "",
-        )
-    return Checked(
-        program=program,
-        complete=not errors,
-        used=_used_codes(tally, run.meaning),
-        findings=findings_of(errors, program),
-    )
+        kinematics = request.controller.kinematics
+        program = replace(program, moves=Recorder().moves(), kinematics=kinematics.label if kinematics else "")
+    return Checked(program, not errors, _used_codes(tally, run.meaning), findings_of(errors, program))
 
 
 def _run_to_the_end(run: ProgramRun, g_code: bool) -> tuple[list[InputError], list[Remark]]:
-    """Run a program; its errors, and the warnings of its end. A file in another language has that one error alone."""
+    """Run a program; returns its errors, and the warnings at its end. A file in another language has that one error."""
     assert run.tally is not None
     lines, name, errors, warnings = run.lines, run.name, run.tally.errors, list[Remark]()
     foreign = refused_program(lines, name, run.state.dialect) if g_code else None
@@ -217,7 +209,7 @@ def _used_codes(tally: Tally, meaning: Callable[[str], str] = code_meaning) -> t
 
 
 def _check_by_linuxcnc(request: Request, may_lack: bool = False) -> Checked:
-    """What LinuxCNC's interpreter says, which must be there unless it `may_lack`; codes as they stand, not run."""
+    """Check by LinuxCNC's interpreter, which must be installed unless it `may_lack`; codes as written, not as run."""
     try:
         program, errors = read(request), list[InputError]()
     except InputError as error:
@@ -228,16 +220,11 @@ def _check_by_linuxcnc(request: Request, may_lack: bool = False) -> Checked:
         program = request.program(
             Record(request.name), origin=origin, interpreter="linuxcnc", dialect=request.controller.label
         )
-    return Checked(
-        program=program,
-        complete=not errors,
-        used=_codes_in_lines(request),
-        findings=findings_of(errors, program),
-    )
+    return Checked(program, not errors, _codes_in_lines(request), findings_of(errors, program))
 
 
 def _codes_in_lines(request: Request) -> tuple[UsedCode, ...]:
-    """G and M codes as they stand in the lines, not how often they run; computed ones are not among them."""
+    """G and M codes as written in the lines, not as often as they run; computed ones are not included."""
     tally = Tally()
     try:
         lines = split(request.lines, request.name)

@@ -1,4 +1,4 @@
-"""Cutter compensation: the path of the tool centre beside a programmed contour. mm, rad.
+"""Cutter compensation: path of the tool centre beside a programmed contour. mm, rad.
 
 As LinuxCNC makes it (sources: its manual, "Cutter Compensation"; what `rs274` 2.9 prints, against which the tests
 hold this on random contours). In a plane: the first move ends beside its end point; a convex corner is rounded by an
@@ -116,23 +116,23 @@ class RadiusCompensation:
         return self.in_plane(self.position)
 
     def in_plane(self, point: list[float]) -> complex:
-        """A point's two coordinates of the plane."""
+        """The two in-plane coordinates of a point."""
         return complex(point[self.axes[0]], point[self.axes[1]])
 
     def moved(self, point: list[float], to: complex) -> list[float]:
-        """A point with other coordinates in the plane."""
+        """Point with other coordinates in the plane."""
         point = list(point)
         point[self.axes[0]], point[self.axes[1]] = to.real, to.imag
         return point
 
     def beside(self, point: complex, heading: complex) -> complex:
-        """Where the tool centre is beside a point of a contour, at a unit vector along it."""
+        """Tool centre beside a point of a contour whose unit tangent is `heading`."""
         return point + self.side * 1j * self.radius * heading
 
 
 @dataclass(frozen=True)
 class CenterMove:
-    """What a programmed move makes of the path: the new end of those before it, an arc about a corner, its own end."""
+    """Path of the tool centre for a programmed move: new end of the moves before it, arc about a corner, own end."""
 
     end: complex
     trim: complex | None = None
@@ -145,7 +145,7 @@ class CenterMove:
 def enter(
     cutter: RadiusCompensation, start: complex, target: complex, arc: OffsetArc | None
 ) -> tuple[CenterMove, complex]:
-    """The first move, and its direction (arcs have none). Raises `ArcError`.
+    """First move, and its direction (arcs have none). Raises `ArcError`.
 
     LinuxCNC's, longer than the tool's radius, ends beside its end point, an arc tangent there to the programmed one;
     Fanuc's where the next one says.
@@ -177,7 +177,7 @@ def enter(
 
 
 def go_on(cutter: RadiusCompensation, start: complex, target: complex, arc: OffsetArc | None) -> CenterMove:
-    """A further move, straight or an arc. Raises `ArcError` where the tool cannot follow it, or controls differ."""
+    """Further move, straight or an arc. Raises `ArcError` if the tool cannot follow it or controls differ."""
     element = _element(start, target, arc)
     if arc is not None and cutter.side * arc.turn > 0:
         _check_fits(cutter, abs(arc.center - target))
@@ -211,7 +211,7 @@ def _element(start: complex, target: complex, arc: OffsetArc | None) -> Element:
 
 
 def _check_fits(cutter: RadiusCompensation, radius: float) -> None:
-    """Raise `ArcError` for an arc that the tool, inside it, cannot follow."""
+    """Raise `ArcError` for an arc that the tool, on its inside, cannot follow."""
     refuse_arc_if(
         radius <= cutter.radius,
         f"an inside arc of radius {radius:.4f} mm",
@@ -228,13 +228,13 @@ def _turn_off(
     arc: OffsetArc | None,
     least: float,
 ) -> CenterMove:
-    """A move of the tool centre that begins in another direction than the one before it ended; `least` makes a corner.
+    """Move of the tool centre that starts in another direction than the last one ended; `least`: smallest corner.
 
     Raises `ArcError`.
     """
     (beside, end), last, center = ends, cutter.pending[0].arc, cutter.center
     corner = (math.pi / 2.0 - cutter.side * cmath.phase(ahead / before)) % math.tau - math.pi / 2.0  # above 0: convex
-    if arc is None:  # over the round part of an "h" and along its upright the tool stays above, it does not go round
+    if arc is None:  # as over the arch of an "h" and along its stem: the tool stays outside, it does not go round
         over = corner > math.pi - CORNER and last is not None and cutter.side * last.turn < 0
     else:
         over = abs(corner - math.pi) < CORNER and cutter.side * arc.turn < 0

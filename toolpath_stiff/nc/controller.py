@@ -1,4 +1,4 @@
-"""The controller: its dialect, and its file, which holds what belongs to the control and not to the machine.
+"""The controller: its dialect, and its file, which holds settings of the control rather than of the machine.
 
 Of the dialects, `generic` is the meaning that most programs share: plain numbers, LinuxCNC's start-up state; a block
 from which Fanuc's controls and LinuxCNC would make different paths is refused. The other dialects decide it. Sources:
@@ -38,7 +38,7 @@ INCH_METRIC = {"G70": "G20", "G71": "G21"}
 
 @dataclass(frozen=True)
 class Dialect:
-    """The meanings in which controls differ.
+    """Meanings in which controls differ.
 
     Attributes
     ----------
@@ -118,15 +118,12 @@ DIALECTS = {
         Dialect("siemens", additional=()),
     )
 }
-# Dialects that are languages of their own, with a reader each: what they are called.
-LANGUAGES = {
-    "heidenhain": "Heidenhain's conversational language",
-    "siemens": "Siemens' own language (Sinumerik)",
-}
+# Dialects that are separate languages, each with its reader -> their names.
+LANGUAGES = {"heidenhain": "Heidenhain's conversational language", "siemens": "Siemens' own language (Sinumerik)"}
 
 
 def dialect_named(name: str) -> Dialect:
-    """The dialect of a name. Raises `InputError`.
+    """Dialect by name. Raises `InputError`.
 
     Examples
     --------
@@ -147,7 +144,7 @@ KEYS = (
 
 @dataclass(frozen=True)
 class Controller:
-    """What is known of the control.
+    """Known settings of the control.
 
     Attributes
     ----------
@@ -178,7 +175,7 @@ class Controller:
 
     @property
     def plain(self) -> bool:
-        """Whether LinuxCNC's interpreter reads numbers, switches and codes in the same way."""
+        """True if LinuxCNC's interpreter reads numbers, switches and codes the same way."""
         return self.dialect in (GENERIC, DIALECTS["linuxcnc"]) and self.switches in (frozenset(), ALL_SWITCHES)
 
     def check_plain(self) -> None:
@@ -190,7 +187,7 @@ class Controller:
 
     @property
     def label(self) -> str:
-        """The dialect's name, and whether a controller file changes it."""
+        """Name of the dialect, with a note if a controller file changes it."""
         name = self.dialect.name
         return name if self.dialect == DIALECTS[name] else f"{name}, changed by the controller file"
 
@@ -199,7 +196,7 @@ UNKNOWN_CONTROL = Controller()
 
 
 def read_controller(path: str | Path, dialect: str | None = None) -> Controller:
-    r"""Read a controller file; .var and .tbl files are LinuxCNC's. `dialect`, if given, is in place of the file's.
+    r"""Read a controller file; .var and .tbl files are LinuxCNC's. `dialect`, if given, replaces the file's.
 
     Raises `InputError` that names file and key.
 

@@ -1,4 +1,4 @@
-"""Courses of moves: lengths, frames of arcs, points and tangents along them. SI units, but where mm are said."""
+"""Courses of moves: lengths, frames of arcs, points and tangents along them. SI units unless mm are stated."""
 
 import math
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ def move_lengths(moves: Moves) -> FloatArray:
 
 
 def length_of_move(start: Sequence[float], end: Sequence[float], arc: Arc | None) -> float:
-    """Millimetres of a move, an arc's as `move_lengths` has it: so G93's F is one over the move's time."""
+    """Length of a move in mm, of arcs as in `move_lengths`, so that G93's F is one over the move's time."""
     if arc is None:
         return math.dist(start[:3], end[:3])
     climb = sum((e - s) * n for s, e, n in zip(start, end, arc.normal, strict=False))
@@ -62,17 +62,17 @@ class ArcFrame:
 
 
 def arc_frame(moves: Moves, rows: IntArray) -> ArcFrame:
-    """The frames of the arcs in `rows` of moves."""
+    """Frames of the arcs in `rows` of moves."""
     return ArcFrame(moves.arc_center[rows], moves.arc_normal[rows], moves.start[rows, :3], moves.end[rows, :3])
 
 
 def frame_of(arc: Arc, start: Sequence[float], end: Sequence[float]) -> ArcFrame:
-    """The frame of a single arc in mm."""
+    """Frame of a single arc in mm."""
     return ArcFrame(*(np.array([point[:3]], dtype=float) for point in (arc.center, arc.normal, start, end)))
 
 
 def point_on_arc(arc: Arc, start: Sequence[float], end: Sequence[float], share: float) -> tuple[float, float, float]:
-    """The point at a share of an arc's sweep, as it is sampled; mm."""
+    """Point at a share of an arc's sweep, as it is sampled; mm."""
     frame, row = frame_of(arc, start, end), np.zeros(1, dtype=np.int64)
     x, y, z = _along_arcs(frame, np.array([arc.sweep]), row, np.array([share]))[0][0].tolist()
     return (x, y, z)
@@ -84,7 +84,7 @@ def points_along(moves: Moves, move: IntArray, u: FloatArray) -> tuple[FloatArra
     chord = end - start
     length = norms(chord)
     tangent = (chord / np.where(length > 0.0, length, 1.0)[:, None]).take(move, axis=0)
-    position = start.take(move, axis=0)  # of most samples in a program of short moves: they are ends
+    position = start.take(move, axis=0)  # in a program of short moves most samples are ends
     last = np.flatnonzero(u == 1.0)
     position[last] = end[move[last]]
     inner = np.flatnonzero((u != 0.0) & (u != 1.0))
@@ -127,7 +127,7 @@ def extents(moves: Moves) -> Extents:
 
 
 def _arc_extremes(arcs: Moves) -> FloatArray:
-    """(m, 3) m, points of arcs where a coordinate turns; climbs and growing radii as far along as the angle is."""
+    """(m, 3) m, points of arcs at which a coordinate has an extreme; climb and radius change in step with the angle."""
     row = np.arange(len(arcs))
     frame, sweep = arc_frame(arcs, row), np.abs(arcs.arc_sweep)
     points = [np.empty((0, 3))]

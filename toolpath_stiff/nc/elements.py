@@ -24,7 +24,7 @@ def direction(element: Element, place: complex) -> complex:
 
 
 def _foot(element: Element, place: complex) -> complex:
-    """The point of an element next to a place beside it."""
+    """Point of an element nearest to a place beside it."""
     start, _, center, _ = element
     if center is not None:
         return center + abs(start - center) * (place - center) / abs(place - center)
@@ -33,7 +33,7 @@ def _foot(element: Element, place: complex) -> complex:
 
 
 def _holds(element: Element, place: complex) -> bool:
-    """Whether a point of an element lies between its ends."""
+    """True if a point of an element lies between its ends."""
     start, end, center, turn = element
     if center is None:
         return -REACHED <= ((place - start) / (end - start)).real <= 1.0 + REACHED
@@ -43,7 +43,7 @@ def _holds(element: Element, place: complex) -> bool:
 
 
 def meetings(first: Element, second: Element, left: float = 0.0) -> tuple[complex, ...]:
-    """Where two elements, both set off to the left, meet: nowhere or at two places, which lines have in one.
+    """Points where two elements, both offset to the left, meet: none or two, which coincide for two lines.
 
     In the order along the line; of two arcs the one to the right of the way from the first's centre to the second's.
     """

@@ -17,13 +17,13 @@ from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.poses import ShopPose
 
 Numbers = TypeVar("Numbers", float, FloatArray)
-STILL = 1e-12  # of a coordinate, or of 1 mm if that is more: what frames' sums leave of an axis that stands
+STILL = 1e-12  # of a coordinate, or of 1 mm if more: rounding by frames of an axis that does not move
 Rotation = tuple[float, float, float]  # of G68: centre X, Y in program coordinates, angle in degrees
 
 
 @dataclass
 class Frames:
-    """The coordinate systems in force, and the tool tip in control coordinates.
+    """Coordinate systems in force, and the tool tip in control coordinates.
 
     Attributes
     ----------
@@ -71,8 +71,8 @@ class Frames:
 
     @property
     def bound(self) -> bool:
-        """Whether the present point was given in machine coordinates, an axis of it at least."""
-        # The rotary axes of a machine that is not this one have one zero for both.
+        """True if at least one axis of the present point was given in machine coordinates."""
+        # Rotary axes of a posted machine have the same zero in both systems.
         return any(self.from_machine if self.posted is None else self.from_machine[:3])
 
     def to_control(self, program: list[float]) -> list[float]:
@@ -103,26 +103,26 @@ class Frames:
         return program if self.rotation is None else _about(self.rotation, program, -self.rotation[2])
 
     def axis_to_control(self, axis: int, program: Numbers) -> Numbers:
-        """`to_control` of one axis of many points at once, where nothing is rotated."""
+        """`to_control` for one axis of many points at once, without rotation."""
         return shifted(program, self.g92[axis], self.offsets.at(self.active).axes[axis])
 
     def axis_to_program(self, axis: int, control: Numbers) -> Numbers:
-        """`to_program` of one axis of many points at once, where nothing is rotated."""
+        """`to_program` for one axis of many points at once, without rotation."""
         return shifted_back(control, self.g92[axis], self.offsets.at(self.active).axes[axis])
 
     @property
     def rotated(self) -> bool:
-        """Whether a work offset or G68 turns the program's X and Y."""
+        """True if a work offset or G68 rotates the program's X and Y."""
         turned = self.rotation is not None or self.linear is not None
         return turned or self.offsets.at(self.active).rotation != 0.0
 
     @property
     def turned(self) -> float:
-        """Degrees by which the program's X and Y axes are turned from the control's: work offset and G68."""
+        """Angle in degrees of the program's X and Y axes from the control's: work offset and G68."""
         return self.offsets.at(self.active).rotation + (self.rotation[2] if self.rotation else 0.0)
 
     def turn_direction(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
-        """The normal of an arc in the program's axes in control axes: a mirror image turns it over."""
+        """Normal of an arc, from program axes to control axes; a mirror image reverses it."""
         if self.linear is not None:
             first, second, third = self.linear
             x, y, z = (  # the cofactors, whose lengths are the square of the scale
@@ -136,7 +136,7 @@ class Frames:
         return (*_turned(vector[0], vector[1], rotation), vector[2])
 
     def fix_reference(self) -> tuple[float, float, float]:
-        """G54's zero at the first motion, from then on the set-up frame's."""
+        """G54's zero at the first motion, which defines the set-up frame from then on."""
         if self.reference is None:
             g54 = self.offsets.table[0]
             x, y, z = g54.axes[:3]
@@ -146,7 +146,7 @@ class Frames:
 
     @property
     def origin(self) -> ShopPose:
-        """Where G54's zero sits on the machine, mm and degrees."""
+        """Position of G54's zero on the machine, mm and degrees."""
         x, y, z = self.fix_reference()
         if self.option is not None:
             return self.option
@@ -154,14 +154,15 @@ class Frames:
 
     def to_setup(self, control: list[float]) -> list[float]:
         """Set-up coordinates of a point in control coordinates."""
-        return [*(c - r for c, r in zip(control[:3], self.fix_reference(), strict=True)), *control[3:]]
+        (a, b, c), (x, y, z, *angles) = self.reference or self.fix_reference(), control
+        return [x - a, y - b, z - c, *angles]
 
     def from_setup(self, setup: list[float]) -> list[float]:
         """Control coordinates of a point in set-up coordinates."""
         return [*(s + r for s, r in zip(setup[:3], self.fix_reference(), strict=True)), *setup[3:]]
 
     def machine_position(self) -> list[float]:
-        """The spindle's place in machine coordinates, as a control shows it: without the tool length in force."""
+        """Spindle position in machine coordinates, as a control shows it: without the tool length in force."""
         point = self.to_setup(self.position)
         point[2] += self.tool
         origin = self.origin
@@ -179,23 +180,23 @@ class Frames:
         return control
 
     def set_tool(self, length: float) -> None:
-        """Another tool length: the machine stands still, the controlled point's numbers change."""
+        """Put another tool length in force: the machine stands still, the controlled point's numbers change."""
         self.position = [*self.position[:2], self.position[2] + (self.tool - length), *self.position[3:]]
         self.tool = length
 
 
 def standing(start: list[float], end: list[float]) -> list[float]:
-    """The end, with the numbers of the start where an axis stands but for rounding."""
-    return [s if abs(e - s) < STILL * max(1.0, abs(s)) else e for s, e in zip(start, end, strict=True)]
+    """End of a move, with the start's numbers for axes that differ by rounding only."""
+    return [s if s == e or abs(e - s) < STILL * max(1.0, abs(s)) else e for s, e in zip(start, end, strict=True)]
 
 
 def shifted(program: Numbers, shift: float, offset: float) -> Numbers:
-    """A program coordinate in control coordinates: G92 or G52 first, then the work offset."""
+    """Program coordinate in control coordinates: first G92 or G52, then the work offset."""
     return (program + shift) + offset
 
 
 def shifted_back(control: Numbers, shift: float, offset: float) -> Numbers:
-    """A control coordinate in program coordinates."""
+    """Control coordinate in program coordinates."""
     return (control - offset) - shift
 
 
@@ -231,5 +232,5 @@ def _cross(a: list[float], b: list[float]) -> list[float]:
 
 
 def rotate(matrix: list[list[float]], vector: list[float]) -> list[float]:
-    """A vector turned, or changed otherwise, by a matrix."""
+    """Vector times a matrix."""
     return [sum(m * v for m, v in zip(row, vector, strict=True)) for row in matrix]

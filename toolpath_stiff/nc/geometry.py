@@ -38,7 +38,7 @@ def normal_of(plane: str) -> Vector:
 
 
 class ArcError(Exception):
-    """What is wrong with an arc: found, expected."""
+    """Error of an arc: what was found, what was expected."""
 
     def __init__(self, problem: str, expected: str) -> None:
         super().__init__(problem)
@@ -46,7 +46,7 @@ class ArcError(Exception):
 
 
 def refuse_arc_if(wrong: object, problem: str, expected: str) -> None:
-    """Raise `ArcError` where something is wrong."""
+    """Raise `ArcError` if `wrong`."""
     if wrong:
         raise ArcError(problem, expected)
 
@@ -74,14 +74,15 @@ def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: boo
     return (middle[0] - side * height * along[1], middle[1] + side * height * along[0])
 
 
-def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) -> None:
-    """Raise `ArcError` if start and end do not lie on one circle about the centre within LinuxCNC's tolerance.
+def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) -> float:
+    """The radius at the start; `ArcError` if the end does not lie on its circle within LinuxCNC's tolerance.
 
     `inch`: it is an inch program, whose ends may be rounded to thousandths; the points are in mm all the same.
 
     Examples
     --------
     >>> check_radii((10.0, 0.0), (0.0, 10.001), (0.0, 0.0))
+    10.0
     >>> check_radii((10.0, 0.0), (10.0, 0.0), (10.0, 0.0))
     Traceback (most recent call last):
         ...
@@ -92,23 +93,24 @@ def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) 
         raise ArcError("an arc of radius 0", "a centre apart from the start and the end point")
     difference, least = abs(first - last), INCH_TOLERANCE if inch else MM_TOLERANCE
     if difference <= least:  # of nearly all arcs
-        return
+        return first
     allowed = min(max(least, RELATIVE_TOLERANCE * max(first, last)), MOST_TOLERANCES * least)
     if difference > allowed:
         radii = f"(radius {first:.4f} mm at the start, {last:.4f} mm at the end)"
         problem = f"an arc whose end lies {difference:.4f} mm off its circle {radii}"
         raise ArcError(problem, f"radii that agree within {allowed:.4f} mm")
+    return first
 
 
 def check_bulge(radius: float, sweep: float) -> None:
-    """Raise `ArcError` if an arc leaves its start further than coordinates may be apart: its ends do not bound it.
+    """Raise `ArcError` if an arc goes further from its start than coordinates may: its ends do not bound it.
 
     Examples
     --------
     >>> check_bulge(1e9, 1e-7)
     """
-    away = 2.0 * radius * math.sin(min(abs(sweep), math.pi) / 2.0)
-    if away > LARGEST_MM:
+    widest = 2.0 * radius
+    if widest > LARGEST_MM and (away := widest * math.sin(min(abs(sweep), math.pi) / 2.0)) > LARGEST_MM:
         problem = f"an arc of radius {radius:g} mm that goes {away:g} mm away from its start"
         raise ArcError(problem, f"at most {LARGEST_MM:g} mm")
 
@@ -131,16 +133,15 @@ def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns
 
 def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, inch: bool, turns: int = 1) -> float:
     """Signed angle of an arc in rad. Raises `ArcError` unless start and end lie on one circle about the centre."""
-    check_radii(start, end, center, inch)
-    sweep = arc_sweep(start, end, center, clockwise, turns)
-    check_bulge(math.dist(start, center), sweep)
+    radius, sweep = check_radii(start, end, center, inch), arc_sweep(start, end, center, clockwise, turns)
+    check_bulge(radius, sweep)
     return sweep
 
 
 def turn_between(first: float, last: float, clockwise: bool) -> float:
     """Signed turn in rad from one polar angle to another, above 0 and up to a whole one in size."""
     sweep = (first - last if clockwise else last - first) % math.tau
-    # The modulus of a tiny negative difference is almost a whole turn, and must be one.
+    # A tiny negative difference modulo a turn is almost a whole turn, and must count as one.
     if sweep < LEAST_SWEEP:
         sweep = math.tau
     return -sweep if clockwise else sweep

@@ -1,4 +1,4 @@
-"""Blocks to moves: in which order the codes of a block act.
+"""Blocks to moves: the order in which the codes of a block act.
 
 The meaning of each code is a function in `codes`, found in the table of `codes.registry`; here is the order alone
 (LinuxCNC's manual, "G-Code Overview", "Order of Execution").
@@ -28,7 +28,7 @@ def execute(state: State, block: Block) -> Then:
 
 
 def begin(state: State, block: Block) -> CurrentBlock:
-    """Take a block's codes and set its modes, not moving yet; doing so twice changes nothing but dwells."""
+    """Take a block's codes and set its modes, without moving; repeating it changes nothing but dwells."""
     current = sort_words(state, block)
     read_numbers(state, current)
     check_block(state, current)
@@ -40,7 +40,7 @@ def begin(state: State, block: Block) -> CurrentBlock:
 
 
 def finish(state: State, block: CurrentBlock) -> Then:
-    """Offsets and moves of the block begun; returns what runs after it."""
+    """Carry out offsets and moves of a begun block; returns what runs after it."""
     _check_axis_words(block)
     for code in _in_order(block, ahead=False):
         code.act(state, block, code.name)
@@ -59,7 +59,7 @@ def finish(state: State, block: CurrentBlock) -> Then:
 
 
 def _in_order(block: CurrentBlock, ahead: bool) -> list[Code]:
-    """The codes and words of a block that set modes (`ahead`), or act after those, in the order of execution."""
+    """Codes and words of a block, in order of execution: those that set modes (`ahead`), or those that act later."""
     codes = [code for name in block.groups.values() if (code := CODES[name]).when != "motion"]
     codes += [CODES[letter] for letter in WORDS_THAT_ACT if letter in block.values]
     return sorted((code for code in codes if (code.rank <= LAST_MODE) == ahead), key=lambda code: code.rank)
@@ -89,13 +89,13 @@ def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
     code = CODES.get(name)
     unknown = code is None and word.letter == "G"
     block.refuse_if(unknown, word, "is not a G code that is known", hint="check the program, or post it without it")
-    if code is None:  # it may run anything, a change of kinematics included; its parameters go with it
+    if code is None:  # unknown: it may run anything, even a change of kinematics; its parameters belong to it
         state.note_unknown(block.line, word)
         for other in block.block.words:
             if other.letter in "PQE":
                 state.note(block.line, other, f"parameter of {word.text}")
         return
-    acts = word.letter == "G" or code.group == "M subprogram"  # other M codes are a machine builder's
+    acts = word.letter == "G" or code.group == "M subprogram"  # other unknown M codes are a machine builder's
     foreign = acts and name == written and dialect.name not in code.controls
     hint = f"there it is {code.meaning}: name the control with --dialect"
     block.refuse_if(foreign, word, f"is not a code of the dialect {dialect.name}", " or ".join(code.controls), hint)
@@ -113,11 +113,11 @@ def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
 
 
 def _check_axis_words(block: CurrentBlock) -> None:
-    """Two codes that use the axis words of their block are an error."""
+    """Refuse two codes that both use the axis words of their block."""
     present = [block.groups.get(group) for group in TAKERS]
     takers = [name for name in present if name is not None and CODES[name].takes_axes]
     moving = block.groups.get("motion")
-    if takers in (["G28"], ["G30"]) and moving in ("G0", "G1"):  # it homes, and that motion mode holds afterwards
+    if takers in (["G28"], ["G30"]) and moving in ("G0", "G1"):  # it homes, and the motion mode is in force afterwards
         return
     if len(takers) > 1 or (takers and moving and moving != "G80"):
         other = moving if moving and len(takers) == 1 else takers[0]
@@ -125,7 +125,7 @@ def _check_axis_words(block: CurrentBlock) -> None:
 
 
 def _move(state: State, block: CurrentBlock) -> None:
-    """Change the motion mode, and move as the block asks."""
+    """Change the motion mode, and move as the block requires."""
     given = block.groups.get("motion")
     if given is not None:
         if given in (*CYCLES, "G80") and state.dialect.increments and state.motion not in CYCLES:

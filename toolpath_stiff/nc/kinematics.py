@@ -40,7 +40,7 @@ LETTERS = "ABC"
 DIRECTIONS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 PLACE_KEYS = {TABLE: "point_mm", HEAD: "pivot_mm"}
 TOLERANCE_MM, LEAST_TOLERANCE_MM, LARGEST_TOLERANCE_MM = 1e-3, 1e-5, 1.0
-PARALLEL = 1e-6  # sine of the angle between two axes that are one
+PARALLEL = 1e-6  # sine of the angle between two axes below which they are one
 UPRIGHT = 1e-9  # of a unit vector: a tool axis along y has no pitch
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -73,7 +73,7 @@ class RotaryAxis:
 
     @property
     def column(self) -> int:
-        """Its place among A, B, C."""
+        """Position among A, B, C."""
         return LETTERS.index(self.letter)
 
 
@@ -103,7 +103,7 @@ class PostedKinematics:
 
     @property
     def from_tool_to_work(self) -> tuple[RotaryAxis, ...]:
-        """The axes in the order in which the tool meets them on its way to the work."""
+        """Axes in order from the tool to the work."""
         heads = [axis for axis in self.axes if axis.turns == HEAD]
         return (*reversed(heads), *(axis for axis in self.axes if axis.turns == TABLE))
 
@@ -113,7 +113,7 @@ class PostedKinematics:
         return " ".join([self.type, *(axis.letter for axis in self.axes)])
 
     def assumption(self, *, switched: bool = False) -> str:
-        """What was made of X Y Z A B C, in one sentence; `switched`: tool centre point control came and went."""
+        """Sentence on how X Y Z A B C were interpreted; `switched`: tool centre point control was switched."""
         directions = [", ".join(f"{v:.6g}" for v in axis.direction) for axis in self.axes]
         turns = zip(self.axes, directions, strict=True)
         axes = ", ".join(f"{axis.letter} turns the {axis.turns} about ({direction})" for axis, direction in turns)
@@ -127,7 +127,7 @@ class PostedKinematics:
 
 
 def read_kinematics(toml: TomlReader) -> PostedKinematics | None:
-    """The kinematics of a controller file's `[kinematics]`; None where there is none. Raises `InputError`."""
+    """Kinematics in a controller file's `[kinematics]`; None if there is none. Raises `InputError`."""
     given = toml.data.get("kinematics")
     if given is None:
         return None
@@ -199,7 +199,7 @@ def _vector(toml: TomlReader, where: str, value: object) -> Vector:
 
 
 def _check_pair(toml: TomlReader, axes: tuple[RotaryAxis, ...], parts: tuple[tuple[str, str], ...]) -> None:
-    """Raise the error of two axes that are one, or that one letter moves."""
+    """Raise the error if two axes coincide, or share a letter."""
     if len(axes) < 2:
         return
     first, second = (f"kinematics.{key}" for key, _ in parts)
@@ -250,7 +250,7 @@ def tool_poses(
         axis = turned(axis, rotary, angle)
         if not kinematics.tcp:
             center = line_point(rotary, xyz, tool_length)
-            # Where nothing turns the numbers stay to their last digit, and a tool's unknown length does not matter.
+            # Where nothing turns, numbers stay exact to the last digit, and an unknown tool length does not matter.
             turns = ~held & (angle != 0.0)
             tip = np.where(turns[:, None], center + turned(tip - center, rotary, angle), tip)
     return tip, axis
@@ -278,7 +278,7 @@ def turned(vectors: FloatArray, rotary: RotaryAxis, angle: FloatArray) -> FloatA
 
 
 def line_point(rotary: RotaryAxis, xyz: FloatArray, tool_length: FloatArray | float) -> FloatArray:
-    """(n, 3) a point of the rotary axis at the numbers X Y Z of the linear axes."""
+    """(n, 3) a point of the rotary axis at values X Y Z of the linear axes."""
     assert rotary.point is not None
     if rotary.turns == HEAD:
         reach = np.broadcast_to(np.asarray(tool_length, dtype=float), (len(xyz),))

@@ -13,11 +13,11 @@ from toolpath_stiff.nc.moves import Moves, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import LATHE_HINT
 
-# Of cutter-location files, which are not blocks of words: what tells them from G code is known here, their own
-# reader is loaded for them alone.
+# Signs of cutter-location files, which are not blocks of words: they are known here, while their own
+# reader is loaded only for them.
 EXTENSIONS = (".apt", ".aptsource", ".cl", ".cls", ".clsf", ".ncl")
-HEAD_LINES = 50  # a file says what it is at its beginning, comments and blank lines apart
-# What no line of G code looks like.
+HEAD_LINES = 50  # a file shows its language at its beginning, apart from comments and blank lines
+# Lines that cannot be G code.
 STATEMENT = re.compile(
     r"\s*(?:N?\d+\s+)?(?:(?:GOTO|FROM|FEDRAT|CUTTER|LOADTL|UNITS?|MACHIN|SPINDL|TLDATA|MSYS|TOOL\s+PATH|TLAXIS|TOOLNO"
     r"|GODLTA|INTOL|OUTTOL)\s*/|PPRINT\b|PARTNO\b|MULTAX\s*(?:/|$)|(?:RAPID|FINI)\s*$)",
@@ -38,8 +38,8 @@ HINTS = {
     _SUB: "post it as ISO G code, or write its subprograms as LinuxCNC's O words",
 }
 READ = {language: dialect for dialect, language in LANGUAGES.items()}
-LONGEST_SIGN = 200  # characters of a line that are looked at
-# What no G code of the controls read here has at the beginning of a block, blanks and N words apart.
+LONGEST_SIGN = 200  # characters of a line that are examined
+# Beginnings of a block, after blanks and N words, that no G code of the supported controls has.
 _SIGNS = (
     (_HEIDENHAIN, r"BEGIN\s+PGM\b"),
     (_HEIDENHAIN, r"(?:L|LN|C|CC|CR|CT|RND|CHF)\s[^(;]*\bF\s*MAX\b|C\s+I?[A-Z][+-][^(;]*\bDR[+-]"),
@@ -57,17 +57,19 @@ _SIGNS = (
 _PATTERNS = [(what, re.compile(rf"\s*(?:N\d+\s+|\d+\s+)?(?:{sign})", re.IGNORECASE)) for what, sign in _SIGNS]
 
 PLAIN_LANGUAGE = re.compile(r"\s*(?:N?\d+\s+)?BEGIN\s+PGM\b", re.IGNORECASE)  # also behind a long heading
-# Of Siemens' programs that begin as G code does.
+# Signs of Siemens' programs that begin like G code.
 LATE_SIGN = re.compile(
     r"\s*(?:N\d+\s+)?(?:(?:MCALL\s+)?CYCLE\d+\s*\(|MSG\s*\(|A?TRANS\b|TRAORI\b|SUPA\b|R\d+\s*=|T\s*=\s*\"|"
     r"(?:[A-Z]++[\d.+-]*+\s++)*(?:CR|[XYZ])\s*=)",
     re.IGNORECASE,
 )
+# Signs absent from Siemens' language but present in the ISO dialect of the same controls.
+_ISO = re.compile(r"\s*\(|[^;(]*(?<![A-Z])G(?:2[018]|43|8\d|9[89])(?![\d.])|\s*O\d", re.IGNORECASE)
 LATHE_LINES = 2000  # lines: a lathe's program shows what it is at its beginning
 _NO_CODE = re.compile(r"\([^)]*\)?|;.*|<[^>]*>")  # comments, names
 _M6, _Y = r"M0*6(?![\d.])", r"(?<![A-Z])Y[-+]?[\d.#\[]"
-_CYCLE = r"G8[1-9](?![\d.])"  # of a mill, which G99 belongs to
-_OTHER_U = r"^(?!.*G(?:0*(?:28|30)|6[56])(?![\d.])).*"  # not homes, nor arguments of a macro
+_CYCLE = r"G8[1-9](?![\d.])"  # a mill's cycle, to which G99 belongs
+_OTHER_U = r"^(?!.*G(?:0*(?:28|30)|6[56])(?![\d.])).*"  # neither homes nor arguments of a macro
 # Fanuc, operator's manuals of lathes, G-code system A: T has the tool and its offset, U and W are X and Z in steps,
 # G98 and G99 the feed per minute and per revolution. A sign, its pattern, what the program then has not, and has too.
 LATHE_SIGNS = (
@@ -81,7 +83,7 @@ LATHE_SIGNS = (
 
 
 def language_of(line: str) -> str | None:
-    """The other language that a line is written in, or None.
+    """Other language in which a line is written, or None.
 
     Examples
     --------
@@ -94,7 +96,7 @@ def language_of(line: str) -> str | None:
 
 
 def recognise(lines: tuple[str, ...], name: str, dialect: Dialect) -> tuple[str, str]:
-    """The language of a program and by what it is recognised: its first lines, unless the dialect says so.
+    """Language of a program and the sign of it: from its first lines, unless the dialect decides.
 
     Examples
     --------
@@ -108,18 +110,23 @@ def recognise(lines: tuple[str, ...], name: str, dialect: Dialect) -> tuple[str,
         return LANGUAGES[dialect.name], f"as asked for: --dialect {dialect.name}"
     if looks_like_cutter_location(lines, name):
         return CUTTER_LOCATION_FILE, "its ending, or statements such as GOTO/"
-    if name.lower().endswith((".mpf", ".spf")):
-        return _SIEMENS, "its ending"
     for index, line in enumerate(lines[:LATHE_LINES]):
         language = language_of(line) if index < HEAD_LINES else _HEIDENHAIN if PLAIN_LANGUAGE.match(line) else None
         language = language or (_SIEMENS if LATE_SIGN.match(line) else None)
         if language is not None:
             return language, f"line {index + 1}: {line.strip()[:40]!r}"
+    if name.lower().endswith((".mpf", ".spf")):
+        iso = next((line for line in lines[:LATHE_LINES] if _ISO.match(line)), None)
+        return (
+            (_SIEMENS, "its ending")
+            if iso is None
+            else (G_CODE, f"the ISO dialect in spite of its ending: {iso[:40]!r}")
+        )
     return G_CODE, "no sign of another language"
 
 
 def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = None) -> InputError | None:
-    """The error for a program in another language; `suspect` is a line (from 1) that could not be read as G code."""
+    """Error for a program in another language; `suspect` is a line (from 1) that could not be read as G code."""
     places = list(range(min(HEAD_LINES, len(lines))))
     if suspect is not None and 0 < suspect <= len(lines):
         places.append(suspect - 1)
@@ -133,13 +140,13 @@ def foreign_program(lines: tuple[str, ...], name: str, suspect: int | None = Non
 
 
 def refused_program(lines: tuple[str, ...], name: str, dialect: Dialect) -> InputError | None:
-    """The error for a program in another language, or for a lathe; LinuxCNC's lathes have X as a position."""
+    """Error for a program in another language, or for a lathe; LinuxCNC's lathes have X as a position."""
     foreign = foreign_program(lines, name)
     return foreign if foreign is not None or dialect.name == "linuxcnc" else lathe_program(lines, name)
 
 
 def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
-    """Whether a file is a cutter-location file, by its extension or by how it begins.
+    """True if a file is a cutter-location file, by its extension or by its beginning.
 
     Examples
     --------
@@ -155,12 +162,12 @@ def looks_like_cutter_location(lines: tuple[str, ...], name: str) -> bool:
 
 
 def any_statement(lines: Iterable[str]) -> bool:
-    """Whether any of these lines is a statement that no other text looks like."""
+    """True if any of these lines is a statement that cannot be mistaken for other text."""
     return any(STATEMENT.match(line) for line in lines)
 
 
 def lathe_program(lines: Sequence[str], name: str) -> InputError | None:
-    """The error for a lathe's program; None where not two signs are there.
+    """Error for a lathe's program; None without two signs of one.
 
     Examples
     --------
@@ -181,7 +188,7 @@ def lathe_program(lines: Sequence[str], name: str) -> InputError | None:
 
 
 def _lathe_signs(lines: Iterable[str]) -> list[tuple[int, str]]:
-    """Line (from 1) and name of each sign, in the order of lines."""
+    """Line (from 1) and name of each sign, in order of lines."""
     text = "\n".join("".join(_NO_CODE.sub(" ", line).split()).upper() for line in lines)
     signs = []
     for what, pattern, nowhere, beside in LATHE_SIGNS:
@@ -192,7 +199,7 @@ def _lathe_signs(lines: Iterable[str]) -> list[tuple[int, str]]:
 
 
 def lathe_warning(signs: Mapping[str, int], moves: Moves | None) -> list[Remark]:
-    """What makes a program look like a lathe's (with its line), if nothing of it ever moves along Y."""
+    """Warning on the first sign (with its line) of a lathe's program, if no move is along Y."""
     if moves is None or not signs or (moves.start[:, 1] != moves.end[:, 1]).any() or moves.arc_normal[:, 2].any():
         return []
     what, line = next(iter(signs.items()))

@@ -1,4 +1,4 @@
-"""A program file to lines: bytes to text, text to lines."""
+"""Lines of a program file: bytes to text, text to lines."""
 
 import codecs
 import re
@@ -34,7 +34,7 @@ def read_text(path: str | Path) -> tuple[str, str]:
     Raises `InputError` where the file cannot be read or is larger than `LARGEST_FILE`.
     """
     try:
-        check_regular(Path(path))  # no pipe of the shell either: a program is read more than once
+        check_regular(Path(path))  # not even a pipe of the shell: a program is read more than once
         with Path(path).open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
     except OSError as error:
@@ -75,6 +75,6 @@ def split_lines(text: str, name: str) -> tuple[str, ...]:
 
 
 def _any_binary(text: str) -> bool:
-    """Whether a text holds anything of `BINARY`; a fifth of the time of a search, and UTF-8 has the same bytes."""
+    """True if a text contains any of `BINARY`; takes a fifth of a search's time, as UTF-8 has the same bytes."""
     content = text.encode("utf-8", "surrogatepass")
     return len(content.translate(None, _BINARY_BYTES)) != len(content)

@@ -1,4 +1,4 @@
-"""The moves of an NC program, one row a move, in SI units; and the recorder that collects them while reading.
+"""The moves of an NC program, one row per move, in SI units; and the recorder that collects them while reading.
 
 This is what the reader hands on: geometry with its line, feed and tool; no machine, no sampling.
 """
@@ -31,7 +31,7 @@ MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
 NARROW = {"line": np.int32, "motion": np.int8}  # whole numbers that a long program has many of
 KINDS = {**dict.fromkeys(("line", "motion", "tool"), np.int64), "from_machine": np.bool_}  # other columns: float
 WIDE = {"start": (6,), "end": (6,), "arc_center": (3,), "arc_normal": (3,), "from_machine": (2,)}
-HELD = ("tool", "tool_length", "spindle")  # columns that most programs have one value of
+HELD = ("tool", "tool_length", "spindle")  # columns with a single value in most programs
 
 
 @dataclass(frozen=True, repr=False)
@@ -107,7 +107,7 @@ class Moves(ArrayColumns):
 
 
 def move_columns(moves: Moves) -> dict[str, NDArray[Any]]:
-    """Column -> values of a table of moves in the shop's units; arcs have their signed angle, else it is 0."""
+    """Column -> values of a table of moves in the shop's units; arcs have their signed angle, others 0."""
     columns: dict[str, NDArray[Any]] = {
         "line": moves.line,
         "motion": np.array(MOTION_NAMES)[moves.motion],
@@ -122,7 +122,7 @@ def move_columns(moves: Moves) -> dict[str, NDArray[Any]]:
 
 
 class Jump(NamedTuple):
-    """A run that leaves the order of the lines: moves before it, the line left, the line after which it goes on."""
+    """A departure from the order of lines: moves before it, the line left, the line after which the run continues."""
 
     moves: int
     left: int
@@ -131,7 +131,7 @@ class Jump(NamedTuple):
 
 @dataclass(frozen=True)
 class Remark:
-    """What should be checked: a sentence, and the line of the program that it is about, 0 for the whole of it."""
+    """Something to check: a sentence, and the line of the program that it concerns, 0 for the whole."""
 
     text: str
     line: int = 0
@@ -152,7 +152,7 @@ class Unsupported:
 
 @dataclass(frozen=True, repr=False)
 class ReadProgram:
-    r"""A program that was read to its end.
+    r"""A program read to its end.
 
     Attributes
     ----------
@@ -221,7 +221,7 @@ class ReadProgram:
 
     @property
     def native(self) -> bool:
-        """Whether its words A, B, C are those of the machine that it runs on, not recovered from another one's."""
+        """True if words A, B, C are those of the machine that it runs on, not recovered from another's."""
         return not self.kinematics and self.dialect != CUTTER_LOCATION
 
     def __repr__(self) -> str:
@@ -259,10 +259,10 @@ class Move:
 
 @dataclass
 class Recorder:
-    """Collects moves; a move of no length in any axis is none. `recent`: those that are not in `columns` yet."""
+    """Collector of moves; a move without length in any axis does not count. `recent`: moves not yet in `columns`."""
 
     recent: list[Move] = field(default_factory=list)
-    columns: dict[str, NDArray[Any]] = field(default_factory=dict)  # of `Moves`, longer than what they hold
+    columns: dict[str, NDArray[Any]] = field(default_factory=dict)  # columns of `Moves`, longer than their content
     cuts: bool = False  # whether any move is a cutting one
     packed: int = 0  # number of moves in `columns`
 
@@ -270,7 +270,7 @@ class Recorder:
         return len(self.recent) + self.packed
 
     def add(self, move: Move) -> bool:
-        """Add a move. Returns whether it was one."""
+        """Add a move. Returns True if it has any length."""
         if move.start == move.end and move.arc is None:
             return False
         if move.motion == RAPID:
@@ -281,7 +281,7 @@ class Recorder:
         return True
 
     def drop(self, row: int) -> None:
-        """Take one of the recent moves out; its pause goes to the one before it."""
+        """Remove one of the recent moves; its pause goes to the move before."""
         pause = self.recent.pop(row).dwell
         if row:
             self.recent[row - 1].dwell += pause
@@ -289,7 +289,7 @@ class Recorder:
             self.columns["dwell"][self.packed - 1] += pause
 
     def add_many(self, moves: Moves) -> None:
-        """Add moves at once, each of some length; units as of `Move`."""
+        """Add moves at once, each of nonzero length; units as for `Move`."""
         if not len(moves):
             return
         self.pack()
@@ -297,13 +297,13 @@ class Recorder:
         self.cuts = self.cuts or bool((moves.motion != RAPID).any())
 
     def pack(self) -> None:
-        """The recent moves to arrays, which take a fifth of their memory."""
+        """Move the recent moves into arrays, which take a fifth of the memory."""
         if self.recent:
             self._keep(self._recent_in_si())
             self.recent = []
 
     def _keep(self, moves: Moves) -> None:
-        """Moves in SI behind those in the columns, which grow in place: a long program stands in memory once."""
+        """Append moves in SI to the columns, which grow in place: a long program is in memory only once."""
         first, self.packed = self.packed, self.packed + len(moves)
         for column in fields(Moves):
             new = getattr(moves, column.name)
@@ -313,20 +313,20 @@ class Recorder:
             kept[first : self.packed] = new
 
     def add_dwell(self, seconds: float) -> None:
-        """A pause after the last move; before the first move nothing waits."""
+        """Add a pause after the last move; before the first move it is ignored."""
         if self.recent:
             self.recent[-1].dwell += seconds
         elif self.packed:
             self.columns["dwell"][self.packed - 1] += seconds
 
     def moves(self) -> Moves:
-        """The moves as arrays, SI; the recorder is empty afterwards."""
+        """Moves as arrays, SI; the recorder is empty afterwards."""
         self._keep(self._recent_in_si())
         columns, n = self.columns, self.packed
         self.recent, self.columns, self.packed = [], {}, 0
         for name, column in columns.items():
             column.resize((n, *column.shape[1:]), refcheck=False)
-            if not column.any():  # pages that nobody writes to take no memory
+            if not column.any():  # pages never written to take no memory
                 columns[name] = np.zeros(column.shape, column.dtype)
         return Moves(**columns | {name: held_once(columns[name]) for name in HELD})
 
@@ -344,11 +344,11 @@ class Recorder:
 
 
 def in_si(moves: Moves) -> Moves:
-    """Moves in SI, whose columns have the units of `Move`."""
+    """Moves in SI, from columns in the units of `Move`."""
     start, end = (
         np.concatenate([m_from_mm(ends[:, :3]), rad_from_deg(ends[:, 3:])], axis=1) for ends in (moves.start, moves.end)
     )
-    # The feed of a move of the rotary axes alone is in degrees per minute.
+    # If only rotary axes move, the feed is in degrees per minute.
     rotary = np.logical_and.reduce([start[:, axis] == end[:, axis] for axis in range(3)]) & (moves.arc_sweep == 0.0)
     return replace(
         moves,
@@ -362,6 +362,6 @@ def in_si(moves: Moves) -> Moves:
 
 
 def held_once(column: NDArray[Any]) -> NDArray[Any]:
-    """A column (n,); of one value, nan counts as one, a read-only view of that: most programs have one tool."""
+    """Column (n,); if it has one value (nan counts as one), a read-only view of that: most programs have one tool."""
     alike = len(column) > 0 and np.array_equal(column, np.broadcast_to(column[0], column.shape), equal_nan=True)
     return np.broadcast_to(column[0], column.shape) if alike else column

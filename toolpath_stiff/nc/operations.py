@@ -1,4 +1,4 @@
-"""The operations of a program: which moves belong together, and what people call them.
+"""Operations of a program: moves that belong together, and their names.
 
 An operation begins at a tool change, and at a block of comment lines, if cutting follows before the next one. Between
 two cuts there is one beginning at most: tool change, comments and rapids between them belong to what follows, rapids
@@ -26,7 +26,7 @@ COMMENTS = re.compile(r"\(([^()]*)\)?|;(.*)")
 NO_WORDS = re.compile(r"\s*+(?:N\s*+\d++\s*+)?", re.IGNORECASE)  # a line number is not a word
 BEGINS = re.compile(r"\s*+(?:N\s*+\d++\s*+)?[(;]", re.IGNORECASE)
 ACTIVE = re.compile(r"\s*(?:MSG|DEBUG|PRINT)\s*,", re.IGNORECASE)  # LinuxCNC shows what follows
-FRAME, DASHES = " *=#~|'\"", "-_."  # of dashes and points only two and more are a frame: -X SIDE, .5 CHAMFER
+FRAME, DASHES = " *=#~|'\"", "-_."  # dashes and points frame only if two or more: -X SIDE, .5 CHAMFER
 MARK = re.compile(
     r"(?:(?:begin|start)\s+(?:of\s+)?(?:operation|section|toolpath|cutting\s+path\s+id)|tool\s?path(?:\s+name)?"
     r"|operation(?:\s+name)?|block-name)\s*(?::-?|=)\s*(?=.*\w)",
@@ -35,7 +35,7 @@ MARK = re.compile(
 FIELD = re.compile(r"(?:name|type)\s*:\s*(?=.*\w)", re.IGNORECASE)  # after `Operation: 0`
 TOOL_LINE = re.compile(r"(?:T\s*\d+|tools?|change\s+(?:to\s+)?tool)\b|.*\btool\s*-\s*\d", re.IGNORECASE)
 TOOL_NUMBERS = re.compile(r"\s*\btool\s*-\s*\d+\s*|\s*\b(?:tool\s+)?dia\.\s*off\..*$", re.IGNORECASE)
-# The end of something, the state of a post, single moves, licence notes, code that is commented out: no headings.
+# No headings: ends of things, states of a post, single moves, licence notes, commented-out code.
 NOTHING = re.compile(
     r"(?:finish(?:ed)?|end)\s+(?:of\s+)?(?:the\s+)?(?:op|operation|section|tool\s?path|cutting|path|preamble)\b"
     r"|.*\b(?:done|finished|completed)$"
@@ -47,7 +47,7 @@ NOTHING = re.compile(
     r"|[A-Z]\s*[-+]?(?:\d++\.\d*+|\.\d++)$",  # an axis and where it stands; M8 may be a hole
     re.IGNORECASE,
 )
-FROM_HERE_NOTES = re.compile(r"when\s+using\s+fusion\b", re.IGNORECASE)  # the rest of its block is its sentence
+FROM_HERE_NOTES = re.compile(r"when\s+using\s+fusion\b", re.IGNORECASE)  # the rest of its block belongs to the sentence
 
 
 class Heading(NamedTuple):
@@ -64,7 +64,7 @@ def split_comments(text: str) -> tuple[str, str]:
 
 
 def headings(lines: Sequence[str]) -> list[Heading]:
-    """Blocks of successive lines that hold comments alone, in order; those that name nothing are left out.
+    """Blocks of successive lines with comments only, in order; blocks that name nothing are left out.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def headings(lines: Sequence[str]) -> list[Heading]:
 
 
 def heading_of(block: Sequence[str], line: int) -> Heading | None:
-    """The heading of a block of comments: what the post marks, else the first line with letters, else a tool."""
+    """Heading of a block of comments: the post's mark, otherwise the first line with letters, otherwise a tool."""
     named = tool = number = None
     for comment in block:
         name = plain_name(comment)
@@ -112,7 +112,7 @@ def heading_of(block: Sequence[str], line: int) -> Heading | None:
 
 
 def plain_name(comment: str) -> str:
-    """A comment without what frames it: blanks, asterisks, dashes; the text alone of `MSG, text`."""
+    """Comment without its frame of blanks, asterisks, dashes; of `MSG, text` only the text."""
     active = ACTIVE.match(comment)
     text = " ".join((comment[active.end() :] if active else comment).split())
     inside = text.lstrip(FRAME + DASHES)
@@ -122,11 +122,11 @@ def plain_name(comment: str) -> str:
 
 
 def _last_dash(frame: str) -> str:
-    """The dash or point next to the text, if it stands alone: it belongs to the text."""
+    """Dash or point next to the text, if single: it belongs to the text."""
     return frame[-1:] if frame and frame[-1] in DASHES and frame[-2:-1] not in tuple(DASHES) else ""
 
 
-MOST_OPERATIONS = 1000  # beyond, comments name passes or moves, not operations: the tools are taken
+MOST_OPERATIONS = 1000  # if there are more, comments name passes or moves: tools define the operations
 BARE = re.compile(r"\s*+(?:%|[O:]\s*+\d++|N\s*+\d++)?\s*+", re.IGNORECASE)
 CHANGES_TOOL = re.compile(r"M\s*0*6(?!\d)|T\s*\d", re.IGNORECASE)
 
@@ -159,7 +159,7 @@ class Operation:
 
 @dataclass(frozen=True)
 class Operations:
-    """All operations of a program, and `of_move` (n,): the row of its operation for every move, ascending."""
+    """All operations of a program, and `of_move` (n,): the row of each move's operation, ascending."""
 
     rows: tuple[Operation, ...]
     of_move: IntArray
@@ -200,7 +200,7 @@ def operations(program: ReadProgram) -> Operations:
 
 @dataclass
 class _Beginning:
-    """The gap between two cuts: the first move after it, headings passed, the tool that cuts, its tool change."""
+    """Gap between two cuts: the first move after it, headings passed, the cutting tool, its tool change."""
 
     move: int
     heads: list[Heading]
@@ -209,13 +209,13 @@ class _Beginning:
 
     @property
     def line(self) -> int:
-        """The line of its heading or its tool change; the largest number there is without any."""
+        """Line of its heading or tool change; the largest possible number without either."""
         lines = [head.line for head in self.heads] + ([self.change[0]] if self.change else [])
         return min(lines, default=np.iinfo(np.int64).max)
 
 
 def _title_and_headings(lines: Sequence[str]) -> tuple[str, list[Heading]]:
-    """The program's title, and the headings of its operations.
+    """Title of the program, and headings of its operations.
 
     The title is the comment beside the program's number, or the first heading before the first line with other words.
     """
@@ -230,22 +230,22 @@ def _title_and_headings(lines: Sequence[str]) -> tuple[str, list[Heading]]:
     every = headings(lines)
     title = title or next((head.name for head in every if head.line <= header_end and head.kind == NAMED), "")
     marked = [head for head in every if head.kind == MARKED]
-    if len(marked) > 1:  # a post that marks operations means other things by other comments
+    if len(marked) > 1:  # if a post marks operations, its other comments are something else
         return title, marked
     return title, [head for head in every if head.line > header_end or head.kind == MARKED]
 
 
 class _Way:
-    """What a run passes between two moves: lines, and headings."""
+    """Lines and headings that a run passes between two moves."""
 
     def __init__(self, program: ReadProgram, heads: Sequence[Heading]) -> None:
         self.jumps = program.jumps
-        self.line = np.concatenate([[0], program.moves.line])  # that of move i is at i + 1
+        self.line = np.concatenate([[0], program.moves.line])  # the line of move i is at i + 1
         self.jump_moves = np.array([jump.moves for jump in self.jumps], dtype=np.int64)
         self.head_lines = np.array([head.line for head in heads], dtype=np.int64)
 
     def stretches(self, last: int, move: int) -> list[tuple[int, int]]:
-        """Lines from move `last` (-1: the start of the file) to a later one: the first left out, the last in it."""
+        """Stretches of lines from move `last` (-1: file start) to a later one; first line excluded, last included."""
         stretches, start = [], int(self.line[last + 1])
         first, stop = np.searchsorted(self.jump_moves, [last + 1, move + 1]).tolist()
         for jump in self.jumps[first:stop]:
@@ -254,23 +254,23 @@ class _Way:
         return [*stretches, (start, int(self.line[move + 1]))]
 
     def headings(self, last: int, move: int) -> list[int]:
-        """Rows of the headings, in the order of the run."""
+        """Rows of the headings, in order of the run."""
         ends = np.searchsorted(self.head_lines, self.stretches(last, move), side="right").tolist()
         return [row for low, high in ends for row in range(low, high)]
 
     def events(self, moves: IntArray) -> IntArray:
-        """Headings above the lines of moves, jumps before them: where neither grows the run passes no heading."""
+        """Number of headings above the lines of moves and of jumps before them: if it stays, no heading is passed."""
         above = np.searchsorted(self.head_lines, self.line[moves + 1], side="right")
         return np.stack([above, np.searchsorted(self.jump_moves, moves + 1)])
 
 
 def _beginnings(program: ReadProgram, cuts: IntArray, heads: list[Heading]) -> list[_Beginning]:
-    """One for every cut before which a heading is passed or the tool changes, and one for the first cut."""
+    """Beginnings: at the first cut, and at every cut before which a heading is passed or the tool changes."""
     way, tools, before_cuts = _Way(program, heads), program.moves.tool, np.array([-1, *cuts[:-1]])
     eventful = (way.events(before_cuts) != way.events(cuts)).any(axis=0) | (tools[before_cuts] != tools[cuts])
     eventful[0] = True
     begins: list[_Beginning] = []
-    known: set[int] = set()  # headings passed where the running operation began: passed again, they begin none
+    known: set[int] = set()  # headings passed where the present operation began: passing them again begins none
     for last, cut in zip(before_cuts[eventful].tolist(), cuts[eventful].tolist(), strict=True):
         if heads and len(begins) > MOST_OPERATIONS:
             return _beginnings(program, cuts, [])
@@ -290,7 +290,7 @@ def _beginnings(program: ReadProgram, cuts: IntArray, heads: list[Heading]) -> l
 
 
 def _tool_change(lines: Sequence[str], stretches: list[tuple[int, int]]) -> tuple[int, str]:
-    """Line of the first tool change in some stretches of lines, and the comment beside the last one that has any."""
+    """Line of the first tool change in some stretches of lines, and the comment beside the last one with any."""
     first, remark = 0, ""
     for low, high in stretches:
         for number, words in enumerate(lines[low:high], low + 1):
@@ -302,7 +302,7 @@ def _tool_change(lines: Sequence[str], stretches: list[tuple[int, int]]) -> tupl
 
 
 def _name(begin: _Beginning, title: str, remarks: dict[int, str], alone: bool) -> str:
-    """The name: what the post marks, else the first heading, else the tool; of a lone one rather the title, or ""."""
+    """Name: the post's mark, otherwise the first heading, otherwise the tool; a lone operation has the title, or ""."""
     names = {kind: [head.name for head in begin.heads if head.kind == kind] for kind in (MARKED, NAMED, TOOL)}
     if names[MARKED]:
         return names[MARKED][-1]

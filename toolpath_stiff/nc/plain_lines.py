@@ -41,7 +41,7 @@ class PlainRun:
 
     def __init__(self, state: State, lines: Sequence[str], name: str) -> None:
         self.state, self.lines, self.name = state, lines, name
-        self._pause = 0  # the line before which another run is not worth trying
+        self._pause = 0  # no other run is tried before this line
         self._start, self._words = -CHUNK, lex([""])[0]  # the chunk
         self._others = [0]  # its lines that are not plain, and its end
 
@@ -64,7 +64,7 @@ class PlainRun:
 
 
 def _suits(state: State) -> bool:
-    """Whether the modes in force leave plain words their plain meaning."""
+    """True if the modes in force leave plain words their plain meaning."""
     frames = state.frames
     return (
         state.feed_mode == "G94"
@@ -81,7 +81,7 @@ def _suits(state: State) -> bool:
 
 
 class Lines:
-    """The words of lines in columns, and what they make of the state; the line `end` is left to the interpreter."""
+    """The words of lines in columns, and their effect on the state; the line `end` is left to the interpreter."""
 
     def __init__(self, state: State, words: PlainWords) -> None:
         self.state, self.words = state, words
@@ -97,7 +97,7 @@ class Lines:
             self._count_increments()
 
     def _stop(self, where: BoolArray) -> None:
-        """Leave the first such line, and all after it, to the interpreter."""
+        """Leave the first line where `where` is true, and all lines after it, to the interpreter."""
         if where.any():
             self.end = min(self.end, int(np.argmax(where)))
 
@@ -109,7 +109,7 @@ class Lines:
             self.counted |= bare
 
     def execute(self, first: int) -> int:
-        """Move; returns how many lines were executed. `first`: the first one's number, from 0."""
+        """Execute the lines' moves; returns the number of lines executed. `first`: number of the first, from 0."""
         self.coded = self.words.code != NO_CODE
         before = MODES.get(self.state.motion or "", NO_MODE)
         self.mode = np.concatenate([[before], self.words.code[self.coded]])[np.cumsum(self.coded)]
@@ -129,11 +129,11 @@ class Lines:
         return self._leave(control if moving[: self.end].any() else None)
 
     def _record(self, first: int, control: FloatArray, arc: tuple[FloatArray, FloatArray], moving: BoolArray) -> None:
-        """Hand over the moves of the lines that are done, those that go anywhere."""
+        """Record the moves of the executed lines, apart from those that go nowhere."""
         state, done = self.state, slice(self.end)
         setup = control - np.array([*state.frames.fix_reference(), 0.0, 0.0, 0.0])
         start, end = setup[:-1][done], setup[1:][done]
-        # An axis that stands keeps its number (`motion.record`).
+        # An axis that does not move keeps its number (`motion.record`).
         end = np.where(np.abs(end - start) < STILL * np.maximum(1.0, np.abs(start)), start, end)
         center, sweep, feed = arc[0][done], arc[1][done], self.feed[done]
         same = [start[:, axis] == end[:, axis] for axis in range(6)]
@@ -163,7 +163,7 @@ class Lines:
             state.note_tool()
 
     def _spindle(self) -> FloatArray:
-        """1/min of the spindle on each line, as `State.spindle` has it."""
+        """Spindle speed on each line, 1/min, as `State.spindle` gives it."""
         given = self.words.values.get("S", np.full(self.n, math.nan))
         if self.state.turn == 0 or self.state.surface_speed or np.isnan(given).all():
             return np.full(self.n, self.state.spindle)
@@ -176,7 +176,7 @@ class Lines:
         return np.asarray(np.logical_or.reduce([np.zeros(self.n, dtype=bool), *columns]))
 
     def _feed_words(self) -> None:
-        """F in force on each line."""
+        """Set the F in force on each line."""
         state = self.state
         has_feed, values, bare = np.zeros(self.n, dtype=bool), np.full(self.n, math.nan), np.zeros(self.n, dtype=bool)
         for key in (FIRST_F, LAST_F):
@@ -210,7 +210,7 @@ class Lines:
         return control
 
     def _arcs(self, rows: IntArray, control: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n, 3) centres in the set-up frame and (n,) sweeps, 0 but for these lines; the first unfit ends the run."""
+        """(n, 3) centres in the set-up frame and (n,) sweeps, 0 off `rows`; the first arc that does not fit ends it."""
         frames, nothing = self.state.frames, np.full(self.n, math.nan)
         center, sweep = np.zeros((self.n, 3)), np.zeros(self.n)
         first, second, normal = geometry.PLANES[self.state.plane]
@@ -218,7 +218,7 @@ class Lines:
         letters = (AXES[first], AXES[second], centers[first], centers[second], "R", centers[normal])
         words = np.stack([self.values.get(letter, nothing)[rows] for letter in letters], axis=1).tolist()
         points = np.stack([frames.axis_to_program(axis, control[rows, axis]) for axis in range(3)], axis=1)
-        starts = zip(points[:, first].tolist(), points[:, second].tolist(), strict=True)  # tuples, as ends are
+        starts = zip(points[:, first].tolist(), points[:, second].tolist(), strict=True)  # tuples, like the ends
         clockwise = (self.mode[rows] == CLOCKWISE).tolist()
         inch, middles, sweeps = self.state.inch, list[geometry.Point2](), list[float]()
         try:
@@ -237,7 +237,7 @@ class Lines:
     def _arc(
         self, start: geometry.Point2, words: list[float], clockwise: bool
     ) -> tuple[geometry.Point2, geometry.Point2]:
-        """End and centre of an arc; `words`: X, Y, I, J of the plane, R, the offset off the plane, nan for none."""
+        """End and centre of an arc; `words`: X, Y, I, J of the plane, R, the offset normal to it; nan: not given."""
         (x, y, i, j, radius, off_plane), scale = words, self.state.length_scale
         no_x, no_y, no_i, no_j, by_center = map(math.isnan, words[:5])
         fits = by_center != (no_i and no_j) and not (no_x and no_y and not by_center)
@@ -251,7 +251,7 @@ class Lines:
         return end, (a if no_i else a + i * scale, b if no_j else b + j * scale)
 
     def _leave(self, control: FloatArray | None) -> int:
-        """Set the state as the lines executed leave it; their number."""
+        """Set the state to that after the executed lines; returns their number."""
         state, last = self.state, self.end - 1
         if last < 0:
             return 0

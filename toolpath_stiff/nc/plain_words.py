@@ -1,4 +1,4 @@
-"""The words of plain lines, lexed many at a time (`plain_lines`): by array arithmetic over the characters of a chunk.
+"""Lexer of plain lines, many at a time (`plain_lines`): array arithmetic over the characters of a chunk.
 
 Lines of words alone are most of a program. A character is a digit, a point, a sign, a letter or the end of a line; a
 word reaches from its letter to the next one, and its number is its digits as a whole number over a power of ten. Both
@@ -25,7 +25,7 @@ LETTERS = AXES + CENTER_LETTERS
 # behind, S last.
 FIRST_F, LAST_F = "F in front", "F behind"
 KEYS = ("N", "G", FIRST_F, *LETTERS, LAST_F, "S")
-NO_CODE = -1  # of a line without a G word
+NO_CODE = -1  # the code of a line without a G word
 NONE, BARE, POINTED, BROKEN = range(4)  # form of a number: none, without a point, ending with it, with decimals
 
 _POINT, _SIGN, _LETTER, _END, _OTHER = range(1, 6)
@@ -39,7 +39,7 @@ _FEED_RANK = KEYS.index(FIRST_F)
 
 
 def _tables() -> tuple[ByteArray, NDArray[np.int8]]:
-    """Class and rank (place in `KEYS`; -1 for none) of each byte; small letters are as large ones."""
+    """Class and rank (place in `KEYS`; -1 for none) of each byte; lower-case letters count as upper-case ones."""
     kinds, ranks = np.full(256, _OTHER, dtype=np.uint8), np.full(256, -1, dtype=np.int8)
     kinds[ord(".")], kinds[ord("\n")] = _POINT, _END
     kinds[[ord("+"), ord("-")]] = _SIGN
@@ -67,7 +67,7 @@ class PlainWords:
     forms: dict[str, ByteArray]
 
     def part(self, start: int, end: int) -> PlainWords:
-        """Some of the lines, with the columns that they have words in."""
+        """The lines from `start` to `end`, with only the columns in which they have words."""
         forms = {key: form[start:end] for key, form in self.forms.items()}
         forms = {key: form for key, form in forms.items() if form.any()}
         values = {key: self.values[key][start:end] for key in forms}
@@ -81,7 +81,7 @@ def lex(lines: Sequence[str]) -> tuple[PlainWords, IntArray]:
     codes = np.frombuffer(buffer, dtype=np.uint8)
     marks = np.flatnonzero(codes - np.uint8(ord("0")) > 9)  # all characters but digits
     kinds = np.append(_KINDS[codes[marks]], np.array([_END, _END], dtype=np.uint8))
-    first = np.flatnonzero(kinds[:-2] >= _LETTER)  # what begins a word, ends a line, or is none of it
+    first = np.flatnonzero(kinds[:-2] >= _LETTER)  # start of a word, end of a line, or a character that is neither
     following = np.append(first[1:], len(marks))
     begin, kind = marks[first], kinds[first]
     end = np.append(begin[1:], len(codes))
@@ -95,7 +95,7 @@ def lex(lines: Sequence[str]) -> tuple[PlainWords, IntArray]:
     rank = _ranks(codes[begin], kind)
     unsigned = (rank < _FEED_RANK + 1) | (rank >= len(KEYS) - 2)
     bad = (digits < 1) | (digits > MOST_DIGITS) | (unsigned & signed) | ((rank < _FEED_RANK) & pointed)
-    bad |= (signed & (sign > begin + 1)) | (following > last + 1)  # misplaced, or too many
+    bad |= (signed & (sign > begin + 1)) | (following > last + 1)  # signs misplaced, or too many
     bad[1:] |= rank[1:] <= rank[:-1]
     bad |= kind == _OTHER
     bad[is_end] = (end > begin + 1)[is_end]  # numbers without a letter
@@ -110,7 +110,7 @@ def lex(lines: Sequence[str]) -> tuple[PlainWords, IntArray]:
 
 
 def _ranks(begins: ByteArray, kind: ByteArray) -> IntArray:
-    """Place in `KEYS` of each word; -1 of what is none. An F is in front unless more than N and G stands before it."""
+    """Place in `KEYS` of each word; -1 for anything else. An F is in front if at most N and G stand before it."""
     rank = _RANKS[begins].astype(np.int64)
     feeds = np.flatnonzero(rank == _FEED_RANK)
     rank[feeds[(rank[feeds - 1] >= _FEED_RANK) & (kind[feeds - 1] == _LETTER)]] = KEYS.index(LAST_F)
@@ -118,12 +118,12 @@ def _ranks(begins: ByteArray, kind: ByteArray) -> IntArray:
 
 
 def _values(buffer: bytes, point: IntArray, end: IntArray, digits: IntArray, decimals: IntArray) -> FloatArray:
-    """The numbers, without their signs, of words of up to `MOST_DIGITS` digits: `decimals` of them before `end`.
+    """The unsigned numbers of words of up to `MOST_DIGITS` digits: `decimals` of these before `end`.
 
     Eight characters are one word of 64 bits, whose digits add up by pairs, fours and eights: three multiplications.
     Lemire, "Number parsing at a gigabyte per second", Software: Practice and Experience 51 (2021) 1700.
     """
-    eights = np.ndarray(len(buffer) - 7, dtype="<u8", buffer=buffer, strides=(1,))  # the eight from each place on
+    eights = np.ndarray(len(buffer) - 7, dtype="<u8", buffer=buffer, strides=(1,))  # the eight bytes from each place on
     bits = eights[end - 8] & _MASKS.take(decimals, mode="clip")
     bits |= (eights[point - 8] & _MASKS.take(digits - decimals, mode="clip")) >> _SHIFTS.take(decimals, mode="clip")
     mantissa = _sum_of_digits(bits)
@@ -141,7 +141,7 @@ def _values(buffer: bytes, point: IntArray, end: IntArray, digits: IntArray, dec
 
 
 def _sum_of_digits(bits: NDArray[np.uint64]) -> FloatArray:
-    """The whole numbers that eight characters make, the last digit in the highest byte; bytes of zero before them."""
+    """The whole number that each group of eight digits makes, last digit in the highest byte, zero bytes in front."""
     pairs = bits * 10 + (bits >> 8)
     return np.asarray((((pairs & _PAIRS) * _EVEN + ((pairs >> 16) & _PAIRS) * _ODD) >> 32).astype(np.float64))
 

@@ -1,4 +1,4 @@
-"""A program posted for another machine: what of it can be known on the part, and what is reported about it."""
+"""A program posted for another machine: its moves on the part as far as they are known, and warnings about the rest."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -29,7 +29,7 @@ OWN_POINTS = (
 def recovered(
     program: ReadProgram, kinematics: PostedKinematics, tip_held: Sequence[tuple[int, bool]], origin: Pose, source: str
 ) -> ReadProgram:
-    """A program as read for its own machine, with the moves of the tool on the part.
+    """A program as read for its own machine, converted to moves of the tool on the part.
 
     Parameters
     ----------
@@ -73,11 +73,7 @@ def recovered(
         origin=origin,
         origin_source=source,
         warnings=(*program.warnings, *warnings),
-        assumptions=(
-            *program.assumptions,
-            kinematics.assumption(switched=any(on for _, on in tip_held)),
-            *assumptions,
-        ),
+        assumptions=(*program.assumptions, kinematics.assumption(switched=any(on for _, on in tip_held)), *assumptions),
         kinematics=kinematics.label,
         jumps=tuple(jump._replace(moves=int(np.searchsorted(of_move, jump.moves))) for jump in program.jumps),
     )
@@ -92,7 +88,7 @@ def check_rotary_offsets(offsets: Offsets, kinematics: PostedKinematics, name: s
 
 
 def switched(frames: Frames, tool_length: float, hold: bool) -> list[float]:
-    """The numbers of the present point once tool centre point control is switched on (`hold`) or off.
+    """Coordinates of the present point after tool centre point control is switched on (`hold`) or off.
 
     The machine stands still. Control coordinates, mm and degrees; `tool_length` in mm. nan where a head has none.
     """
@@ -131,7 +127,7 @@ def _points_at(kinematics: PostedKinematics, zero: Pose | None, name: str) -> Po
 def _known_points(
     moves: Moves, kinematics: PostedKinematics, zero: Pose | None, name: str
 ) -> tuple[BoolArray, list[Remark], list[str]]:
-    """(n,) the moves whose ends are known on the part; warnings and assumptions about those to machine points."""
+    """(n,) True for moves whose ends are known on the part; warnings and assumptions about moves to machine points."""
     fixed = np.asarray(moves.from_machine.any(axis=1))
     if not fixed.any():
         return ~fixed, [], []

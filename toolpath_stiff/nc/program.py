@@ -1,4 +1,4 @@
-"""An NC program or a cutter-location file, and how it is to be read."""
+"""An NC program or a cutter-location file, and the options for reading it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -39,7 +39,7 @@ class Reading(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Program:
-    r"""An NC program or a cutter-location file, and how it is to be read.
+    r"""An NC program or a cutter-location file, and the options for reading it.
 
     `Program.read` and `Program.from_text` make one. What a program does may depend on the machine that runs it and on
     where its zero sits (G53, G28), so every function reads it for what it needs.
@@ -58,7 +58,7 @@ class Program:
 
     name: str
     file: str | None
-    request: Request  # without lines, and not placed yet
+    request: Request  # without lines and without a zero yet
     text: str | None = None
     given: Mapping[str, object] = field(default_factory=dict)
     _last: list[tuple[object, ReadProgram]] = field(default_factory=list, compare=False)
@@ -115,7 +115,7 @@ class Program:
         ['--dialect', 'fanuc', '--block-delete']
         """
         if not is_file(file):
-            read_lines(file)  # says what is wrong with it
+            read_lines(file)  # raises the error that names the problem
         return cls._of(Path(file).name, str(file), None, reading)
 
     @classmethod
@@ -132,7 +132,7 @@ class Program:
 
     @classmethod
     def _of(cls, name: str, file: str | None, text: str | None, reading: Reading) -> Self:
-        """A program whose options of reading are looked up, tables included."""
+        """A program with its reading options resolved, tables included."""
         arguments = arguments_of(cls.read)
         if unknown := reading.keys() - arguments.keys():
             raise TypeError(f"Program.read does not know {', '.join(unknown)}")
@@ -188,12 +188,12 @@ class Program:
 
     @property
     def words(self) -> list[str]:
-        """The options of a command that say how it is read."""
+        """Command-line options that state how the program is read."""
         return options(**self.given)
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The files that it is read from."""
+        """Files from which the program is read."""
         beside = (self.given.get(name) for name in ("controller", "offsets", "tools"))
         return tuple(str(file) for file in (self.file, *beside) if file)
 
@@ -209,7 +209,7 @@ class Program:
         >>> len(read.moves), read.unsupported
         (1, ())
         """
-        from toolpath_stiff.nc.reader import read  # with the tables of codes, for those alone who read a program
+        from toolpath_stiff.nc.reader import read  # imports the tables of codes, so only when a program is read
 
         key = (origin, tuple(default_origin))
         if not self._last or self._last[0][0] != key:
@@ -217,7 +217,7 @@ class Program:
         return self._last[0][1]
 
     def placed(self, origin: Pose | None, default_origin: Pose) -> Request:
-        r"""What the reader takes, for a zero, SI.
+        r"""The reader's request for a zero, SI.
 
         Examples
         --------
@@ -242,5 +242,5 @@ class Program:
 
 
 def program_from(program: Program | str | Path) -> Program:
-    """A program; of a file, as `Program.read` reads it without options."""
+    """The program given, or that of a file, read with default options."""
     return program if isinstance(program, Program) else Program.read(program)

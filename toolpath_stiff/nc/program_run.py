@@ -22,7 +22,7 @@ from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
-from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
+from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end, collector_at_rest
 from toolpath_stiff.nc.run_result import program_of
 from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, Then
 from toolpath_stiff.nc.words import Block, Word, read_block
@@ -68,20 +68,21 @@ class ProgramRun:
         self.folder = None if request.controller.subprograms is None else Path(request.controller.subprograms)
         self._files: list[tuple[int, int, str]] = []
         self._main_lines = len(lines)
-        self._passes: dict[int, str] = {}  # by the line that jumps back: what changes often, as it was there
-        self._moved = (0, 0)  # moves at the last step back after a move, and the blocks that had run by then
+        self._passes: dict[int, str] = {}  # line that jumps back -> the often-changing state, as it was there
+        self._moved = (0, 0)  # moves, and blocks run, at the last jump back after a move
 
     _at, _main_lines = 0, 1  # the line that runs, and how many lines the file itself has
-    meaning = staticmethod(code_meaning)  # what a code, or a word of the language, is taken for
+    meaning = staticmethod(code_meaning)  # the meaning of a code, or of a word of the language
     cuts_by = "a feed move (G1, G2, G3 or a cycle)"
 
     def program(self, ending: list[Remark]) -> ReadProgram:
-        """What the run has made of the program, with the warnings of its end."""
+        """The program as run so far, with the warnings `ending` of its end."""
         return program_of(self.state, self.request, self.lines, self.jumps, ending)
 
+    @collector_at_rest()
     def run(self) -> list[Remark]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
-        row, begun, numbered = 0, False, False  # from the first word on, a tape mark is the last one
+        row, begun, numbered = 0, False, False  # after the first word, a tape mark is the last one
         while row < len(self.lines):
             self._at = row
             words = self._plain.execute(row) if self._plain is not None and not self._levels else None
@@ -120,7 +121,7 @@ class ProgramRun:
         return self._end(len(self.lines) - 1, "the file")
 
     def _tried(self, act: Callable[[Argument], Outcome], argument: Argument, instead: Outcome) -> Outcome:
-        """What a step gives; in a check its error is kept and the run goes on with `instead`."""
+        """The result of a step; in a check its error is kept and the run continues with `instead`."""
         try:
             return act(argument)
         except InputError as error:
@@ -142,7 +143,7 @@ class ProgramRun:
             self.tally.add(code, line + 1, column, len(rows))
 
     def _steered(self, row: int) -> int | None:
-        """Where the run goes on, of a line that only says that; None: its words act."""
+        """The line at which the run continues, for a line that only steers the run; None: its words act."""
         return None
 
     def _block(self, row: int) -> Block:
@@ -160,7 +161,7 @@ class ProgramRun:
 
     def _read(self, row: int) -> Block:
         block = read_block(self.lines[row], row + 1, self.name, self.state.dialect.semicolon)
-        cut = block.rest is not None and block.switch in self.switches  # what stands behind a slash in its middle
+        cut = block.rest is not None and block.switch in self.switches  # drop the words behind a slash in mid-block
         return replace(block, words=block.words[: block.rest]) if cut else block
 
     def _fail(
@@ -169,22 +170,22 @@ class ProgramRun:
         return self._place(row).fail(problem, expected, hint, column)
 
     def _place(self, row: int) -> Place:
-        """File and line (from 1) of a line that is read."""
+        """File, and line in it (from 1), of the line `row` of all lines read."""
         in_files = (Place(name, row - first + 1) for first, stop, name in self._files if first <= row < stop)
         return next(in_files, Place(self.name, row + 1))
 
     def _line_of_call(self) -> int:
-        """The line of the main file from which a subprogram's file is called: its moves are of that line."""
+        """The line of the main file that calls a subprogram's file: the subprogram's moves belong to that line."""
         return next((level.back for level in reversed(self._levels) if level.back <= self._main_lines), 1)
 
     def _count_block(self, row: int) -> None:
-        """Count a block that runs."""
+        """Count a block that runs. Raises `InputError` beyond `MOST_BLOCKS`."""
         self._blocks += 1
         if self._blocks > MOST_BLOCKS:
             raise self._fail(row, f"more than {MOST_BLOCKS:,} blocks have run", "fewer repeats, a loop that ends")
 
     def _check_loop(self, row: int, to: int, changing: object) -> None:
-        """Refuse a loop in which nothing changes, or that makes no move in very many blocks, where it goes back."""
+        """At a jump back: refuse a loop in which nothing changes, or which makes no move in very many blocks."""
         moves = len(self.state.recorder)
         if moves != self._moved[0]:
             self._moved = (moves, self._blocks)
@@ -195,7 +196,7 @@ class ProgramRun:
         self._passes[row] = now
 
     def _load(self, names: Iterable[str], before: tuple[str, ...] = ()) -> int | None:
-        """Read the first of these files of the folder that is there; its first line, None if there is none."""
+        """Read the first of these files that exists in the folder; returns its first line, None if none exists."""
         files = (self.folder / name for name in names) if self.folder is not None else ()
         file = next((file for file in files if file.is_file()), None)
         if file is None:
@@ -207,12 +208,12 @@ class ProgramRun:
         return first
 
     def _files_called(self, stem: str, suffixes: tuple[str, ...]) -> list[str]:
-        """Files of the folder with a name, whatever its case."""
+        """Files of the folder with this name, in upper or lower case."""
         files = sorted(self.folder.iterdir()) if self.folder is not None and stem else []
         return [file.name for file in files if file.suffix.upper() in suffixes and file.stem.upper() == stem]
 
     def _check_head(self, block: Block, numbered: bool) -> None:
-        """A program number within a program: the next one begins where this one did not end."""
+        """Refuse a program number within a program: the next program begins before this one has ended."""
         if self._levels:
             raise self._unended(block.line - 1)
         if (numbered or len(self.state.recorder)) and self.state.dialect.name != "linuxcnc":
@@ -226,7 +227,7 @@ class ProgramRun:
         )
 
     def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
-        """A warning if anything but tape marks and the subprograms that ran follows the end."""
+        """A warning if lines other than tape marks and the subprograms that ran follow the end."""
         if self._levels and not ended:
             raise self._unended(row)
         rest = [
@@ -261,7 +262,7 @@ class ProgramRun:
         return to
 
     def _numbered(self, row: int, number: float) -> list[int]:
-        """The lines (from 0) with an N number, of the program that runs at `row`."""
+        """Lines (from 0) with this N number, in the program that runs at `row`."""
         if self._sequence is None:
             self._sequence = {}
             for index, line in enumerate(self.lines):
@@ -271,7 +272,7 @@ class ProgramRun:
         return self._sequence.get(round(number), []) if number == round(number) else []
 
     def _block_numbered(self, row: int, what: str, number: float, column: int) -> int:
-        """The line (from 0) of the block with an N number. Raises `InputError` unless there is one."""
+        """The line (from 0) of the block with this N number. Raises `InputError` unless there is one."""
         rows = self._numbered(row, number)
         if len(rows) != 1:
             places = ", ".join(str(self._place(duplicate).line) for duplicate in rows)
@@ -280,7 +281,7 @@ class ProgramRun:
         return rows[0]
 
     def _return(self, row: int, flow: Flow | Word) -> int | None:
-        """The line at which M99 goes on; None where that is the beginning of the program, or before this line."""
+        """The line at which M99 continues; None if that is the beginning of the program, or a line before this one."""
         if not isinstance(flow, Word):
             return self._leave(row) if self._levels else None
         to = self._block_numbered(row, "M99 P goes to", flow.value, flow.column)
@@ -324,7 +325,7 @@ class ProgramRun:
         return known[0]
 
     def _heads(self) -> dict[int, int]:
-        """Program number -> line (from 0) of its O word; what follows the last tape mark is not part of one."""
+        """Program number -> line (from 0) of its O word; lines after the last tape mark belong to no program."""
         if self._programs is None:
             self._programs = {}
             started = False

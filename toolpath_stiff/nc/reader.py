@@ -6,13 +6,7 @@ from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.controller import DIALECTS, LANGUAGES, UNKNOWN_CONTROL, Controller
-from toolpath_stiff.nc.languages import (
-    CUTTER_LOCATION_FILE,
-    READ,
-    foreign_program,
-    recognise,
-    refused_program,
-)
+from toolpath_stiff.nc.languages import CUTTER_LOCATION_FILE, READ, foreign_program, recognise, refused_program
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, ReadProgram
 from toolpath_stiff.nc.parametric.families import line_with_variables
@@ -36,7 +30,7 @@ RUNS = {
 
 
 def run_of(language: str) -> type[ProgramRun]:
-    """What runs programs of a language, or `PARAMETRIC` ones, loaded for these alone: most are plain G code."""
+    """The class that runs programs of a language, or `PARAMETRIC` ones; imported on demand: most are plain G code."""
     module, name = RUNS[language].split(":")
     run: type[ProgramRun] = getattr(import_module(f"toolpath_stiff.nc.{module}"), name)
     return run
@@ -52,7 +46,7 @@ def read_program(
     interpreter: str = "builtin",
     rs274: str | None = None,
 ) -> ReadProgram:
-    """Read an NC program file; the tool table wins over the controller's. Further arguments as of `Request`.
+    """Read an NC program file; the tool table overrides the controller's. Other arguments as for `Request`.
 
     Examples
     --------
@@ -78,7 +72,7 @@ def parse_program(
     default_origin: Pose = ZERO,
     interpreter: str = "builtin",
 ) -> ReadProgram:
-    r"""Read an NC program from text; arguments as of `Request`.
+    r"""Read an NC program from text; arguments as for `Request`.
 
     Examples
     --------
@@ -99,7 +93,7 @@ def parse_program(
 
 
 def read(request: Request) -> ReadProgram:
-    """A program by the interpreter that is asked for: the built-in one, LinuxCNC's, or that where the first refuses.
+    """A program read by the chosen interpreter: the built-in one, LinuxCNC's, or LinuxCNC's where the first refuses.
 
     Raises
     ------
@@ -152,13 +146,13 @@ def recognised(request: Request) -> tuple[str, str]:
 
 
 def in_language(request: Request, language: str) -> Request:
-    """The request with the dialect of the program's language, where that is one."""
+    """The request with the dialect of the program's language, if that language is a dialect."""
     dialect = DIALECTS[READ[language]] if language in READ else request.controller.dialect
     return replace(request, controller=replace(request.controller, dialect=dialect))
 
 
 def by_linuxcnc(request: Request) -> ReadProgram:
-    """A program as LinuxCNC's interpreter reads it."""
+    """A program read by LinuxCNC's interpreter."""
     from toolpath_stiff.nc.linuxcnc.reader import read as read_by_linuxcnc
 
     return on_the_part(read_by_linuxcnc(request), request)
@@ -181,12 +175,12 @@ def _finished(request: Request, run: ProgramRun) -> ReadProgram:
 
 
 def no_cut(run: ProgramRun) -> ProgramError:
-    """The error of a program that cuts nothing."""
+    """The error for a program without a cut."""
     return ProgramError("no cutting move", expected=run.cuts_by, file=run.name)
 
 
 def on_the_part(program: ReadProgram, request: Request, state: State | None = None) -> ReadProgram:
-    """A program with the moves of the tool on the part, if it was posted for another machine; the state at its end."""
+    """A program with moves of the tool on the part, if posted for another machine; `state`: that at its end."""
     program = _with_feed(program, request)
     if request.controller.kinematics is None or program.dialect == CUTTER_LOCATION:
         return program
@@ -199,7 +193,7 @@ def on_the_part(program: ReadProgram, request: Request, state: State | None = No
 
 
 def _with_feed(program: ReadProgram, request: Request) -> ReadProgram:
-    """Noted that the first cuts have the feed that was asked for."""
+    """The program with a note that its first cuts have the requested feed."""
     feed, cuts = request.controller.feed, program.moves.feed[program.moves.motion != RAPID][:1]
     if feed is None or not len(cuts) or abs(mm_per_min_from_m_per_s(float(cuts[0])) - feed) > 1e-9 * feed:
         return program

@@ -84,7 +84,7 @@ def recover_moves(
 
 
 def turns_far(moves: Moves, kinematics: PostedKinematics) -> list[tuple[int, str, float]]:
-    """Cutting moves in which an axis without roll-over turns by more than half a turn: line, letter, degrees."""
+    """Cutting moves in which an axis without roll-over turns more than half a turn: line, letter, degrees."""
     turns = []
     for rotary in kinematics.axes:
         turn = np.abs(moves.end[:, 3 + rotary.column] - moves.start[:, 3 + rotary.column])
@@ -104,7 +104,7 @@ def _check_letters(moves: Moves, kinematics: PostedKinematics, name: str) -> Non
 
 
 def _shorter_way(moves: Moves, kinematics: PostedKinematics) -> Moves:
-    """Axes with roll-over go to their angle the shorter way; where they stand then is the same."""
+    """Moves in which axes with roll-over take the shorter way to their angle; their later positions are equivalent."""
     end = moves.end.copy()
     for column in (3 + axis.column for axis in kinematics.axes if axis.rollover):
         turn = end[:, column] - moves.start[:, column]
@@ -114,14 +114,14 @@ def _shorter_way(moves: Moves, kinematics: PostedKinematics) -> Moves:
 
 
 def _turning(moves: Moves) -> FloatArray:
-    """(n, 3) rad, how far each rotary axis turns within each move."""
+    """(n, 3) rad, travel of each rotary axis in each move."""
     return np.asarray(np.abs(moves.end[:, 3:] - moves.start[:, 3:]))
 
 
 def _lengths_at_heads(
     moves: Moves, kinematics: PostedKinematics, held: BoolArray, tool_lengths: Mapping[int, float], name: str
 ) -> FloatArray:
-    """(n,) m, gauge line to tip: G43's, else the tool table's; needed wherever a head is tilted."""
+    """(n,) m, gauge line to tip: G43's, else the tool table's. Raises `InputError` if unknown at a tilted head."""
     length = moves.tool_length.copy()
     for tool in np.unique(moves.tool[np.isnan(length)]):
         length[np.isnan(length) & (moves.tool == tool)] = tool_lengths.get(int(tool), math.nan)
@@ -140,7 +140,7 @@ def _lengths_at_heads(
 
 
 def _pieces(moves: Moves, kinematics: PostedKinematics, held: BoolArray, length: FloatArray) -> IntArray:
-    """(n,) into how many pieces each move is divided.
+    """(n,) number of pieces into which each move is divided.
 
     A curve with |q''| <= a (per share of the move) is within a / (8 m^2) of m equal chords. A turn at the rate w about
     a line at the distance r adds 2 w |q'| + w^2 r to the bound of |q''|, and w r to that of |q'|.
@@ -156,11 +156,11 @@ def _pieces(moves: Moves, kinematics: PostedKinematics, held: BoolArray, length:
 
 
 def _bend(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> FloatArray:
-    """(n,) m, a bound of the tip's |q''| over a move that runs from 0 to 1."""
+    """(n,) m, an upper bound of the tip's |q''| over a move that runs from 0 to 1."""
     turning = _turning(moves)
     linear, bend = _linear_bounds(moves)
     ends = [np.array(pose[:, :3]) for pose in (moves.start, moves.end)]
-    rides = [np.zeros_like(point) for point in ends]  # of the tip from X, by the heads so far
+    rides = [np.zeros_like(point) for point in ends]  # displacement of the tip from X, by the heads so far
     speed, ride_speed = linear, np.zeros(len(moves))
     for rotary in kinematics.from_tool_to_work:
         rate = turning[:, rotary.column]
@@ -170,7 +170,7 @@ def _bend(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> Flo
         for point, pose in zip(points, (moves.start, moves.end), strict=True):
             center = line_point(rotary, np.zeros_like(point) if head else pose[:, :3], length)
             turns = (rate != 0.0) | (pose[:, 3 + rotary.column] != 0.0)
-            # A head that stands upright may have a tool of unknown length.
+            # With the head upright the tool length may be unknown.
             out = np.where(turns[:, None], point - center, 0.0)
             reach = np.maximum(reach, np.linalg.norm(np.cross(rotary.direction, out), axis=1))  # from the line
             there.append(np.where(turns[:, None], center + turned(out, rotary, pose[:, 3 + rotary.column]), point))
@@ -187,7 +187,7 @@ def _bend(moves: Moves, kinematics: PostedKinematics, length: FloatArray) -> Flo
 
 
 def _linear_bounds(moves: Moves) -> tuple[FloatArray, FloatArray]:
-    """(n,) m, bounds of |X'| and |X''| of the linear axes over a move that runs from 0 to 1."""
+    """(n,) m, upper bounds of |X'| and |X''| of the linear axes over a move that runs from 0 to 1."""
     speed, bend = move_lengths(moves), np.zeros(len(moves))
     arcs = np.flatnonzero(moves.arc_sweep != 0.0)
     frame, sweep = arc_frame(moves, arcs), np.abs(moves.arc_sweep[arcs])
@@ -199,33 +199,28 @@ def _linear_bounds(moves: Moves) -> tuple[FloatArray, FloatArray]:
 
 
 def _without_rounding(points: FloatArray) -> FloatArray:
-    """Points (n, k) in which a step below `SAME_PLACE` is none: the point before stands in its place."""
+    """Points (n, k) in which a step below `SAME_PLACE` is removed: the point takes the value of the one before."""
     moved = np.ones(len(points), dtype=bool)
     moved[1:] = (np.abs(np.diff(points, axis=0)) > SAME_PLACE).any(axis=1)
     return points[np.maximum.accumulate(np.where(moved, np.arange(len(points)), 0))]
 
 
 def _on_the_part(
-    moves: Moves,
-    kinematics: PostedKinematics,
-    held: BoolArray,
-    length: FloatArray,
-    move: IntArray,
-    share: FloatArray,
+    moves: Moves, kinematics: PostedKinematics, held: BoolArray, length: FloatArray, move: IntArray, share: FloatArray
 ) -> Moves:
-    """One row a piece, which begins at its share of its move; arcs that stay arcs; the ends are still the moves'."""
+    """Rows of the pieces, each from its share of its move; arcs that stay arcs; ends still those of the moves."""
     arc = moves.arc_sweep != 0.0
     turning = (_turning(moves) > 0.0).any(axis=1)
     stays = arc & (~turning | held)
     center, normal = moves.arc_center.copy(), moves.arc_normal.copy()
-    # Turned as a whole: the centre as a point of the linear axes, the normal as the way to another one.
+    # Turn the whole arc: its centre as a point of the linear axes, its normal as the vector to a second point.
     rows = np.flatnonzero(stays & ~held)
     abc = moves.start[rows, 3:]
     here, there = (tool_poses(kinematics, center[rows] + along, abc, length[rows])[0] for along in (0.0, normal[rows]))
     center[rows], normal[rows] = here, (there - here) / np.linalg.norm(there - here, axis=1)[:, None]
     rows, climb = np.flatnonzero(stays), np.zeros(len(moves))
     climb[rows] = arc_frame(moves, rows).climb
-    risen = center[move] + (climb[move] * share)[:, None] * normal[move]  # the plane of the piece's start
+    risen = center[move] + (climb[move] * share)[:, None] * normal[move]  # centre in the plane of the piece's start
     pieces = np.bincount(move, minlength=len(moves))
     return replace(
         moves.take(move),
@@ -240,14 +235,14 @@ def _on_the_part(
 def _with_times(
     pieces: Moves, moves: Moves, move: IntArray, count: IntArray, last: BoolArray
 ) -> tuple[Moves, IntArray]:
-    """The pieces that move tip or tool axis, and the moves that they are of.
+    """Pieces that move the tip or the tool axis, and the move to which each belongs.
 
     Feeds and dwells keep the time of every move; a pause before the first one is none.
     """
     length, turn = move_lengths(moves), _turning(moves).max(axis=1)
     share = (np.where(length > 0.0, length, turn) / moves.feed / count)[move]  # s; nan: a rapid
     way = move_lengths(pieces)
-    # Where the tip on the part runs as far as the axes do (tool centre point control, or none turns): as programmed.
+    # Where the tip's travel on the part equals that of the axes (tool centre point control, or no turn): as programmed.
     same = (way > 0.0) & np.isclose(way * count[move], length[move], rtol=1e-9, atol=0.0)
     way = np.where(way > 0.0, way, _turning(pieces).max(axis=1))
     feed, kept = np.where(same, pieces.feed, way / share), way > 0.0

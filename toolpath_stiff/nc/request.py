@@ -1,4 +1,4 @@
-"""A program that is to be read, and all that is known of its control: what the readers of every language take."""
+"""A program to be read, and all that is known of its control: the input of the reader of each language."""
 
 import copy
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ ORIGIN_WINS = Remark(
 
 @dataclass(frozen=True)
 class Request:
-    """A program to be read, and with what.
+    """A program to be read, and the options for reading it.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Request:
 
     @property
     def zero(self) -> tuple[ShopPose | None, ShopPose]:
-        """G54's zero, mm and degrees, as the caller says, and by default.
+        """G54's zero, mm and degrees: as given by the caller, and the default.
 
         A program that was posted for another machine is read in that one's coordinates first.
         """
@@ -67,13 +67,13 @@ class Request:
         return None if self.origin is None else pose_in_mm(self.origin), pose_in_mm(self.default_origin)
 
     def start(self) -> State:
-        """The control as the program finds it."""
+        """The state of the control before the first block."""
         frames = Frames(copy.deepcopy(self.work_offsets), *self.zero, posted=self.controller.kinematics)
         control = self.controller
         return State(self.name, frames, control.dialect, tools=copy.deepcopy(control.tools), feed=control.feed)
 
     def program(self, record: Record, **more: Any) -> ReadProgram:
-        """What a reading has made of the program; `more`: other attributes of `ReadProgram`."""
+        """The program made of a reading's record; `more`: other attributes of `ReadProgram`."""
         return ReadProgram(
             self.name, self.path, self.lines, record.recorder.moves(), unsupported=tuple(record.unsupported),
             tools=tuple(record.used_tools.values()), **more,

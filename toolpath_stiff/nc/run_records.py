@@ -1,7 +1,9 @@
-"""What a run keeps of its calls, and of its errors and codes for a check."""
+"""Records of a run: its calls and, for a check, its errors and codes."""
 
+import gc
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +13,18 @@ from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.words import Block
 
 MOST_ERRORS = 100
+
+
+@contextmanager
+def collector_at_rest() -> Iterator[None]:
+    """Context without Python's search for cycles of objects: a run leaves none, and would spend its time looking."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
 
 
 @dataclass
@@ -43,15 +57,15 @@ class Subprogram:
 
 @dataclass
 class Tally:
-    """What a check gathers while a program runs: its errors, and of each code its first place and how often it runs."""
+    """Results that a check collects during a run: errors, and for each code its first place and its count."""
 
     errors: list[InputError] = field(default_factory=list)
-    met: int = 0  # errors, repeated ones too
+    met: int = 0  # number of errors, repeated ones included
     first: dict[str, tuple[int, int]] = field(default_factory=dict)
     count: Counter[str] = field(default_factory=Counter)
 
     def keep(self, error: InputError) -> None:
-        """Keep an error, once; it is raised where a file has so many that it is not a program for this reader."""
+        """Keep an error, once; raise it from `MOST_ERRORS` on: the file is then not a program for this reader."""
         self.met += 1
         if str(error) not in map(str, self.errors):
             self.errors.append(error)
@@ -71,5 +85,5 @@ class Tally:
 
 
 def beyond_the_end(what: str, row: int, lines: int) -> list[Remark]:
-    """The warning that lines follow what ends a program in line `row` (from 0), if any do."""
+    """The warning that lines follow the end of a program in line `row` (from 0), if any do."""
     return [Remark(f"what follows {what} is not part of the program (lines: {lines})", row + 1)] if lines else []

@@ -1,4 +1,4 @@
-"""What a run made of a program: moves, warnings, assumptions, the blank."""
+"""The result of a run: moves, warnings, assumptions, the blank."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ from toolpath_stiff.units import m_from_mm
 def program_of(
     state: State, request: Request, lines: Sequence[str], jumps: Sequence[Jump], ending: Sequence[Remark]
 ) -> ReadProgram:
-    """The program of a run, with the warnings of its end; of a posted one the moves of its own machine."""
+    """The program made of a run, with the warnings of its end; a posted one has moves of its own machine."""
     frames, warnings = state.frames, [*ending]
     if frames.source == "option" and (request.work_offsets.table[0].given or frames.offsets.table[0].given):
         warnings.append(ORIGIN_WINS)
@@ -34,7 +34,7 @@ def program_of(
 
 
 def blank_of(stock: Mapping[str, Sequence[float]]) -> Blank | None:
-    """The corners of BLK FORM in m, where both are whole."""
+    """Corners of the blank (BLK FORM) in m, if both are complete."""
     corners = [[m_from_mm(v) for v in corner] for corner in stock.values()]
     if len(corners) != 2 or any(map(math.isnan, [*corners[0], *corners[1]])):
         return None

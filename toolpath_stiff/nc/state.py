@@ -1,4 +1,4 @@
-"""The state of the interpreter: the current block, and all that a control keeps from block to block.
+"""The state of the interpreter: the current block, and all that a control keeps between blocks.
 
 mm, degrees, mm/min.
 """
@@ -41,7 +41,7 @@ LATHE_HINT = "this reads the programs of mills: post it for a mill, with X as a 
 
 
 class Flow(Enum):
-    """Which block runs after this one, unless that is a `Call`."""
+    """The block that runs after this one, unless that is a `Call`."""
 
     NEXT = "the next one"
     RETURN = "the one after the call (M99)"
@@ -63,12 +63,12 @@ class Call:
     modal: bool = False
 
 
-Then = Flow | Call | Word  # what runs after a block; the P of M99: the block of the caller with that N number
+Then = Flow | Call | Word  # what runs after a block; a `Word` is the P of M99: the caller's block with that N number
 
 
 @dataclass
 class CurrentBlock:
-    """The block that is executed.
+    """The block being executed.
 
     Attributes
     ----------
@@ -96,31 +96,31 @@ class CurrentBlock:
 
     @property
     def line(self) -> int:
-        """Its line, from 1."""
+        """Line number, from 1."""
         return self.block.line
 
     def code(self, group: Group) -> tuple[str, Word] | None:
-        """The code of a modal group, and its word; None if the block has none."""
+        """The block's code of a modal group, and its word; None if there is none."""
         name = self.groups.get(group)
         return None if name is None else (name, self.codes[name])
 
     def has(self, letter: str) -> bool:
-        """Whether the block has that word, not used yet."""
+        """True if the block has this word and it is not yet used."""
         return letter in self.free
 
     def take(self, letter: str) -> float | None:
-        """The value of a word, which then counts as used; None if the block has none."""
+        """The value of a word, now counted as used; None if the block does not have it."""
         if letter not in self.free:
             return None
         self.free.discard(letter)
         return self.values[letter].value
 
     def as_written(self, letter: str) -> Word:
-        """A word with the number as written, before the decimal-point rule."""
+        """A word with its number as written, before the decimal-point rule."""
         return next(word for word in self.block.words if word.letter == letter)
 
     def whole(self, letter: str, word: Word, least: int = 1) -> int | None:
-        """The whole number that a word beside a code gives, taken; None without it. Raises `InputError`."""
+        """The whole number of a word beside a code, now used; None without the word. Raises `InputError`."""
         value = self.take(letter)
         if value is None:
             return None
@@ -131,12 +131,12 @@ class CurrentBlock:
     def refuse_if(
         self, wrong: object, culprit: Word | str | None, problem: str, expected: str = "", hint: str = ""
     ) -> None:
-        """Raise the error of `fail` where something is wrong."""
+        """Raise the error of `fail` if `wrong`."""
         if wrong:
             raise self.fail(culprit, problem, expected, hint)
 
     def add(self, letter: str, word: Word) -> None:
-        """Take up a word by its letter: each once, and not beyond what a control takes."""
+        """Add a word under its letter: each letter once, and values only up to a control's limit."""
         self.refuse_if(letter in self.values, word, "repeats a word of its block", "each word once")
         of_axis = letter.lstrip("I@") in {*AXES}
         largest = LARGEST_MM if of_axis else LARGEST_WORD
@@ -147,16 +147,16 @@ class CurrentBlock:
 
     @contextmanager
     def placing(self, hint: str = "") -> Iterator[None]:
-        """Give errors of geometry (`ArcError`) the block's place, and perhaps a hint."""
+        """Add the block's place, and a hint if given, to errors of geometry (`ArcError`)."""
         try:
             yield
         except ArcError as error:
             raise self.fail(None, error.found, error.expected, hint) from None
 
     def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
-        """An error at a word of the block (or that of a code or letter), or at the block."""
+        """An error at a word of the block (given itself, or by code or letter), or at the block."""
         word = self.codes.get(culprit) or self.values.get(culprit) if isinstance(culprit, str) else culprit
-        head = self.block.words[0]  # of a statement in plain language its name
+        head = self.block.words[0]  # for a statement in plain language: its name
         text = f"{word.text} {problem}" if word else problem if head.letter else f"{head.text}: {problem}"
         column = word.column if word else head.column
         return ProgramError(text, expected=expected, hint=hint, file=self.name, line=self.line, column=column)
@@ -167,7 +167,7 @@ START = "before its first move the tool stands at 0, 0, 0 of the control, as Lin
 
 @dataclass
 class Conversational:
-    """What controls with words of their own (Heidenhain, Siemens) keep besides; mm and degrees, points in program axes.
+    """State kept only by controls with words of their own (Heidenhain, Siemens); mm, degrees, program axes.
 
     Attributes
     ----------
@@ -245,7 +245,7 @@ class Conversational:
 
 @dataclass
 class Record:
-    """What a program of any language sets, and what is made of it; mm.
+    """State that a program of any language sets, and the results of its run; mm.
 
     Attributes
     ----------
@@ -279,7 +279,7 @@ class Record:
     assumptions: list[str] = field(default_factory=list)
 
     def note_tool(self) -> None:
-        """Keep the tool in the spindle among those that moved."""
+        """Add the tool in the spindle to those that moved."""
         if self.tool not in self.used_tools:
             self.used_tools[self.tool] = replace(tool_of(self.tools, self.tool))
 
@@ -291,7 +291,7 @@ class Record:
 
 @dataclass
 class State(Record):
-    """The state of a control, at its start as LinuxCNC's is unless the dialect says otherwise.
+    """The state of a control, at the start as LinuxCNC's unless the dialect says otherwise.
 
     Attributes
     ----------
@@ -384,17 +384,17 @@ class State(Record):
 
     @property
     def length_scale(self) -> float:
-        """Millimetres of one length unit of the program."""
+        """Millimetres per length unit of the program."""
         return MM_PER_INCH if self.inch else 1.0
 
     @property
     def feed_scale(self) -> float:
-        """Millimetres of the length unit of F."""
+        """Millimetres per length unit of F."""
         return MM_PER_INCH if self.inch and self.feed_mode != "G93" else 1.0
 
     @property
     def spindle(self) -> float:
-        """1/min of the spindle, below 0 after M4; nan: not known."""
+        """Spindle speed, 1/min, negative after M4; nan: unknown."""
         return math.nan if self.turn and self.surface_speed else self.turn * self.speed
 
     def fault(self, error: InputError) -> None:
@@ -404,7 +404,7 @@ class State(Record):
         self.keep(error)
 
     def note_unknown(self, line: int, word: Word) -> None:
-        """List an M code that may do anything, with a warning."""
+        """List an M code of unknown effect, with a warning."""
         self.note(line, word, "an M code of one control, not acted upon")
         self.warnings.append(Remark(f"what {word.text} does on its control is not known", line))
 
@@ -415,5 +415,5 @@ class State(Record):
         self.recorder.add_dwell(seconds)
 
     def note(self, line: int, word: Word, reason: str) -> None:
-        """List a word that is not acted upon."""
+        """List a word that is ignored."""
         self.unsupported.append(Unsupported(line, word.column, word.text, reason))

@@ -8,7 +8,7 @@ from toolpath_stiff.nc.moves import CYCLE, RAPID
 FEEDS_OUT = ("G89", "G84", "G74")
 PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
 SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
-MOST_STROKES = 100_000  # of one block; beyond, the depth of a peck or the number of repeats is a slip
+MOST_STROKES = 100_000  # in one block; more means a mistaken peck depth or number of repeats
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Drilling:
 
 
 def strokes(hole: Drilling) -> Iterator[tuple[float, int, float]]:
-    """Moves of one hole along the normal, from the R plane: to which height, RAPID or CYCLE, how long to wait there.
+    """Moves of one hole along the normal, from the R plane: the height to reach, RAPID or CYCLE, the dwell there.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def strokes(hole: Drilling) -> Iterator[tuple[float, int, float]]:
 
 
 def _depths(hole: Drilling) -> Iterator[float]:
-    """Depths of the pecks above the bottom."""
+    """Heights of the pecks above the bottom."""
     count, depth = 1, hole.retract - (hole.first or hole.peck)
     while depth > hole.bottom + SAME_HEIGHT_MM:
         yield depth

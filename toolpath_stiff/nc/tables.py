@@ -13,15 +13,15 @@ from toolpath_stiff.tables import Columns, parse_table
 from toolpath_stiff.toml_reader import TomlReader, is_number
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
-ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', numbered by P up to that
+ADDITIONAL_OFFSETS = {"G54.1": 300, "G154": 99}  # Fanuc's and Haas', with the largest P
 LARGEST_BYTES = 10_000_000
-LARGEST_MM = 1e5  # 100 m: a coordinate beyond is a slip of unit or key
-LARGEST_WORD = 1e9  # any other word: the radius of an arc that is nearly straight, a tool's number
+LARGEST_MM = 1e5  # 100 m: a larger coordinate is a mistaken unit or key
+LARGEST_WORD = 1e9  # for any other word, such as the radius of a nearly straight arc or a tool's number
 # LinuxCNC's parameter file (manual, "Parameters"): G54 is 5221 to 5230, each further offset 20 on; X Y Z A B C U V W R.
 FIRST_OFFSET, OFFSET_STRIDE, ROTATION = 5221, 20, 9
 HOME_G28, HOME_G30 = 5161, 5181
 HOMES = ("G28", "G30")
-# Of a cutter, beyond what a path asks for (`cutting.cutters`): key -> smallest and largest number.
+# Data of a cutter that a path does not need (`cutting.cutters`): key -> smallest and largest number.
 CUTTER_KEYS = {
     "flutes": (1.0, 100.0), "helix_deg": (-80.0, 80.0), "corner_radius_mm": (0.0, 1000.0), "core_mm": (0.01, 1000.0),
     "cutting_length_mm": (0.01, 1000.0), "modulus_GPa": (1.0, 2000.0), "lateral_nm_per_N": (0.0, 1e6),
@@ -35,7 +35,7 @@ ADDITIONAL = re.compile(r"(G54\.1|G154) ?P([1-9]\d{0,2})")
 
 
 def tool_table_hint(tool: int) -> str:
-    """How to give the length of a tool where there is no tool table, with one to copy."""
+    """Advice on giving the length of a tool without a tool table, with a table to copy."""
     return (
         "give one with --tools tools.csv, or drop it on the studio's page first; with the length in mm:\n"
         f"tool,length_mm\n{tool},LENGTH"
@@ -59,7 +59,7 @@ class ToolEntry:
 
 
 def tool_of(tools: dict[int, ToolEntry] | None, number: int) -> ToolEntry:
-    """The tool of a number; where no table has it, one of which nothing else is known."""
+    """The tool with this number; if no table has it, one of unknown length and diameter."""
     return (tools or {}).get(number) or ToolEntry(number)
 
 
@@ -82,7 +82,7 @@ class Offsets:
     home_g30: list[float] = field(default_factory=lambda: [0.0] * 6)
 
     def at(self, index: int) -> WorkOffset:
-        """The offset of an index: of `WORK_OFFSETS`, and beyond them G54.1 P1, P2 and so on."""
+        """The offset with an index: into `WORK_OFFSETS`, and beyond these G54.1 P1, P2 and so on."""
         standard = len(self.table)
         return self.table[index] if index < standard else self.additional[index - standard + 1]
 
@@ -100,7 +100,7 @@ def _text(path: str | Path, what: str) -> str:
 
 
 def _number(text: str, what: str) -> float:
-    """A number of a table. Raises `ProgramError` without a place."""
+    """A number in a table. Raises `ProgramError` without a place."""
     try:
         value = float(text)
     except ValueError:
@@ -137,7 +137,7 @@ def read_tool_table(path: str | Path) -> dict[int, ToolEntry]:
 
 
 def tools_of(toml: TomlReader, key: str = "tools") -> dict[int, ToolEntry] | None:
-    """Tool number -> tool, of `tools` of a controller file or `tool` of `cut.toml`: tables, or the name of a file."""
+    """Tool number -> tool, from `tools` of a controller file or `tool` of `cut.toml`: tables, or the name of a file."""
     given = toml.data.get(key)
     if given is None:
         return None
@@ -164,7 +164,7 @@ def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
     numbers_of = (*columns[:4], *CUTTER_KEYS)
     table = parse_table(text, file, Columns(numbers_of, columns[4:6]))
     unknown = [f"{name!r} is not known" for name in table.heading if name not in columns]
-    for problem in unknown + [f"{name!r} is missing" for name in columns[:2] if name not in table.heading]:
+    for problem in unknown + [f"{name!r} is missing" for name in columns[:1] if name not in table.heading]:
         raise Place(file, table.heading_line).fail(f"column {problem}", f"columns {', '.join(columns)}")
     for line, cells in table.rows:
         try:
@@ -177,7 +177,7 @@ def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
 
 
 def _tool(row: Mapping[str, object]) -> ToolEntry:
-    """The tool of `TOOL_KEYS`. Raises `ProgramError` without a place."""
+    """The tool given by `TOOL_KEYS`. Raises `ProgramError` without a place."""
     number, remark, material = row.get("number"), row.get("remark", ""), row.get("material", "")
     lengths: dict[str, float] = {}
     if not is_number(number) or number != int(number) or number < 0:
@@ -217,7 +217,7 @@ def _linuxcnc_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
 
 
 def additional_offset(name: str) -> int | None:
-    """The P of `G54.1 P3` or `G154 P3`, which name the same offset; None for any other name.
+    """The P in `G54.1 P3` or `G154 P3`, names of the same offset; None for any other name.
 
     Examples
     --------
@@ -292,7 +292,7 @@ def _offsets_in(toml: TomlReader, table: Mapping[str, object], before: str) -> O
 
 
 def _offsets_of_parameters(lines: list[tuple[int, list[str]]], file: str) -> Offsets:
-    """Offsets of the lines of a LinuxCNC parameter file; other parameters are ignored."""
+    """Offsets in the lines of a LinuxCNC parameter file; other parameters are ignored."""
     offsets = Offsets()
     for line, words in lines:
         if len(words) != 2 or not PARAMETER.fullmatch(words[0]):

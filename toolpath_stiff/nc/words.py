@@ -1,4 +1,4 @@
-"""Lines to blocks, blocks to words. The only module that knows pygcode.
+"""Lexer: lines to blocks, blocks to words. The only module that knows pygcode.
 
 pygcode 0.2.1 (unmaintained since 2017) fails on comments of both styles in one line, on `X+1` and on spaces inside
 words, drops the E of `1.5E2`, and ignores what it does not know. So comments, spaces, signs, exponents and N words are
@@ -27,9 +27,9 @@ LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *CORNERS))
 COMMENT = re.compile("[();]")
 EXPRESSION = re.compile(r"[#\[]")
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
-# Longer is no block.
+# A longer line is no block.
 LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
-MOST_DIGITS = 9  # of a program number, its O included
+MOST_DIGITS = 9  # in a program number, its O included
 NAMED_TAPE = re.compile(r"%[^,%();]{1,24},[-MX]+,?", re.ASCII)  # `%name,MX--,` begins a program (Fagor 8055)
 # Marlin's texts to the operator: M117 Milling, M0 Attach the probe.
 MESSAGE = re.compile(r"(\s*(?:N\d+\s*)?M0*(?:117|118|0|1))\s+[A-Z\"']{2}", re.IGNORECASE)
@@ -37,7 +37,7 @@ HAS_E_WORD = re.compile(r"M0*6[678](?![\d.])", re.ASCII)  # analog inputs and ou
 
 
 class Word(NamedTuple):
-    """One word: letter, value, column (from 1) and its text as it stands."""
+    """One word: letter, value, column (from 1) and its text as written."""
 
     letter: str
     value: float
@@ -47,7 +47,7 @@ class Word(NamedTuple):
 
 @dataclass(frozen=True)
 class Block:
-    """One line of a program, read.
+    """One line of a program, split into words.
 
     `optional`: it begins with the block-delete slash; `switch`: the number of the slash, 1 to 9 (`/` is `/1`).
     `percent`: it holds the tape mark alone. `rest`: where a slash stands in the middle, the number of words before it;
@@ -101,7 +101,7 @@ def read_block(text: str, line: int, name: str, semicolon: bool = True) -> Block
 
 
 def block_delete(compact: str, slash: int, columns: Sequence[int], place: Place) -> tuple[int, int]:
-    """Where a block-delete slash and its number end, and which switch it names."""
+    """The end of a block-delete slash and its number, and the switch that it names."""
     end = slash + 1
     while end < len(compact) and "0" <= compact[end] <= "9":
         end += 1
@@ -114,7 +114,7 @@ def block_delete(compact: str, slash: int, columns: Sequence[int], place: Place)
 
 
 def program_number(compact: str, column: int, place: Place) -> Block:
-    """`O1234` alone is a program's number; any other O word controls subprograms or loops."""
+    """The block of a program number: `O1234` alone; any other O word controls subprograms or loops."""
     if compact[1:].isascii() and compact[1:].isdigit():
         if len(compact) > MOST_DIGITS:
             raise place.fail(f"a program number of {len(compact) - 1} digits", "O and up to 8 digits", column=column)
@@ -126,7 +126,7 @@ def program_number(compact: str, column: int, place: Place) -> Block:
 
 def without_comments(text: str, place: Place, semicolon: bool) -> tuple[str, Sequence[int]]:
     """Upper-case text without comments and blanks, and the column of each of its characters."""
-    if text.isascii() and not COMMENT.search(text):  # the bulk of a big program
+    if text.isascii() and not COMMENT.search(text):  # shortcut for the bulk of a big program
         compact = "".join(text.split()).upper()
         if len(compact) == len(text):
             return compact, range(1, len(text) + 1)
@@ -148,7 +148,7 @@ def without_comments(text: str, place: Place, semicolon: bool) -> tuple[str, Seq
         elif character == ")":
             raise place.fail("`)` without `(`", column=column)
         elif not character.isspace() and character != "\ufeff":
-            # Of other scripts some letters grow in upper case, and some become ASCII ones.
+            # Some letters of other scripts get longer in upper case, and some become ASCII letters.
             characters.append(character.upper() if character.isascii() else character)
             columns.append(column)
     if depth:
@@ -171,7 +171,7 @@ def _tokens(
         letter, number, exponent = match.groups()
         end = match.end()
         if exponent:
-            # An exponent stands without blanks; `X1 E5` is two words, not a hundred metres.
+            # An exponent has no blanks before it; `X1 E5` is two words, not a hundred metres.
             begin = match.start(3)
             if letter in NO_EXPONENT or (columns[begin] - columns[begin - 1] > 1) or HAS_E_WORD.search(compact):
                 end = begin
@@ -196,7 +196,7 @@ def _tokens(
 
 
 def _unreadable(compact: str, position: int, column: int, place: Place) -> InputError:
-    """The error for text that is not a word."""
+    """The error for text that is no word."""
     character, follower = compact[position], compact[position + 1 : position + 3].lstrip("+-")[:1]
     if character == "%":
         return place.fail("`%` among other words", "`%` alone on its line", "take the name behind it away", column)
@@ -209,7 +209,7 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
 
 
 def through_pygcode(words: Sequence[Word], place: Place) -> None:
-    """Let pygcode read the normalised words; what it does not return exactly is an error."""
+    """Let pygcode read the normalised words; raise an error for any that it does not return exactly."""
     known = [word for word in words if word.letter not in CORNERS]
     returned: list[tuple[str, float]] = []
     try:
@@ -225,7 +225,7 @@ def through_pygcode(words: Sequence[Word], place: Place) -> None:
 
 
 def _plain(word: Word) -> str:
-    """The word as pygcode can read it: no plus, no exponent, whole numbers where it wants them."""
+    """The word in a form that pygcode can read: no plus, no exponent, whole numbers where it requires them."""
     number = repr(word.value)
     if "e" in number:
         number = format(Decimal(number), "f")

@@ -39,7 +39,7 @@ def place(moves: Moves, origin: ArrayLike) -> Moves:
     turn = rotation_matrices(zero[3:])
 
     def turned(vectors: FloatArray) -> FloatArray:
-        # Nothing where nothing turns: a multiplication by the unit matrix would cost the last digit.
+        # Skipped where nothing turns: multiplying by the unit matrix would cost the last digit.
         return product(vectors, turn.T) if zero[3:].any() else vectors
 
     def placed(pose: FloatArray) -> FloatArray:

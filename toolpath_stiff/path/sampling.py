@@ -100,7 +100,7 @@ class Samples(ArrayColumns):
 
 
 def move_durations(moves: Moves, length: FloatArray, rapid_feed: float = defaults.RAPID_FEED) -> FloatArray:
-    r"""(n,) s, the time of each move of `length` (n,) m without the dwell after it; rapids at `rapid_feed`, m/s.
+    r"""(n,) s, duration of each move of `length` (n,) m, without the dwell after it; rapids run at `rapid_feed`, m/s.
 
     Examples
     --------
@@ -202,15 +202,15 @@ def sample_moves(
 def _plunge_borders(
     moves: Moves, pieces: FloatArray, length: FloatArray, orient: Orient
 ) -> tuple[IntArray, FloatArray]:
-    """(k,) move and (k,) share of it where a plunge becomes a cut or a cut a plunge, in order along the path."""
+    """(k,) moves, (k,) shares along them: borders between plunge and cut within a move, in order along the path."""
     turn = np.abs(moves.end[:, 3:] - moves.start[:, 3:]).sum(axis=1)
     arcs = np.flatnonzero(moves.arc_sweep != 0.0)
     chosen = turn > 0.0
-    # An arc across the axis keeps its angle to it.
+    # An arc in a plane normal to the tool axis keeps its angle to the axis.
     upright = along_tool_axis(moves.arc_normal[arcs], orient(moves.start[arcs, 3:]))
     chosen[arcs] |= np.abs(upright) < 1.0 - ROUNDED
     rows = np.flatnonzero(chosen & (moves.motion != RAPID) & (length > 0.0))
-    # Lines lean by no more than the axes turn.
+    # On a line, the angle to the tool axis changes by no more than the rotary axes turn.
     lean = np.arccos(np.minimum(np.abs(_along(moves, rows, np.zeros(len(rows)), orient)), 1.0))
     near = np.abs(lean - defaults.PLUNGE_ANGLE) <= turn[rows] + ROUNDED
     rows = rows[near | (moves.arc_sweep[rows] != 0.0)]
@@ -230,7 +230,7 @@ def _plunge_borders(
 def _borders_of_block(
     moves: Moves, rows: IntArray, counts: IntArray, finer: IntArray, orient: Orient
 ) -> tuple[IntArray, FloatArray]:
-    """The same of some moves divided into `counts` pieces, of which `finer` lie between two samples."""
+    """`_plunge_borders` of some moves, each searched in `counts` pieces, `finer` of them between two samples."""
     moves, (move, index) = moves.take(rows), numbered(counts + 1)
     plunge = np.abs(_along(moves, move, index / counts[move], orient)) >= BORDER
     before = np.flatnonzero((plunge[1:] != plunge[:-1]) & (move[1:] == move[:-1]))
@@ -245,19 +245,19 @@ def _borders_of_block(
 
 
 def _along(moves: Moves, move: IntArray, u: FloatArray, orient: Orient) -> FloatArray:
-    """(n,) cosine of the angle between the motion of the tip and the tool axis at shares u of moves."""
+    """(n,) cosine of the angle between the tip's motion and the tool axis, at shares u along moves."""
     first = moves.start[move, 3:]
     abc = orient(first + u[:, None] * (moves.end[move, 3:] - first))
     return along_tool_axis(points_along(moves, move, u)[1], abc)
 
 
 def _turn(moves: Moves) -> FloatArray:
-    """(n,) rad, the largest turn of a rotary axis in each move."""
+    """(n,) rad, the largest turn of any rotary axis in each move."""
     return np.asarray(np.maximum.reduce([np.abs(moves.end[:, axis] - moves.start[:, axis]) for axis in (3, 4, 5)]))
 
 
 def _pieces(moves: Moves, length: FloatArray, step: float) -> FloatArray:
-    """(n,) whole numbers from 1, into how many pieces the samples divide each move."""
+    """(n,) number of pieces (whole, at least 1) into which the samples divide each move."""
     # A length that is a whole number of steps up to rounding must not gain a step.
     steps, turns = length * _fastest_part(moves) / step, _turn(moves) / ANGULAR_STEP
     return np.asarray(np.maximum(np.maximum(np.ceil(steps - 1e-9), np.ceil(turns - 1e-9)), 1.0))
@@ -275,7 +275,7 @@ def _check_count(pieces: FloatArray, step: float) -> None:
 
 
 def _empty_samples(moves: Moves, n: int) -> Samples:
-    """Room for n samples; what the moves have one value of they have at once."""
+    """`Samples` allocated for n samples; columns with one value a move are filled in already."""
     held = {name: getattr(moves, name) for name in HELD}
     columns: dict[str, NDArray[Any]] = {name: np.empty(n) for name in ("s", "t", "weight", "feed")}
     columns |= {"move": np.empty(n, np.int32), "line": np.empty(n, np.int32), "motion": np.empty(n, np.int8)}
@@ -293,7 +293,7 @@ def _sample_block(
     orient: Orient,
     into: Samples,
 ) -> None:
-    """Samples of some moves, into their rows. `columns` holds what is known of each move, `border` further shares."""
+    """Write the samples of some moves into their rows; `columns` has figures of each move, `border` further shares."""
     even = counts - np.bincount(border[0], minlength=len(moves))
     move, index = numbered(even)
     u = index / columns["pieces"][move]
@@ -330,7 +330,7 @@ def _sample_block(
 
 
 def _fastest_part(moves: Moves) -> FloatArray:
-    """(n,) greatest speed along a move over its mean speed: above 1 only where the radii of an arc differ."""
+    """(n,) ratio of greatest to mean speed along a move: above 1 only where the radii of an arc differ."""
     ratio, arcs = np.ones(len(moves)), np.flatnonzero(moves.arc_sweep != 0.0)
     frame = arc_frame(moves, arcs)
     radii = np.stack([frame.radius_start, frame.radius_end])

@@ -20,7 +20,7 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_
 
 
 def decimals_of(column: str) -> int:
-    """Decimals of a column by the unit in its name: a tenth of a micrometre is finer than machines move."""
+    """Decimals of a column, by the unit in its name: a tenth of a micrometre is finer than any machine moves."""
     return 4 if column.endswith("_mm") else 6
 
 

@@ -13,7 +13,7 @@ WHOLE = 2.0 * np.pi
 
 
 def turned_about_tool(rotation: FloatArray, turn: FloatArray) -> FloatArray:
-    """(..., 3, 3) tool axes (..., 3, 3) turned about their own z by angles (...) rad."""
+    """(..., 3, 3) tool frames: `rotation` (..., 3, 3) turned about its own z by angles (...) rad."""
     return np.asarray(product(rotation, rotation_about_z(turn)))
 
 
@@ -31,14 +31,14 @@ def feed_turns(rotation: FloatArray, tangent: FloatArray) -> FloatArray:
 
 
 def unwound(joints: FloatArray, winds: BoolArray) -> FloatArray:
-    """(n, ..., j) joint values of poses with whole turns added where `winds` (j,): they go on the shorter way."""
+    """(n, ..., j) joint values of poses; whole turns added where `winds` (j,), so that each step is the shorter one."""
     step = np.diff(joints, axis=0)
     step = step - winds * WHOLE * np.round(step / WHOLE)
     return np.concatenate([joints[:1], joints[:1] + np.cumsum(step, axis=0)])
 
 
 def room_to_wind(path: FloatArray, limits: FloatArray, winds: BoolArray) -> BoolArray:
-    """(...) whether unwound values (n, ..., j) lie within limits (j, 2), as a whole path and but for whole turns."""
+    """(...) True where unwound values (n, ..., j), or all of them a whole turn or more away, keep to limits (j, 2)."""
     low, high = limits[:, 0] - path.min(axis=0), limits[:, 1] - path.max(axis=0)
     with np.errstate(invalid="ignore"):
         fits = np.where(winds, np.ceil(low / WHOLE) <= np.floor(high / WHOLE), (low <= 0.0) & (high >= 0.0))
@@ -48,7 +48,7 @@ def room_to_wind(path: FloatArray, limits: FloatArray, winds: BoolArray) -> Bool
 def constant_costs(
     joints: FloatArray, cost: FloatArray, limits: FloatArray, winds: BoolArray, largest: float
 ) -> FloatArray:
-    """(c, t) mean costs of configurations and turns that are kept at all poses; inf where a pose or a step forbids it.
+    """(c, t) mean costs of configurations and turns held at all poses; inf where a pose or a step rules one out.
 
     Arguments as of `least_costly_way`, and the limits (j, 2) of the joints; poses that nobody reaches do not count.
     """
@@ -64,7 +64,7 @@ def constant_costs(
 def least_costly_way(
     joints: FloatArray, cost: FloatArray, winds: BoolArray, largest: float, weight: float, window: int
 ) -> tuple[IntArray, IntArray]:
-    """The configuration and the turn of every pose whose costs and squared steps add up to the least.
+    """Configuration and turn at every pose that minimise the sum of costs and weighted squared steps.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def least_costly_way(
     same = np.arange(configurations * turns).reshape(configurations, turns)
     for i in range(1, n):
         if not np.isfinite(cost[i]).any():
-            came[i] = same  # nobody gets there: as if it were not on the path
+            came[i] = same  # out of reach: passed over, as if it were not on the path
             continue
         step = joints[i][:, :, None] - last[:, near]
         step -= winds * WHOLE * np.round(step / WHOLE)
@@ -103,7 +103,7 @@ def least_costly_way(
         best = ways.argmin(axis=-1)
         least = np.take_along_axis(ways, best[..., None], axis=-1)[..., 0]
         came[i] = same[:, 0][:, None] + near[np.arange(turns), best]
-        if np.isfinite(total).any():  # else this is the first pose that is reached
+        if np.isfinite(total).any():  # otherwise this is the first pose within reach
             broken = total.min() + change < least
             least, came[i][broken] = np.minimum(least, total.min() + change), int(total.argmin())
         else:

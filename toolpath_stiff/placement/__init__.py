@@ -1,1 +1,1 @@
-"""Placements of the work: the search, the front, the placement chosen and the advice about it."""
+"""Placements of the work: the search, the front, the placement chosen, and advice on it."""

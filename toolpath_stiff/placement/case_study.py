@@ -37,18 +37,18 @@ REGIONS: dict[str, Region] = {
     "4": (-150.0, 100.0, HIGH_MM, 45.0),
 }
 HEIGHTS_MM = tuple(float(z) for z in range(300, 1401, 25))
-STEP_MM, MOST_STEPS, ROOM_MM = 25.0, 50, 500.0  # of other heights; where no workspace is bounded, above and below
+STEP_MM, MOST_STEPS, ROOM_MM = 25.0, 50, 500.0  # step and number of other heights; their range without workspace
 FIGURES = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "max_N_per_mm")
 REGION_COLUMNS = ("x_mm", "y_mm", "z_mm", "rotation_deg")
 MOST_REGIONS = 50
 MEANS_AGREE = 0.01  # the paper: "stiffnesses of the same magnitude"; we ask for one per cent
-WAVES_MM = (10.0, 20.0, 40.0)  # how far the non-planar variants of the path go up and down
+WAVES_MM = (10.0, 20.0, 40.0)  # amplitudes of the non-planar variants of the path
 DECIMALS = 3  # N/mm: finer than anything that can be measured, coarser than the processor's last digits
 
 
 @dataclass(frozen=True, repr=False)
 class CaseStudy(FolderResult):
-    r"""One tool path in several regions: the paper's conclusions checked one by one, and where they stop holding.
+    r"""One tool path in several regions: the paper's conclusions checked one by one, and where they cease to hold.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class CaseStudy(FolderResult):
         return not self.summary["non_planar"]
 
     def to_dict(self) -> Document:
-        """The JSON document of the command."""
+        """JSON document of the command."""
         return self.summary
 
     def to_frame(self) -> DataFrame:
@@ -104,7 +104,7 @@ def case_study_program() -> ReadProgram:
 
 
 def wavy_program(amplitude_mm: float) -> ReadProgram:
-    """The square with its height going up and down once along every side: a non-planar cut of the same outline."""
+    """The square with one wave of height along each side: a non-planar cut of the same outline."""
     lines = ["G21 G90 F1200", "G0 X-100 Y-100 Z0"]
     corners = [(-100, -100), (100, -100), (100, 100), (-100, 100), (-100, -100)]
     for (x0, y0), (x1, y1) in pairwise(corners):
@@ -198,7 +198,7 @@ def run_case_study(
 
 
 def _heights(model: StiffnessModel, of_path: float) -> list[float]:
-    """mm, whole steps over the workspace, and the height of the path itself."""
+    """Heights, mm: whole steps over the workspace, and the height of the path itself."""
     low, high = (mm_from_m(float(end)) for end in model.machine.limits.workspace[:, 2])
     low, high = (low if np.isfinite(low) else of_path - ROOM_MM), (high if np.isfinite(high) else of_path + ROOM_MM)
     step = STEP_MM * max(1, math.ceil((high - low) / STEP_MM / MOST_STEPS))
@@ -218,7 +218,7 @@ def _figures(analysis: Analysis) -> dict[str, float]:
 
 
 def conclusions(regions: Sequence[Document]) -> list[Document]:
-    """The paper's three statements, each with the numbers that decide it; None where no two regions can."""
+    """The paper's three statements, each with the numbers that decide it; None where no two regions allow a test."""
     above: dict[tuple[float, ...], list[Document]] = defaultdict(list)
     for row in sorted(regions, key=lambda row: row["z_mm"]):
         above[row["x_mm"], row["y_mm"], row["rotation_deg"]].append(row)
@@ -254,7 +254,7 @@ def _statement(statement: str, held: Sequence[bool], words: Sequence[str], nothi
 
 
 def _in_plane(regions: Sequence[Document]) -> list[tuple[Document, Document]]:
-    """The two regions of each height whose means are farthest apart."""
+    """The two regions at each height whose means are farthest apart."""
     pairs = []
     for z in sorted({row["z_mm"] for row in regions}):
         rows = [row for row in regions if row["z_mm"] == z]
@@ -270,7 +270,7 @@ def _apart(a: Document, b: Document) -> float:
 
 
 def _wave(model: StiffnessModel, amplitude: float, step: float) -> Document:
-    """The wavy square in the four regions, and whether its mean still does not depend on where it lies."""
+    """The wavy square in the four regions, and True if its mean is still independent of the region."""
     program = wavy_program(amplitude)
     analyses = {name: analyze(model, program, origin=origin_of(*at), step=step) for name, at in REGIONS.items()}
     rows = _rows(REGIONS, analyses)

@@ -1,4 +1,4 @@
-"""Climbing from one placement, a sequence of linear programmes within a trust region.
+"""Climbs from one placement: a sequence of linear programmes within a trust region.
 
 Range and weakest place are extremes over samples and have kinks where two samples are equally stiff, which is where
 their best values lie. Linearised sample by sample they are constraints of a linear programme (the epigraph form:
@@ -19,14 +19,14 @@ from toolpath_stiff.placement.evaluator import Evaluator, PlacedRows
 from toolpath_stiff.placement.goals import Bounds, Goal, SearchRules
 from toolpath_stiff.placement.linear_programmes import Programme, least_costs
 
-DIFFERENCE = 1e-6  # of each range, for the derivatives
-PENALTY = 100.0  # what a shortfall costs, in units of the objective
-INSIDE = 1e-6  # of the mean stiffness, and of a limit's span: constraints are met with this to spare
+DIFFERENCE = 1e-6  # step of the derivatives, as a share of each range
+PENALTY = 100.0  # cost of a shortfall, in units of the objective
+INSIDE = 1e-6  # share of mean stiffness and of limits' spans by which constraints are met with room to spare
 SMALLEST_REGION = 1e-5  # of each range
 SMALLEST_GAIN = 1e-9  # of the mean stiffness
-WORTH_A_RESTART = 1e-5  # of the mean stiffness: with a region as wide as at first, which kinks may have closed early
+WORTH_A_RESTART = 1e-5  # of the mean stiffness: gain worth a restart with the first region, which kinks may close early
 SLACKEST = 1e3
-SOME_STIFFNESS = 5e7  # N/m, the order of a machine tool's: where no climb begins within reach
+SOME_STIFFNESS = 5e7  # N/m, typical of a machine tool; used if no climb begins within reach
 NO_SLOPE = np.zeros((1, 1))
 Rank = tuple[float, float, float]  # more is better, the first that differs decides: rules, floors, value
 _Block = tuple[FloatArray, tuple[float, float, float, float], FloatArray | float]  # slopes, L H t slack, bound
@@ -34,7 +34,7 @@ _Block = tuple[FloatArray, tuple[float, float, float, float], FloatArray | float
 
 @dataclass
 class _Climb:
-    """One climb: where it is, the best that it met, how far the next linear programme may go."""
+    """State of one climb: its place, the best placement met, the trust region."""
 
     goal: Goal
     here: FloatArray
@@ -48,13 +48,13 @@ class _Climb:
     step: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def move(self, there: FloatArray, rows: PlacedRows, merit: float) -> None:
-        """Go to where the step led."""
+        """Move to the result of the step."""
         if float(np.abs(self.step).max()) > 0.9 * self.region:
             self.region = min(2.0 * self.region, 0.25)
         self.here, self.rows, self.merit, self.gradient = there, rows, merit, None
 
     def bent(self, tried: PlacedRows) -> PlacedRows:
-        """Rows from which the programme would have foretold those after the step: the second-order correction.
+        """Rows from which the programme would have predicted those after the step: the second-order correction.
 
         A kink along which the figures are curved else lets only ever smaller steps pass (Fletcher 1987, section 14.4).
         """
@@ -62,7 +62,7 @@ class _Climb:
         return tried.combined(lambda now, slope: now - product(self.step[None], slope), self.gradient)
 
     def shrink(self, first_region: float) -> None:
-        """Look nearer; from as far as at first again while that is worth it."""
+        """Shrink the trust region; restart with the initial one as long as that pays."""
         self.region = 0.4 * min(self.region, max(float(np.abs(self.step).max()), SMALLEST_REGION))
         if self.region < SMALLEST_REGION and self.merit - self.began >= WORTH_A_RESTART:
             self.began, self.region = self.merit, first_region
@@ -70,7 +70,7 @@ class _Climb:
 
 @dataclass(frozen=True)
 class Climber:
-    """One evaluator, the bounds and the rules that a climb keeps."""
+    """An evaluator with the bounds and rules that a climb keeps."""
 
     evaluator: Evaluator
     bounds: Bounds
@@ -78,7 +78,7 @@ class Climber:
 
     @cached_property
     def free(self) -> IntArray:
-        """Columns that a climb may vary: a height from a list stays."""
+        """Columns that a climb may vary: a height taken from a list stays."""
         free = self.bounds.free
         return free[free != 2] if self.bounds.heights else free
 
@@ -89,12 +89,12 @@ class Climber:
 
     @cached_property
     def weight(self) -> FloatArray:
-        """(h,) share of the path's length that each headline sample stands for."""
+        """(h,) share of the path's length that each headline sample represents."""
         lengths = self.evaluator.path.weight[self.evaluator.head]
         return np.asarray(lengths / lengths.sum())
 
     def climb(self, first: FloatArray, goal: Goal | Sequence[Goal], steps: int, region: float = 0.05) -> FloatArray:
-        """The best placements (k, 6) on the ways up from `first` (k, 6): rules first, then floors, then value.
+        """Best placements (k, 6) met on climbs from `first` (k, 6): rules first, then floors, then value.
 
         One goal for all, or one for each. All climb in step, so that each trial evaluates k placements at once.
         """
@@ -113,7 +113,7 @@ class Climber:
                 break
             self._differentiate([climb for climb in going if climb.gradient is None])
             missed = self._try(going, [climb.rows for climb in going], scale)
-            # Corrected for the curvature of what was found.
+            # Corrected for the curvature found.
             for climb, _ in self._try(
                 [climb for climb, _ in missed], [climb.bent(tried) for climb, tried in missed], scale
             ):
@@ -123,7 +123,7 @@ class Climber:
     def _try(
         self, climbs: Sequence[_Climb], rows: Sequence[PlacedRows], scale: float
     ) -> list[tuple[_Climb, PlacedRows]]:
-        """Evaluate the next step of each climb, foretold from `rows`, and take it where it gains; the others."""
+        """Evaluate the next step of each climb, predicted from `rows`, and take it if it gains; return the others."""
         if not climbs:
             return []
         programmes = [self._programme(climb, values) for climb, values in zip(climbs, rows, strict=True)]
@@ -143,7 +143,7 @@ class Climber:
         return missed
 
     def _judged(self, rows: PlacedRows, goals: Sequence[Goal], scale: float) -> list[tuple[float, Rank]]:
-        """The merit of each placement for its goal, value less penalties in units of `scale` (N/m), and its rank."""
+        """Merit of each placement for its goal, value less penalties in units of `scale` (N/m), and its rank."""
         figures = self.evaluator.summary(rows)
         ranks = np.empty((len(goals), 3))
         ranks[:, 0] = -self.rules.violation(figures)
@@ -159,7 +159,7 @@ class Climber:
         return judged
 
     def _moved(self, placement: FloatArray, step: FloatArray) -> FloatArray:
-        """A placement moved by a step (free,) of the ranges; a whole turn is brought back when the climb ends."""
+        """Placement moved by a step (free,) in shares of the ranges; whole turns are taken out when the climb ends."""
         bounds, moved = self.bounds, placement.copy()
         moved[self.free] += step * self.span
         held = self.free[~bounds.round[self.free]]
@@ -169,7 +169,7 @@ class Climber:
         return moved
 
     def _differentiate(self, climbs: Sequence[_Climb]) -> None:
-        """Derivatives of every row along each free column: arrays (free, samples), per unit of the range."""
+        """Differentiate every row along each free column: arrays (free, samples), per unit of the range."""
         if not climbs:
             return
         d, middle = len(self.free), 0.5 * (self.bounds.low + self.bounds.high)[self.free]
@@ -184,7 +184,7 @@ class Climber:
             climb.gradient = there.combined(lambda moved, start, step=step: (moved - start) / step, climb.rows)
 
     def _programme(self, climb: _Climb, rows: PlacedRows) -> Programme:
-        """The linear programme of the step within the region; variables step (free,), L, H, t, slack."""
+        """Linear programme of the step within the trust region; variables step (free,), L, H, t, slack."""
         here, region, gradient, goal, head = climb.here, climb.region, climb.gradient, climb.goal, self.evaluator.head
         assert gradient is not None
         d = len(self.free)
@@ -193,7 +193,7 @@ class Climber:
         if np.isfinite(scale):
             k, g = k / scale, g / scale
             g = g if np.isfinite(g.sum()) else np.nan_to_num(g)
-        else:  # a cut out of reach: no figures, the limits alone guide
+        else:  # a cut is out of reach: no figures, only the limits guide
             k, g = np.ones(len(k)), np.zeros((d, len(k)))
         slope = (g * self.weight).sum(axis=1)
         cost = np.zeros(d + 4)
@@ -222,7 +222,7 @@ class Climber:
     def _kept(
         self, rows: PlacedRows, gradient: PlacedRows, k: FloatArray, g: FloatArray, region: float
     ) -> list[_Block]:
-        """L and H below and above all stiffnesses, and what the rules keep; rows that cannot bind are left out."""
+        """Constraints of L and H as bounds of all stiffnesses, and of the rules; rows that cannot bind are left out."""
         reach = region * np.abs(g).sum(axis=0)
         low = np.flatnonzero(k - reach <= (k + reach).min(initial=np.inf))
         high = np.flatnonzero(k + reach >= (k - reach).max(initial=-np.inf))
@@ -236,7 +236,7 @@ class Climber:
         law = rows.law[0, self.evaluator.cuts]
         if np.isfinite(self.rules.extrapolated) and len(law):
             inside = law >= 0.0
-            # With room for more samples outside the law none is held; a trial that takes too many is refused.
+            # While more samples may leave the law, none is constrained; a trial with too many is refused.
             if np.mean(~inside) >= 0.98 * self.rules.extrapolated:
                 kept.append((law[inside], gradient.law[:, self.evaluator.cuts][:, inside], 0.0))
         for values, slopes, least in kept:
@@ -245,7 +245,7 @@ class Climber:
         return blocks
 
     def _floors(self, goal: Goal, scale: float, slope: FloatArray, k: FloatArray) -> list[_Block]:
-        """Constraints on what must not get worse: by the slack, or by the common surplus t where that is the goal."""
+        """Constraints against getting worse: with the slack, or with the common surplus t if that is the goal."""
         floors = (goal.floors / scale) + (0.0 if goal.weights is None else INSIDE)
         soft = (1.0, 0.0) if goal.weights is None else (0.0, -1.0)
         blocks: list[_Block] = [

@@ -1,4 +1,4 @@
-"""Many placements of one path at once: mean, range, smallest stiffness, and how far from the limits.
+"""Many placements of one path at once: mean, range, smallest stiffness, and margins to the limits.
 
 The path is sampled once, in the set-up frame; a placement turns and moves the samples rigidly. Limits come from strut
 lengths and determinants that the closed form computes on its way; so does the stiffness of linear struts on a rigid
@@ -34,13 +34,13 @@ from toolpath_stiff.stiffness import closed_form, core
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 POSES_AT_A_TIME = 30_000  # fits the processor's cache
-UNREACHABLE = -9.0  # margin where no joint values lead to a pose: finite, because a search takes differences of it
-COMPLIANCE_DECIDES = ("softest", "normal")  # loads whose direction asks the compliance, the second at plunges
+UNREACHABLE = -9.0  # margin where no joint values reach a pose: finite, as a search takes differences of it
+COMPLIANCE_DECIDES = ("softest", "normal")  # loads directed by the compliance, the second at plunges
 
 
 @dataclass(frozen=True)
 class PlacementFigures(ArrayColumns):
-    """Figures of k placements. SI; the stiffnesses are nan where a cut is out of reach.
+    """Figures of k placements. SI; stiffnesses are nan if a cut is out of reach.
 
     Attributes
     ----------
@@ -70,13 +70,13 @@ class PlacementFigures(ArrayColumns):
 
     @property
     def objectives(self) -> FloatArray:
-        """(k, 3) N/m, all to be raised: mean, minus range, weakest."""
+        """(k, 3) N/m, objectives to maximise: mean, minus range, weakest."""
         return np.stack([self.mean, -self.spread, self.lowest], axis=1)
 
 
 @dataclass(frozen=True)
 class PlacedRows(ArrayColumns):
-    """Rows of k placements, a column a sample (k, n). SI.
+    """Values of each sample (k, n) at k placements. SI.
 
     `stiffness`, nan but at headline samples; `law` m, how far the struts are inside the lengths of their law; `margin`;
     `clearance` m, inf without keep-outs.
@@ -88,13 +88,13 @@ class PlacedRows(ArrayColumns):
     clearance: FloatArray
 
     def combined(self, formula: Callable[..., FloatArray], other: PlacedRows) -> PlacedRows:
-        """Columns that a formula makes of these and of the same ones of others."""
+        """Columns that a formula makes from these and the corresponding ones of `other`."""
         with np.errstate(invalid="ignore"):
             return PlacedRows(*(formula(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)))
 
 
 class Evaluator:
-    """Evaluates placements of one path and counts the poses that this took."""
+    """Evaluator of placements of one path, which counts the poses computed."""
 
     def __init__(
         self, model: StiffnessModel, path: WorkPath, load: Load, force: float, keepouts: tuple[KeepOut, ...] = ()
@@ -102,12 +102,12 @@ class Evaluator:
         self.model, self.path, self.load, self.force, self.keepouts = model, path, load, force, keepouts
         self.poses, self.known = 0, dict[bytes, PlacementFigures]()
         self.direct = core.is_closed_form(model) and load.kind not in COMPLIANCE_DECIDES
-        # A still sample has no direction; none of them is a headline sample, so any direction does.
+        # A sample at rest has no direction; none is a headline sample, so any direction will do.
         still = ~np.asarray(path.tangent.any(axis=1))
         tangent = np.where(still[:, None], np.array([0.0, 0.0, 1.0]), path.tangent)
         self.position, self.tangent = (np.ascontiguousarray(values.T) for values in (path.position, tangent))
         self.turned = np.ascontiguousarray(np.moveaxis(rotation_matrices(path.abc), 0, -1)) if path.abc.any() else None
-        # Of each tool its poses; with those of corners the samples there too, which are the same under other loads.
+        # Poses of each tool; at corners with the samples that share the pose under other loads.
         corner = corners(path.position, path.abc, path.tool_length)
         first, self.of_one_tool = ~np.append(False, corner[:-1]), list[tuple[float, tuple[IntArray | slice, ...]]]()
         for tool, some in core.rows_of_tools(path.tool_length):
@@ -118,7 +118,7 @@ class Evaluator:
         self.cuts, self.rapids = _columns(path.cutting), _columns(~path.cutting)
 
     def figures(self, placements: FloatArray) -> PlacementFigures:
-        """Figures of placements (k, 6) m and rad; those of a long path are kept, as a search asks for them again."""
+        """Figures of placements (k, 6) m and rad; those of a long path are cached, as a search repeats them."""
         group = max(1, POSES_AT_A_TIME // max(len(self.path), 1))
         parts = [placements[i : i + group] for i in range(0, max(len(placements), 1), group)]
         if group > 1 or not len(placements):
@@ -131,7 +131,7 @@ class Evaluator:
         return PlacementFigures.joined([self.known[part.tobytes()] for part in parts])
 
     def rows(self, placements: FloatArray) -> PlacedRows:
-        """Rows of placements (k, 6) m and rad; all in memory at once."""
+        """Rows of placements (k, 6) m and rad, all in memory at once."""
         k, n = len(placements), len(self.path)
         self.poses += k * n
         turn = rotation_matrices(placements[:, 3:6])
@@ -151,7 +151,7 @@ class Evaluator:
                 [motion[:, :, rows].reshape(3, -1) for rows in loaded[: None if self.direct else 1]],
             )
             compliances, margins, laws = self._kernel_rows(tool, tip, towards, some)
-            for rows, compliance in zip(loaded, compliances, strict=False):  # effects have compliances of their own
+            for rows, compliance in zip(loaded, compliances, strict=False):  # only the first unless direct
                 along[:, rows] = compliance.reshape(k, -1)
             for rows in loaded:
                 margin[:, rows], law[:, rows] = margins.reshape(k, -1), laws.reshape(k, -1)
@@ -165,7 +165,7 @@ class Evaluator:
         return PlacedRows(stiffness, law, margin, clearance)
 
     def summary(self, rows: PlacedRows) -> PlacementFigures:
-        """Figures of placements from what each of their samples does."""
+        """Figures of placements from the rows of their samples."""
         path, k = self.path, len(rows.margin)
         margin = rows.margin[:, self.cuts].min(axis=1, initial=np.inf)
         rapid = rows.margin[:, self.rapids].min(axis=1, initial=np.inf)
@@ -189,7 +189,7 @@ class Evaluator:
         )
 
     def deciding_rows(self, placement: FloatArray, stretches: int) -> IntArray:
-        """Rising samples that decide at a placement (6,): of each of so many stretches the extremes of what counts."""
+        """Samples that decide at a placement (6,), ascending: the extremes in each of `stretches` stretches."""
         path, placed = self.path, self.rows(placement[None])
         head, cuts, everything = np.flatnonzero(path.headline), np.flatnonzero(path.cutting), np.arange(len(path))
         counts = [(head, placed.stiffness), (head, -placed.stiffness), (everything, placed.margin), (cuts, placed.law)]
@@ -199,7 +199,7 @@ class Evaluator:
         return np.unique([part[int(np.argmin(values[part]))] for part, values in parts])
 
     def _orientations(self, placements: FloatArray, turn: FloatArray) -> FloatArray | None:
-        """(9, k, n) rows of R' = Q R Rz(-C), the rule of `path`, and the tool's turn; None: all vertical."""
+        """(9, k, n) rows of R' = Q R Rz(-C), the rule of `path`, with the tool's turn; None if all are vertical."""
         k, n = len(placements), len(self.path)
         back = placements[:, 5] - placements[:, 6:].sum(axis=1)
         if self.turned is None:
@@ -217,7 +217,7 @@ class Evaluator:
     def _of_elements(
         self, position: FloatArray, motion: FloatArray, rotation: FloatArray | None
     ) -> tuple[FloatArray, FloatArray]:
-        """(k, n) N/m at headline samples where all cuts are within reach, and (k, n) margins; a machine of elements."""
+        """(k, n) N/m at headline samples, if all cuts are in reach, and (k, n) margins; for a machine of elements."""
         machine, (k, n) = self.model.machine, position.shape[1:]
         stiffness, margin = np.full((k, n), np.nan), np.empty((k, n))
 
@@ -249,7 +249,7 @@ class Evaluator:
     def _kernel_rows(
         self, tool: float, tip: FloatArray, motions: list[FloatArray], rotation: FloatArray | None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Compliance along the load of each motion, margin and law of n poses with one tool; (3, n), (3, n), (9, n)."""
+        """Compliance along the load of each motion, margin and law at n poses with one tool; (3, n), (3, n), (9, n)."""
         machine, turns = as_hexapod(self.model.machine, "the closed form"), _matrices(rotation)
         directions = motions
         if self.direct and self.load.kind != "tangential":
@@ -271,7 +271,7 @@ class Evaluator:
     def _with_effects(
         self, position: FloatArray, motion: FloatArray, rotation: FloatArray | None, margin: FloatArray
     ) -> FloatArray:
-        """(k, h) N/m at the headline samples where all cuts are within reach, by the closed form where possible."""
+        """(k, h) N/m at the headline samples if all cuts are in reach, by the closed form where possible."""
         head = np.flatnonzero(self.path.headline)
         stiffness = np.full((len(margin), len(head)), np.nan)
         possible = np.flatnonzero((margin[:, self.cuts] >= 0.0).all(axis=1))
@@ -279,7 +279,7 @@ class Evaluator:
             return stiffness
 
         def some(columns: FloatArray) -> FloatArray:
-            """Columns of the headline samples at the possible placements."""
+            """Columns of the headline samples, at the feasible placements."""
             return columns[:, possible][:, :, head].reshape(len(columns), -1)
 
         tip, towards = some(position).T, some(motion).T
@@ -306,18 +306,18 @@ class Evaluator:
 
 
 def _matrices(rotation: FloatArray | None) -> FloatArray | None:
-    """(n, 3, 3) of columns (9, n)."""
+    """(n, 3, 3) matrices from columns (9, n)."""
     return None if rotation is None else rotation.T.reshape(-1, 3, 3)
 
 
 def _turned(turn: FloatArray, columns: FloatArray) -> FloatArray:
-    """(3, k, n) the columns (3, n) turned by k rotations (k, 3, 3)."""
+    """(3, k, n) columns (3, n) turned by k rotations (k, 3, 3)."""
     k = len(turn)
     return product(turn.swapaxes(0, 1).reshape(3 * k, 3), columns).reshape(3, k, -1)
 
 
 def _columns(those: BoolArray) -> IntArray | slice:
-    """The columns that are true; a slice, which copies nothing, where they follow each other."""
+    """Columns marked true; a slice, which copies nothing, if they are contiguous."""
     columns = np.flatnonzero(those)
     if len(columns) and columns[-1] - columns[0] + 1 == len(columns):
         return slice(int(columns[0]), int(columns[-1]) + 1)

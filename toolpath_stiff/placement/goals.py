@@ -1,4 +1,4 @@
-"""Bounds of a search, rules that a placement has to keep, goals that are to be raised."""
+"""Bounds of a search, rules that a placement must keep, goals to maximise."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -30,12 +30,12 @@ class Bounds:
 
     @cached_property
     def round(self) -> BoolArray:
-        """(6,) or (7,) turns that go all the way round, and so have no end."""
+        """(6,) or (7,) angles that may go all the way round, and so have no bounds."""
         angle = np.arange(len(self.low)) >= 5
         return np.asarray(angle & (self.high - self.low >= 2.0 * np.pi - 1e-9))
 
     def placements(self, unit: FloatArray) -> FloatArray:
-        """Placements (k, 6) of points (k, free) of the unit cube; a whole turn goes round."""
+        """Placements (k, 6) from points (k, free) of the unit cube; full-circle angles wrap round."""
         placements = np.repeat(self.low[None], len(unit), axis=0)
         free = self.free
         inside = np.where(self.round[free], np.mod(unit, 1.0), np.clip(unit, 0.0, 1.0))
@@ -47,12 +47,12 @@ class Bounds:
         return placements
 
     def unit(self, placements: FloatArray) -> FloatArray:
-        """Points (k, free) of the unit cube of placements (k, 6)."""
+        """Points (k, free) of the unit cube for placements (k, 6)."""
         free = self.free
         return np.asarray((placements[:, free] - self.low[free]) / (self.high - self.low)[free])
 
     def apart(self, placements: FloatArray, count: int, distance: float = 0.1) -> list[int]:
-        """Rows of ranked placements: the first, and the best of the others that are not beside one chosen.
+        """Rows of ranked placements: the first, and the best of the others that are not close to one chosen.
 
         `distance` in shares of the ranges.
         """
@@ -68,7 +68,7 @@ class Bounds:
         return chosen
 
     def holds(self, placement: FloatArray) -> bool:
-        """True for a placement within; turns count modulo a whole one."""
+        """True for a placement within the bounds; angles count modulo a whole turn."""
         apart = np.mod(placement[5:] - self.low[5:] + 1e-9, 2.0 * np.pi) - 1e-9
         inside = (placement >= self.low - 1e-9) & (placement <= self.high + 1e-9)
         inside[5:] = apart <= self.high[5:] - self.low[5:] + 1e-9
@@ -107,7 +107,7 @@ class SearchRules:
     extrapolated: float = np.inf
 
     def violation(self, figures: PlacementFigures) -> FloatArray:
-        """(k,) how far placements are from keeping the rules; 0 where they are kept."""
+        """(k,) amount by which placements break the rules; 0 where they keep them."""
         shortfalls = [self.margin - figures.margin, self.margin - figures.rapid_margin, -figures.clearance]
         shortfalls.append(figures.extrapolated - self.extrapolated - 1e-12)
         return np.asarray(np.maximum(np.max(shortfalls, axis=0), 0.0))
@@ -115,7 +115,7 @@ class SearchRules:
 
 @dataclass(frozen=True)
 class Goal:
-    """A figure that is to be raised: `weights` . (mean, -range, weakest), N/m, none of them below `floors`.
+    """A figure to maximise: `weights` . (mean, -range, weakest), N/m, none of them below `floors`.
 
     `weights` None: the smallest surplus over the floors, which may be negative.
     """

@@ -1,4 +1,4 @@
-"""Boxes that the tool tip stays out of."""
+"""Keep-outs: boxes that the tool tip must stay out of."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from toolpath_stiff.units import m_from_mm
 
 @dataclass(frozen=True)
 class KeepOut:
-    """A box that the tool tip stays out of, rapids included: its name, two corners in machine coordinates, mm.
+    """A box that the tool tip must stay out of, also in rapids: its name, two corners in machine coordinates, mm.
 
     Examples
     --------
@@ -34,10 +34,10 @@ class KeepOut:
 
     @property
     def corners(self) -> FloatArray:
-        """(2, 3) m, the lower corner and the upper one."""
+        """(2, 3) m, lower and upper corner."""
         return m_from_mm(np.array([self.low_mm, self.high_mm], dtype=float))
 
     def clearances(self, position: FloatArray) -> FloatArray:
-        """(...,) m, how far points (..., 3) lie outside, negative inside: the depth below the nearest face."""
+        """(...,) m, distance of points (..., 3) from the box; negative inside: the depth below the nearest face."""
         low, high = self.corners
         return np.asarray(np.maximum(low - position, position - high).max(axis=-1))

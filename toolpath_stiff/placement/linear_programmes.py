@@ -1,4 +1,4 @@
-"""Small linear programmes, many at once: some ten unknowns and up to some thousand rows."""
+"""Small linear programmes, many at once: some ten unknowns and up to a few thousand rows."""
 
 from collections.abc import Sequence
 
@@ -6,13 +6,13 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray, product
 
-PERTURBATION, TOLERANCE = 1e-10, 1e-10  # of costs and of rows, both of the order of one
-MOST_PIVOTS = 500  # some fifteen are usual
+PERTURBATION, TOLERANCE = 1e-10, 1e-10  # of costs; of rows; both are of the order of one
+MOST_PIVOTS = 500  # about fifteen are usual
 Programme = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]  # cost, matrix, right, low, high
 
 
 def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
-    """The x (n,) of least `cost` . x of each programme, with `matrix` x <= `right` and `low` <= x <= `high`, finite.
+    """Minimisers x (n,) of `cost` . x in each programme, with `matrix` x <= `right` and `low` <= x <= `high`, finite.
 
     The dual simplex method in the form of a working set: n rows that hold as equations, at first the bounds that the
     cost leans on; the row that is broken most comes in, the one whose multiplier reaches zero first goes out (Nocedal
@@ -26,13 +26,13 @@ def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
     solutions: list[FloatArray | None] = [None] * len(programmes)
     number, going = np.arange(len(programmes)), np.ones(len(programmes), dtype=bool)
     for pivot in range(MOST_PIVOTS):
-        if going.sum() <= 0.6 * len(going):  # those that are done cost time
+        if going.sum() <= 0.6 * len(going):  # finished programmes are dropped, as they cost time
             number, working = number[going], working[going]
             rows, state, leaning = rows[going], state[going], leaning[going]
             going = np.ones(len(number), dtype=bool)
         if not len(going):
             break
-        if pivot % 20 == 19:  # what the updates have rounded away
+        if pivot % 20 == 19:  # recompute what the updates have lost to rounding
             held = np.take_along_axis(rows, working[:, None], axis=2)
             inverse = _inverses(held[:, :n].swapaxes(1, 2))
             state[:, :n, :n], state[:, :n, n] = inverse, -product(inverse, held[:, n, :, None])[..., 0]
@@ -57,7 +57,7 @@ def least_costs(programmes: Sequence[Programme]) -> list[FloatArray | None]:
 
 
 def _inverses(matrices: FloatArray) -> FloatArray:
-    """(k, n, n) inverses by elimination with pivots, the same to the last bit on every processor."""
+    """(k, n, n) inverses by elimination with pivoting, identical to the last bit on every processor."""
     k, n, _ = matrices.shape
     table = np.concatenate([matrices, np.broadcast_to(np.eye(n), (k, n, n))], axis=2)
     each = np.arange(k)
@@ -72,12 +72,12 @@ def _inverses(matrices: FloatArray) -> FloatArray:
 
 
 def _leaning(cost: FloatArray) -> FloatArray:
-    """Costs of which no two are equal: with equal multipliers the method could go round in a circle."""
+    """Costs perturbed so that no two are equal: with equal multipliers the method could cycle."""
     return np.asarray(cost + PERTURBATION * np.arange(1, len(cost) + 1))
 
 
 def _set_up(programmes: Sequence[Programme]) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Rows, state and working sets (k, n) to start from.
+    """Initial rows, state and working sets (k, n).
 
     (x, 1) @ `rows` (k, n + 1, m) says by how much each row is broken, the bounds last. `state` (k, n + 2, n + 1) has
     the inverse of the working set and x beside it; 0 and 1; the multipliers.
@@ -85,7 +85,7 @@ def _set_up(programmes: Sequence[Programme]) -> tuple[FloatArray, FloatArray, In
     k, n = len(programmes), len(programmes[0][0])
     m = max(len(right) for _, _, right, _, _ in programmes)
     rows, state = np.zeros((k, n + 1, m + 2 * n)), np.zeros((k, n + 2, n + 1))
-    rows[:, n], state[:, n, n] = -1.0, 1.0  # fewer rows than others: rows that nothing breaks
+    rows[:, n], state[:, n, n] = -1.0, 1.0  # padding with rows that nothing can break
     rows[:, :n, m : m + n], rows[:, :n, m + n :] = np.eye(n), -np.eye(n)
     working = np.empty((k, n), dtype=np.int64)
     for i, (cost, matrix, right, low, high) in enumerate(programmes):

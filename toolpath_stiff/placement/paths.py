@@ -1,4 +1,4 @@
-"""The path that is placed, sampled in the set-up frame, and thinned for a search.
+"""The path to be placed, sampled in the set-up frame, and thinned for a search.
 
 A placement (x, y, z, A, B, C; the numbers of `--origin`) turns and moves the samples rigidly, as `path`. Rapids
 to a point of the machine (G53, G28, G30), and the first one, which comes from where the control stands, do not move so
@@ -58,7 +58,7 @@ class WorkPath(ArrayColumns):
         return len(self.line)
 
     def alone(self, rows: BoolArray) -> WorkPath:
-        """Some of the samples as a path of their own, which the headline figures are about."""
+        """Some of the samples as a separate path, which the headline figures are about."""
         some = self.take(rows)
         return replace(some, headline=np.ones(len(some), dtype=bool))
 
@@ -103,7 +103,7 @@ def work_path(
 
 
 def representative_path(path: WorkPath, count: int) -> WorkPath:
-    """A path of `count` headline samples that stands for the whole, and of the outermost samples of all cuts.
+    """Path of `count` headline samples that represents the whole, with the outermost samples of all cuts.
 
     A quarter as many of the other cuts and of the rapids stay for the limits.
     """
@@ -119,7 +119,7 @@ def representative_path(path: WorkPath, count: int) -> WorkPath:
 
 
 def _outermost(position: FloatArray, rows: IntArray) -> IntArray:
-    """Those of the rows that lie furthest in one of 26 directions: along the axes and halfway between them."""
+    """Rows that lie furthest in one of 26 directions: along the axes and halfway between them."""
     if not len(rows):
         return rows
     directions = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1.0
@@ -127,19 +127,19 @@ def _outermost(position: FloatArray, rows: IntArray) -> IntArray:
 
 
 def with_rows(few: WorkPath, whole: WorkPath, rows: IntArray) -> WorkPath:
-    """A path that stands for the whole, with some samples of the whole added, which stand for no length."""
+    """A representative path with some samples of the whole added, which represent no length."""
     return WorkPath.joined([few, replace(whole.take(rows), weight=np.zeros(len(rows)))])
 
 
 def _spread(path: WorkPath, rows: IntArray, count: int) -> tuple[IntArray, FloatArray]:
-    """At most `count` of the rows, spread over position and direction, and the weights that they take over.
+    """At most `count` of the rows, spread over position and direction, with the weights they take over.
 
     Farthest-point sampling: each next sample is the one least like those chosen, position counted in units of the
     path's size. Each chosen sample takes over the weights of those that are most like it.
     """
     if len(rows) <= count:
         return rows, path.weight[rows]
-    if len(rows) > MOST_COMPARED:  # those between stand at their neighbours
+    if len(rows) > MOST_COMPARED:  # the samples between are represented by their neighbours
         number = np.arange(len(rows)) * MOST_COMPARED // len(rows)
         first = np.flatnonzero(np.diff(number, prepend=-1))
         carried = np.bincount(number, weights=path.weight[rows]).astype(float)

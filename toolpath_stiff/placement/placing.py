@@ -1,4 +1,4 @@
-"""Placing a program: the search, the placement that it recommends analyzed, the program written for it."""
+"""Placing a program: the search, the recommended placement analyzed, the program written for it."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -98,7 +98,7 @@ def place_program(task: PlacementTask, progress: Callable[[int, int], None] | No
 
 
 def _in_best_configuration(task: PlacementTask, path: WorkPath) -> StiffnessModel:
-    """The model in the configuration of the machine in which some placement of many is best for the objective."""
+    """The model in the machine's configuration with the best of many placements for the objective."""
     bounds, rules, model = task.bounds, task.rules, task.model
     draws = np.random.default_rng(rules.seed).uniform(size=(SCOUTS, len(bounds.free)))
     scouts, few = bounds.placements(draws), representative_path(path, SCOUT_SAMPLES)
@@ -112,7 +112,7 @@ def _in_best_configuration(task: PlacementTask, path: WorkPath) -> StiffnessMode
 
 
 def _check(task: PlacementTask) -> None:
-    """Raise `InputError` for what can be told before a search."""
+    """Raise `InputError` for faults that show before a search."""
     machine, turns = task.model.machine, np.concatenate([task.bounds.low[3:6], task.bounds.high[3:6]])
     if not isinstance(machine, Hexapod) and task.program.native and task.program.moves.end[:, 3:].any() and turns.any():
         mistake = f"the program turns axes of machine {machine.name}, whose words another turn of the work would change"
@@ -126,7 +126,7 @@ def numbered_rows(task: PlacementTask, path: WorkPath, found: PlacementResult) -
     figures, nothing = found.figures, np.full(len(found.front), np.nan)
     stiffnesses = [figures.mean, figures.spread, figures.lowest]
     plunging = plunging_rows(task.load, path.tangent, path.abc, path.cutting & (path.weight > 0.0)) & ~path.headline
-    if plunging.any():  # a class of their own
+    if plunging.any():  # plunges are counted separately
         plunges = Evaluator(task.model, path.alone(plunging), task.load, task.force).figures(found.front)
         stiffnesses += [plunges.mean, plunges.lowest]
     else:
@@ -143,7 +143,7 @@ def numbered_rows(task: PlacementTask, path: WorkPath, found: PlacementResult) -
 
 
 def _analyzed_row(analysis: Analysis, like: PlacementRow | None = None) -> PlacementRow:
-    """Placement and figures of an analysis, headline and plunges; number and margins are those of a row `like` it."""
+    """Placement and figures of an analysis, headline and plunges; number and margins from a row `like` it."""
     headline, plunges = (stiffness_figures(analysis, rows) for rows in (analysis.headline, analysis.set_aside))
     cells: list[Any] = [headline[key] for key in (*FIGURES.values(), "mean_deflection_um")]
     cells += [plunges["mean_N_per_mm"], plunges["min_N_per_mm"]]
@@ -153,7 +153,7 @@ def _analyzed_row(analysis: Analysis, like: PlacementRow | None = None) -> Place
 
 
 def _mm_deg(placement: Pose | FloatArray) -> ShopPose:
-    """A placement (6,) in mm and degrees; the rotation within 0 to 360."""
+    """A placement (6,) in mm and degrees; the rotation from 0 to 360."""
     x, y, z, a, b, c = pose_in_mm(map(float, placement))
     return x, y, z, a, b, c % 360.0
 
@@ -161,7 +161,7 @@ def _mm_deg(placement: Pose | FloatArray) -> ShopPose:
 def _analyzed(
     task: PlacementTask, program: ReadProgram, origin: Pose, turn_deg: float | None = None
 ) -> tuple[Analysis | None, str]:
-    """The program at a placement, the tool turned about its axis, or None and why."""
+    """Analysis of the program at a placement, with the tool turned about its axis; or None and the reason."""
     turn = FIXED if turn_deg is None else turn_deg
     try:
         return analyze(
@@ -172,7 +172,7 @@ def _analyzed(
 
 
 def _rewritten(task: PlacementTask, best: Analysis) -> tuple[bytes | None, Written]:
-    """The transformed program's bytes, and how it compares; or why there are none."""
+    """Bytes of the transformed program, and how it compares; or the reason why there is none."""
     try:
         place, chord = (best.program, best.origin, task.present), task.linearise
         rewritten = rewrite_program(*place, decimals=task.decimals, linearise=chord, control=task.control)
@@ -186,7 +186,7 @@ def _rewritten(task: PlacementTask, best: Analysis) -> tuple[bytes | None, Writt
 def rewriting_differences(
     placed: Analysis, rewritten: RewrittenProgram, original_origin: Pose, control: Controller = UNKNOWN_CONTROL
 ) -> dict[str, float]:
-    """Relative differences of mean, range and smallest stiffness: the rewritten program against the placed one.
+    """Relative differences of mean, range and smallest stiffness between rewritten and placed program.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A program placed: the result of a search, and the advice that terminal, placement.json, page and sheet give alike."""
+"""A placed program: the result of a search, with the same advice for terminal, placement.json, page and sheet."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -22,18 +22,18 @@ from toolpath_stiff.rewriting.offset_blocks import OffsetBlocks, offset_blocks
 from toolpath_stiff.stiffness.model import StiffnessModel, effects_stated
 from toolpath_stiff.units import mm_from_m
 
-# The three objectives and where their values stand.
+# The three objectives and the keys of their values.
 FIGURES = {"mean": "mean_N_per_mm", "range": "range_N_per_mm", "weakest": "min_N_per_mm"}
 WORSE = {"mean": "the mean is lower", "range": "the range is wider", "weakest": "the weakest place is softer"}
-SEARCH = ("pose_evaluations", "searches", "nothing_better")  # what placement.json says of the search
+SEARCH = ("pose_evaluations", "searches", "nothing_better")  # entries of placement.json on the search
 VARIED = ("--x", "--y", "--z", "--tilt-a", "--tilt-b", "--rotate")  # options of the columns of a placement
-ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less
-AT_BOUND = 1e-3  # of a bound's span: this near the search has ended on it
+ROUNDING = 1e-9  # of the mean: two evaluations of one placement differ by less than this
+AT_BOUND = 1e-3  # share of a bound's span within which the search has ended on the bound
 
 
 @dataclass(frozen=True)
 class PlacementTask:
-    """A program to be placed: the machine, the bounds and rules, the load. SI.
+    """A program to place, with the machine, the bounds and rules, the load. SI.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class PlacementRow:
 
     @property
     def cells(self) -> Document:
-        """What is known of it, by column."""
+        """Known values, by column."""
         return {name: value for name, value in vars(self).items() if name != TOOL_TURN or value is not None}
 
     @property
@@ -116,7 +116,7 @@ TOOL_TURN = "tool_turn_deg"
 
 @dataclass(frozen=True)
 class Written:
-    """The program written for the placement: its file, where it was analysed again, how it differs; or why not."""
+    """The program written for the placement: its file, place of re-analysis, differences; or the reason why not."""
 
     file: str
     analysed_at: Mapping[str, float] = field(default_factory=dict)
@@ -127,7 +127,7 @@ class Written:
 
 @dataclass(frozen=True, repr=False)
 class Placement(FolderResult):
-    r"""A program at the placement that was chosen for it, and the others of the front.
+    r"""A program at the placement chosen for it, and the other placements of the front.
 
     Attributes
     ----------
@@ -193,12 +193,12 @@ class Placement(FolderResult):
 
     @property
     def origin_mm_deg(self) -> ShopPose:
-        """The chosen placement: what `analyze` takes as `origin_mm_deg`."""
+        """The chosen placement, as `analyze` takes `origin_mm_deg`."""
         return self.chosen.origin_mm_deg
 
     @property
     def fixed(self) -> str:
-        """The options that fix the chosen placement."""
+        """Options that fix the chosen placement."""
         return " ".join(f"{name}={value:.6g}" for name, value in zip(VARIED, self.origin_mm_deg, strict=True))
 
     @cached_property
@@ -215,7 +215,7 @@ class Placement(FolderResult):
 
     @cached_property
     def alarms(self) -> list[str]:
-        """Sentences that come before the recommendation: limits and rules that it breaks, figures that get worse."""
+        """Sentences to precede the recommendation: limits and rules that it breaks, figures that get worse."""
         alarms = self._rules_broken(self.best, "recommended")
         if self.nothing_better:
             alarms.append(
@@ -232,7 +232,7 @@ class Placement(FolderResult):
 
     @cached_property
     def warnings(self) -> list[str]:
-        """Sentences that deserve a look, `alarms` first."""
+        """Sentences on points to check, `alarms` first."""
         warnings = [*self.alarms]
         if self.worse:
             warnings.append("no placement was found within the bounds that is as good as the present one in all three")
@@ -254,7 +254,7 @@ class Placement(FolderResult):
         return list(dict.fromkeys([*warnings, *self.best.warnings]))
 
     def _rules_broken(self, analysis: Analysis, which: str) -> list[str]:
-        """Rules that a placement does not keep: rapids that do not follow the work are held to none in the search."""
+        """Rules that a placement breaks: the search does not hold rapids that do not follow the work to any."""
         words, margin, line = [], self.task.rules.margin, analysis.samples.line
         nearest = int(np.argmin(analysis.at.reach.margin))
         least = float(analysis.at.reach.margin[nearest])
@@ -274,7 +274,7 @@ class Placement(FolderResult):
 
     @property
     def program_bytes(self) -> bytes:
-        """The program written for the placement; it was asked for with `write`.
+        """The program written for the placement, if it was requested with `write`.
 
         Raises `InputError` where it cannot be written there; the rest of the result stands.
         """
@@ -284,7 +284,7 @@ class Placement(FolderResult):
 
     @property
     def refusal(self) -> str:
-        """The reason why the program could not be written for the placement, "" unless that is so."""
+        """Reason why the program could not be written for the placement; "" if it could."""
         return "" if self.written is None else self.written.refused
 
     @cached_property
@@ -294,7 +294,7 @@ class Placement(FolderResult):
 
     @property
     def trade_offs(self) -> dict[str, dict[str, float]]:
-        """The cost of the choice in each objective: the best on the front beside it."""
+        """Cost of the choice in each objective, against the best on the front."""
         return {
             name: {
                 "chosen_N_per_mm": getattr(self.chosen, key),
@@ -305,11 +305,11 @@ class Placement(FolderResult):
 
     @property
     def machine_stated(self) -> Document:
-        """The machine and what acts on it, as every JSON document has them."""
+        """The machine and its active effects, as in every JSON document."""
         return {"machine": self.best.machine.name, **effects_stated(self.best.model)}
 
     def to_dict(self) -> Document:
-        """The JSON document of the command."""
+        """JSON document of the command."""
         document: Document = to_dict(
             {
                 "warnings": self.warnings,
@@ -343,7 +343,7 @@ class Placement(FolderResult):
 
 
 def bound_warnings(bounds: Bounds, placement: ShopPose, workspace: FloatArray) -> list[str]:
-    """Bounds of the search that a placement lies on, with the options that widen them by half."""
+    """Warnings for bounds of the search on which a placement lies, with the options that widen them by half."""
     words = []
     lows, highs = (pose_in_mm(ends[:6].tolist()) for ends in (bounds.low, bounds.high))
     least, most = (
@@ -353,7 +353,7 @@ def bound_warnings(bounds: Bounds, placement: ShopPose, workspace: FloatArray) -
         if i > 5 or bounds.round[i] or (i == 2 and bounds.heights):
             continue
         low, high, half = lows[i], highs[i], 0.5 * (highs[i] - lows[i])
-        value = low + (placement[i] - low + 1e-6) % 360.0 - 1e-6 if i == 5 else placement[i]  # the row's: 0 to 360
+        value = low + (placement[i] - low + 1e-6) % 360.0 - 1e-6 if i == 5 else placement[i]  # as in rows: 0 to 360
         for end, wider in ((low, (max(low - half, least[i]), high)), (high, (low, min(high + half, most[i])))):
             if abs(value - end) <= AT_BOUND * (high - low) and wider != (low, high):  # else the machine's own end
                 words.append(

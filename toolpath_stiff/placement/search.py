@@ -1,4 +1,4 @@
-"""The search for placements: a front of mean, range and weakest place, and one recommendation that is never worse.
+"""The search for placements: a front of mean, range and weakest place, and a recommendation that is never worse.
 
 Mean up, range down and weakest up are in conflict, so there is a front. Many placements at random and a small
 evolution on a hundred-odd samples that stand for the path find where it lies; climbs then finish its ends
@@ -25,23 +25,23 @@ from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
 SCOUTS = 250  # placements tried at random before the evolution, for each that is free of x, y, z, A, B, C
-LEGS, GENERATIONS, CHILDREN, ARCHIVE = 3, 12, 60, 120  # after each leg the few samples hear of what they missed
-WIDE, NARROW = 0.2, 0.003  # of each range: steps of the first and of the last generation
-SEARCHES = 3  # with other seeds, while nothing but the present placement is found
-WHOLE_POSES = 2_000_000  # about, of the whole path to which the front's candidates are thinned
-NO_WORSE = 1e-9  # of the mean: what rounding does to a figure that stays as it was
+LEGS, GENERATIONS, CHILDREN, ARCHIVE = 3, 12, 60, 120  # after each leg, samples that the few had missed are added
+WIDE, NARROW = 0.2, 0.003  # share of each range: steps of the first and the last generation
+SEARCHES = 3  # most searches, with other seeds, while only the present placement is found
+WHOLE_POSES = 2_000_000  # approximate number of poses of the whole path, to which the front's candidates are thinned
+NO_WORSE = 1e-9  # of the mean: rounding of an unchanged figure
 SAME = 1e-7  # of the mean: figures that differ by less count as equal; the order of the coordinates decides
-# Climbs to one goal, for each that is free: on few samples, from the best of these on more, from the best on all.
-STARTS, FLOORED_STARTS, FINALISTS = (4, 3, 12, 3), 2, 3  # of each objective; the range has most hills
+# Climbs to one goal, for each free column: on few samples, from the best of these on more, from the best on all.
+STARTS, FLOORED_STARTS, FINALISTS = (4, 3, 12, 3), 2, 3  # for each objective; the range has the most hills
 HEATS, CLIMB_STEPS, POLISH_STEPS, FINAL_STEPS = 3, 4, 6, 6
-APART = 0.1  # of each range, where they start
+APART = 0.1  # share of each range between starting points
 BASIN = 0.02  # of each range: climbs that end nearer to each other than this went up the same hill
 FINAL_REGION = 0.01  # of each range, about where the climb on fewer samples ended
 SHORT = 3000  # samples of a path that is climbed on as a whole; of a longer one, on what stands for it
-ROUNDS, STRETCHES = 2, 120  # of that: how often it is told anew, and stretches whose extremes join it
-EXCHANGES = 4  # at most, until the samples that stand for the path miss nothing at the finalists
+ROUNDS, STRETCHES = 2, 120  # rounds in which such samples are renewed; stretches whose extremes are added
+EXCHANGES = 4  # most exchanges until the representative samples miss nothing at the finalists
 PARENTS = 6  # placements of least surface error, around which the next are tried
-MISSED = 1e-3  # of the mean: a figure that they put so much too high is missed
+MISSED = 1e-3  # of the mean: overestimate of a figure from which samples have missed something
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def search_placements(search: Search) -> PlacementResult:
 
 
 def _candidates(search: Search, rng: np.random.Generator) -> FloatArray:
-    """Candidates for the front (k, 6), the present placement first where it may be one."""
+    """Candidates for the front (k, 6), the present placement first if it is eligible."""
     bounds = search.bounds
     unit = rng.uniform(size=(max(SCOUTS * len(bounds.free), 1), len(bounds.free)))
     scouts = np.vstack([search.start, bounds.placements(unit)])
@@ -110,7 +110,7 @@ def _candidates(search: Search, rng: np.random.Generator) -> FloatArray:
     ends = climbed(search, np.vstack([archive, scouts]), PlacementFigures.joined([figures, known]))
     search.report(3, 4)
     most = max(search.rules.points, WHOLE_POSES // max(len(search.path), 1))
-    if len(archive) > most:  # of a long path no more than the front needs
+    if len(archive) > most:  # on a long path, no more than the front needs
         figures = search.evaluators["middle"].figures(archive)
         rows = front_rows(figures, search.rules_for("middle").violation(figures) == 0.0)
         archive = archive[thin(figures.take(rows).objectives, rows, most) if len(rows) else slice(0, most)]
@@ -118,8 +118,8 @@ def _candidates(search: Search, rng: np.random.Generator) -> FloatArray:
 
 
 def _result(search: Search, candidates: FloatArray) -> PlacementResult:
-    """The front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
-    candidates = candidates[np.lexsort(np.round(candidates.T[::-1], 9))]  # of equals the first stands
+    """Front of the candidates on the whole path, and the recommendation. Raises `UnreachableError`."""
+    candidates = candidates[np.lexsort(np.round(candidates.T[::-1], 9))]  # of equals the first is kept
     figures = search.whole.figures(candidates)
     if not search.kept(figures).any():
         raise _infeasible(search, candidates[int(np.argmin(search.rules.violation(figures)))])
@@ -127,7 +127,7 @@ def _result(search: Search, candidates: FloatArray) -> PlacementResult:
         candidates, figures = _with_least_errors(search, candidates, figures, search.errors)
     best = _recommended(search, figures, candidates)
     rows = front_rows(_rounded(figures), search.kept(figures))
-    if best not in rows:  # equal to another in all three
+    if best not in rows:  # it equals another in all three
         rows = np.append(rows, best)
     rows = rows[np.argsort(figures.mean[rows], kind="stable")]
     rows = thin(figures.take(rows).objectives, rows, search.rules.points, best)
@@ -140,7 +140,7 @@ def _result(search: Search, candidates: FloatArray) -> PlacementResult:
 
 
 def front_rows(figures: PlacementFigures, kept: BoolArray) -> IntArray:
-    """Rows of those kept that no other beats in all of mean, range and weakest, by rising mean; equals stand once."""
+    """Kept rows that no other beats in all of mean, range and weakest, by rising mean; equal ones appear once."""
     rows = np.flatnonzero(kept & np.isfinite(figures.mean))
     values, first = np.unique(figures.objectives[rows], axis=0, return_index=True)
     rows = rows[first]
@@ -150,7 +150,7 @@ def front_rows(figures: PlacementFigures, kept: BoolArray) -> IntArray:
 
 
 def thin(objectives: FloatArray, rows: IntArray, points: int, best: int = -1) -> IntArray:
-    """At most `points` of rows (n,) with objectives (n, 3), spread over the front by farthest-point choice.
+    """At most `points` of rows (n,) with objectives (n, 3), spread over the front by farthest-point selection.
 
     Its ends and the row `best` come first.
     """
@@ -166,7 +166,7 @@ def thin(objectives: FloatArray, rows: IntArray, points: int, best: int = -1) ->
 
 
 def _extrapolation_allowed(search: Search, scouts: FloatArray, few: PlacementFigures) -> float:
-    """Largest share of samples outside the strut law: as now; where that is out of reach, the least that was found.
+    """Largest share of samples outside the strut law: the present one; if that is out of reach, the least found.
 
     `few` are the figures of the scouts on few samples.
     """
@@ -185,7 +185,7 @@ def _extrapolation_allowed(search: Search, scouts: FloatArray, few: PlacementFig
 def _evolved(
     search: Search, scouts: FloatArray, known: PlacementFigures, rng: np.random.Generator
 ) -> tuple[FloatArray, PlacementFigures]:
-    """An archive of placements that nothing dominates, from the scouts on, with their figures on few samples.
+    """Archive of non-dominated placements evolved from the scouts, with their figures on few samples.
 
     `known` are the figures of the scouts. Each generation moves members of the archive at random, by steps that shrink,
     and along the difference of two others, as differential evolution does; what is dominated goes, and so does what is
@@ -210,7 +210,7 @@ def _evolved(
 def _survivors(
     search: Search, placements: FloatArray, figures: PlacementFigures
 ) -> tuple[FloatArray, PlacementFigures]:
-    """Placements that none dominates, thinned; where too few keep the rules, the nearest to keeping them as well."""
+    """Non-dominated placements, thinned; if too few keep the rules, also those closest to keeping them."""
     violation = search.rules_for("few").violation(figures)
     rows = front_rows(figures, violation == 0.0)
     rows = thin(figures.take(rows).objectives, rows, ARCHIVE) if len(rows) else rows
@@ -223,7 +223,7 @@ def _survivors(
 def _with_least_errors(
     search: Search, candidates: FloatArray, figures: PlacementFigures, errors: Errors
 ) -> tuple[FloatArray, PlacementFigures]:
-    """The candidates and some more, ever nearer to the least surface error that keeps the rules and what is now."""
+    """The candidates and further ones, ever closer to the least surface error within rules and present figures."""
     rng, bounds = np.random.default_rng(search.rules.seed), search.bounds
     pool, known = candidates, figures
     for spread in np.geomspace(WIDE, NARROW, GENERATIONS) if len(bounds.free) else ():
@@ -237,7 +237,7 @@ def _with_least_errors(
 
 
 def _allowed(search: Search, figures: PlacementFigures) -> IntArray:
-    """Rows that keep the rules and are no worse in anything than what is now, else the least worse."""
+    """Rows that keep the rules and are no worse than present in any figure; if there are none, the least worse."""
     now, possible = search.now, np.flatnonzero(search.kept(figures))
     if now is not None and search.present is not None and len(possible):
         fall = (now.objectives[0] - figures.objectives[possible]).max(axis=1)
@@ -247,7 +247,7 @@ def _allowed(search: Search, figures: PlacementFigures) -> IntArray:
 
 
 def _recommended(search: Search, figures: PlacementFigures, candidates: FloatArray) -> int:
-    """Row of the recommendation: the best of those that are no worse in anything, else the least worse."""
+    """Row of the recommendation: the best of those that are no worse in any figure, otherwise the least worse."""
     possible = _allowed(search, figures)
     if search.errors is not None:
         return int(possible[np.argmin(search.errors(candidates[possible]))])
@@ -257,14 +257,14 @@ def _recommended(search: Search, figures: PlacementFigures, candidates: FloatArr
 
 
 def _rounded(figures: PlacementFigures) -> PlacementFigures:
-    """Figures of which equal ones compare as equal: symmetric machines have placements that rounding alone parts."""
+    """Figures rounded so that equal ones compare equal: a symmetric machine's placements differ by rounding alone."""
     unit = SAME * float(np.nanmax(figures.mean))
     mean, spread, lowest = (np.round(v / unit) * unit for v in (figures.mean, figures.spread, figures.lowest))
     return replace(figures, mean=mean, spread=spread, lowest=lowest)
 
 
 def climbed(search: Search, candidates: FloatArray, figures: PlacementFigures) -> FloatArray:
-    """The ends of the front and what each objective recommends, climbed to from candidates with figures on few samples.
+    """Ends of the front and recommendations of each objective, climbed to from candidates with figures on few samples.
 
     Whichever objective is asked for, all are climbed to: no answer may be beaten by the end of another one's front.
     """
@@ -281,7 +281,7 @@ def climbed(search: Search, candidates: FloatArray, figures: PlacementFigures) -
 
 
 def _falls(search: Search, placements: FloatArray, floors: FloatArray) -> bool:
-    """True where each of some placements is worse in something than the floors."""
+    """True if each of some placements is worse than the floors in some figure."""
     return bool((Goal(ENDS[0].weights, floors).worsening(search.whole.figures(placements)) > 0.0).all())
 
 
@@ -298,7 +298,7 @@ def _climbed_to(
         search.best_apart(candidates, figures, goal, count * free, APART)
         for goal, count in zip(goals, starts, strict=True)
     ]
-    for _ in range(HEATS):  # the better half of the climbs, those up the same hill counted once, goes on
+    for _ in range(HEATS):  # the better half of the climbs continues, those up the same hill counted once
         ends = _together(few, tops, goals, CLIMB_STEPS)
         known = few.evaluator.figures(np.vstack(ends))
         last = np.cumsum([len(placements) for placements in ends]).tolist()
@@ -320,7 +320,7 @@ def _climbed_to(
 
 
 def _exchanged(search: Search, tops: list[FloatArray], goals: Sequence[Goal]) -> list[FloatArray]:
-    """Ends of climbs on more samples, to which what decides at these ends is added until they miss nothing there."""
+    """Ends of climbs on more samples, to which the deciding ones at these ends are added until none is missing."""
     for _ in range(EXCHANGES):
         search.heed(np.vstack([placements[:1] for placements in tops]))
         climber = search.climber("middle")
@@ -341,7 +341,7 @@ def _together(climber: Climber, first: list[FloatArray], goals: Sequence[Goal], 
 
 
 def _finished(search: Search, best: list[FloatArray], goals: Sequence[Goal]) -> list[FloatArray]:
-    """For each goal (k, 6) the end of a climb on the whole path, from a placement (6,) near its top.
+    """For each goal, ends (k, 6) of climbs on the whole path from a placement (6,) near its top.
 
     A long path is climbed on samples that stand for it, to which those are added that decide on it there: the extremes
     of each of its stretches (an exchange method of semi-infinite programming; Hettich and Kortanek, SIAM Review 35
@@ -363,7 +363,7 @@ def _finished(search: Search, best: list[FloatArray], goals: Sequence[Goal]) -> 
 
 
 def _infeasible(search: Search, placement: FloatArray) -> UnreachableError:
-    """The error that names the rule, the line and by how much, at the least bad placement."""
+    """Error naming the rule, the line and the amount by which it is broken at the least bad placement."""
     path, rules, machine = search.path, search.rules, search.model.machine
     position, _, abc = placed_path(path, placement)
     rotation = rotation_matrices(abc)

@@ -1,4 +1,4 @@
-"""The error of final walls at other placements: the forces stay, the machine gives way otherwise."""
+"""Error of final walls at other placements: the forces stay, the machine's compliance changes."""
 
 from collections.abc import Callable
 
@@ -11,14 +11,14 @@ from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.poses import Pose
 from toolpath_stiff.stiffness.model import StiffnessModel
 
-STATIONS = 200  # of all final walls, evenly along them
-SHARE = 0.95  # of the walls, whose largest error counts
+STATIONS = 200  # stations on all final walls, evenly spaced
+SHARE = 0.95  # share of the walls' length whose largest error counts
 
 Errors = Callable[[FloatArray], FloatArray]  # placements (k, 6) to errors (k,) m, inf where there are none
 
 
 def errors_of_walls(model: StiffnessModel, cut: Cut, present: Pose, name: str) -> Errors:
-    """What gives of placements (k, 6) the error (k,) m that 95 % of the final walls' length stay below.
+    """Function from placements (k, 6) to the error (k,) m that 95 % of the final walls' length stay below.
 
     `cut` is the program's at the present placement. Engagement and cutting forces belong to the program; of the error
     what the machine gives way, across the wall under the force at the wall's moment, is that of the placement.

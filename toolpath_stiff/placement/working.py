@@ -1,4 +1,4 @@
-"""The means of a search: evaluators of the whole path and of the samples that stand for it, bounds and rules."""
+"""Tools of a search: evaluators of the whole path and of representative samples, bounds and rules."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -16,14 +16,14 @@ from toolpath_stiff.placement.surface_error import Errors
 from toolpath_stiff.stiffness.model import StiffnessModel
 
 SCOUT_SAMPLES, POLISH_SAMPLES = 120, 400
-HEEDED = 4  # stretches whose extremes join the few samples, for each placement that these are held against
+HEEDED = 4  # stretches whose extremes are added to the few samples, for each placement checked
 NO_FLOORS = np.full(3, -np.inf)
 ENDS = [Goal(weights, NO_FLOORS) for weights in defaults.OBJECTIVES.values()]
 
 
 @dataclass
 class Search:
-    """One search for placements: the evaluators of a few samples, of more, of the whole path; bounds and rules.
+    """One search for placements: evaluators of few samples, of more, of the whole path; bounds and rules.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Search:
             self.present = self.present if self.now.margin[0] >= 0.0 else None
 
     def heed(self, placements: FloatArray) -> None:
-        """Add to the samples that stand for the path those that decide on the whole of it at some placements."""
+        """Add to the representative samples those that decide on the whole path at some placements."""
         deciding = [self.whole.deciding_rows(placement, HEEDED) for placement in placements]
         rows = np.setdiff1d(np.concatenate(deciding), self.heeded)
         self.heeded = np.concatenate([self.heeded, rows])
@@ -78,31 +78,31 @@ class Search:
                 self.evaluators[name] = self.evaluator(with_rows(evaluator.path, self.path, rows))
 
     def evaluator(self, path: WorkPath) -> Evaluator:
-        """An evaluator of a part of the path."""
+        """Evaluator of a part of the path."""
         self.made.append(Evaluator(self.model, path, self.load, self.force, self.rules.keepouts))
         return self.made[-1]
 
     @property
     def whole(self) -> Evaluator:
-        """The evaluator of the whole path."""
+        """Evaluator of the whole path."""
         return self.evaluators["whole"]
 
     @property
     def few(self) -> Evaluator:
-        """The evaluator of the few samples that stand for it."""
+        """Evaluator of the few representative samples."""
         return self.evaluators["few"]
 
     @property
     def poses(self) -> int:
-        """Poses evaluated so far."""
+        """Number of poses evaluated so far."""
         return sum(evaluator.poses for evaluator in self.made)
 
     def climber(self, name: str) -> Climber:
-        """A climber on some of the samples."""
+        """Climber on some of the samples."""
         return Climber(self.evaluators[name], self.bounds, self.rules_for(name))
 
     def rules_for(self, name: str) -> SearchRules:
-        """The rules as some samples see them: of those that stand for the path another share is outside the law."""
+        """Rules adapted to some samples: among representative ones another share is outside the law."""
         if name == "whole" or self.present is None or not 0.0 < self.rules.extrapolated < np.inf:
             return self.rules
         now = self.evaluators[name].figures(self.present[None])
@@ -113,12 +113,12 @@ class Search:
         return np.asarray(self.rules.violation(figures) == 0.0)
 
     def ranked(self, goal: Goal, figures: PlacementFigures) -> IntArray:
-        """Rows, best first: the rules, then what must not get worse, then the value."""
+        """Rows, best first: by the rules, then by what must not get worse, then by value."""
         return np.lexsort((-goal.value(figures), goal.worsening(figures), self.rules.violation(figures)))
 
     def best_apart(
         self, placements: FloatArray, figures: PlacementFigures, goal: Goal, count: int, distance: float
     ) -> FloatArray:
-        """The best of some placements for a goal that are not beside each other."""
+        """The best of some placements for a goal that are not close to each other."""
         ranked = placements[self.ranked(goal, figures)]
         return ranked[self.bounds.apart(ranked, count, distance)]

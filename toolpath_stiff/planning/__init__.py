@@ -1,1 +1,1 @@
-"""Plans of what to measure next, or first."""
+"""Plans of what to measure: a first campaign, or the next readings."""

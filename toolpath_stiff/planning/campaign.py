@@ -43,12 +43,12 @@ LEAST_TILT = 15.0 * RAD_PER_DEG
 IMAGES = 3
 LONG_TOOL_SHARE, CLAMPINGS = 6, 3  # every sixth pose with a longer tool; two poses clamped three times a set-up
 TRIES = 600  # poses to choose from
-SHOWS = 3.0  # standard deviations from which on an effect is said to show
+SHOWS = 3.0  # standard deviations from which an effect counts as visible
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """Visits in measuring order.
+    """Visits of a campaign, in measuring order.
 
     Attributes
     ----------
@@ -70,22 +70,22 @@ class Campaign:
 
     @property
     def chosen(self) -> Sequence[int]:
-        """All of them."""
+        """Numbers of the visits: all of them."""
         return range(len(self.visits))
 
     @property
     def why(self) -> tuple[str, ...]:
-        """The purpose of each."""
+        """Purpose of each visit."""
         return self.kinds
 
     @property
     def poses(self) -> int:
-        """Different poses."""
+        """Number of different poses."""
         return len({pose.tobytes() for pose in self.visits.pose})
 
     @property
     def minutes(self) -> float:
-        """Work."""
+        """Minutes of work."""
         visits, costs = self.visits, self.visits.menu.costs
         changes = {
             "setup": sum(before != after for before, after in pairwise(visits.setup.tolist())),
@@ -96,7 +96,7 @@ class Campaign:
 
     @property
     def sentences(self) -> list[str]:
-        """Sentences on what it takes, and what it would not show."""
+        """Sentences on the work it takes, and on effects that it would not show."""
         hidden = ", ".join(name for name, gap in self.sees.items() if gap < SHOWS)
         lines = [
             f"{self.poses} poses at {len(np.unique(np.round(self.visits.pose[:, 2], 9)))} heights, {len(self.visits)} "
@@ -108,7 +108,7 @@ class Campaign:
         return lines
 
     def head(self) -> Document:
-        """The first entries of plan.json."""
+        """First entries of plan.json."""
         return {
             "kind": "campaign",
             "poses": self.poses,
@@ -170,7 +170,7 @@ def first_campaign(
 
 
 def _poses(machine: Hexapod, menu: Menu, n: int, rng: Generator) -> FloatArray:
-    """(n, 6): one pose and its images, then vertical ones, then n // 2 tilted ones; as unlike each other as can be."""
+    """(n, 6) poses as unlike each other as possible: one and its images, others vertical, then n // 2 tilted."""
     levels = menu.heights or axis_levels(machine)
     if len(levels) < 4:
         raise InputError(f"a first campaign at {len(levels)} heights", expected="4 or more")
@@ -180,7 +180,7 @@ def _poses(machine: Hexapod, menu: Menu, n: int, rng: Generator) -> FloatArray:
     scale = np.array([menu.radius, menu.radius, np.ptp(levels) / 2.0, *[max(largest, 1e-3)] * 3])
     chosen = _images(machine, upright, levels[len(levels) // 2], menu)
     for pool, count in ((upright, n - (n // 2 if len(tilted) else 0)), (tilted, n)):
-        while len(chosen) < count and len(pool):  # the farthest from all before it
+        while len(chosen) < count and len(pool):  # the pose farthest from all those chosen so far
             apart = np.linalg.norm((pool[:, None] - chosen[None]) / scale, axis=2).min(axis=1, initial=np.inf)
             best = int(np.argmax(apart))
             if apart[best] < 1e-9:
@@ -195,7 +195,7 @@ def _poses(machine: Hexapod, menu: Menu, n: int, rng: Generator) -> FloatArray:
 
 
 def _images(machine: Hexapod, upright: FloatArray, height: float, menu: Menu) -> FloatArray:
-    """(3, 6) a vertical pose off the axis, near that height, and its two images, if the machine reaches such."""
+    """(3, 6) a vertical pose off the axis near that height and its two images; (0, 6) if out of reach."""
     off = np.hypot(upright[:, 0], upright[:, 1])
     candidates = upright[off > 0.4 * menu.radius]
     angles = 2.0 * np.pi / IMAGES * np.arange(IMAGES)
@@ -210,7 +210,7 @@ def _images(machine: Hexapod, upright: FloatArray, height: float, menu: Menu) ->
 
 
 def _stops(machine: Hexapod, poses: FloatArray, menu: Menu, rng: Generator) -> tuple[AnyArray, ...]:
-    """Stops: numbers of their poses, tools' extensions, set-ups, purposes.
+    """Stops of a campaign: numbers of their poses, tool extensions, set-ups, purposes.
 
     At random within a set-up and a tool, which are changed as seldom as can be.
     """
@@ -239,7 +239,7 @@ def _sees(
     noise: tuple[float, float],
     effect_files: Sequence[str | Path],
 ) -> dict[str, float]:
-    """Gap between each effect at its usual size and nothing, the strut law refitted."""
+    """Gap in standard deviations between each effect at its usual size and no effect, the strut law refitted."""
     installed = {entry.name for entry in (*machine.effects, *machine.instruments)}
     names = [NONE, *(name for name in effects if name not in installed)]
     rivals = unfitted_rivals(names, effects, setup=visits.menu.setups[-1])

@@ -1,4 +1,4 @@
-"""Forecasts of rivals: the mean of each reading, and how they vary together."""
+"""Forecasts of rivals: mean and covariance of the readings under each."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ SMALL_SHARE = 1e-3  # of the largest usual size: the step where the size is noth
 
 @dataclass(frozen=True)
 class Rival:
-    """An explanation of the data, as fitted to them.
+    """An explanation of the data, fitted to them.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Rival:
 
     @property
     def effects(self) -> tuple[ActiveEffect, ...]:
-        """The effects with their values."""
+        """Effects with their values."""
         return tuple(c.active(sizes) for c, sizes in zip(self.candidates, self.sizes, strict=True))
 
     @property
@@ -64,7 +64,7 @@ class Rival:
 
 @dataclass(frozen=True)
 class Forecast:
-    """A rival's forecast of m readings: mean (m,) of ln k, and a factor (m, q) of its own covariance."""
+    """Forecast of m readings by a rival: mean (m,) of ln k, and a factor (m, q) of the rival's own covariance."""
 
     name: str
     weight: float
@@ -81,7 +81,7 @@ def forecast_all(
     joint_error: float = JOINT_ERROR,
     rest: float = REST,
 ) -> tuple[list[Forecast], BoolArray, FloatArray]:
-    """The rivals' forecasts, which readings (m,) all of them can answer, and what the machine scatters by.
+    """Forecasts of the rivals, mask (m,) of readings that all of them predict, and the machine's own scatter.
 
     The last is (m, k), a factor of the covariance that the struts' spread (relative sd), the joints' errors (m, sd of
     each coordinate) and the links that the model takes for rigid (rms over the readings) cause.
@@ -89,7 +89,7 @@ def forecast_all(
     predictor = predictor_of(machine, readings, effect_files)
     forecasts = [_forecast(rival, predictor) for rival in rivals]
     good = np.all([np.isfinite(f.mean) & np.isfinite(f.factor).all(axis=1) for f in forecasts], axis=0)
-    # What a loop beside the tip reads hangs on the joints' places too little to count them.
+    # Readings of loops beside the tip depend too little on the joints' positions to count them.
     joints, tip = np.zeros((len(readings), 36)), readings.of_tip
     path = measured_path(predictor.base, tip)
     if isinstance(machine, Hexapod):
@@ -99,12 +99,12 @@ def forecast_all(
 
 
 def principal(columns: FloatArray, share: float = 1e-3) -> FloatArray:
-    """(m, k) columns with the same covariance as (m, q), but for a share of the variance at most."""
+    """(m, k) columns with the covariance of columns (m, q), up to a share of the variance."""
     values, vectors = np.linalg.eigh(columns.T @ columns)
     if not values.any():
         return columns[:, :0]
     least = values[np.cumsum(values) > share * values.sum()][0]
-    # Of equal values, which a symmetric machine has, all or none: which of them comes first is chance.
+    # Equal eigenvalues, as of a symmetric machine, are kept all or none: their order is chance.
     return np.asarray(columns @ vectors[:, values >= (1.0 - ALIKE) * least])
 
 
@@ -124,7 +124,7 @@ def _forecast(rival: Rival, predictor: Predictor) -> Forecast:
     free = range(len(places)) if rival.free is None else rival.free
     for index, sd in zip(free, deviations[2:].tolist(), strict=True):
         columns.append(_slope(rival, *places[index], sd, predictor, law, mean))
-    # Of the correlations: beside 1e7 of one unit the variances of another, 1e-18, are rounding.
+    # Of the correlations: units differ so much that variances of 1e-18 would be rounding beside those of 1e7.
     scale = np.where(deviations > 0.0, deviations, 1.0)
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T) / np.outer(scale, scale))
     factor = (np.stack(columns, axis=1) * deviations) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
@@ -134,7 +134,7 @@ def _forecast(rival: Rival, predictor: Predictor) -> Forecast:
 def _slope(
     rival: Rival, k: int, j: int, sd: float, predictor: Predictor, law: FloatArray, mean: FloatArray
 ) -> FloatArray:
-    """(m,) d ln k / d size j of effect k, by a difference that stays within the bounds."""
+    """(m,) d ln k / d size j of effect k, by a difference within the bounds."""
     candidate, sizes = rival.candidates[k], rival.sizes[k].copy()
     component, size = candidate.components[j], float(sizes[j])
     usual = component.typical()[1]
@@ -149,7 +149,7 @@ def _slope(
 
 
 def _answers(predictor: Predictor, law: FloatArray, effects: Sequence[ActiveEffect]) -> FloatArray:
-    """(m,) ln k, nan only for the readings that the model itself cannot answer.
+    """(m,) ln k; nan only for readings for which the model has no stiffness.
 
     `Predictor` answers all readings or none; halving finds those at fault.
     """

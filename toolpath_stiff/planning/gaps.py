@@ -1,4 +1,4 @@
-"""What visits would tell of rivals: the gap between two of them, and the outcome to be expected among all."""
+"""Value of visits for telling rivals apart: gap between two rivals, expected outcome among all."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ DRAWS = 400  # simulated results a rival
 
 @dataclass(frozen=True)
 class ReadingNoise:
-    """Scatter of ln readings: of each, of each clamping (relative sd), and of the machine as a factor (m, k)."""
+    """Scatter of ln readings: relative sd of a reading and of a clamping, and the machine's as a factor (m, k)."""
 
     repeat: float
     clamping: float
     machine: FloatArray
 
     def shared_out(self, repeats: float) -> ReadingNoise:
-        """The noise of the mean of so many re-clamped readings; the machine stays as it is."""
+        """Noise of the mean of `repeats` re-clamped readings; the machine's part does not shrink."""
         return ReadingNoise(self.repeat / np.sqrt(repeats), self.clamping / np.sqrt(repeats), self.machine)
 
 
 def repeat_and_clamping(relative: float | tuple[float, float]) -> tuple[float, float]:
-    """Relative sd of a reading and of a clamping, from these or from that of a reading in total.
+    """Relative sd of a reading and of a clamping, as given or split from the total of a reading.
 
     Raises
     ------
@@ -50,19 +50,19 @@ def repeat_and_clamping(relative: float | tuple[float, float]) -> tuple[float, f
 
 @dataclass(frozen=True)
 class GapShares:
-    """Shares of v visits in the gap of a pair: a (v,), h (v, q), M (v, q, q)."""
+    """Contributions of v visits to the gap of a pair of rivals: a (v,), h (v, q), M (v, q, q)."""
 
     a: FloatArray
     h: FloatArray
     M: FloatArray
 
     def gap(self, chosen: Sequence[int] | IntArray) -> float:
-        """Gap in standard deviations after the chosen visits."""
+        """Gap after the chosen visits, in standard deviations."""
         index = np.asarray(chosen, dtype=np.int64)
         return float(_gap(self.a[index].sum(), self.h[index].sum(axis=0), self.M[index].sum(axis=0)))
 
     def gaps_with(self, chosen: Sequence[int] | IntArray) -> FloatArray:
-        """(v,) gaps after the chosen visits and one more, for each that it could be."""
+        """(v,) gap after the chosen visits and one more, for every visit that could be added."""
         index = np.asarray(chosen, dtype=np.int64)
         sums = self.a[index].sum(), self.h[index].sum(axis=0), self.M[index].sum(axis=0)
         return _gap(self.a + sums[0], self.h + sums[1], self.M + sums[2])
@@ -74,13 +74,13 @@ def _gap(a: FloatArray, h: FloatArray, M: FloatArray) -> FloatArray:
 
 
 def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: ReadingNoise) -> GapShares:
-    """Shares of the visits in the gap of two rivals."""
+    """Contributions of the visits to the gap of two rivals."""
     difference = first.mean - second.mean
     F = np.concatenate([first.factor, second.factor, np.sqrt(2.0) * noise.machine], axis=1)
     columns = np.concatenate([difference[:, None], F], axis=1)[visits.members]
     starts, counts, q = visits.starts, visits.counts, columns.shape[1]
     products = np.empty((len(counts), q, q))
-    for count in np.unique(counts).tolist():  # all visits with so many rows at once
+    for count in np.unique(counts).tolist():  # all visits with the same number of rows at once
         alike = np.flatnonzero(counts == count)
         rows = columns[starts[alike, None] + np.arange(count)]
         products[alike] = np.swapaxes(rows, 1, 2) @ rows
@@ -93,7 +93,7 @@ def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: Readin
 
 @dataclass(frozen=True)
 class Expectation:
-    """Expected outcome of readings.
+    """Expected outcome of a set of readings.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ def expected_outcome(
     standard = np.random.default_rng(seed).standard_normal((DRAWS, len(rows)))
     truth, settled = 0.0, []
     for i, weight in enumerate(weights):
-        # Of -|z + (m_i - m_j)|^2 / 2 for every j, z standard normal.
+        # Log likelihoods -|z + (m_i - m_j)|^2 / 2 for every j, z standard normal.
         apart = whitened[i] - whitened
         logs = np.log(weights) - 0.5 * (apart**2).sum(axis=1) - standard @ apart.T
         probability = np.exp(logs - logs.max(axis=1, keepdims=True))

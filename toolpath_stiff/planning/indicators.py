@@ -1,4 +1,4 @@
-"""Indicators beside the tip in a plan: across which links rivals differ, and visits that read there.
+"""Indicators beside the tip in a plan: links at which rivals differ, and visits that measure across them.
 
 Such a visit reads the tip along X, Y, Z as others do, and at each of these loads the second indicator as well.
 """
@@ -15,7 +15,7 @@ from toolpath_stiff.readings.loops import LoopColumns
 from toolpath_stiff.readings.measurements import with_offsets
 
 PLACES = 40  # with an indicator: a link shows at any pose where it is loaded
-MOST_LOOPS = 4  # one strut or vertex stands for all where an effect is of all
+MOST_LOOPS = 4  # if an effect acts on all struts or vertices, one stands for all
 LOOPS_OF = {
     "tool": ("spindle",),
     "table": ("table",),
@@ -26,7 +26,7 @@ LOOPS_OF = {
 
 
 def loops_between(rivals: Sequence[Rival]) -> tuple[str, ...]:
-    """Loops that hold a link at which the rivals differ, the likelier rivals' first."""
+    """Loops around the links at which rivals differ, those of the more likely rivals first."""
     common = set.intersection(*(set(rival.names) for rival in rivals))
     loops: list[str] = []
     for active in (active for rival in rivals for active in rival.effects if active.effect.name not in common):
@@ -36,7 +36,7 @@ def loops_between(rivals: Sequence[Rival]) -> tuple[str, ...]:
 
 
 def with_indicators(machine: Hexapod, visits: Visits, loops: Sequence[str], noise: float) -> Visits:
-    """The same visits, and some of them with an indicator across each loop.
+    """The visits, some of them repeated with an indicator across each loop.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def with_indicators(machine: Hexapod, visits: Visits, loops: Sequence[str], nois
     members = np.concatenate([np.tile(rows, (len(loops), 1)), across], axis=1)
     owner = np.concatenate([np.arange(len(visits)), np.tile(beside, len(loops))])
     of_visits = {name: getattr(visits, name)[owner] for name in ("pose", "extension", "wait", "setup", "label")}
-    source = np.concatenate([np.arange(len(taken)), np.tile(rows.ravel(), len(loops))])  # of which readings they are
+    source = np.concatenate([np.arange(len(taken)), np.tile(rows.ravel(), len(loops))])  # reading that each is of
     loop = np.concatenate([taken.loop, np.repeat(loops, rows.size)])
     readings = replace(
         taken.select(source),

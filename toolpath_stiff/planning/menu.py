@@ -1,4 +1,4 @@
-"""The menu of a plan: what may vary, and what work costs."""
+"""The menu of a plan: what may vary, and the cost of each change."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -22,7 +22,7 @@ COSTS = {"reading": 1.0, "pose": 15.0, "tool": 10.0, "setup": 45.0, "indicator":
 
 @dataclass(frozen=True)
 class Menu:
-    """The menu of a plan: what may vary, and what it costs. Defaults are assumed; each is an option of `tps plan`.
+    """The menu of a plan: what may vary, and its cost. Defaults are assumed; each is an option of `tps plan`.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Menu:
             raise InputError("costs of a plan", expected="a pose that costs something")
 
     def with_options(self, **options: Any) -> Self:
-        """The menu with those options that are given. Who names the heights knows how low a set-up may be used."""
+        """The menu with the given options. Stated heights drop the floors: whoever states them knows each set-up's."""
         given: Any = {
             name: tuple(v) if isinstance(v, list) else v for name, v in options.items() if v not in (None, (), [])
         }
@@ -93,12 +93,12 @@ class Menu:
 
     @classmethod
     def of(cls, data: Readings | None) -> Self:
-        """The menu after some measurements: also their poses, set-ups, tools and loads; before any, of a riser too."""
+        """The menu after some measurements, with their poses, set-ups, tools and loads; before any, with a riser."""
         if data is None:
             return cls(setups=(TABLE, RISER))
         poses = np.concatenate([data.position, data.angles], axis=1)
         first = np.sort(np.unique(np.round(poses, 6), axis=0, return_index=True)[1])
-        # What was used last is on the machine now.
+        # The set-up used last is taken to be on the machine now.
         setups = list(dict.fromkeys(data.setup[::-1].tolist()))
         if len(setups) == 1 and setups[0]:
             setups.append(TABLE if setups[0] != TABLE else RISER)
@@ -112,7 +112,7 @@ class Menu:
             setups=tuple(setups),
             measured=poses[first],
             labels=tuple(data.point[first].tolist()),
-            # In a set-up that was never used, the lowest of all.
+            # A set-up never used takes the lowest height of all.
             floors={n: float((z if len(z) else data.position[:, 2]).min()) for n, z in measured.items()},
             timed="time_min" not in data.missing,
             usual_load=float(loads[np.argmax(counts)]),

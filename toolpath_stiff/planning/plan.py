@@ -1,4 +1,4 @@
-"""Plans between rivals: the measurements that would tell rival explanations apart, per minute of work.
+"""Plans between rivals: measurements that best tell rival explanations apart, per minute of work.
 
 Visits are chosen one after another. Each lowers the bound on the chance of taking one rival for another,
 
@@ -45,8 +45,8 @@ SETTLED = 0.95  # probability of one rival at which visits are enough: on the sa
 MOST_RIVALS = 6  # a plan that separates more would separate none well
 MOST_VISITS, MOST_REPEATS = 200, 64
 LEAST_GAP = 1.0  # standard deviations after all visits: below, tip stiffness cannot tell the two apart
-LEAST_GAIN = 0.01  # of a probability that is printed in whole per cent: less is no reason to measure
-# Where an indicator reads a link's own deflection.
+LEAST_GAIN = 0.01  # least gain in probability worth measuring for; it is printed in whole per cent
+# Place of an indicator that reads a link's own deflection.
 INDICATORS = {
     "tool": "between spindle nose and platform, and tool tip and spindle nose",
     "platform": "between two joints of the platform",
@@ -60,18 +60,18 @@ INDICATORS = {
 
 
 def telling(effect: Effect) -> str:
-    """Where an indicator reads an effect's own deflection; after "none: " another reading that tells of it."""
+    """Place of an indicator that reads an effect's own deflection, or "none: " and another reading that reveals it."""
     return f"none: {effect.told_by}" if effect.told_by else INDICATORS[effect.link]
 
 
 def reading_words(place: str) -> str:
-    """What `telling` gives as words for people."""
+    """Text of `telling` in words for people."""
     return place.removeprefix("none: ") if place.startswith("none: ") else f"an indicator {place}"
 
 
 @dataclass(frozen=True)
 class PairGap:
-    """The gap between two rivals.
+    """Gap between two rivals.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class PairGap:
 
 @dataclass(frozen=True, eq=False)
 class RivalPlan:
-    """Visits that tell rivals apart, and what is to be expected of them.
+    """Visits that tell rivals apart, and their expected outcome.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class RivalPlan:
 
     @cached_property
     def chosen(self) -> tuple[int, ...]:
-        """Numbers of the chosen visits, in measuring order: set-up by set-up, tool by tool, at random within.
+        """Numbers of the chosen visits in measuring order: by set-up, then by tool, at random within.
 
         So a drift over the day looks like no pose.
         """
@@ -141,12 +141,12 @@ class RivalPlan:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The change that each chosen visit brings, one word or two."""
+        """Kind of change that each chosen visit brings, in a word or two."""
         return tuple(self.visits.kind(visit) for visit in self.chosen)
 
     @property
     def why(self) -> tuple[str, ...]:
-        """The purpose of each chosen visit, a sentence."""
+        """Purpose of each chosen visit, a sentence."""
         return tuple(self._purpose(visit) for visit in self.chosen)
 
     def _purpose(self, visit: int) -> str:
@@ -170,12 +170,12 @@ class RivalPlan:
 
     @property
     def minutes(self) -> float:
-        """Work."""
+        """Minutes of work."""
         return self.visits.minutes(self.chosen)
 
     @cached_property
     def pairs(self) -> tuple[PairGap, ...]:
-        """The gaps, the narrowest first, the links at which two rivals differ, and where an indicator reads them."""
+        """Gaps between pairs of rivals, the narrowest first, with the differing links and indicators across them."""
         pairs = []
         for names, share in self.shares.items():
             both = [rival for rival in self.rivals if rival.name in names]
@@ -188,11 +188,11 @@ class RivalPlan:
 
     @property
     def separable(self) -> bool:
-        """True where any pair can be told apart by tip stiffness."""
+        """True if tip stiffness can tell at least one pair apart."""
         return any(pair.separable for pair in self.pairs)
 
     def expected(self, count: int | None = None, repeats: int = 1) -> Expectation:
-        """The expected outcome of the best visits (None: all), each made so often."""
+        """Expected outcome of the best `count` visits (None: all), each made `repeats` times."""
         rows = [self.visits.rows(visit) for visit in self.picked[:count]]
         visit_of = np.repeat(np.arange(len(rows)), [len(some) for some in rows])
         noise = self.scatter.shared_out(repeats)
@@ -200,31 +200,31 @@ class RivalPlan:
 
     @property
     def before(self) -> Expectation:
-        """The probabilities of the truth and of a settled verdict as they are now."""
+        """Probabilities of the truth and of a settled verdict before the plan."""
         weights = [forecast.weight for forecast in self.forecasts]
         return Expectation(float(np.square(weights).sum()), float(max(weights) >= NAMED))
 
     @cached_property
     def after(self) -> Expectation:
-        """The same after the plan, to be expected."""
+        """Probabilities of the truth and of a settled verdict expected after the plan."""
         return self.expected()
 
     @cached_property
     def enough(self) -> int | None:
-        """The number of poses, the best ones, that should bring the truth a probability of `SETTLED`; None: not all."""
+        """Number of best poses expected to bring the truth to a probability of `SETTLED`; None if all are too few."""
         counts = range(1, len(self.picked) + 1)
         return next((count for count in counts if self.expected(count).truth >= SETTLED), None)
 
     @cached_property
     def repeats(self) -> int | None:
-        """The repeats of each visit, clamped anew, that this takes; None: not even `MOST_REPEATS` do."""
+        """Repeats of each visit, clamped anew, needed for `SETTLED`; None if even `MOST_REPEATS` are too few."""
         chance = range(MOST_REPEATS + 2)
         fewest = bisect_left(chance, SETTLED, lo=1, hi=MOST_REPEATS + 1, key=lambda n: self.expected(repeats=n).truth)
         return None if fewest > MOST_REPEATS else fewest
 
     @property
     def gains(self) -> bool:
-        """True where the truth becomes likelier, or the verdict settled, on average, and more of it would go on so."""
+        """True if on average the truth becomes likelier or the verdict settled, and further visits would add to it."""
         rises = (self.after.truth - self.before.truth, self.after.settled - self.before.settled)
         return bool(max(rises) >= LEAST_GAIN and (self.separable or self.repeats is not None))
 
@@ -238,7 +238,7 @@ class RivalPlan:
 
     @property
     def sentences(self) -> list[str]:
-        """The promises of the plan."""
+        """Sentences on what the plan is expected to bring."""
         rises = (
             f"{self._work}: the probability of the right explanation is expected to rise {self._rise}, "
             f"and the verdict to be settled in {percent(self.after.settled)} of cases"
@@ -266,7 +266,7 @@ class RivalPlan:
 
     @property
     def nothing_gained(self) -> str:
-        """A sentence: the plan is not worth its minutes, and what would tell its two likeliest rivals apart instead."""
+        """Sentence: the plan is not worth its minutes, and what would tell the two likeliest rivals apart instead."""
         first, second = (rival.name for rival in self.rivals[:2])
         pair = next(pair for pair in self.pairs if {first, second} == set(pair.effects))
         beside = bool((self.visits.readings.loop != "").any())  # indicators take part already
@@ -278,7 +278,7 @@ class RivalPlan:
         return f"{'; '.join(parts)}. {self._work}, would bring the probability of the right explanation {self._rise}"
 
     def head(self) -> Document:
-        """The first entries of plan.json."""
+        """First entries of plan.json."""
         return {
             "kind": "rivals",
             "verdict": self.verdict,
@@ -302,7 +302,7 @@ class RivalPlan:
 
 
 def percent(share: float) -> str:
-    """Never "100 %" or "0 %" for what is only expected."""
+    """Share in per cent; an expectation is never "100 %" or "0 %"."""
     if share > 0.99:
         return "more than 99 %"
     return "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
@@ -319,7 +319,7 @@ def plan_measurements(
     effect_files: Sequence[str | Path] = (),
     strut_spread: float = STRUT_SPREAD,
 ) -> RivalPlan:
-    """Choose the visits that best tell rivals apart per minute.
+    """Choose the visits that tell rivals apart best per minute.
 
     Parameters
     ----------
@@ -360,7 +360,7 @@ def plan_measurements(
     usable = np.logical_and.reduceat(good[visits.members], visits.starts)
     if not usable.any():
         raise InputError("no pose that every rival has an answer to", hint="plan with fewer rivals, or other heights")
-    # A reading without an answer belongs to visits that are never chosen; its numbers only must not spread.
+    # Readings without a forecast belong to visits that are never chosen; their nan must not spread.
     forecasts = [
         replace(f, mean=np.where(good, f.mean, 0.0), factor=np.where(good[:, None], f.factor, 0.0)) for f in forecasts
     ]
@@ -376,7 +376,7 @@ def plan_measurements(
 def choose(
     visits: Visits, usable: BoolArray, shares: Mapping[Pair, GapShares], weights: Mapping[str, float], n: int
 ) -> tuple[int, ...]:
-    """Up to `n` usable visits, one after another, each the one that lowers the bound most per minute."""
+    """Up to `n` usable visits, chosen one by one, each the one that lowers the bound most per minute."""
 
     def log_bound(gaps: Mapping[Pair, FloatArray]) -> FloatArray:
         terms = [0.5 * np.log(weights[i] * weights[j]) - gap**2 / 4.0 for (i, j), gap in gaps.items()]
@@ -395,7 +395,7 @@ def choose(
 
 
 def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
-    """The most probable ones, weights adding up to 1, and what was left out."""
+    """The most probable rivals, weights adding up to 1, and a note on those left out."""
     if len(rivals) < 2:
         raise InputError(f"{len(rivals)} rivals to tell apart", expected="two or more")
     order = sorted(rivals, key=lambda rival: -rival.weight)
@@ -407,7 +407,7 @@ def _ranked(rivals: Sequence[Rival]) -> tuple[tuple[Rival, ...], list[str]]:
 
 
 def matters(rivals: Sequence[Rival]) -> set[str]:
-    """Columns that the rivals' answers hang on."""
+    """Columns that the rivals' forecasts depend on."""
     actives = [active for rival in rivals for active in rival.effects]
     columns = {column for active in actives for column in active.effect.needs}
     if any(active.effect.load_dependent for active in actives):

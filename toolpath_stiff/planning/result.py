@@ -1,4 +1,4 @@
-"""A plan: what to measure next, or first, and what that is expected to show; a measurement file to fill in."""
+"""A plan of what to measure, next or first, with its expected outcome; a measurement file to fill in."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -39,7 +39,7 @@ PlanRow = dict[str, float | str]  # a reading, by the columns of a measurement f
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(FolderResult):
-    """A plan of what to measure next, or first, and what that is expected to show.
+    """A plan of what to measure, next or first, with its expected outcome.
 
     Attributes
     ----------
@@ -65,12 +65,12 @@ class Plan(FolderResult):
 
     @cached_property
     def rows(self) -> list[PlanRow]:
-        """The rows of plan.csv: a measurement file whose stiffness is left empty."""
+        """Rows of plan.csv: a measurement file with the stiffness left empty."""
         return plan_rows(self.choice.visits, self.choice.chosen, () if self.data is None else self.data.point.tolist())
 
     @property
     def visits(self) -> list[Document]:
-        """One entry a clamping: where, how, what is read, why."""
+        """One entry per clamping: pose, set-up, readings, purpose."""
         choice, first = self.choice, {row["clamp"]: row for row in reversed(self.rows)}
         visits, entries = choice.visits, list[Document]()
         for clamp, (visit, kind, why) in enumerate(zip(choice.chosen, choice.kinds, choice.why, strict=True), 1):
@@ -89,7 +89,7 @@ class Plan(FolderResult):
         return entries
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of plan.json."""
+        """Content of plan.json."""
         document = to_dict(
             {
                 **self.choice.head(),
@@ -106,7 +106,7 @@ class Plan(FolderResult):
         return dict(certain(document))
 
     def to_frame(self) -> DataFrame:
-        """One row a reading, as in `plan.csv`: a measurement file with the stiffness left empty."""
+        """One row per reading, as in `plan.csv`: a measurement file with the stiffness left empty."""
         return frame_of(self.rows)
 
     def _short(self) -> str:
@@ -150,7 +150,7 @@ def plan_rows(visits: Visits, chosen: Sequence[int], taken: Collection[str] = ()
 
 
 def _round(values: FloatArray) -> FloatArray:
-    """To ten digits after the unit's point at most: 0.30000000000000004 is 0.3 to whoever keys it in."""
+    """Values rounded to six decimals, so that nobody has to key in 0.30000000000000004."""
     return np.round(values, 6) + 0.0
 
 
@@ -161,7 +161,7 @@ def plan_csv(rows: Sequence[PlanRow]) -> str:
 
 
 def elements_apart(machine: MachineTool) -> list[str]:
-    """Rivals of a first campaign on a machine of elements: each of its joints that turn soft, else its elements."""
+    """Rivals of a first campaign on a machine of elements: each joint soft in torsion, then each other element soft."""
     turn = [f"joint_torsion:{element.name}" for element in machine.elements if turns(element)]
     soft = [f"weak_element:{element.name}" for element in machine.elements if not turns(element)]
     return [*turn, *soft][:MOST_RIVALS]
@@ -181,7 +181,7 @@ def plan(
     judgement: Judgement | None = None,
     rivals: Sequence[Rival] = (),
 ) -> Plan:
-    """Plan what to measure next, after some measurements; or first.
+    """Plan what to measure next after some measurements, or first.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def plan(
         notes += ["no data: the rivals are taken at their usual sizes"]
         notes += [] if noise is not None else [f"noise of a reading: {100 * CAMPAIGN_NOISE:g} % assumed"]
     else:
-        # Where nothing is known of the noise the larger guess is planned for: too many repeats do no harm.
+        # With unknown noise, plan for the larger guess: too many repeats do no harm.
         scatter = judgement.noise if judgement else noise_models(data, noise, strut_spread)[-1]
         problem = judgement.problem if judgement else Problem.of(Predictor(machine, data, effect_files), scatter)
         notes = [*filter(None, [question(problem.predictor)]), f"noise: {scatter.origin}"]

@@ -1,4 +1,4 @@
-"""The rivals that a plan is to tell apart: as a diagnosis left them, as the user names them, or before any data."""
+"""Rivals for a plan to tell apart: those a diagnosis leaves, those the user names, or those before any data."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,16 +17,16 @@ from toolpath_stiff.stiffness.catalogue import find_effect
 from toolpath_stiff.stiffness.contract import ELEMENT, Effect
 
 LEAST_WEIGHT = 0.02  # probability below which an explanation is no rival
-UNKNOWN_SIZE = 0.5  # relative sd of a size that nothing has been measured of; assumed
+UNKNOWN_SIZE = 0.5  # relative sd of a size before any measurement; assumed
 
 
 def rival_of_fit(name: str, fit: Fit, weight: float = 1.0) -> Rival:
-    """A rival as fitted to the data so far."""
+    """A rival made from a fit to the data."""
     return Rival(name, fit.law, fit.candidates, fit.sizes, fit.covariance, fit.free, weight)
 
 
 def rivals_of(judgement: Judgement) -> list[Rival]:
-    """The explanations that a diagnosis leaves standing, with their probabilities, none below `LEAST_WEIGHT`.
+    """Explanations that a diagnosis leaves standing, with their probabilities, none below `LEAST_WEIGHT`.
 
     Those that votes leave open have none of their own or a small one. Where no two stand, the likely others beside it,
     at least the likeliest: what a plan would confirm the answer against.
@@ -43,7 +43,7 @@ def rivals_of(judgement: Judgement) -> list[Rival]:
 
 
 def _fit_of(judgement: Judgement, name: str) -> Fit | None:
-    """The final fit of a hypothesis; None if there is none to be had."""
+    """Final fit of a hypothesis; None if it cannot be made."""
     if name == NONE:
         return fit_effects(judgement.problem, (), (), (), judgement.base.law)
     if name in judgement.fits:
@@ -53,7 +53,7 @@ def _fit_of(judgement: Judgement, name: str) -> Fit | None:
 
 
 def fitted_rivals(problem: Problem, names: Sequence[str], effects: Mapping[str, Effect]) -> list[Rival]:
-    """Effects by name, or `none`, fitted to the data, all of the same weight.
+    """Effects by name, or `none`, fitted to the data, with equal weights.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def fitted_rivals(problem: Problem, names: Sequence[str], effects: Mapping[str, 
 
 
 def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: str = "") -> list[Rival]:
-    """Effects by name, or `none`, at their usual sizes, before any data; `setup` is what a set-up's own effect is of.
+    """Effects by name, or `none`, at their usual sizes, before any data; `setup` is for effects that act on a set-up.
 
     The size is the middle of the usual range on a logarithmic scale and known within `UNKNOWN_SIZE` of it; the strut
     law within `LAW_PRIOR`.
@@ -119,7 +119,7 @@ def unfitted_rivals(names: Sequence[str], effects: Mapping[str, Effect], setup: 
 
 
 def errors_so_far(problem: Problem, rivals: Sequence[Rival]) -> dict[str, float]:
-    """Mean errors on the data so far, %: as given, strut law refitted, then with each rival that is an effect."""
+    """Mean errors on the data so far, %: as given, strut law refitted, and with each rival that has an effect."""
     as_given, refitted = baseline(problem)
     residuals = {AS_GIVEN: as_given.residual, LAW_REFITTED: refitted.residual}
     for rival in rivals:
@@ -130,7 +130,7 @@ def errors_so_far(problem: Problem, rivals: Sequence[Rival]) -> dict[str, float]
 
 
 def usual_size(component: Component) -> float:
-    """The middle of the usual sizes on a logarithmic scale, a fifth of the largest where the usual range holds 0."""
+    """Middle of the usual sizes on a logarithmic scale; a fifth of the largest if the usual range includes 0."""
     low, high = component.typical()
     sign = component.signs[-1]
     if not np.isfinite(high):
@@ -145,12 +145,12 @@ def _check(names: Sequence[str], effects: Mapping[str, Effect]) -> None:
         raise InputError(f"--between {','.join(names)}", expected="two or more different effects, or none")
     for name in names:
         if name != NONE and name.partition(":")[0] not in effects:
-            find_effect(name)  # says what there is
+            find_effect(name)  # its error lists the known effects
             raise InputError(f"--between {name}: it holds on hexapods only", expected=f"one of {', '.join(effects)}")
 
 
 def rivals_on_elements(fits: Sequence[Fit], standing: Sequence[Fit], between: Sequence[str]) -> list[Rival]:
-    """Explanations of pulls, likeliest first, as rivals: those named, else those that stand, and what comes next.
+    """Explanations of pulls as rivals, the likeliest first: those named, otherwise those that stand and the next ones.
 
     Weights are as of equally likely explanations, none below `LEAST_WEIGHT`. Raises `InputError` for one that changes
     nothing there.
@@ -167,7 +167,7 @@ def rivals_on_elements(fits: Sequence[Fit], standing: Sequence[Fit], between: Se
 
 
 def rival_name(fit: Fit) -> str:
-    """As `--between` has it: "joint_torsion:joint 3", "none"."""
+    """Name of a rival as `--between` takes it: "joint_torsion:joint 3", "none"."""
     if not fit.candidates:
         return NONE
     element = dict(fit.candidates[-1].choice).get(ELEMENT)

@@ -1,4 +1,4 @@
-"""Visits that could be made next: to poses, all reachable and in round figures, and what each costs.
+"""Visits that could be made next: reachable poses in round figures, and the cost of each.
 
 A visit is one pose with one tool in one set-up, clamped once: the indicator is zeroed and readings are taken along
 some directions under one load or two. Visits are what costs time; further directions and loads at the same visit are
@@ -75,7 +75,7 @@ class Visits:
 
     @property
     def counts(self) -> IntArray:
-        """(v,) readings a visit."""
+        """(v,) number of readings in each visit."""
         return np.diff(np.append(self.starts, len(self.members)))
 
     def rows(self, visit: int) -> IntArray:
@@ -88,14 +88,14 @@ class Visits:
         return float(tilts(self.pose[visit]))
 
     def same_place(self, visit: int) -> BoolArray:
-        """(v,) visits to the same pose with the same tool in the same set-up: other readings there are no new pose."""
+        """(v,) True for visits to the same pose with the same tool and set-up: other readings there are no new pose."""
         there = (self.pose == self.pose[visit]).all(axis=1)
         return np.asarray(
             there & (self.extension == self.extension[visit]) & (self.setup == self.setup[visit]), dtype=bool
         )
 
     def kind(self, visit: int) -> str:
-        """The dearest thing that the visit changes."""
+        """The most expensive change that the visit makes."""
         if self.setup[visit] != self.menu.setups[0]:
             return "another set-up"
         if self.loop[visit]:
@@ -107,11 +107,11 @@ class Visits:
         return "tilted" if self.tilt(visit) > 1e-6 else "vertical"
 
     def further_minutes(self, chosen: Sequence[int]) -> FloatArray:
-        """(v,) minutes that each visit adds to those chosen; visits of one set-up and tool are made together."""
+        """(v,) minutes that each visit would add to those chosen; visits of one set-up and tool are made together."""
         costs, tool, rows = self.menu.costs, self.menu.tool_extensions[0], list(chosen)
         setups = [self.menu.setups[0], *self.setup[rows].tolist()]
         equipped = set(zip(setups, [tool, *self.extension[rows].tolist()], strict=True))
-        known = [  # in a new set-up the tool that is in the spindle stays there
+        known = [  # a new set-up needs no tool change for the tool in the spindle
             there in equipped or (there[0] not in setups and there[1] == tool)
             for there in zip(self.setup.tolist(), self.extension.tolist(), strict=True)
         ]
@@ -125,7 +125,7 @@ class Visits:
 
 
 def possible_visits(machine: MachineTool, menu: Menu, matters: Collection[str], rng: Generator) -> Visits:
-    """Every visit that a plan may choose from; of load, set-up and time only those columns vary that matter.
+    """All visits that a plan may choose from; load, set-up and time vary only if their columns matter.
 
     Each place is offered with every choice of directions, loads and rounds. X, Y, Z are always read: what the rivals do
     not think of shows there. Readings are taken round by round, the axes before the diagonals, in random order: a drift
@@ -182,7 +182,7 @@ def visits_of(
     rounds: IntArray | int = 1,
     choices: Sequence[IntArray] = (),
 ) -> Visits:
-    """Visits to p places with k readings each, or with some of these.
+    """Visits to p places with k readings each, or with subsets of these.
 
     Parameters
     ----------
@@ -249,11 +249,11 @@ def draw_poses(machine: MachineTool, menu: Menu, count: int, rng: Generator) -> 
     drawn: list[FloatArray] = []
     for batch in range(8):
         radius, azimuth = menu.radius * np.sqrt(rng.random(count)), rng.uniform(0.0, 2.0 * np.pi, count)
-        # The largest tilts mostly tell the most.
+        # Large tilts usually tell the most.
         tilt, about = menu.max_tilt * np.sqrt(rng.uniform(0.16, 1.0, count)), rng.uniform(0.0, 2.0 * np.pi, count)
         tilt[rng.random(count) < STEEP_SHARE] = menu.max_tilt
         tilt[rng.random(count) < UPRIGHT_SHARE] = 0.0
-        # Toward zero: rounding never tilts further than allowed.
+        # Rounded toward zero, so that no tilt exceeds the limit.
         lean = np.stack([tilt * np.cos(about), tilt * np.sin(about)], axis=1)
         place = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth)], axis=1)
         poses = np.zeros((count, 6))
@@ -269,7 +269,7 @@ def draw_poses(machine: MachineTool, menu: Menu, count: int, rng: Generator) -> 
 
 
 def axis_levels(machine: MachineTool) -> tuple[float, ...]:
-    """Five heights in m, from the lowest to the highest that the tip reaches on the machine's axis, its base frame's Z.
+    """Five heights, m, from the lowest to the highest that the tip reaches on the machine's axis, its base frame's Z.
 
     They begin a tenth of the way from each end.
     """
@@ -292,14 +292,14 @@ def axis_levels(machine: MachineTool) -> tuple[float, ...]:
 
 
 def _upright(machine: MachineTool, levels: FloatArray) -> FloatArray:
-    """(n, 6) poses above one another with the spindle upright."""
+    """(n, 6) vertical poses at given heights above one another."""
     poses = np.outer(levels, np.arange(6) == 2)
     poses[:, :2] += middle_of(machine)
     return poses
 
 
 def reachable(machine: MachineTool, pose: FloatArray, tool_extension: float, margin: float = MARGIN) -> BoolArray:
-    """(n,) whether the machine takes poses (n, 6) with such a tool, clear of its limits and of a strut law at zero."""
+    """(n,) True where the machine takes poses (n, 6) with such a tool, clear of its limits and of strut stiffness 0."""
     rotation = rotation_matrices(pose[:, 3:])
     stance = solved(machine, pose[:, :3], rotation, machine.reference_tool_length + tool_extension)
     good = reach(machine, pose[:, :3], stance, rotation).margin >= margin
@@ -309,7 +309,7 @@ def reachable(machine: MachineTool, pose: FloatArray, tool_extension: float, mar
 
 
 def middle_of(machine: MachineTool) -> FloatArray:
-    """(2,) m, X and Y about which poses are drawn: a hexapod's axis, of other machines where program zero sits."""
+    """(2,) m, X and Y about which poses are drawn: a hexapod's axis, otherwise the place of program zero."""
     return np.zeros(2) if isinstance(machine, Hexapod) else np.array(machine.default_origin[:2])
 
 

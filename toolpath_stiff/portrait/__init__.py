@@ -1,1 +1,1 @@
-"""What no effect of the catalogue explains, described: which link, which direction, what it varies with."""
+"""Description of what no effect of the catalogue explains: its link, its direction, its variable."""

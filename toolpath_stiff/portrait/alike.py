@@ -1,4 +1,4 @@
-"""What else would look the same as an effect of the catalogue that is named as the answer.
+"""Alternatives to a named effect: what else would look the same as the answer from the catalogue.
 
 A name of the catalogue is a part and a way in which it gives; where poses are few, a part that is in no catalogue may
 give the same readings: without tilted poses a floor that rocks is a table that shifts. So each term of the dictionary
@@ -22,8 +22,8 @@ from toolpath_stiff.stiffness.terms import Term
 # constants or places must fit better than the plainest ones by as much as its prior weight is smaller.
 AS_WELL = float(np.log(20.0))
 ITSELF = 0.99  # correlation from which a term of the same link is the named effect itself
-MOST_NAMED = 2  # effects that one is replaced of; a triple would take as long as the diagnosis
-MOST_TOLD, TOLD = 6, 0.03  # terms that are told, and the least share of one
+MOST_NAMED = 2  # named effects of which one is replaced; three would take as long as the diagnosis
+MOST_TOLD, TOLD = 6, 0.03  # most terms reported, and the smallest share reported
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Alike:
 
 
 def looks_the_same(problem: Problem, base: Fit, named: Fit, noise: Noise, seed: int) -> dict[str, Alike]:
-    """Named effect -> terms of the dictionary that fit the readings as well in its place; without those of none.
+    """Named effect -> terms of the dictionary that fit the readings as well in its place; only effects with such terms.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def _without(problem: Problem, named: Fit, k: int) -> Fit:
 
 
 def _in_place(selection: Selection, named: Fit, k: int) -> Alike | None:
-    """Terms that fit as well as effect k of a fit; None where there are none."""
+    """Terms that fit as well as effect k of a fit; None if there are none."""
     problem, candidate = selection.problem, named.candidates[k]
     if not selection.dictionary.terms:
         return None
@@ -88,14 +88,14 @@ def _in_place(selection: Selection, named: Fit, k: int) -> Alike | None:
     columns = np.array([selection.ground.column(term) for term in terms])
     sizes = selection.together(start, terms)
     squares = float(start.fit.scatter.precision.squares(named.residual))
-    # Less what it gains by its further sizes (Schwarz 1978) and by a choice, which a term has not.
+    # Less the gain from its further sizes (Schwarz 1978) and from its choice of element, which a term does not have.
     data = problem.predictor.data
     choices, sizes_of_it = len(candidates_of(candidate.effect, data)), int(np.count_nonzero(named.sizes[k]))
     freedom = 0.5 * (sizes_of_it - 1) * float(np.log(len(data))) + float(np.log(max(choices, 1)))
     reached = -0.5 * (squares + float(named.law @ named.law) / LAW_PRIOR**2) - freedom
     plainest = float(selection.dictionary.log_prior.max())
     same = (sizes.posterior + prior - plainest >= reached - AS_WELL) & (np.abs(sizes.size[:, -1]) > 0.0)
-    # A term is the named effect itself where it does what that does, in its own link.
+    # A term counts as the named effect itself if it has the same signature in the same link.
     change = np.exp(named.residual - problem.observed) - problem.predictor.strut_part(named.law) - selection.rest
     alike = columns @ change > ITSELF * np.linalg.norm(columns, axis=1) * np.linalg.norm(change)
     link = candidate.effect.link
@@ -115,7 +115,7 @@ def _in_place(selection: Selection, named: Fit, k: int) -> Alike | None:
 
 
 def _told(leading: list[Leading]) -> tuple[tuple[Term, float], ...]:
-    """The best of each link, direction and variable, with the shares of all of them."""
+    """The best term of each link, direction and variable, with the summed share of all such terms."""
 
     def kind(term: Term) -> str:
         return f"{term.link} {term.direction} {term.variable}"

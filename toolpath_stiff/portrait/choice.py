@@ -1,4 +1,4 @@
-"""Which terms of the dictionary describe what is missing: few, chosen by likelihood, held to left-out points.
+"""Choice of the terms of the dictionary that describe what is missing: few, by likelihood, tested at left-out points.
 
 Terms are added one by one. A term joins where its gain is more than the best of the whole dictionary would reach by
 chance (simulated from the noise model: look-elsewhere) and where the error at left-out points falls. What is added one
@@ -20,15 +20,15 @@ from toolpath_stiff.portrait.selection import Description, Selection
 from toolpath_stiff.stiffness.terms import Term
 
 MOST_TERMS, POINTS_EACH = 3, 6  # and points for each term but the first
-LEADS = 0.01  # probability by chance below which the first term is taken for something
-BETTER = 0.98  # share of the rms at left-out points to which a further term must bring it
+LEADS = 0.01  # probability by chance below which the first term is accepted
+BETTER = 0.98  # factor by which a further term must lower the rms at left-out points
 BEGINNINGS = 3  # further links at which the search begins
-# By how much likelihoods are flattened: the true shape is none of the dictionary's, so that what fits a little better
-# is not that much likelier. Of a large effect the shape's error counts, which grows with the gain; assumed.
+# Flattening of likelihoods: the true shape is not among the dictionary's, so a slightly better fit
+# is not so much more likely. For a large effect the error of shape counts, which grows with the gain; assumed.
 ROUGH, SHAPE = 2.5, 0.0015
 HELD = 0.90  # probability that a set of links or variables adds up to
 FAINT = 0.02  # share below which a description, or a term as the leading one of it, is left out of the sums
-Leading = tuple[Term, float, bool]  # may be the leading term; its probability; whether it was tried in the chosen one
+Leading = tuple[Term, float, bool]  # possible leading term; probability; True if tried in the chosen description
 
 
 def summed(leading: Sequence[Leading], of: Callable[[Term], str]) -> list[tuple[str, float]]:
@@ -40,13 +40,13 @@ def summed(leading: Sequence[Leading], of: Callable[[Term], str]) -> list[tuple[
 
 
 def fewest(summed: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
-    """The fewest names that hold `HELD` of the probability."""
+    """Shortest list of names that together hold `HELD` of the probability."""
     count = 1 + int(np.searchsorted(np.cumsum([share for _, share in summed]), HELD - 1e-9))
     return tuple(summed[:count])
 
 
 def choose(selection: Selection) -> tuple[Description | None, list[Leading], float]:
-    """One to three terms, none where nothing stands out from chance; what may lead; how often chance does as much.
+    """One to three terms (None: nothing beyond chance), candidates for leading term, probability that chance does it.
 
     The leading term is the first one. What else may be is told with posterior probabilities, the likeliest first.
     """
@@ -61,20 +61,20 @@ def choose(selection: Selection) -> tuple[Description | None, list[Leading], flo
     if len(descriptions[0].terms) > 1:
         others = _other_beginnings(selection, start, descriptions[0].terms[0])
         descriptions += [_completed(selection, other, threshold) for other in others]
-    # Less what chance would gain by further terms.
+    # Less the gain that chance would bring with further terms.
     descriptions.sort(key=lambda whole: -(whole.posterior - 0.5 * threshold * (len(whole.terms) - 1)))
     descriptions = [_leading_first(selection, description) for description in _different(descriptions)]
     return descriptions[0], weigh(selection, descriptions, threshold), chance
 
 
 def _completed(selection: Selection, begun: Description, threshold: float) -> Description:
-    """With further terms as long as they join: do more than chance, and at left-out points too."""
+    """Description with further terms, as long as each gains more than chance, at left-out points too."""
     points, description = selection.problem.predictor.data.point, begun
     while len(description.terms) < min(MOST_TERMS, len(np.unique(points)) // POINTS_EACH):
         more = selection.grown(description) if selection.scores(description).max() > threshold else None
         if more is None or 2.0 * (more.posterior - description.posterior) <= threshold:
             break
-        # The first term once more the best beside the others: it was chosen without them.
+        # Choose the first term again beside the others: it was chosen without them.
         again = selection.grown(selection.without(more, 0))
         more = again if again is not None and again.posterior > more.posterior else more
         if held_out(more.fit, points).rms > BETTER * held_out(description.fit, points).rms:
@@ -84,7 +84,7 @@ def _completed(selection: Selection, begun: Description, threshold: float) -> De
 
 
 def _other_beginnings(selection: Selection, start: Description, first: Term) -> list[Description]:
-    """Single terms of other links than that of `first` that promise most together with a further term."""
+    """Single terms of links other than that of `first` that promise most together with a further term."""
     terms = list(selection.finalists(start))
     posterior = selection.together(start, terms).posterior
     seen: set[tuple[str, str]] = set()
@@ -103,7 +103,7 @@ def _other_beginnings(selection: Selection, start: Description, first: Term) -> 
 
 
 def _different(descriptions: Sequence[Description]) -> list[Description]:
-    """The first of those that differ by constants only."""
+    """The first of each group of descriptions that differ in constants only."""
     kept: dict[frozenset[tuple[object, ...]], Description] = {}
     for description in descriptions:
         kinds = frozenset((t.link, t.where, t.direction, t.variable, t.column, t.shape) for t in description.terms)
@@ -112,13 +112,13 @@ def _different(descriptions: Sequence[Description]) -> list[Description]:
 
 
 def _costs(selection: Selection, description: Description) -> FloatArray:
-    """(p,) of log posterior that the absence of each term costs."""
+    """(p,) loss of log posterior when each term is left out."""
     left = [selection.without(description, k).posterior for k in range(len(description.terms))]
     return description.posterior - np.array(left)
 
 
 def _leading_first(selection: Selection, description: Description) -> Description:
-    """Terms by what their absence would cost."""
+    """Description with its terms in order of the loss that their absence would cause."""
     if len(description.terms) < 2:
         return description
     order = np.argsort(-_costs(selection, description), kind="stable").tolist()
@@ -126,9 +126,9 @@ def _leading_first(selection: Selection, description: Description) -> Descriptio
 
 
 def weigh(selection: Selection, descriptions: Sequence[Description], threshold: float) -> list[Leading]:
-    """What may be the leading term, over descriptions, the chosen one first; with posterior probabilities."""
+    """Candidates for the leading term, over all descriptions, the chosen one first; with posterior probabilities."""
     costs = [_costs(selection, description) for description in descriptions]
-    # By how much less a likelihood is to be trusted where shapes are rough, for a gain in log likelihood.
+    # Divisor of log likelihoods, which are less to be trusted where shapes are rough.
     fit, free = descriptions[0].fit, len(selection.compliance) - 2 - len(descriptions[0].terms)
     left = float(fit.scatter.precision.squares(fit.residual)) / max(free, 1)
     flat = ROUGH * max(left, 1.0) + SHAPE * max(float(costs[0].max()), 0.0)
@@ -151,7 +151,7 @@ def weigh(selection: Selection, descriptions: Sequence[Description], threshold: 
 
 
 def _in_place(selection: Selection, description: Description, k: int, flat: float) -> tuple[list[Term], FloatArray]:
-    """Terms in the place of the k-th one, beside the others, with their flattened log posterior."""
+    """Terms in place of the k-th one, beside the others, with their flattened log posterior."""
     others = selection.scattered(selection.without(description, k), description)
     priors = selection.finalists(others) | crossed(description.terms[k], selection.ground)
     sizes = selection.together(others, list(priors))

@@ -1,4 +1,4 @@
-"""What terms do to readings: the shapes over the values that occur, and the compliance that a unit of a term adds."""
+"""Effects of terms on readings: shapes over the values that occur, and compliance added by a unit of a term."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ Shapes = tuple[tuple[Shape, ...], FloatArray]  # shape and constants; (s, n) or 
 BUMPS, MOST_EDGES = 5, 5
 SHORTEST_PITCH = 8e-3  # m, period in a strut's length: screws of mills have leads of 5 to 40 mm
 MOST_TURNS = 5  # of a wave over a place: clamps and grooves of a table
-TURNED = 0.1  # rms change of stiffness at which a resistance to turning is looked for: it is not linear in its size
-MOST_HELD = 1000  # readings of which the dictionary keeps columns; of more shapes alone, with seven digits
-PHASES = 3  # of half a turn; the other half is the other sign's
+TURNED = 0.1  # rms change of stiffness at which a resistance to turning, not linear in size, is searched for
+MOST_HELD = 1000  # readings; beyond, the dictionary keeps no columns, only shapes with seven digits
+PHASES = 3  # phases over half a turn; the other half is covered by the other sign
 
 
 def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "") -> list[Shape]:
-    """Shapes over the values that a variable takes, with their constants; none where it does not vary.
+    """Shapes over the values of a variable, with their constants; none if it does not vary.
 
     `signed`: of what may change to both sides, where one side of each shape says it all; `column`: of a tilt. About a
     lean few poses say more than its side and its size; a swing counts from where the joint rests.
@@ -102,7 +102,7 @@ def shapes_of(variable: str, values: FloatArray, signed: bool, column: str = "")
 
 
 def _edges(different: FloatArray, most: int) -> list[float]:
-    """Edges between values, and 0 where it lies among them."""
+    """Edges between neighbouring values, and 0 if it lies among them."""
     between = 0.5 * (different[1:] + different[:-1])
     if len(between) > most:
         between = between[np.unique(np.linspace(0, len(between) - 1, most + 2).round().astype(int)[1:-1])]
@@ -110,10 +110,10 @@ def _edges(different: FloatArray, most: int) -> list[float]:
 
 
 def _periodic(variable: str, low: float, span: float, many: int, signed: bool) -> list[Shape]:
-    """Waves over the range: some turns of a place, down to a screw's lead in a strut's length."""
+    """Waves over the range: a few periods over a place; down to a screw's lead over a strut's length."""
     turns = np.arange(1.0, min(MOST_TURNS, many / 3.0) + 0.5)
     if variable == "strut length":
-        # So close that between two neighbours a wave over the whole range loses a quarter of a turn at most.
+        # Spaced so that over the whole range two neighbouring waves differ by a quarter of a turn at most.
         turns = np.arange(1.0, min(span / SHORTEST_PITCH, many / 3.0), 0.5)
     phases = np.arange(PHASES if signed else 2 * PHASES) / (2.0 * PHASES)
     waves = product((span / turns).tolist(), phases.tolist())
@@ -121,7 +121,7 @@ def _periodic(variable: str, low: float, span: float, many: int, signed: bool) -
 
 
 def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
-    """The same term with constants about its own: steps of a grid's spacing times `finer`."""
+    """The term with constants near its own, in steps of a grid's spacing times `finer`."""
     constants = term.constants
     names = set(constants) - {"first", "second", "side", "power", "reference", "reach"}
     if not names or term.shape == "sign":
@@ -137,7 +137,7 @@ def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
     if "crest" in names:
         moves["crest"] = constants["crest"] + finer * constants["period"] / (2 * PHASES) * about
     begins = "from" if "from" in constants else "start"
-    if "end" in constants:  # where it begins; its end is a matter of scale
+    if "end" in constants:  # only the beginning moves; the end merely scales
         if begins == "start" and term.signed:
             return []
         moves = {begins: np.clip(moves[begins], low - step, high + step)}
@@ -152,7 +152,7 @@ def shapes_near(term: Term, ground: Ground, finer: float) -> list[Term]:
 
 
 class Ground:
-    """What columns are made from: the readings as the links feel them.
+    """Basis for columns: the readings with the forces and variables that the links see.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class Ground:
         self._shapes: dict[tuple[Any, ...], Shapes] = {}
 
     def values(self, variable: str, column: str = "") -> FloatArray:
-        """(n,) or (n, 6) of a variable, SI; also the order of the readings (0 to 1) and further columns."""
+        """(n,) or (n, 6) values of a variable, SI; also of the order of readings (0 to 1) and of further columns."""
         if variable == "order":
             return np.linspace(0.0, 1.0, len(self.data))
         if variable in self.data.extra:
@@ -186,7 +186,7 @@ class Ground:
         return self._values[variable, column]
 
     def known(self, variable: str) -> bool:
-        """Whether the readings say what a variable is."""
+        """True if the readings state the variable."""
         if variable in self.data.extra:
             return bool(np.isfinite(self.data.extra[variable]).all())
         if variable == "tool length":
@@ -194,7 +194,7 @@ class Ground:
         return NEEDS.get(variable, "") not in self.data.missing
 
     def share(self, term: Term) -> FloatArray:
-        """(n,) or (n, 6) m/N that a term's link adds where its shape is 1, per unit of its size; worked out once."""
+        """(n,) or (n, 6) m/N added by a term's link where its shape is 1, per unit of its size; computed once."""
         plain = _plain(term)
         if plain not in self._shares:
             self._shares[plain] = self._share(plain)
@@ -229,19 +229,19 @@ class Ground:
 
     @cached_property
     def _flexibility(self) -> FloatArray:
-        """(n, 6, 6) of the tip, forces and moments."""
+        """(n, 6, 6) compliance of the tip to forces and moments."""
         path = self.path
         links = exact.assemble_links(replace(self.predictor.base, machine=path.machine), path)
         return exact.respond(path, *links, np.broadcast_to(np.eye(6), (len(path), 6, 6)))[0]
 
     @cached_property
     def _seen(self) -> FloatArray:
-        """(n,) compliance over that of `_flexibility`: where more gives way, the joints turn by as much more."""
+        """(n,) ratio of the compliance to that of `_flexibility`: the joints turn by so much more in proportion."""
         wrench = self.forces[:, 6:]
         return np.asarray(self.compliance / np.einsum("ni,nij,nj->n", wrench, self._flexibility, wrench))
 
     def _parallel(self, term: Term, shape: FloatArray, size: float) -> tuple[FloatArray, FloatArray]:
-        """(n,) m/N per unit of size that a term of `PARALLEL` adds at a size, and by which it grows there.
+        """(n,) m/N per unit of size that a term of `PARALLEL` adds at a size, and its slope there.
 
         Springs K of the motions B x of a twist x stand parallel to what bears the load: C + dC = (C^-1 + B^T K B)^-1.
         """
@@ -258,7 +258,7 @@ class Ground:
         return np.asarray(change * self._seen / size), np.asarray(slope * self._seen / size)
 
     def _at_size(self, term: Term, tangents: FloatArray, shapes: FloatArray) -> FloatArray:
-        """(s, n) of a term of `PARALLEL`, at its size or, where it has none, at one as it is usually found."""
+        """(s, n) secant columns of a term of `PARALLEL`, at its size or, if it has none yet, at a usual one."""
         rows = []
         for tangent, shape in zip(tangents, shapes, strict=True):
             size = term.size or TURNED / max(float(np.sqrt(np.mean((tangent / self.compliance) ** 2))), 1e-12)
@@ -266,17 +266,17 @@ class Ground:
         return np.array(rows).reshape(tangents.shape)
 
     def slope(self, term: Term) -> FloatArray:
-        """(n,) m/N by which what a term adds grows with its size; its `column` unless it is not linear in it."""
+        """(n,) derivative of a term's contribution in m/N by its size; equal to its `column` if linear in size."""
         if not term.size or term.action not in PARALLEL:
             return self.column(term)
         return self._parallel(term, self.shape(term), term.size)[1]
 
     def shape(self, term: Term) -> FloatArray:
-        """(n,) or (n, 6) of what a term depends on."""
+        """(n,) or (n, 6) shape of a term at the readings."""
         return shaped(term, self.values)
 
     def shapes(self, variable: str, column: str, signed: bool, where: int | None) -> Shapes:
-        """All shapes of a variable over these readings, worked out once; of strut `where` where each has its own."""
+        """All shapes of a variable over these readings, computed once; of strut `where` if each has its own."""
         values = self.values(variable, column)
         strut = where if values.ndim == 2 else None
         key = (variable, column, signed, strut)
@@ -289,14 +289,14 @@ class Ground:
         return self._shapes[key]
 
     def columns(self, term: Term, share: FloatArray, shapes: FloatArray) -> FloatArray:
-        """(s, n) m/N per unit of size of a term's link, for shapes (s, n) or (s, n, 6); its `share` (n,) or (n, 6)."""
+        """(s, n) m/N per unit of size of a term's link, for shapes (s, n) or (s, n, 6) and `share` (n,) or (n, 6)."""
         if share.ndim == 1:
             columns = share * shapes
         elif shapes.ndim == 3:
             columns = np.einsum("ni,sni->sn", share, shapes)
         else:
             columns = (share.sum(axis=1) if term.where is None else share[:, term.where - 1]) * shapes
-        # Springs that are looked for are small beside the struts: their tangent will do.
+        # Springs searched for are small beside the struts: the tangent will do.
         straight = term.action not in PARALLEL or (term.action == "spring" and not term.size)
         return np.asarray(columns) if straight else self._at_size(term, columns, shapes)
 
@@ -306,7 +306,7 @@ class Ground:
 
 
 def _plain(term: Term) -> Term:
-    """The term's link as it gives way where the shape is 1, which of its kind it is."""
+    """The term's link with shape 1, as a key; a coupling keeps its pair, a joint offset its end."""
     column = term.column if term.action == "joint offset" else ""
     pair = tuple((name, value) for name, value in term.at if name in PAIR)
     return replace(term, variable="constant", shape="offset", at=pair, column=column)

@@ -1,4 +1,4 @@
-"""The dictionary: for every link of the load path its own compliance, times each shape of what it can depend on.
+"""The dictionary: for each link of the load path its compliance, times each shape of each variable it may depend on.
 
 Drawn up from the mechanics of a machine, not from any simulator: which forces a link carries says where its compliance
 shows, and a link depends on what it feels. A table feels where the work stands on it; a strut its length, its force and
@@ -24,14 +24,14 @@ from toolpath_stiff.stiffness.terms import PARALLEL, PINS, PLACE, SWINGS, Action
 WHOLE = ("constant", "load", "time", "order", "temperature", "setup")
 ONCE = ("constant", "direction")  # variables whose every place stands in the dictionary as it is
 ALL_STRUTS, ALL_VERTICES = (None, 1, 2, 3, 4, 5, 6), (None, 1, 2, 3)
-ALONE = ("coupling", "joint offset")  # actions that depend on nothing
-SIDE = 0.2  # prior weight of what a link could do by a way round: a frame does not feel where the tip is
-NOTHING = 1e-4  # rms change of stiffness by the largest size below which a term does nothing to these readings
+ALONE = ("coupling", "joint offset")  # actions that depend on no variable
+SIDE = 0.2  # prior weight of an indirect dependence: a frame does not feel where the tip is
+NOTHING = 1e-4  # rms change of stiffness at the largest size below which a term is negligible here
 
 
 @dataclass(frozen=True)
 class Local:
-    """A link as it gives way locally, with what it may depend on.
+    """A link with its local way of giving, and the variables it may depend on.
 
     `side`: variables on which it depends by a way round only; `crossed`: further variables, tried where another place
     has shown them.
@@ -49,17 +49,17 @@ class Local:
 
     @property
     def single(self) -> bool:
-        """Whether it is one of several places or channels: a joint, a vertex, the readings along one axis."""
+        """True if it is one of several places or channels: a joint, a vertex, the readings along one axis."""
         return self.where is not None or (self.link == "instrument" and self.direction != "reading")
 
     def term(self, variable: str, shape: str, constants: Constants, column: str = "") -> Term:
-        """With a variable and a shape."""
+        """A term of this link with a variable and a shape."""
         column, constants = column or self.column, (*self.constants, *constants)
         return Term(self.link, self.direction, variable, shape, self.action, self.where, constants, column)
 
 
 def locals_of(extra: Iterable[str]) -> list[Local]:
-    """Every link with its places and directions; `extra`: names of further columns, which instruments may feel."""
+    """Every link with its places and directions; `extra`: names of further columns, on which instruments may depend."""
     whole = (*WHOLE, *extra)
     base, turning = ("X", "Y", "Z", "horizontal", "all"), ("X", "Y", "all", "tangential")
     return [
@@ -90,7 +90,7 @@ def locals_of(extra: Iterable[str]) -> list[Local]:
 
 
 def _of_head(link: str, whole: tuple[str, ...]) -> list[Local]:
-    """Tool or platform: gives across and along its axis, and tips about the middle of the joints."""
+    """Tool or platform: gives across and along its axis, and tilts about the middle of the joints."""
     return [
         *(Local(link, "give", direction, None, (*whole, "tilt")) for direction in ("radial", "axial", "X", "Y", "all")),
         *(Local(link, "tilting", direction, None, ("constant", "load", "tilt")) for direction in ("radial", "X", "Y")),
@@ -98,7 +98,7 @@ def _of_head(link: str, whole: tuple[str, ...]) -> list[Local]:
 
 
 def _of_vertices(link: str, directions: Iterable[str], variables: tuple[str, ...]) -> Iterator[Local]:
-    """The vertices of frame or platform, all together or one alone."""
+    """Vertices of frame or platform, all together or one alone."""
     for direction, where in product(directions, ALL_VERTICES):
         if where is None:
             yield Local(link, "vertex", direction, where, variables)
@@ -107,7 +107,7 @@ def _of_vertices(link: str, directions: Iterable[str], variables: tuple[str, ...
 
 
 def _of_joints(whole: tuple[str, ...]) -> Iterator[Local]:
-    """Joints: they give along their strut or along a pin of their cross, resist turning, or stand off their place."""
+    """Joints: give along their strut or along a pin of their cross, resist turning, or are displaced."""
     forces = ("strut force", "force sign")
     for where in ALL_STRUTS:
         variables = ("constant", "load", "temperature", *forces) if where else (*whole, *forces, "tilt")
@@ -121,7 +121,7 @@ def _of_joints(whole: tuple[str, ...]) -> Iterator[Local]:
 
 
 def _of_struts(whole: tuple[str, ...]) -> list[Local]:
-    """Struts: their own share of the strut law, all together or one alone, and what couples two of them."""
+    """Struts: their share of the strut law, all together or one alone, and couplings of two."""
     variables, along = (*whole[1:], "strut length", "strut force", "force sign", *PLACE), "along the struts"
     pairs = [(("first", float(first)), ("second", float(second))) for first, second in combinations(range(1, 7), 2)]
     return [
@@ -133,7 +133,7 @@ def _of_struts(whole: tuple[str, ...]) -> list[Local]:
 
 @dataclass(frozen=True)
 class Dictionary:
-    """N terms with what they do to n readings.
+    """N terms with their effect on n readings.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class Dictionary:
 
 
 def dictionary_of(ground: Ground) -> Dictionary:
-    """Every term that does something to these readings."""
+    """Every term that has an effect on these readings."""
     terms, logs, blocks = list[Term](), list[float](), list[FloatArray | Callable[[], FloatArray]]()
     for local, priors in place_priors(ground):
         plain = local.term("constant", "offset", ())
@@ -172,9 +172,9 @@ def dictionary_of(ground: Ground) -> Dictionary:
                 relative = _relative(ground, plain, variable, column, slice(None))
                 scale = np.sqrt((relative**2).mean(axis=1))
                 limit = max(map(abs, plain.bounds)) * plain.si
-                # A term that changes every reading alike is the strut law's affair.
+                # A term that changes every reading alike belongs to the strut law.
                 kept = np.flatnonzero((scale * limit > NOTHING) & (relative.std(axis=1) > 1e-6 * scale))
-                held = len(ground.data) <= MOST_HELD or plain.action in PARALLEL  # dear ones are kept
+                held = len(ground.data) <= MOST_HELD or plain.action in PARALLEL  # expensive columns are kept
                 blocks.append(relative[kept] if held else partial(_relative, ground, plain, variable, column, kept))
                 kinds = Counter(shape for shape, _ in named)
                 log = priors[variable] - float(np.log(len(kinds) * len(names)))
@@ -185,13 +185,13 @@ def dictionary_of(ground: Ground) -> Dictionary:
 
 
 def _relative(ground: Ground, plain: Term, variable: str, column: str, kept: IntArray | slice) -> FloatArray:
-    """(m, n) change of compliance over the compliance, of the shapes that are kept."""
+    """(m, n) change of compliance relative to the compliance, for the shapes kept."""
     shapes = ground.shapes(variable, column, plain.signed, plain.where)[1]
     return ground.columns(plain, ground.share(plain), shapes)[kept] / ground.compliance
 
 
 def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]:
-    """What a variable comes in: set-ups by name, a tilt, its two leans and swings, else once; none where unknown."""
+    """Variants of a variable: set-ups by name; of a tilt its size, leans and swings; otherwise one. None if unknown."""
     if not ground.known(variable):
         return []
     if variable == "setup":
@@ -201,7 +201,7 @@ def columns_of(variable: str, ground: Ground, joints: bool = False) -> list[str]
 
 
 def place_priors(ground: Ground) -> list[tuple[Local, dict[str, float]]]:
-    """Every link with its places and directions, and for each variable its log prior weight, all shapes together.
+    """Every link with its places and directions, and for each variable the log prior weight of all its shapes together.
 
     Even over links, over the variables of each that the readings tell, over places and directions. A link with single
     places (a joint, a vertex) has half for one of them and half for all of them together.
@@ -220,7 +220,7 @@ def place_priors(ground: Ground) -> list[tuple[Local, dict[str, float]]]:
 
 
 def crossed(term: Term, ground: Ground) -> dict[Term, float]:
-    """The same variable and shape, constants included, at every other link, place and direction that may feel it.
+    """Terms with the same variable, shape and constants at every other link, place and direction that may feel it.
 
     With the log prior weight of each.
     """
@@ -236,7 +236,7 @@ def crossed(term: Term, ground: Ground) -> dict[Term, float]:
 
 
 def _translated(term: Term, signed: bool, ground: Ground) -> list[tuple[str, Constants]]:
-    """A shape for links that give only, or whose stiffness may change to both sides, as it says the same there."""
+    """Equivalent shapes for a link that can only give, or for one whose stiffness may change to both sides."""
     constants = term.constants
     if term.signed == signed or "power" in constants:
         return [(term.shape, term.at)]
@@ -246,9 +246,9 @@ def _translated(term: Term, signed: bool, ground: Ground) -> list[tuple[str, Con
         return [("slope", (("start", constants["from"]), ("end", constants["end"])))]
     values = ground.values(term.variable, term.column)
     low, high = float(values.min()), float(values.max())
-    if term.shape == "slope":  # a straight line to both sides: up or down over the range
+    if term.shape == "slope":  # a straight line of either sign: rising or falling over the range
         return [("slope", (("start", start), ("end", end))) for start, end in ((low, high), (high, low))]
-    if "side" in constants and not signed:  # more on one side is less on the other
+    if "side" in constants and not signed:  # an increase on one side is a decrease on the other
         return [
             (term.shape, tuple((name, side if name == "side" else value) for name, value in term.at))
             for side in (1.0, -1.0)

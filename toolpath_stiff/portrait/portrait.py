@@ -1,4 +1,4 @@
-"""A portrait of what is missing: which link of the load path, along what, with what it varies, how large.
+"""A portrait of what is missing: link of the load path, direction, variable it depends on, size.
 
 Where no effect of the catalogue explains the readings, or where the best explanation leaves something, one to three
 terms of a dictionary of machine mechanics (`dictionary`, `terms`) are chosen (`selection`) and put in words (`words`).
@@ -30,7 +30,7 @@ MOST_READINGS = 1000  # of more no portrait is drawn: every term of the dictiona
 
 @dataclass(frozen=True)
 class Sized:
-    """A term with its size (SI), its 95 % interval, the rms change of stiffness that it makes, and its probability."""
+    """A term with its size (SI), 95 % interval, rms change of stiffness, and probability."""
 
     term: Term
     interval: tuple[float, float]
@@ -45,7 +45,7 @@ LACKING = 1.3
 
 @dataclass(frozen=True)
 class Portrait:
-    """What the readings say of what is missing.
+    """Description of what is missing, as far as the readings tell.
 
     Attributes
     ----------
@@ -84,12 +84,12 @@ class Portrait:
 
     @property
     def lacking(self) -> bool:
-        """True where the terms stand for something that the dictionary lacks: they leave more than noise does."""
+        """True if the terms only stand in for something that the dictionary lacks: they leave more than noise."""
         return bool(self.terms and self.held_out_rms > LACKING * self.noise_floor)
 
 
 def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portrait:
-    """Describe what a fit leaves.
+    """Describe what a fit leaves unexplained.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def draw_portrait(problem: Problem, base: Fit, noise: Noise, seed: int) -> Portr
     """
     if len(base.residual) > MOST_READINGS:
         return Portrait(look_elsewhere=np.nan, before=base.residual, after=base.residual)
-    # The links taken for rigid are what is to be described: they may give freely, and are no scatter here.
+    # Links taken for rigid may be what is missing: they are described here, not counted as scatter.
     noise = replace(noise, rest=0.0)
     problem = Problem.of(problem.predictor, noise)
     kept = fit_effects(problem, base.candidates, base.sizes, (), base.law) if base.candidates else problem.score_base()
@@ -143,7 +143,7 @@ def _sized(ground: Ground, description: Description, k: int, probability: float 
 
 
 def _alike(selection: Selection, description: Description, leads: Sequence[Leading]) -> tuple[Sized, ...]:
-    """Other terms in the place of the leading one, the best of each link, place, direction and variable."""
+    """Other terms in place of the leading one, the best of each link, place, direction and variable."""
     others = selection.scattered(selection.without(description, 0), description)
     seen = {_kind(description.terms[0])}
     alike: list[Sized] = []
@@ -164,7 +164,7 @@ def _kind(term: Term) -> tuple[object, ...]:
 
 
 def _explained(selection: Selection, start: Description, description: Description) -> float:
-    """Under the scatter of the description, so that wild readings count alike."""
+    """Share of the misfit that the terms take, under the description's scatter, so that wild readings count alike."""
     precision, free = description.fit.scatter.precision, len(selection.compliance) - 2
     fixed = selection.described((), start.fit.law, description.fit.scatter)
     before, after = (float(precision.squares(fitted.fit.residual)) for fitted in (fixed, description))
@@ -172,7 +172,7 @@ def _explained(selection: Selection, start: Description, description: Descriptio
 
 
 def noise_floor(selection: Selection, description: Description) -> float:
-    """Rms at left-out points that noise alone leaves: simulated campaigns through the same fit."""
+    """Rms at left-out points from noise alone: simulated campaigns through the same fit."""
     draws = simulate(selection.noise, selection.problem.scatter.covariance, selection.seed, FLOOR_DRAWS)
     jacobian, precision = description.fit.jacobian, description.fit.scatter.precision
     weighted = precision.times(jacobian.T)

@@ -1,4 +1,4 @@
-"""Fits of terms of the dictionary beside a base fit, and the search for the best further one.
+"""Fits of terms of the dictionary beside a base fit, and the search for the best further term.
 
 Every term's gain is first its score beside what is fitted already (Rao's score test, sizes on their allowed side); the
 best are fitted with the compliances added up, c = c_struts(law) + rest + sum size c_j, exact for whatever gives way in
@@ -25,17 +25,17 @@ from toolpath_stiff.stiffness.terms import PARALLEL, Term
 
 DRAWS = 200  # simulated campaigns
 JOINS = 0.02  # probability by chance below which a further term is taken for something
-TIE = 0.5  # of log likelihood: so near, the place with the larger prior is taken
+TIE = 0.5  # of log likelihood: within it, the place with the larger prior is taken
 FINALISTS = 40  # terms that are fitted in full: the best of all; and the best of every link and variable
 STEPS, SETTLED = 5, 0.02  # Gauss-Newton; standard deviations
-AT_SIZE = 3  # fits of what is not linear in its size, each at the size of the last
+AT_SIZE = 3  # fits of a term not linear in its size, each linearised at the size of the last
 FINER = (1.0, 0.4)  # shares of a grid's spacing, for constants about those of a term
 ROUNDS = 2  # searches for wild readings
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Fits of G sets of p terms each beside the law.
+    """Fits of G sets of p terms each, beside the strut law.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Description:
 
 
 class Selection:
-    """The search on one set of readings, beside a base fit.
+    """Search on one set of readings, beside a base fit.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Selection:
         self.dictionary = dictionary_of(self.ground)
 
     def beside(self, base: Fit) -> Self:
-        """The same dictionary beside another fit to the same readings; before anything is searched."""
+        """The same dictionary beside another fit to the same readings; to be called before any search."""
         other = copy(self)
         compliance = np.exp(base.residual - self.problem.observed)
         other.base, other.rest = base, compliance - self.problem.predictor.strut_part(base.law)
@@ -108,7 +108,7 @@ class Selection:
 
     @property
     def start(self) -> Description:
-        """Nothing but the base fit."""
+        """Description without terms: the base fit alone."""
         return self.described((), self.base.law, self.base.scatter)
 
     def fitted(
@@ -146,12 +146,12 @@ class Selection:
         return self.problem.observed + np.log(compliance), jacobian
 
     def limits(self, terms: Sequence[Term], scale: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(p,) each, of scaled sizes."""
+        """Lower and upper limits (p,) of scaled sizes."""
         bounds = np.array([[bound * term.si for bound in term.bounds] for term in terms]).reshape(-1, 2)
         return bounds[:, 0] * scale, bounds[:, 1] * scale
 
     def described(self, terms: Sequence[Term], law: FloatArray, scatter: Scatter) -> Description:
-        """Terms fitted together, with the readings that this fit takes for wild."""
+        """Terms fitted together, with the readings that this fit takes to be wild."""
         columns, scale = self._scaled(terms)
         low, high = self.limits(terms, scale)
         for _ in range(ROUNDS):
@@ -174,11 +174,11 @@ class Selection:
         return Description(sized, columns, scale, fit, float(sizes.posterior[0]) + scatter.log_price)
 
     def refitted(self, before: Description, terms: Sequence[Term]) -> Description:
-        """A description with these terms, from where another one is."""
+        """Description with other terms, fitted from where another description stands."""
         return self.described(terms, before.fit.law, before.fit.scatter)
 
     def without(self, before: Description, k: int) -> Description:
-        """A description less one of its terms, refitted."""
+        """Description less one of its terms, refitted."""
         return self.refitted(before, before.terms[:k] + before.terms[k + 1 :])
 
     def scores(self, before: Description) -> FloatArray:
@@ -186,7 +186,7 @@ class Selection:
         return np.asarray(self._gains(before.fit.residual[None], before)[0])
 
     def chance(self, before: Description, gain: float) -> tuple[float, float]:
-        """How often the best of all terms gains as much by chance; the gain that it rarely reaches."""
+        """Probability that the best of all terms gains as much by chance; gain that chance rarely reaches."""
         draws = simulate(self.noise, self.problem.scatter.covariance, self.seed, DRAWS)
         best = self._gains(draws, before).max(axis=-1)
         return float((1.0 + (best >= gain).sum()) / (1.0 + len(best))), float(np.quantile(best, 1.0 - JOINS))
@@ -197,7 +197,7 @@ class Selection:
         return np.concatenate([self.base.scatter.precision.squares(block) for block in self.dictionary.columns()])
 
     def _gains(self, residuals: FloatArray, before: Description) -> FloatArray:
-        """(s, N) twice the gain in log likelihood for residuals (s, n), where the size goes to an allowed side.
+        """(s, N) twice the gain in log likelihood for residuals (s, n), 0 if the size would go to a side not allowed.
 
         Beside a description each term has the information A - A J (J^T A J + prior)^-1 J^T A leaves of it.
         """
@@ -224,11 +224,11 @@ class Selection:
         return chosen
 
     def together(self, before: Description, terms: Sequence[Term]) -> Sizes:
-        """Each of some terms refitted along with a description."""
+        """Fits of each of some terms together with a description."""
         columns, scale = self._scaled(terms)
 
         def beside(shared: FloatArray, each: FloatArray) -> FloatArray:
-            """(G, p + 1, ..) of what all share (p, ..) and of each term (G, ..)."""
+            """(G, p + 1, ..): the shared part (p, ..) repeated for each term, followed by the term's own (G, ..)."""
             return np.concatenate([np.repeat(shared[None], len(terms), axis=0), each[:, None]], axis=1)
 
         limits = zip(self.limits(before.terms, before.scale), self.limits(terms, scale), strict=True)
@@ -236,13 +236,13 @@ class Selection:
         return self.fitted(beside(before.columns, columns), low, high, before.fit.law, before.fit.scatter.precision)
 
     def grown(self, before: Description) -> Description | None:
-        """A description with the best further term, its constants settled; None where none has a size."""
+        """Description with the best further term, its constants refined; None if no term helps."""
         terms = list(self.finalists(before))
         if not terms:
             return None
         best = terms[int(np.argmax(self.together(before, terms).posterior))]
         grown = self.settled(before, self.extended(before, best))
-        # The same variable and shape where they fit best.
+        # Move the same variable and shape to the place where they fit best.
         places = crossed(grown.terms[-1], self.ground)
         if len(places) < 2:
             return grown
@@ -254,25 +254,25 @@ class Selection:
         return better if better.posterior > grown.posterior - TIE else grown
 
     def scattered(self, before: Description, grown: Description) -> Description:
-        """A description under the scatter of another one."""
+        """Description under the scatter of another one."""
         return replace(before, fit=replace(before.fit, scatter=grown.fit.scatter))
 
     def extended(self, before: Description, term: Term) -> Description:
-        """A description with a term more, all refitted."""
+        """Description with one more term, all refitted."""
         grown = self.refitted(before, (*before.terms, term))
         for _ in range(AT_SIZE if any(sized.action in PARALLEL for sized in grown.terms) else 0):
             grown = self.refitted(grown, grown.terms)
         return grown
 
     def _scaled(self, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray]:
-        """(p, n) change of compliance over the base model's for an rms change of 1, (p,) that of an SI unit of size."""
+        """(p, n) relative change of compliance, scaled to an rms of 1, and (p,) rms change for an SI unit of size."""
         columns = np.array([self.ground.column(term) for term in terms]).reshape(-1, len(self.compliance))
         columns = columns / self.compliance
         scale = np.maximum(np.sqrt((columns**2).mean(axis=1)), 1e-300)
         return columns / scale[:, None], scale
 
     def settled(self, before: Description, grown: Description) -> Description:
-        """With finer constants of the last term's shape."""
+        """Description with finer constants for the shape of its last term."""
         for finer in FINER:
             near = shapes_near(grown.terms[-1], self.ground, finer)
             if not near:
@@ -286,7 +286,7 @@ class Selection:
 def _bounded_step(
     information: FloatArray, gradient: FloatArray, size: FloatArray, low: FloatArray, high: FloatArray
 ) -> FloatArray:
-    """(G, 2 + p) Newton steps; sizes that would leave their bounds are held there and the others solved again."""
+    """(G, 2 + p) Newton steps; sizes that would leave their bounds are held there and the rest solved again."""
     scale = np.sqrt(np.maximum(np.einsum("gii->gi", information), 1e-300))
     matrix = information / (scale[:, :, None] * scale[:, None, :]) + 1e-10 * np.eye(scale.shape[1])
     right = gradient / scale

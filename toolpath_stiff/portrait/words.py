@@ -1,4 +1,4 @@
-"""A portrait in an engineer's words, and as parts of diagnose.json in shop units."""
+"""A portrait in an engineer's words, and as entries of diagnose.json in shop units."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,7 +11,7 @@ from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.stiffness.terms import PINS, SWINGS, Term
 from toolpath_stiff.units import RAD_PER_DEG
 
-# Variable -> how it is said, SI value of the unit shown, that unit.
+# Variable -> its name in a sentence, SI value of the unit shown, that unit.
 SAID: dict[str, tuple[str, float, str]] = {
     "x": ("x", 1e-3, "mm"),
     "y": ("y", 1e-3, "mm"),
@@ -52,7 +52,7 @@ CAUSES = {
     "tilting": "the {link} {tips} under the load's moment",
     "give": "the {link} gives way {way}",
 }
-# Constant of a shape that is not in those after it, or "signed" of a straight line to both sides -> how it varies.
+# A constant that marks the shape (the first match counts), or "signed" for a straight line of either sign -> wording.
 COURSES = {
     "power": "{power}, the size given at {reference})",
     "signed": " in a straight line with {name}, nothing at {from} and in full at {end}",
@@ -68,12 +68,12 @@ MOST_SAID = 3  # terms in a sentence on what else would look the same; a documen
 
 
 def term_words(term: Term) -> str:
-    """What gives way and what it varies with: a clause, without its size."""
+    """Clause on what gives way and what it varies with, without its size."""
     return f"{_cause(term)}{_with(term)}"
 
 
 def _cause(term: Term) -> str:
-    """Link, place and direction."""
+    """Words on link, place and direction."""
     single, link, direction, more = term.where is not None, term.link, term.direction, term.size >= 0.0
     strut, joint, give = (f"strut {term.where}", "joint", "gives") if single else ("the struts", "joints", "give")
     ways = {**GIVES, **OF_HEAD} if link in ("tool", "platform") and term.action != "spring" else GIVES
@@ -98,7 +98,7 @@ def _cause(term: Term) -> str:
 
 
 def _with(term: Term) -> str:
-    """What it varies with and how, after its cause."""
+    """Words on the variable and the shape, to follow the cause."""
     if term.variable in ("constant", "direction"):
         return ""
     if term.variable == "setup":
@@ -122,7 +122,7 @@ def _with(term: Term) -> str:
 
 
 def size_words(sized: Sized) -> str:
-    """Size with its interval and the change that it makes: "9.1 nm/N (8 to 10), 6 % of stiffness in the mean"."""
+    """Size with its interval and the change it makes: "9.1 nm/N (8 to 10), 6 % of stiffness in the mean"."""
     si = sized.term.si
     low, high = (f"{float(f'{end / si:.3g}'):g}" for end in sized.interval)
     return (
@@ -132,7 +132,7 @@ def size_words(sized: Sized) -> str:
 
 
 def portrait_text(portrait: Portrait) -> str:
-    """One paragraph: what is missing as far as the data support it, and what else would look the same."""
+    """Paragraph on what is missing, as far as the data support it, and on what else would look the same."""
     if not portrait.terms and np.isnan(portrait.look_elsewhere):
         return f"No description: it is made of {MOST_READINGS} readings at most."
     if not portrait.terms:
@@ -169,14 +169,14 @@ def _named(names: Sequence[tuple[str, float]]) -> str:
 
 
 def alike_text(name: str, alike: Alike) -> str:
-    """What else would look the same as a named effect."""
+    """Sentence on what else would look the same as a named effect."""
     terms = "; or if ".join(term_words(term) for term, _ in alike.terms[:MOST_SAID])
     links = joined([link for link, _ in alike.links]).replace(" and ", " or ")
     return f"These readings fit as well, without {name}, if {terms}. By link: {links}."
 
 
 def variable_label(term: Term) -> tuple[str, float]:
-    """Of an axis: what a term varies with and its unit, and the SI value of that unit."""
+    """Axis label, a term's variable with its unit, and the SI value of that unit."""
     name, si, unit = SAID.get(term.variable, (term.variable, 1.0, ""))
     return (f"{name}, {unit}" if unit else name), si
 
@@ -185,7 +185,7 @@ SHARES = ("explained", "error", "held_out_rms", "noise_floor")  # of a portrait
 
 
 def portrait_entry(portrait: Portrait) -> Document:
-    """A portrait as diagnose.json has it."""
+    """A portrait as an entry of diagnose.json."""
     return {
         "text": portrait_text(portrait),
         "links": _shares("link", portrait.links),
@@ -201,7 +201,7 @@ def portrait_entry(portrait: Portrait) -> Document:
 
 
 def alike_entry(alike: Mapping[str, Alike]) -> Document | None:
-    """What else would look the same as the named effects, as diagnose.json has it; None where nothing would."""
+    """Alternatives to the named effects as an entry of diagnose.json; None if there are none."""
     if not alike:
         return None
     each = alike.values()
@@ -218,12 +218,12 @@ def alike_entry(alike: Mapping[str, Alike]) -> Document | None:
 
 
 def _shares(key: str, shares: Sequence[tuple[str, float]]) -> list[Document]:
-    """Names with their probabilities."""
+    """Names with their probabilities, as entries of a document."""
     return [{key: name, "probability": json_number(share, 3)} for name, share in shares]
 
 
 def _sized(sized: Sized) -> Document:
-    """A term with its interval, and the change of stiffness that it makes."""
+    """A term with its interval and the change of stiffness that it makes, as an entry of a document."""
     return {
         **_term(sized.term),
         "interval": [json_number(end / sized.term.si) for end in sized.interval],
@@ -233,7 +233,7 @@ def _sized(sized: Sized) -> Document:
 
 
 def _term(term: Term) -> Document:
-    """A term of the dictionary with its size; `where` is a strut or a vertex."""
+    """A term of the dictionary with its size, as an entry of a document; `where` is a strut or a vertex."""
     return {
         "link": term.link,
         "where": term.where,

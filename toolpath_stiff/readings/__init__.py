@@ -1,1 +1,1 @@
-"""Measured stiffnesses: tables and raw records to readings in columns, struts over time."""
+"""Measured stiffnesses: tables and raw records as readings in columns, struts over time."""

@@ -1,4 +1,4 @@
-"""Dates of readings in ISO 8601, as days since 1970, and back. Other forms are said by a mapping of columns."""
+"""Dates of readings in ISO 8601, as days since 1970, and back. Other forms are declared by a mapping of columns."""
 
 import math
 import re
@@ -16,9 +16,9 @@ OTHERWISE = 'say how dates are written: --columns "date=date:DD.MM.YYYY" (column
 DATE_TIME = re.compile(r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d{1,6})?)?(?:Z|[+-]\d{2}:\d{2})?)?")
 
 
-@lru_cache(maxsize=1024)  # asked of every record
+@lru_cache(maxsize=1024)  # called for every record
 def day_of(text: str) -> float:
-    """Days since 1970-01-01, nan of an empty cell; a time with a zone in UTC, one without as it stands.
+    """Days since 1970-01-01, nan for an empty cell; a time with a zone is converted to UTC, one without is kept.
 
     Raises
     ------
@@ -44,5 +44,5 @@ def day_of(text: str) -> float:
 
 
 def date_text(day: float) -> str:
-    """The calendar date of a count of days, as day_of counts them."""
+    """Calendar date of a number of days as counted by `day_of`."""
     return (EPOCH + timedelta(days=math.floor(day))).date().isoformat()

@@ -1,9 +1,12 @@
-"""Records of a dynamometer in slots: mean force over whole turns, without drift, and what comes back turn by turn.
+"""Dynamometer records of slots: mean force over whole turns, without drift, and harmonics of the turn.
 
-A turn cuts where the force swings by half as much as in the strongest turns, and is air where it swings hardly more
-than in the quietest; over a radius of feed after entry and before exit the slot is not full. The zero is a straight
-line through the air before and after. The speed of the spindle is taken from the record itself, where its teeth are
-heard.
+A file with neither a time nor a rate of sampling holds mean forces, a row per slot.
+
+A turn cuts where its mean force is half of the strongest turns' or more, and is air where the force swings hardly more
+than in the quietest. (Not where it swings: many teeth in a full slot make it swing less than its entry does.) Over a
+radius of feed after entry and before exit the slot is not full, unless the second turn already pushes as the others.
+The zero is a straight line through the air before and after. The speed of the spindle is taken from the record itself,
+where its teeth are heard.
 """
 
 from collections.abc import Iterator
@@ -25,20 +28,24 @@ ComplexArray = NDArray[np.complex128]
 RATE = "sample_rate_Hz"  # instead of time_s
 COLUMNS = Columns(numbers=("time_s", RATE, *FORCES, *FEEDS, "spindle_rpm", "depth_mm"), texts=("record",))
 LAYOUT = (
-    "time_s or sample_rate_Hz, fx_N, fy_N, fz_N, feed_per_tooth_mm or feed_mm_per_min, spindle_rpm, depth_mm; record, "
-    "if several"
+    "time_s or sample_rate_Hz (neither: mean forces, a row a slot), fx_N, fy_N, fz_N, feed_per_tooth_mm or "
+    "feed_mm_per_min, spindle_rpm, depth_mm; record, if several"
 )
-CUTS, AIR = 0.5, 1.5  # swing of turns that cut, of the strongest ones'; of turns in air, of the quietest ones'
+MEAN = "a mean force, taken as that of whole turns of the full slot, less what the dynamometer reads in air"
+MOST_MEANS = 100  # rows of a file without a time: more are moments of a record
+CUTS, AIR = 0.5, 1.5  # mean force of turns that cut, of the strongest's; swing of turns in air, of the quietest's
+SLIGHT = 0.2  # of the swing: means no further apart are of one kind; that of one tooth in a slot is over a quarter
+STEADY = 0.05  # of the mean force, within which a turn is as the usual one
 STRONG = 90.0  # per cent of the turns that are weaker than the strongest, and stronger than the quietest
 LEAST_TURNS = 5  # of the full slot
-SPEED_RANGE = 0.03  # by which the spindle may turn faster or slower than is said
-FINER = 8  # times finer than the spectrum of the record its speed is looked for
+SPEED_RANGE = 0.03  # relative range of spindle speed about the stated one
+FINER = 8  # refinement of the search for the speed over the record's spectrum
 
 
 def read_records(
     file: str, columns: Mapped, flutes: int
 ) -> Iterator[tuple[str, tuple[float, float, float], FloatArray, tuple[str, ...]]]:
-    """Name, settings (feed m per tooth, depth m, turns a second), rows (m, 4) s and N of each record; the remarks.
+    """Name, settings (feed m per tooth, depth m, turns a second) and rows (m, 4) s and N of each record; remarks.
 
     Raises
     ------
@@ -48,8 +55,11 @@ def read_records(
     table = mapped_table(file, "records of forces", COLUMNS, columns)
     feed = next((name for name in FEEDS if name in table.heading), FEEDS[0])
     clock = RATE if RATE in table.heading else "time_s"
-    check_needed(table, (clock, "fy_N", "spindle_rpm", "depth_mm", feed), LAYOUT)
-    names = np.array([table.record(row).get("record", "") for _, row in table.rows])
+    means = clock not in table.heading and len(table.rows) <= MOST_MEANS
+    needed = ["fy_N", "depth_mm", feed, *(["spindle_rpm"] if not means or feed == FEEDS[1] else [])]
+    check_needed(table, needed if means else [clock, *needed], LAYOUT)
+    each = " line {}" if means else ""
+    names = np.array([table.record(row).get("record", "") + each.format(line) for line, row in table.rows])
     lines = np.array([line for line, _ in table.rows])
     numbers = number_columns(table, (clock, *FORCES, "spindle_rpm", "depth_mm", feed))
     signal, (rate, depth, fed) = numbers[:, :4], numbers[:, 4:].T
@@ -57,28 +67,27 @@ def read_records(
         signal[:, 0] = np.arange(len(signal)) / signal[:, 0]
     for name in dict.fromkeys(names.tolist()):
         rows = np.flatnonzero(names == name)
+        wrong = {"time_s": (np.diff(signal[rows, 0], prepend=-np.inf) <= 0.0, "later than the row before")}
         for setting, column in (("spindle_rpm", rate), ("depth_mm", depth), (feed, fed)):
             odd = (column[rows] != column[rows[0]]) | (column[rows] <= 0.0)
-            if odd.any():
+            wrong[setting] = odd, f"above 0 and the same in all rows of a record, {column[rows[0]]:g}"
+        for setting, (odd, expected) in wrong.items():
+            if setting in (*needed, "time_s") and odd.any():
                 row = int(rows[np.argmax(odd)])
-                mistake, line = f"{setting} = {column[row]:g}", int(lines[row])
-                expected = f"above 0 and the same in all rows of a record, {column[rows[0]]:g}"
-                raise MeasurementError(mistake, expected=expected, file=file, line=line)
-        back = np.diff(signal[rows, 0]) <= 0.0
-        if back.any():
-            line = int(lines[rows[1 + np.argmax(back)]])
-            expected = "a row for each moment of a record"
-            raise MeasurementError("time_s does not rise", expected=expected, file=file, line=line)
+                mistake = f"{setting} = {table.record(table.rows[row][1]).get(setting, '')}"
+                raise MeasurementError(mistake, expected=expected, file=file, line=int(lines[row]))
         turns_a_second = float(rate[rows[0]]) / s_from_min(1.0)
         per_tooth = float(fed[rows[0]]) / (s_from_min(1.0) * turns_a_second * flutes if feed == FEEDS[1] else 1.0)
         settings = (m_from_mm(per_tooth), m_from_mm(float(depth[rows[0]])), turns_a_second)
-        yield f"{file} {name}".strip(), settings, signal[rows], table.remarks
+        yield f"{file} {name.strip()}".strip(), settings, signal[rows], table.remarks
 
 
 def mean_force(
     name: str, signal: FloatArray, rate: float, cutter: Cutter, feed: float, side: int
 ) -> tuple[FloatArray, ComplexArray, list[str]]:
-    """(3,) N, mean force over the whole turns of the full slot; (2,) N, its `harmonics` to the side; and remarks.
+    """(3,) N, mean force over the whole turns of the full slot; (2,) N, its `harmonics` sideways; remarks.
+
+    Of a record that is a mean itself there are no harmonics: nan.
 
     Parameters
     ----------
@@ -98,6 +107,8 @@ def mean_force(
     MeasurementError
         The record does not hold enough whole turns of a full slot.
     """
+    if np.isnan(signal[0, 0]):
+        return signal[0, 1:], np.full(2, np.nan, complex), [MEAN]
     time, force = signal[:, 0] - signal[0, 0], signal[:, 1:]
     known = np.nan_to_num(force)
     remarks = []
@@ -127,29 +138,35 @@ def mean_force(
 
 
 def _cut_and_air(turn: IntArray, force: FloatArray, filling: int) -> tuple[IntArray, IntArray]:
-    """Whole turns of the full slot, and turns in air; a slot is full `filling` turns after entry.
+    """Whole turns of the full slot, and turns in air; the slot is full `filling` turns after entry.
 
     `turn` (m,) of the forces (m, 3).
     """
-    first = np.searchsorted(turn, np.arange(turn[-1]))  # the last turn is not whole
-    ending = np.searchsorted(turn, turn[-1])
-    if len(first) < LEAST_TURNS:
+    first = np.searchsorted(turn, np.arange(turn[-1] + 1))  # the last turn is not whole
+    if len(first) <= LEAST_TURNS:
         return first[:0], first[:0]
+    first, ending = first[:-1], first[-1]
     high, low = (extreme.reduceat(force[:ending], first) for extreme in (np.maximum, np.minimum))
+    mean = np.add.reduceat(force[:ending], first) / np.diff(np.append(first, ending))[:, None]
     swing = (high - low).max(axis=1)
-    strongest, quiet = np.percentile(swing, [STRONG, 100.0 - STRONG])
-    runs = np.flatnonzero(swing >= CUTS * strongest)
+    quiet = np.percentile(swing, 100.0 - STRONG)
+    push = np.linalg.norm(mean - np.median(mean[swing <= quiet], axis=0), axis=1)
+    strong, slight = np.percentile(push, STRONG), SLIGHT * np.median(swing)
+    aired = strong > slight
+    runs = np.flatnonzero(push >= CUTS * strong if aired else push <= slight)
     cutting = max(np.split(runs, np.flatnonzero(np.diff(runs) > 1) + 1), key=len)
-    if AIR * quiet > CUTS * strongest:
+    if not aired:
         return cutting, first[:0]
-    # Where the swing hardly differs from the air's, the first touch may already push.
+    # Even where the swing hardly differs from that in air, first contact may already push.
     reach = min(filling // 10 + 1, (len(swing) - 1) // 2)
     touched = np.convolve(swing > AIR * quiet, np.ones(2 * reach + 1), "same") > 0.5
-    return cutting[filling : len(cutting) - filling], np.flatnonzero(~touched)
+    usual = np.median(push[cutting])
+    begin, end = (1 if abs(of / usual - 1.0) < STEADY else filling for of in push[cutting][[1, -2]])
+    return cutting[begin : len(cutting) - end], np.flatnonzero(~touched & (push < CUTS * strong))
 
 
 def _heard_rate(time: FloatArray, force: FloatArray, rate: float, flutes: int) -> float:
-    """Turns a second at which the teeth pass, near the rate that is said; that one where none are heard."""
+    """Turns a second at which the teeth pass, near the stated rate; the stated rate if no teeth are heard."""
     count = FINER * len(time)
     even = np.linspace(time[0], time[-1], len(time))
     power = np.zeros(count // 2 + 1)
@@ -167,6 +184,6 @@ def _heard_rate(time: FloatArray, force: FloatArray, rate: float, flutes: int) -
 
 
 def harmonics(turns: FloatArray, force: FloatArray, flutes: int) -> ComplexArray:
-    """(2,) N, of forces (m,) N after (m,) turns what comes back once a turn and once a tooth."""
+    """(2,) N: components of forces (m,) N, after (m,) turns, that recur once a turn and once a tooth."""
     waves = np.exp(-2j * np.pi * np.array([[1], [flutes]]) * turns)
     return np.asarray((waves * force).mean(axis=1))

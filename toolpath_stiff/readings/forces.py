@@ -1,4 +1,4 @@
-"""Coefficients of the cutting force from records of a dynamometer: how sure they are, what is not told by them."""
+"""Coefficients of the cutting force from dynamometer records, their uncertainty, and what the records leave open."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,8 +21,8 @@ from toolpath_stiff.units import mm_from_m, um_from_m
 
 AXES = ("x", "y", "z")
 FEW = 5  # feeds below which a straight line is hardly tested
-PROBE, NONE = 1e-6, 1e-9  # m, the run-out that is tried first; what counts as none
-BINS, ROUNDS = 720, 4  # angles of a turn; rounds in which fit and run-out settle
+PROBE, NONE = 1e-6, 1e-9  # m, run-out tried first; run-out that counts as none
+BINS, ROUNDS = 720, 4  # angles of a turn; rounds until fit and run-out settle
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -45,7 +45,7 @@ class CoefficientFit(FolderResult):
         (n, 3) N on the tool along the feed, to its left, up: measured mean, fitted, and measured less what the slots
         of all other feeds predict; nan where not recorded or not to be had.
     run_out
-        (n,) m, as what comes back once a turn tells; 0 of a single flute.
+        (n,) m, as what comes back once a turn tells; nan of a single flute and of mean forces, which show none.
     notes
         What was assumed, and read differently.
     inputs
@@ -70,14 +70,14 @@ class CoefficientFit(FolderResult):
 
     @property
     def reach(self) -> float:
-        """How many standard deviations an interval of 95 % reaches to either side: Student's t."""
+        """Half width of a 95 % interval in standard deviations: Student's t."""
         from scipy.special import stdtrit
 
         return float(stdtrit(len(self.feed) - 2, SURE))
 
     @property
     def silent(self) -> list[str]:
-        """What the records cannot tell, a sentence each."""
+        """Sentences on what the records cannot tell."""
         low, high = (um_from_m(float(value)) for value in (self.feed.min(), self.feed.max()))
         sentences = [
             f"other feeds per tooth than {low:.4g} to {high:.4g} um: thinner chips, as in finishing, are extrapolated"
@@ -90,14 +90,14 @@ class CoefficientFit(FolderResult):
             sentences.append(f"whether forces rise straight with the feed: {feeds} feeds hardly test it, {FEW} would")
         if len(np.unique(self.depth)) == 1:
             sentences.append("whether forces rise with the depth of cut: all slots are equally deep")
-        if self.cutter.flutes == 1:
-            sentences.append("run-out: a single flute shows none")
+        if np.isnan(self.run_out).all():
+            sentences.append("run-out: mean forces and a single flute show none")
         elif self.cutter.flutes == 2:
             sentences.append("run-out square to the two flutes: theirs differ only by its part along them")
         return sentences
 
     def to_dict(self) -> Document:
-        """Coefficients as a setup file takes them, with their intervals; one entry a record; what is not determined."""
+        """Coefficients in the form of a setup file, with intervals; one entry per record; what is not determined."""
         columns, values = self.columns(), self.coefficients.values * SHOWN
         deviation = self.coefficients.deviation * SHOWN * self.reach
         document = {
@@ -114,11 +114,11 @@ class CoefficientFit(FolderResult):
         return dict(without_nan(document))
 
     def to_frame(self) -> DataFrame:
-        """One row a record, as `columns`."""
+        """One row per record, with the columns of `columns`."""
         return frame_of(self.columns())
 
     def columns(self) -> dict[str, list[object]]:
-        """One row a record: feed, depth, measured, fitted, measured less the prediction of the other feeds."""
+        """One row per record: feed, depth, force measured, fitted, and less the prediction from other feeds."""
         columns: dict[str, list[object]] = {
             "record": list(self.records),
             "feed_per_tooth_um": um_from_m(self.feed).round(6).tolist(),
@@ -146,7 +146,7 @@ def fit_coefficients(
     cutter
         That cut them.
     columns
-        Which columns the files call otherwise.
+        Columns that the files name differently.
     axes
         Directions of the dynamometer's axes: those that point along the feed, to its left and up.
     material
@@ -163,7 +163,7 @@ def fit_coefficients(
     for file in files:
         for name, setting, signal, how in read_records(file, columns, cutter.flutes):
             mean, wave, remarks = mean_force(name, signal, setting[2], cutter, setting[0], turned[1][0])
-            # A dynamometer reads what acts on the work.
+            # A dynamometer reads the force on the work.
             forces.append([-sign * mean[axis] for axis, sign in turned])
             waves.append(-turned[1][1] * wave)
             settings.append(setting)
@@ -174,16 +174,16 @@ def fit_coefficients(
     if (count := len(np.unique(feed))) < 3:
         fault = f"slots at {count} feed{'s' * (count != 1)}"
         raise MeasurementError(fault, expected="3 or more, so that a straight line can be wrong; 5 are better")
-    force = np.array(forces)
-    run_out, angle = np.zeros(len(feed)), np.zeros(len(feed))
+    force, told = np.array(forces), cutter.flutes > 1 and bool(np.isfinite(waves).all())
+    run_out, angle = np.full(len(feed), np.nan), np.zeros(len(feed))
     for _ in range(ROUNDS):  # with run-out some teeth cut less, which bends the lines a little
-        cutter = replace(cutter, run_out=float(np.median(run_out)), run_out_angle=float(angle[0]))
         response = slot_responses(cutter, feed, depth, angle)
         values, covariance, determined = least_squares(response, force)
-        if cutter.flutes > 1 and values[0] > 0.0:
+        if told and values[0] > 0.0:
             known = Coefficients(values[:3], values[3:], covariance)
             slots = zip(waves, feed, depth, strict=True)
             run_out, angle = np.array([_run_out(*slot, cutter, known) for slot in slots]).T
+            cutter = replace(cutter, run_out=float(np.median(run_out)), run_out_angle=float(angle[0]))
     _check_signs(values, covariance, axes)
     coefficients = Coefficients(
         values[:3],
@@ -196,9 +196,14 @@ def fit_coefficients(
     )
     fitted = np.where(np.isnan(force), np.nan, product(response, values[:, None])[..., 0])
     off = left_out(response, force, feed)
-    notes = tuple(f"{', '.join(names)}: {remark}" for remark, names in noted.items())
+    notes = [f"{', '.join(names)}: {remark}" for remark, names in noted.items()]
+    if values[2] + 2.0 * np.sqrt(covariance[2, 2]) < 0.0:
+        notes.append(
+            f"Kac is less than 0 with axes {axes}: chips would push this cutter out of the work, against its helix; "
+            "does the third axis point down? Then say it with the other sign"
+        )
     columns_of_slots = (tuple(records), feed, depth, force, fitted, off, run_out)
-    return CoefficientFit(coefficients, determined, cutter, *columns_of_slots, notes, tuple(files))
+    return CoefficientFit(coefficients, determined, cutter, *columns_of_slots, tuple(notes), tuple(files))
 
 
 def _rotation(axes: str) -> list[tuple[int, float]]:
@@ -211,28 +216,29 @@ def _rotation(axes: str) -> list[tuple[int, float]]:
 
 
 def _check_signs(values: FloatArray, covariance: FloatArray, axes: str) -> None:
-    """Raise `MeasurementError` where the coefficients say that an axis points the other way."""
+    """Raise `MeasurementError` if the coefficients imply that an axis points the other way."""
     surely = values + 2.0 * np.sqrt(np.diagonal(covariance)) <= 0.0
     for symbol, axis, wrong in (("Ktc", "to the left", values[0] <= 0.0), ("Krc", "along the feed", surely[1])):
         if wrong:
             raise MeasurementError(
                 f"{symbol} = {values[SYMBOLS.index(symbol)] * SHOWN[0]:.0f} N/mm2 with axes {axes}",
                 expected="more than 0: a tooth is pushed back",
-                hint=f"the axis {axis} points the other way, or two are exchanged: say --axes, as --axes=-y,x,z",
+                hint=f"the axis {axis} points the other way, or two are exchanged: say --axes, as --axes=-y,x,z; "
+                "of forces on the tool --axes=-x,-y,-z",
             )
 
 
 def _run_out(
     wave: ComplexArray, feed: float, depth: float, cutter: Cutter, coefficients: Coefficients
 ) -> tuple[float, float]:
-    """M and rad, the run-out that makes the force across the feed come back once a turn (`harmonics`) as it does."""
+    """Size (m) and angle (rad) of the run-out that explains the force across the feed once a turn (`harmonics`)."""
     turns = (np.arange(BINS) + 0.5) / BINS
     run_out, angle = PROBE, 0.0
-    for _ in range(ROUNDS):  # teeth that lose contact make it bend
+    for _ in range(ROUNDS):  # teeth that lose contact make it nonlinear
         tried = replace(cutter, run_out=run_out, run_out_angle=angle)
         force = force_at(slot(tried, feed, depth, coefficients), TURN * turns[None])[0, :, 1]
         once, tooth = wave / harmonics(turns, force, cutter.flutes)
         run_out = min(max(run_out * float(np.abs(once)), NONE), feed)
-        # What passes once a tooth tells where in its turn the record begins.
+        # The component once a tooth gives the angle at which the record begins.
         angle += float(np.angle(once) - np.angle(tooth) / cutter.flutes)
     return run_out, angle

@@ -1,4 +1,4 @@
-"""Struts measured alone again and again: which changed, when, at once or slowly; tension against compression.
+"""Struts measured alone repeatedly: which changed, when, suddenly or slowly; tension against compression.
 
 Each strut is a series of ln stiffness over the dates: one mean a date, since what is mounted anew for a date moves all
 its readings together. Against a stiffness that stays the same stand a step between two dates (a mean before and one
@@ -26,10 +26,10 @@ from toolpath_stiff.arrays import ArrayColumns, FloatArray, TextArray
 from toolpath_stiff.documents import certain
 from toolpath_stiff.readings.dates import date_text
 
-SURE = 0.05  # probability, all struts and places counted, below which a change is told of
-LEAST_TOLD = 1e-4  # probability: further digits than simulations have would say nothing
+SURE = 0.05  # probability, over all struts and places, below which a change is reported
+LEAST_TOLD = 1e-4  # smallest probability reported: more digits than the simulations support mean nothing
 DRAWS = 2000  # simulated sets of series
-FEWEST_DIFFERENCES = 6  # that are left of all struts, from which the scatter is estimated
+FEWEST_DIFFERENCES = 6  # fewest differences, of all struts, from which the scatter is estimated
 TRIMMED = 0.2  # of a strut's differences, at least one
 MOUNTING = 0.02  # relative sd from date to date where the data cannot say; assumed: mounting, load cell, indicator
 RESOLUTION = 1e-4  # relative; no scatter is believed to be less: rounding of the readings; assumed
@@ -37,7 +37,7 @@ SIZE = 0.1  # prior sd of a change of ln stiffness; assumed, for step and drift 
 DECISIVE = math.log(20.0)  # log ratio of marginal likelihoods, Kass and Raftery's "strong"
 A_SIDE = 2  # dates on either side of a step, from `SHORT` dates up
 SHORT = 4
-WILD = 4.0  # standard deviations from the median of the others, of one date that alone makes a change
+WILD = 4.0  # standard deviations from the median of the others at which one date alone makes a change
 CREDIBLE = 0.95
 DAYS_PER_YEAR = 365.25  # Julian year
 # Relative sd, the same on all dates, of a difference of tension and compression; assumed: load cell, indicator and
@@ -67,26 +67,26 @@ class StrutReadings(ArrayColumns):
     side: FloatArray
 
     def by_strut(self) -> dict[str, StrutReadings]:
-        """Those of each strut."""
+        """Strut -> its readings."""
         return {name: self.take(self.strut == name) for name in sorted(set(self.strut.tolist()))}
 
     @cached_property
     def dates(self) -> FloatArray:
-        """(dates,) days on which there are readings, rising."""
+        """(dates,) days with readings, ascending."""
         return np.unique(np.floor(self.day[np.isfinite(self.day)]))
 
     @cached_property
     def of_dates(self) -> list[FloatArray]:
-        """Ln stiffness of each date's readings."""
+        """Ln stiffness of the readings of each date."""
         return [self.log_stiffness[np.floor(self.day) == date] for date in self.dates]
 
     @cached_property
     def means(self) -> FloatArray:
-        """(dates,) of ln stiffness."""
+        """(dates,) mean ln stiffness."""
         return np.array([logs.mean() for logs in self.of_dates])
 
     def sides_apart(self) -> FloatArray:
-        """(dates,) ln stiffness in tension less that in compression, of each date with both; undated ones are one."""
+        """(dates,) ln stiffness in tension less compression, for each date with both; undated readings are one date."""
         day = np.nan_to_num(np.floor(self.day), nan=-np.inf)
         sides = [[self.log_stiffness[(day == d) & (self.side * s > 0)] for s in (1, -1)] for d in np.unique(day)]
         return np.array([pulled.mean() - pushed.mean() for pulled, pushed in sides if len(pulled) and len(pushed)])
@@ -111,7 +111,7 @@ class StrutChange:
     def of(
         cls, kind: str, days: Sequence[float], ends: Sequence[float], sd: float, p: float, slope: float = 0.0
     ) -> StrutChange:
-        """From ln stiffness at both ends, the sd of their difference; `slope` of ln stiffness, a year."""
+        """Change with ln stiffness at both ends and the sd of their difference; `slope` of ln stiffness a year."""
         size = ends[1] - ends[0]
         share, low, high = (100.0 * math.expm1(ln) for ln in (size, size - 1.96 * sd, size + 1.96 * sd))
         (after, before), (first, last) = map(date_text, days), map(n_per_mm, ends)
@@ -136,7 +136,7 @@ def chance_text(p: float) -> str:
 
 
 def series_of(readings: StrutReadings) -> dict[str, StrutReadings]:
-    """One a strut; where tension and compression never share a date, one a side."""
+    """Series of each strut; one for each side where tension and compression never share a date."""
     series = {}
     for name, strut in readings.by_strut().items():
         apart, pulled, pushed = strut.sides_apart(), strut.side > 0.0, strut.side < 0.0
@@ -150,7 +150,7 @@ def series_of(readings: StrutReadings) -> dict[str, StrutReadings]:
 
 @dataclass(frozen=True)
 class DateScatter:
-    """How far means of dates scatter, and how large the largest |t| of mere noise is.
+    """Scatter of the means of dates, and the distribution of the largest |t| under mere noise.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class DateScatter:
 
     @classmethod
     def of(cls, series: Sequence[StrutReadings], seed: int) -> DateScatter:
-        """Of all series together, each with two dates or more."""
+        """Scatter of all series together, each with two dates or more."""
         if not series:
             return cls(MOUNTING, "", np.zeros(1))
         rng = np.random.default_rng(seed)
@@ -176,7 +176,7 @@ class DateScatter:
             peak = np.maximum(peak, np.abs(noise @ _contrasts(strut.dates)).max(axis=1))
             left = _trimmed(np.diff(noise, axis=1))
             squares, kept = squares + left.sum(axis=1), kept + left.shape[1]
-        # Of one reading within its date; 0 without repeats.
+        # Scatter of one reading within its date; 0 without repeats.
         of_dates = [logs for strut in series for logs in strut.of_dates]
         repeat = sum(float(logs.var()) * len(logs) for logs in of_dates)
         freedom = max(sum(len(logs) - 1 for logs in of_dates), 1)
@@ -185,24 +185,24 @@ class DateScatter:
             sd = float(np.hypot(MOUNTING, of_mean))
             return cls(sd, f"{100 * MOUNTING:g} % from date to date assumed: too few dates to tell", np.sort(peak))
         scale = np.sqrt(squares / kept)
-        usual = float(np.median(scale))  # what leaving out the largest makes of a sd of 1
+        usual = float(np.median(scale))  # sd of 1 as estimated without the largest differences
         measured = sum(float(_trimmed(np.diff(strut.means)).sum()) for strut in series)
         sd = max(np.sqrt(measured / kept) / usual, of_mean, RESOLUTION)
         return cls(float(sd), "differences of successive dates", np.sort(peak / scale * usual))
 
     def probability(self, day: FloatArray, ln: FloatArray) -> float:
-        """That mere noise shows as large a |t| somewhere as this series (Davison and Hinkley 1997, 4.2.3)."""
+        """Probability that noise alone shows as large a |t| as this series (Davison and Hinkley 1997, 4.2.3)."""
         ratio = float(np.abs(ln @ _contrasts(day)).max() / self.sd)
         return (1 + len(self.largest) - int(np.searchsorted(self.largest, ratio))) / (1 + len(self.largest))
 
     def smallest_step(self, dates: int) -> float:
-        """Step of ln stiffness halfway through so many dates that would be told of."""
+        """Smallest detectable step of ln stiffness, halfway through this number of dates."""
         limit = float(np.quantile(self.largest, 1.0 - SURE))
         return limit * self.sd * math.sqrt(1.0 / (dates // 2) + 1.0 / (dates - dates // 2))
 
 
 def changes_of(day: FloatArray, ln: FloatArray, scatter: DateScatter) -> tuple[list[StrutChange], list[float]]:
-    """Changes of a series (n,) in the order of time, and days that stand out alone."""
+    """Changes of a series (n,) in order of time, and days that stand out alone."""
     p = scatter.probability(day, ln) if len(day) > 1 else 1.0
     if p >= SURE:
         return [], []
@@ -222,7 +222,7 @@ def changes_of(day: FloatArray, ln: FloatArray, scatter: DateScatter) -> tuple[l
     place = int(places[np.argmax(step)])
     before, wild_before = changes_of(day[:place], ln[:place], scatter)
     after, wild_after = changes_of(day[place:], ln[place:], scatter)
-    # The fewest places that hold 95 % of the probability, all places alike beforehand.
+    # The fewest places that hold 95 % of the probability, with equal priors.
     order = np.argsort(-weights, kind="stable")
     held = np.cumsum(weights[order]) / weights.sum()
     likely = places[np.sort(order[: int(np.searchsorted(held, CREDIBLE)) + 1])]
@@ -232,7 +232,7 @@ def changes_of(day: FloatArray, ln: FloatArray, scatter: DateScatter) -> tuple[l
 
 
 def slope_of(day: FloatArray, ln: FloatArray, sd: float) -> tuple[float, float]:
-    """Of ln stiffness, a year, with its sd."""
+    """Slope of ln stiffness a year, with its sd."""
     years = (day - day.mean()) / DAYS_PER_YEAR
     return float(years @ ln / (years @ years)), float(sd / (years @ years) ** 0.5)
 
@@ -244,26 +244,26 @@ def _trimmed(steps: FloatArray) -> FloatArray:
 
 
 def _places(n: int) -> range:
-    """Numbers of dates before a step."""
+    """Possible numbers of dates before a step."""
     side = A_SIDE if n >= SHORT else 1
     return range(side, n - side + 1)
 
 
 def _shapes(day: FloatArray) -> FloatArray:
-    """(n, m): every step as 0 and 1, and last the drift from 0 to 1, less their means."""
+    """(n, m) shapes less their means: every step as 0 and 1, then the drift from 0 to 1."""
     steps = [(np.arange(len(day)) >= place).astype(float) for place in _places(len(day))]
     shapes = np.stack([*steps, (day - day[0]) / (day[-1] - day[0])], axis=1)
     return np.asarray(shapes - shapes.mean(axis=0))
 
 
 def _contrasts(day: FloatArray) -> FloatArray:
-    """The same of length 1: their products with standard normal noise are standard normal."""
+    """`_shapes` normalised to length 1: their products with standard normal noise are standard normal."""
     shapes = _shapes(day)
     return np.asarray(shapes / np.linalg.norm(shapes, axis=0))
 
 
 def _lone(day: FloatArray, ln: FloatArray, scatter: DateScatter) -> int | None:
-    """The date without which nothing is left to tell of, if it lies far from the others."""
+    """Date without which no change is left, if it lies far from the others."""
     far = np.abs(ln - np.median(ln)) / scatter.sd
     i = int(np.argmax(far))
     if len(day) < SHORT or far[i] < WILD:
@@ -294,7 +294,7 @@ class StrutSides:
 
 @dataclass(frozen=True)
 class StrutOverTime:
-    """One strut; `dates`: N/mm in the mean of each."""
+    """One strut over time; `dates`: mean N/mm of each."""
 
     strut: str
     readings: int
@@ -311,7 +311,7 @@ class StrutOverTime:
 
 @dataclass(frozen=True)
 class StrutHistory:
-    """Struts measured alone over the dates; `struts` is empty where there are none."""
+    """Struts measured alone, over the dates; `struts` is empty if there are none."""
 
     scatter_percent: float | None = None
     scatter_from: str = ""
@@ -319,14 +319,14 @@ class StrutHistory:
 
     @property
     def sentences(self) -> list[str]:
-        """Strut by strut: changes or none, and tension against compression where they differ."""
+        """Sentences strut by strut: changes or none, and tension against compression where they differ."""
         texts = [(strut.text, strut.sides) for strut in self.struts]
         both = [(text, sides.text if sides and sides.p < SURE else "") for text, sides in texts]
         return [text for pair in both for text in pair if text]
 
 
 def history(readings: StrutReadings, sides: StrutReadings | None = None, seed: int = 0) -> StrutHistory:
-    """What readings of struts alone say of time and of the sign of the force.
+    """Evaluation of readings of struts alone by time and by sign of the force.
 
     Parameters
     ----------
@@ -356,7 +356,7 @@ def history(readings: StrutReadings, sides: StrutReadings | None = None, seed: i
 
 
 def _strut(strut: str, series: StrutReadings, scatter: DateScatter, sides: StrutSides | None) -> StrutOverTime:
-    """What is said of one strut."""
+    """Evaluation of one strut."""
     n, name = len(series.dates), strut.replace(" alone", "")
     levels = series.means if n else series.log_stiffness
     changes, wild = changes_of(series.dates, series.means, scatter)
@@ -384,7 +384,7 @@ def _strut(strut: str, series: StrutReadings, scatter: DateScatter, sides: Strut
 
 
 def _sides(readings: StrutReadings) -> dict[str, StrutSides]:
-    """Strut -> tension against compression, of those measured under both: the mean of dates' differences."""
+    """Strut -> tension against compression, for struts measured under both: mean of the dates' differences."""
     from scipy.special import stdtr
 
     apart, middle = {}, {}

@@ -26,14 +26,14 @@ from toolpath_stiff.readings.raw_records import SAME_JOG, Loop
 from toolpath_stiff.readings.rows import SOFTEST, STIFFEST
 from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
-NEAR_TURN = 0.1  # of the range: how near to an extreme a cycle must come to turn there
-CLOSED = 3  # turns of the drive, from which the records hold a closed cycle
-A_SIDE = 3  # forces on each side of zero, from which its slope is told
+NEAR_TURN = 0.1  # share of the range: distance from an extreme within which a cycle may turn
+CLOSED = 3  # turns of the drive from which the records contain a closed cycle
+A_SIDE = 3  # forces on each side of zero from which that side's slope is determined
 
 
 @dataclass(frozen=True)
 class LoopFigures:
-    """What a loop says. SI; nan where it has too few records.
+    """Figures of a loop. SI; nan where it has too few records.
 
     Attributes
     ----------
@@ -72,14 +72,14 @@ class LoopFigures:
 
     @property
     def side(self) -> float:
-        """1 of tension, -1 of compression, as recorded or stated; 0 of both or unknown."""
+        """1 for tension, -1 for compression, as recorded or stated; 0 for both or unknown."""
         if len(self.loop.force):
             return self.loop.side
         return 0.0 if math.isnan(self.force) else math.copysign(1.0, self.force)
 
 
 def reduce_loop(loop: Loop) -> LoopFigures:
-    """Stiffness by the paper's equation 12, and what the loop says about play, friction and linearity.
+    """Stiffness by the paper's equation 12, and figures of play, friction and linearity.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def reduce_loop(loop: Loop) -> LoopFigures:
 
 
 def turns_of(drive: FloatArray) -> list[int]:
-    """Records at which the drive turns, high and low alternately; the first of equal ones."""
+    """Records at which the drive turns, alternately high and low; of equal ones the first."""
     high, low, near = float(drive.max()), float(drive.min()), NEAR_TURN * float(np.ptp(drive))
     turns: list[int] = []
     last = 0.0
@@ -125,7 +125,7 @@ def turns_of(drive: FloatArray) -> list[int]:
 
 
 def _between_extremes(loop: Loop, turns: list[int]) -> tuple[float, float]:
-    """Force (N) and deflection (m) between the extremes. Raises `InputError` where they give no stiffness."""
+    """Force (N) and deflection (m) between the extremes. Raises `InputError` if they give no stiffness."""
     drive = loop.drive
     high, low = float(drive.max()), float(drive.min())
     if loop.jog is not None and not (low < -SAME_JOG and high > SAME_JOG):
@@ -154,7 +154,7 @@ def _between_extremes(loop: Loop, turns: list[int]) -> tuple[float, float]:
 
 
 def _without_drift(loop: Loop, turns: list[int]) -> tuple[float, float]:
-    """Force (N) and deflection (m) between the extremes of three turns or more, a steady drift taken out."""
+    """Force (N) and deflection (m) between the extremes of three turns or more, less a steady drift."""
     drive = loop.drive
     bounds = [0, *((start + end) // 2 + 1 for start, end in pairwise(turns)), len(drive)]
     means = []
@@ -167,7 +167,7 @@ def _without_drift(loop: Loop, turns: list[int]) -> tuple[float, float]:
 
 
 def _lost_motion(loop: Loop) -> float:
-    """Straight lines through the outer half of each side, both passes; their distance at zero force."""
+    """Distance at zero force between straight lines through the outer half of each side, both passes; m."""
     drive, at_zero = loop.drive, []
     high, low = float(drive.max()), float(drive.min())
     if not low < 0.0 < high or loop.side:
@@ -202,7 +202,7 @@ def _sides(loop: Loop, turns: list[int], width: float) -> tuple[float, float]:
 
 
 def _loop_width(loop: Loop, main: slice) -> float:
-    """The way from extreme to extreme against the way there and the way back, at the forces of the latter."""
+    """Difference between the way from extreme to extreme and the way there and back, at the latter's forces; m."""
     order = np.argsort(loop.force[main], kind="stable")
     force, deflection = loop.force[main][order], loop.deflection[main][order]
     other = np.r_[0 : main.start, main.stop : len(loop.force)].astype(int)
@@ -213,7 +213,7 @@ def _loop_width(loop: Loop, main: slice) -> float:
 
 
 def in_tension(loop: Loop) -> Loop:
-    """A loop of a bench with tension positive; its displacement counts the way that makes a stiffness positive."""
+    """Loop of a bench with tension positive; displacement is signed so that the stiffness is positive."""
     if loop.jog is not None:
         return loop
     force = -loop.force

@@ -1,4 +1,4 @@
-"""Readings of an indicator beside the tip: how they are compared.
+"""Readings of indicators beside the tip, and the form in which they are compared.
 
 Stiffnesses are compared by their logarithms. A joint that does not give way reads zero, which has none; and a strut
 gets longer or shorter. So a loop's reading y (displacement per load, m/N) is compared as that of a spring in series
@@ -24,15 +24,15 @@ from toolpath_stiff.errors import MeasurementError
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.stiffness.measuring_loop import TIP, WORDS, MeasuringLoop, measuring_loop
 
-# Scatter of one reading where no `sd_um` says: a lever indicator or probe with its stand, and the load; assumed.
+# Scatter of one reading without `sd_um`: a lever indicator or probe with its stand, and the load; assumed.
 INDICATOR_SD, LOAD_SHARE = 0.3e-6, 0.02  # m; of the reading
 OFFSET_SHARE = 0.5  # of the tip's compliance
-WIDEST = 0.05  # of offset and reading: relative sd up to which the logarithm is straight enough
-BACKWARDS = 3.0  # times a reading of the wrong sign, so that its logarithm exists
+WIDEST = 0.05  # relative sd of offset and reading together up to which the logarithm is linear enough
+BACKWARDS = 3.0  # least offset in multiples of a reading of the wrong sign, so that its logarithm exists
 
 
 def loop_of(text: str) -> MeasuringLoop:
-    """The loop that a cell names. Raises `InputError`."""
+    """Loop that a cell names. Raises `InputError`."""
     loop = measuring_loop(text)
     if loop is None:
         raise MeasurementError(f"loop {text!r}", expected=WORDS)
@@ -41,7 +41,7 @@ def loop_of(text: str) -> MeasuringLoop:
 
 @dataclass(frozen=True)
 class LoopColumns:
-    """Of n readings, those of loops beside the tip among them; SI.
+    """Loops of n readings, those beside the tip among them; SI.
 
     Attributes
     ----------
@@ -60,12 +60,12 @@ class LoopColumns:
     length: FloatArray
 
     def select(self, rows: AnyArray) -> LoopColumns:
-        """Of some of the readings."""
+        """Columns of some of the readings."""
         return LoopColumns(self.loops, *(getattr(self, field.name)[rows] for field in fields(self)[1:]))
 
     @classmethod
     def of(cls, names: Sequence[str], length: FloatArray) -> LoopColumns:
-        """Of readings' loops by name ("" is the tip), without offsets yet."""
+        """Columns for readings' loops by name ("" is the tip), still without offsets."""
         loops = (TIP, *(loop_of(name) for name in dict.fromkeys(names) if name))
         number = {"" if k == 0 else str(loop): k for k, loop in enumerate(loops)}
         which = np.array([number[str(name)] for name in names], dtype=np.int64)
@@ -78,12 +78,12 @@ class LoopColumns:
 
     @property
     def straight(self) -> BoolArray:
-        """(n,) those compared with an offset."""
+        """(n,) readings compared with an offset."""
         alone = np.array([loop.kind in ("tip", "alone") for loop in self.loops])
         return ~alone[self.which]
 
     def on_lengths(self, struts: Struts) -> Struts:
-        """Struts of the readings' poses; where a strut was measured alone, of the length that it had."""
+        """Struts of the readings' poses; a strut measured alone has the length it had then."""
         given = ~np.isnan(self.length)
         if not given.any():
             return struts
@@ -91,11 +91,11 @@ class LoopColumns:
         return replace(struts, lengths=lengths)
 
     def joined(self, compliance: FloatArray) -> FloatArray:
-        """(n,) m/N with the offset in series, of readings' compliances (n,)."""
+        """(n,) m/N with the offset in series, from readings' compliances (n,)."""
         return np.asarray(self.offset + self.toward * compliance)
 
     def alone(self, joined: FloatArray) -> FloatArray:
-        """(n,) m/N as read, of compliances with the offset in series: the inverse of `joined`."""
+        """(n,) m/N as read, from compliances with the offset in series: the inverse of `joined`."""
         return np.asarray(self.toward * (joined - self.offset))
 
 
@@ -108,7 +108,7 @@ def offsets(
     tip: FloatArray,
     widest: float = WIDEST,
 ) -> LoopColumns:
-    """The same with offset and sign of every loop reading.
+    """Columns with offset and sign of every loop reading.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which columns of a file hold what, where it calls them otherwise: the mapping that one writes.
+"""Mapping of a file's columns to ours: which of them hold what, written by the user.
 
 `strut=hp, date=day_ms:ms, stiffness=stiff_mean:N/um`: ours = theirs, and after a colon the unit, or of dates the form:
 ms or s since 1970, or as they are written, DD.MM.YYYY. A heading with commas or colons stands in double quotes; `==3`
@@ -31,7 +31,7 @@ PARTS = {"YYYY": "%Y", "YY": "%y", "MM": "%m", "DD": "%d", "hh": "%H", "mm": "%M
 
 
 def mapped_table(path: str, what: str, columns: Columns, mapping: Mapped = None) -> Table:
-    """A table, its columns named by the mapping and by the one that is kept beside the file; dates in ISO 8601.
+    """A table with columns renamed by the mapping and by the one kept beside the file; dates in ISO 8601.
 
     Where both name a column the mapping holds.
 
@@ -55,7 +55,7 @@ def mapped_table(path: str, what: str, columns: Columns, mapping: Mapped = None)
 
 
 def sources_of(mapping: str | Mapping[str, str], columns: Columns) -> dict[str, Source]:
-    """Where the columns of a mapping come from. Raises `InputError`."""
+    """Sources of the columns in a mapping. Raises `InputError`."""
     entries = _parsed(mapping) if isinstance(mapping, str) else mapping
     sources: dict[str, Source] = {}
     for ours, theirs in entries.items():
@@ -90,12 +90,12 @@ def _parsed(text: str) -> dict[str, str]:
 
 
 def _pattern(form: str) -> str:
-    """The form of a date as `strptime` has it."""
+    """Form of a date in the syntax of `strptime`."""
     return re.sub("YYYY|YY|MM|DD|hh|mm|ss", lambda part: PARTS[part[0]], form.replace("%", "%%"))
 
 
 def as_iso(text: str, form: str) -> str:
-    """A date of that form in ISO 8601; "" where it is none."""
+    """A date of that form in ISO 8601; "" if it is not one."""
     try:
         since = SINCE_1970.get(form)
         moment = datetime.fromtimestamp(float(text) * since, UTC) if since else datetime.strptime(text, _pattern(form))
@@ -105,7 +105,7 @@ def as_iso(text: str, form: str) -> str:
 
 
 def _with_dates(table: Table, form: str) -> Table:
-    """The table with dates in ISO 8601. Raises `InputError` for a date that is not written in this form."""
+    """Table with dates in ISO 8601. Raises `InputError` for a date not written in this form."""
     place, rows = table.heading.index(DATE), []
     for line, cells in table.rows:
         iso = [as_iso(cell, form) if i == place else cell for i, cell in enumerate(cells)]
@@ -116,7 +116,7 @@ def _with_dates(table: Table, form: str) -> Table:
 
 
 def number_columns(table: Table, names: Sequence[str]) -> FloatArray:
-    """(rows, names) the numbers of columns; nan where the table has none. Raises `InputError` for what is none."""
+    """(rows, names) numbers of columns; nan for absent columns. Raises `InputError` for cells that are no number."""
     places = [(place, name) for place, name in enumerate(names) if name in table.heading]
     values = np.full((len(table.rows), len(names)), np.nan)
     for row, (line, cells) in enumerate(table.rows):
@@ -131,12 +131,12 @@ def number_columns(table: Table, names: Sequence[str]) -> FloatArray:
 
 
 def unused(table: Table, known: Collection[str]) -> list[str]:
-    """A note for each column that is not known."""
+    """Notes, one for each unknown column."""
     return [f"{table.file}: column {name} is not used" for name in table.heading if name and name not in known]
 
 
 def check_needed(table: Table, needed: Sequence[str], layouts: str) -> None:
-    """Raise `InputError` with the mapping to write where a column is missing."""
+    """Raise `InputError`, with the mapping to write, if a column is missing."""
     absent = [name for name in needed if name not in table.heading]
     if absent:
         theirs = ", ".join(name for name in table.heading if name) or "none"

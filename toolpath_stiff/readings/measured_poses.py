@@ -1,4 +1,4 @@
-"""Poses of readings, held against what the machine can be: beyond a limit is doubtful, singular is impossible."""
+"""Poses of readings checked against the machine: beyond a limit is doubtful, singular is impossible."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,7 +14,7 @@ from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
 SINGULAR = 1e-6  # singularity index: the tip would be a million times softer than at the neutral pose
-# Of the machine file under `limits`; the last word of each stands in its limits' names.
+# Limits of the machine file; the last word of each is part of its limits' names.
 SECTIONS = ("strut_length", "joint_angle", "workspace", "singularity")
 
 
@@ -64,7 +64,7 @@ def pose_warnings(
 
 
 def _impossible(machine: MachineTool, stance: Struts | Stance) -> Iterator[str]:
-    """Of each pose why the machine cannot be there at all, or ""."""
+    """For each pose the reason why the machine cannot be there at all, or ""."""
     if not isinstance(machine, Hexapod) or not isinstance(stance, Struts):
         for row in stance.joints:
             yield "impossible: no joint values lead there" if np.isnan(row).any() else ""

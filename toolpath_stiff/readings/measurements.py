@@ -1,4 +1,4 @@
-"""Measured stiffnesses as columns, SI, with what the model says to each of them."""
+"""Measured stiffnesses as columns, SI, with the model's prediction of each."""
 
 import hashlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -48,7 +48,7 @@ RISER_ABOVE_MM = 1000.0  # of the paper's two planes, 353 and 1268 mm, Figure 6 
 
 @dataclass(frozen=True)
 class Readings(ArrayColumns):
-    """n measured stiffnesses. SI; nan or "" where a reading does not say.
+    """n measured stiffnesses. SI; nan or "" where a reading does not state a value.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Readings(ArrayColumns):
         (n, 3) unit vectors of force and displacement.
     stiffness
         (n,) N/m; nan where a plan leaves it empty. Of a loop beside the tip that of the loop in series with its offset
-        (`updating.loops`): what is compared.
+        (`readings.loops`): what is compared.
     force
         (n,) N, `defaults.FORCE` where not given.
     sd
@@ -117,7 +117,7 @@ class Readings(ArrayColumns):
 
     @property
     def tip(self) -> BoolArray:
-        """(n,) readings of the tool tip against the work."""
+        """(n,) True for readings of the tool tip against the work."""
         return np.ones(len(self), dtype=bool) if self.beside is None else ~self.beside.beside
 
     @property
@@ -146,24 +146,24 @@ class Readings(ArrayColumns):
 
     @cached_property
     def poses(self) -> tuple[IntArray, IntArray]:
-        """(p,) a row of each distinct pose with its tool, and (n,) which of them each reading was taken at."""
+        """(p,) one row of each distinct pose and tool, and (n,) the number of each reading's pose."""
         columns = np.concatenate([self.position, self.angles, self.tool_extension[:, None]], axis=1)
         _, first, which = np.unique(columns, axis=0, return_index=True, return_inverse=True)
         return first, which.reshape(-1)
 
     def select(self, rows: AnyArray) -> Self:
-        """Some of the rows, by mask or index."""
+        """Readings of some rows, by mask or index."""
         extra = {name: values[rows] for name, values in self.extra.items()}
         beside = self.beside.select(rows) if self.beside is not None and self.beside.beside[rows].any() else None
         return replace(self.take(rows), extra=extra, beside=beside)
 
     def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
-        """Effects that these data cannot test -> the columns that they lack."""
+        """Effects that these data cannot test -> columns that are missing for them."""
         return lacking_columns(effects, self.missing)
 
 
 def lacking_columns(effects: Iterable[Effect], missing: Collection[str]) -> dict[str, tuple[str, ...]]:
-    """Effects that need columns which are missing -> these columns."""
+    """Effects that need missing columns -> these columns."""
     lacking = {effect.name: tuple(c for c in effect.needs if c in missing) for effect in effects}
     return {name: columns for name, columns in lacking.items() if columns}
 
@@ -182,7 +182,7 @@ def read_measurements(
     planned
         Whether the stiffness may be left empty.
     columns
-        Which columns the files call otherwise, as `mapping` says.
+        Columns that the files name differently, as `mapping` says.
 
     Raises
     ------
@@ -205,7 +205,7 @@ def read_measurements(
             of_file, remarks = read_rows(table, planned, SOFTEST if isinstance(machine, Hexapod) else SOFTEST_ARM)
             rows += of_file
             notes += remarks
-        except InputErrors as bad:  # those of all files are reported together
+        except InputErrors as bad:  # errors of all files are reported together
             errors += bad.errors
     errors = errors or duplicates(rows)
     if errors:
@@ -217,7 +217,7 @@ def read_measurements(
 
 
 def _table_1() -> Table:
-    """The paper's Table 1, printed with a row a point."""
+    """The paper's Table 1, printed one row per point."""
     text = (resources.files("toolpath_stiff") / "data" / "nist_table1.csv").read_text("utf-8")
     printed = parse_table(text, NIST_TABLE_1, Columns(POSITION))
     rows = tuple(
@@ -235,10 +235,10 @@ def _table_1() -> Table:
 
 
 def _columns(rows: list[Row], notes: Sequence[str], machine: MachineTool) -> Readings:
-    """Readings as columns; those of loops in m/N until `with_offsets`."""
+    """Readings as columns; those of loops stay in m/N until `with_offsets`."""
     names = {field.name for field in fields(Row)} & {field.name for field in fields(Readings)} - {"extra"}
     columns: dict[str, Any] = {name: np.array([getattr(row, name) for row in rows]) for name in sorted(names)}
-    # A strut on a bench has no pose: it is given the machine's neutral one, which its length overrules.
+    # A strut on a bench has no pose: it gets the machine's neutral one, but keeps its own length.
     pose = np.concatenate([columns["position"], columns["angles"]], axis=1)
     pose = np.where(np.isnan(pose[:, :1]), machine.limits.neutral_pose, pose)
     on_tip, point = columns["loop"] == "", point_names(pose, columns["point"])
@@ -249,7 +249,7 @@ def _columns(rows: list[Row], notes: Sequence[str], machine: MachineTool) -> Rea
     dropped = sorted({name for row in rows for name in row.extra} - common)
     unknown = sum(bool(np.isnan(row.length) and np.isnan(row.position[0])) for row in rows)
     bench = f"{unknown} readings of struts alone say neither length_mm nor a pose: taken at the neutral pose"
-    # Numbers of clampings start anew in every file; without a number, a point in a set-up is one.
+    # Clampings are numbered anew in every file; without a number, a point in a set-up is one clamping.
     clamps = [
         f"{row.file}: clamp {row.clamp}" if row.clamp else f"point {p}, set-up {row.setup}"
         for row, p in zip(rows, point, strict=True)
@@ -265,7 +265,7 @@ def _columns(rows: list[Row], notes: Sequence[str], machine: MachineTool) -> Rea
     return Readings(
         **columns,
         extra={name: np.array([row.extra[name] for row in rows]) for name in sorted(common)},
-        # Set-ups and loops may go without a name; of the other columns every reading must have its own.
+        # Set-ups and loops may be unnamed; every other column must be filled for every reading.
         missing=tuple(n for n in OPTIONAL if not (given[n].any() if n in ("setup", "loop") else given[n].all())),
         notes=(
             *notes,
@@ -278,7 +278,7 @@ def _columns(rows: list[Row], notes: Sequence[str], machine: MachineTool) -> Rea
 
 
 def with_offsets(data: Readings, machine: MachineTool, widest: float = WIDEST) -> Readings:
-    """The same with the readings of loops, until then m/N with their sd in m/N, as stiffnesses with offsets.
+    """Readings whose loop readings, until now m/N with sd in m/N, are stiffnesses with offsets.
 
     `widest`: relative sd that no loop reading with its offset has more of.
     """
@@ -288,7 +288,7 @@ def with_offsets(data: Readings, machine: MachineTool, widest: float = WIDEST) -
     read, sd = np.where(rows, data.stiffness, np.nan), np.where(rows, data.sd, np.nan)
     plain = StiffnessModel(as_hexapod(machine, "a reading beside the tip"))
     path = measured_path(plain, data)
-    # A joint moves the way its strut does, which the plain machine's joints, being rigid, do not say.
+    # A joint moves the way its strut does; the plain machine's rigid joints do not show it.
     moving = [replace(loop, kind="strut", where="") if loop.kind == "joint" else loop for loop in loops]
     toward = loop_compliance(plain, path, data.direction, moving, data.beside.which)
     expected = np.where(np.array([loop.kind == "joint" for loop in loops])[data.beside.which], 0.0, toward)
@@ -307,14 +307,14 @@ def with_offsets(data: Readings, machine: MachineTool, widest: float = WIDEST) -
         beside=beside,
         stiffness=np.where(rows, stiffness, data.stiffness),
         sd=np.where(rows, sd * stiffness**2, data.sd),
-        # A loop's indicator is not clamped with the tip's gauge: its readings scatter each on its own.
+        # A loop's indicator is not clamped with the tip's gauge: its readings scatter independently.
         clamp=np.where(rows, np.char.add("loop reading ", np.arange(len(data)).astype(str)), data.clamp),
         notes=(*data.notes, note) if assumed else data.notes,
     )
 
 
 def _incomplete(given: Mapping[str, BoolArray]) -> list[str]:
-    """Remarks about columns that some readings leave empty, and about a load that is assumed."""
+    """Remarks on columns that some readings leave empty, and on an assumed load."""
     n, notes = len(given["force_N"]), []
     for name, there in given.items():
         lacking = n - int(there.sum())
@@ -326,7 +326,7 @@ def _incomplete(given: Mapping[str, BoolArray]) -> list[str]:
 
 
 def point_names(poses: FloatArray, labels: TextArray, prefix: str = "P", taken: Iterable[str] = ()) -> TextArray:
-    """Labels of the points, new ones unlike those taken.
+    """Labels of the points; new ones differ from those taken.
 
     Readings without one share a label if they share the pose (to 1 um and 1e-6 rad).
     """
@@ -337,7 +337,7 @@ def point_names(poses: FloatArray, labels: TextArray, prefix: str = "P", taken: 
 
 
 def reading_columns(data: Readings) -> dict[str, AnyArray]:
-    """Column -> values of a table of the readings, in the shop's units; optional ones without values are left out."""
+    """Column -> values of a table of the readings, in the shop's units; empty optional columns are left out."""
     pose = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles), data.direction], axis=1)
     with np.errstate(divide="ignore"):
         shown = data.stiffness if data.beside is None else 1.0 / data.compliance
@@ -359,11 +359,11 @@ def reading_columns(data: Readings) -> dict[str, AnyArray]:
     return {name: values for name, values in columns.items() if name not in missing}
 
 
-MARK = 10  # hexadecimal digits of a reading's mark: among 5,000 readings two differ in it but for one time in 90,000
+MARK = 10  # hexadecimal digits of a reading's mark: two of 5,000 readings share one once in 90,000 cases
 
 
 def reading_marks(data: Readings) -> TextArray:
-    """(n,) what tells a reading from others, however its file is called, sorted or laid out.
+    """(n,) fingerprint of each reading, whatever the name, order or layout of its file.
 
     The first `MARK` digits of the SHA-256 of its pose (to 0.01 mm and 0.001 degrees), its direction (without sign) and
     the measured stiffness (to five digits).
@@ -382,7 +382,7 @@ def reading_marks(data: Readings) -> TextArray:
 
 
 def measured_path(model: StiffnessModel, data: Readings) -> LoadPath:
-    """What the model's effects see of the measurements; a column that is missing is None there.
+    """Load path of the measurements, as the model's effects see it; a missing column is None there.
 
     A pose is solved once, however often it was measured.
     """
@@ -401,7 +401,7 @@ def measured_path(model: StiffnessModel, data: Readings) -> LoadPath:
 
 
 def model_stiffness(model: StiffnessModel, data: Readings) -> FloatArray:
-    """(n,) N/m that the model, its instruments included, says each reading should show.
+    """(n,) N/m that each reading should show by the model, its instruments included.
 
     Raises
     ------
@@ -418,7 +418,7 @@ def model_stiffness(model: StiffnessModel, data: Readings) -> FloatArray:
 def mechanical_stiffness(
     model: StiffnessModel, path: LoadPath, data: Readings, equilibrium: FloatArray | None = None
 ) -> FloatArray:
-    """(n,) N/m of the machine alone; of loops beside the tip with their offsets, nan where that is no stiffness.
+    """(n,) N/m of the machine alone; for loops beside the tip with their offsets, nan if not positive.
 
     `equilibrium`: strut forces as of `exact.compliance_along`.
     """
@@ -432,5 +432,5 @@ def mechanical_stiffness(
 
 
 def shown_by(active: ActiveEffect, stiffness: FloatArray, path: LoadPath, data: Readings) -> FloatArray:
-    """(n,) N/m that an instrument shows; the indicator of a loop beside the tip is another one."""
+    """(n,) N/m that an instrument shows; indicators of loops beside the tip are separate instruments."""
     return np.where(data.tip, active.reading(stiffness, path), stiffness)

@@ -1,4 +1,4 @@
-"""Pulls: displacements of a machine of elements under known forces, as vectors or along a dial; stiffnesses as well.
+"""Pulls: displacements of a machine of elements under known forces, as vectors or along a dial; also stiffnesses.
 
 A row is a pull: where the machine stands (pose of the tip, or values of its joints, or both, held against each other),
 the force on the tool (its vector, or the tension of a cable and the pulley that it runs to), what moved (components, or
@@ -17,7 +17,6 @@ from toolpath_stiff.arrays import ArrayColumns, BoolArray, FloatArray, IntArray,
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.errors import InputErrors, MeasurementError
 from toolpath_stiff.machine.elements import Stance
-from toolpath_stiff.machine.joint_values import joint_margin
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.readings.mapping import check_needed, mapped_table, unused
 from toolpath_stiff.readings.measurements import lacking_columns, read_measurements
@@ -31,10 +30,11 @@ from toolpath_stiff.readings.rows import (
     optional_number,
     parsed_rows,
 )
+from toolpath_stiff.readings.standing import standing
 from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.stiffness.contract import Effect
 from toolpath_stiff.tables import Columns, Table
-from toolpath_stiff.units import deg_from_rad, m_from_mm, m_from_um, mm_from_m, rad_from_deg
+from toolpath_stiff.units import m_from_mm, m_from_um, rad_from_deg
 
 FORCE, MOVED, DIAL = ("fx_N", "fy_N", "fz_N"), ("ux_um", "uy_um", "uz_um"), ("dial_x", "dial_y", "dial_z")
 MOMENT = ("mx_Nm", "my_Nm", "mz_Nm")  # about the tip, beside the force
@@ -42,15 +42,12 @@ TENSION, CABLE = "tension_N", ("cable_x_mm", "cable_y_mm", "cable_z_mm")
 PULL, TARGET = (tuple(f"{what}_d{axis}_mm" for axis in "xyz") for what in ("pull", "target"))
 FORCE_AXES, MOVED_AXES = (tuple(f"{what}_axes_{axis}_deg" for axis in "abc") for what in ("force", "sensor"))
 USED = "direction", "force_N", "displacement_um", "sd_um", "repeat"  # beside vectors
-FRAMES = "force_axes", "sensor_axes"  # of the components: "base", or "tip", the tip's own at each row
-NOT_READ = ("nan", "n/a", "na", "-")  # cells that say so, as empty ones do
+FRAMES = "force_axes", "sensor_axes"  # of the components, of `AXES`
+AXES = "base", "tip", "work"  # the tip's own at each row; the axes of poses, those of [work] of the machine file
+NOT_READ = ("nan", "n/a", "na", "-")  # cells that count as empty
 FARTHEST = -1e6, 1e6  # um, of a dial
-SMALLEST = m_from_um(1e-3)  # of a displacement that others are compared with
-ROLL_FIRST = 'angles turn about X, then Y, then Z of the base; where a, b, c begin with Z: --columns "a=c_deg, c=a_deg"'
-SMALL_TURNS, SEVERAL = rad_from_deg(6.29), 3  # poses of which no joint turns by more are hardly in degrees
-# By which a pose and the joints beside it may differ: rounded; or of a robot that sags and is not calibrated (some mm:
-# ISO 9283 counts its accuracy apart from its repeatability). Then the joints count, with a note.
-SAME_PLACE, NEAR_PLACE, NEAR_TURN = m_from_mm(1.0), m_from_mm(10.0), rad_from_deg(3.0)
+SMALLEST = m_from_um(1e-3)  # least displacement by which others are scaled
+ALONG = 0.99  # cosine between dial and force from which a reading never vanishes: F d^T C d, C positive definite
 
 
 @dataclass(frozen=True)
@@ -92,23 +89,35 @@ class Pulls(ArrayColumns):
 
     @cached_property
     def pull(self) -> IntArray:
-        """(m,) number of the pull that each is read of: of its row."""
+        """(m,) number of the pull (the row) that each reading belongs to."""
         return np.unique(np.char.add(self.file, self.line.astype(str)), return_inverse=True)[1].reshape(-1)
 
     @cached_property
     def size(self) -> FloatArray:
-        """(m,) m, length of the displacement that each reading is a component of."""
-        return np.asarray(np.maximum(np.sqrt(np.bincount(self.pull, self.value**2)), SMALLEST)[self.pull])
+        """(m,) m, length of the displacement whose component each reading is."""
+        return np.asarray(np.maximum(np.sqrt(np.bincount(self.pull, self.value**2))[self.pull], self.least))
+
+    @cached_property
+    def least(self) -> FloatArray:
+        """(m,) m that a displacement has at least: the tip moves where a dial aside of the force reads next to nothing.
+
+        There it is what such a force moves on average along all such dials, root mean squares.
+        """
+        force = np.linalg.norm(self.wrench[:, :3], axis=1)
+        along = np.abs((self.wrench[:, :3] * self.direction).sum(axis=1))
+        aside = (np.bincount(self.pull)[self.pull] == 1) & (along < ALONG * force)
+        usual = np.sqrt(np.mean((self.value[aside] / force[aside]) ** 2)) if aside.any() else 0.0
+        return np.asarray(np.maximum(np.where(aside, usual * force, 0.0), SMALLEST))
 
     def vectors(self, values: FloatArray) -> FloatArray:
-        """(pulls, 3) in base axes of values (m,) of the components that were read."""
+        """(pulls, 3) vectors in base axes from values (m,) of the components read."""
         total = np.zeros((int(self.pull.max()) + 1, 3))
         np.add.at(total, self.pull, values[:, None] * self.direction)
         return total
 
     @property
     def setup(self) -> TextArray:
-        """(m,) no set-up is named."""
+        """(m,) "": no set-up is named."""
         return np.full(len(self), "")
 
     @property
@@ -118,21 +127,21 @@ class Pulls(ArrayColumns):
 
     @property
     def tip(self) -> BoolArray:
-        """(m,) every reading is of the tip."""
+        """(m,) True: every reading is of the tip."""
         return np.ones(len(self), dtype=bool)
 
     @property
     def of_tip(self) -> "Pulls":
-        """All of them."""
+        """The readings of the tip: all."""
         return self
 
     @property
     def direction(self) -> FloatArray:
-        """(m, 3) along which each was read."""
+        """(m, 3) direction in which each was read."""
         return self.along[:, :3]
 
     def cannot_test(self, effects: Iterable[Effect]) -> dict[str, tuple[str, ...]]:
-        """Effects that pulls cannot test -> the columns that they lack."""
+        """Effects that pulls cannot test -> columns that are missing for them."""
         return lacking_columns(effects, self.missing)
 
 
@@ -147,24 +156,30 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
         raise MeasurementError("pulls beside stiffnesses", hint="give one kind of files at a time")
     for table in tables:
         _check_columns(table, machine)
-        loaded = replace(table, rows=tuple(row for row in table.rows if not _unloaded(table.record(row[1]))))
+        loaded = replace(table, rows=tuple(row for row in table.rows if not _empty(table.record(row[1]))))
         of_file, errors = parsed_rows(loaded, partial(_Pull.of, table.file, joints))
         if errors:
             raise InputErrors(errors)
         rows += of_file
-        unloaded = len(table.rows) - len(loaded.rows)
+        empty = len(table.rows) - len(loaded.rows)
         notes += [
             *table.notes,
-            *([f"{table.file}: {unloaded} rows of no force and no displacement are passed over"] if unloaded else []),
+            *(
+                [f"{table.file}: {empty} rows of no force, or of which nothing was read, are passed over"]
+                if empty
+                else []
+            ),
             *unused(table, used),
         ]
     if not rows:
-        raise MeasurementError("no rows below the heading", file=tables[0].file)
+        raise MeasurementError(
+            "nothing read in any row", expected="pulls below the heading", file=tables[0].file, line=1
+        )
     return _of_rows(rows, machine, notes)
 
 
 def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = None) -> list[Table]:
-    """The files that give forces as vectors or by cables, as tables; the others give stiffnesses along directions."""
+    """Tables of the files that give forces as vectors or by cables; the others give stiffnesses along directions."""
     known = Columns((*COLUMNS.numbers, *_further(machine)), (*COLUMNS.texts, *FRAMES))
     tables = [mapped_table(name, "measurements", known, mapping) for name in files]
     further = {*FORCE, TENSION, *_joint_columns(machine)}
@@ -172,7 +187,7 @@ def pull_tables(files: Sequence[str], machine: MachineTool, mapping: Mapped = No
 
 
 def _check_columns(table: Table, machine: MachineTool) -> None:
-    """Refuse a table that lacks poses or all joints, forces, or what moved."""
+    """Refuse a table that lacks poses or all joints, forces, or displacements."""
     if not {*POSITION} <= {*table.heading}:
         missing = [named for named in _names_of_joints(machine) if {*named}.isdisjoint(table.heading)]
         check_needed(table, [by_number for _, by_number in missing], f"all joints, or {', '.join(POSITION)}")
@@ -186,7 +201,7 @@ def _check_columns(table: Table, machine: MachineTool) -> None:
 
 @dataclass(frozen=True)
 class _Pull:
-    """One row, SI; nan where a cell is empty or a column absent."""
+    """One row, SI; nan for an empty cell or an absent column."""
 
     pose: tuple[float, ...]
     joints: tuple[float, ...]
@@ -197,14 +212,14 @@ class _Pull:
     moved: tuple[tuple[str, tuple[float, ...], float], ...]
     pull: tuple[float, ...]
     target: tuple[float, ...]
-    in_tip: tuple[bool, ...]  # of `FRAMES`
+    frames: tuple[int, ...]  # of `FRAMES` the numbers among `AXES`
     sd: float
     file: str
     line: int
 
     @classmethod
     def of(cls, file: str, joints: Mapping[str, tuple[int, bool]], line: int, record: Mapping[str, str]) -> "_Pull":
-        """A row of a file. Raises `MeasurementError`."""
+        """Pull from a row of a file. Raises `MeasurementError`."""
         record = {name: "" if cell.strip().lower() in NOT_READ else cell for name, cell in record.items()}
 
         def mm(names: Sequence[str]) -> tuple[float, ...]:
@@ -240,23 +255,28 @@ class _Pull:
             expected = f"{', '.join(MOVED)}; or displacement_um along {', '.join(DIAL)}"
             raise MeasurementError("nothing read", expected=expected)
         pose = (*mm(POSITION), *angles) if placed else (np.nan,) * 6
-        pulley, sd, frames = mm(CABLE), m_from_um(optional_number(record, "sd_um")), [record.get(f) for f in FRAMES]
-        if not {*frames} <= {None, "", "base", "tip"}:
-            raise MeasurementError(f"axes {' and '.join(filter(None, frames))}", expected="base or tip")
+        pulley, sd = mm(CABLE), m_from_um(optional_number(record, "sd_um"))
+        frames = [record.get(name) or AXES[0] for name in FRAMES]
+        if strange := [frame for frame in frames if frame not in AXES]:
+            raise MeasurementError(f"axes {strange[0]}", expected=f"one of {', '.join(AXES)}")
         return cls(
             pose, tuple(values), force, moment, tension, pulley, tuple(moved), mm(PULL), mm(TARGET),
-            tuple(frame == "tip" for frame in frames), sd, file, line,
+            tuple(map(AXES.index, frames)), sd, file, line,
         )  # fmt: skip
 
 
-def _unloaded(record: Mapping[str, str]) -> bool:
-    """Whether a row says that nothing moved under no force: where the readings are counted from."""
-    cells = [record.get(name, "").strip() for name in (*FORCE, TENSION, "force_N", *MOVED, "displacement_um")]
-    return any(cells) and set("".join(cells)) <= set("+-.0")
+def _empty(record: Mapping[str, str]) -> bool:
+    """True if a row states no motion under no force, the origin of the readings, or nothing was read."""
+    force, moved = (
+        [record.get(name, "").strip() for name in names]
+        for names in ((*FORCE, TENSION, "force_N"), (*MOVED, "displacement_um"))
+    )
+    unread = all(cell.lower() in ("", *NOT_READ) for cell in moved)
+    return any(force) and (unread or set("".join(force + moved)) <= set("+-.0"))
 
 
 def _component(record: Mapping[str, str], name: str) -> float:
-    """A component of a load; 0 where the file has no such column."""
+    """A component of a load; 0 if the file has no such column."""
     return number(record, name) if name in record else 0.0
 
 
@@ -267,33 +287,34 @@ def _turn(record: Mapping[str, str], names: Sequence[str]) -> FloatArray:
 
 
 def _names_of_joints(machine: MachineTool) -> list[tuple[str, str]]:
-    """Columns that a joint's value may stand in: `joint_J1_deg`, `joint_1_deg`."""
+    """Column names for a joint's value: `joint_J1_deg`, `joint_1_deg`."""
     kinds = zip(machine.joint_names, machine.joint_kinds, strict=True)
     both = [(name.replace(" ", "_"), "mm" if kind == "linear" else "deg") for name, kind in kinds]
     return [(f"joint_{name}_{unit}", f"joint_{i}_{unit}") for i, (name, unit) in enumerate(both, 1)]
 
 
 def _joint_columns(machine: MachineTool) -> dict[str, tuple[int, bool]]:
-    """Column -> number of the joint and whether it is linear."""
+    """Column -> number of the joint, and True if it is linear."""
     return {name: (i, name.endswith("mm")) for i, names in enumerate(_names_of_joints(machine)) for name in names}
 
 
 def _further(machine: MachineTool) -> tuple[str, ...]:
-    """Columns that pulls have beside those of stiffnesses."""
+    """Columns of pulls besides those of stiffnesses."""
     loads = (*FORCE, *MOMENT, *FORCE_AXES, TENSION, *CABLE, *PULL)
     return (*loads, *MOVED, *MOVED_AXES, *DIAL, *TARGET, *_joint_columns(machine))
 
 
 def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) -> Pulls:
-    """The machine stood at each row's pose or joints; a reading for each component that was read."""
+    """Pulls from rows, the machine at each row's pose or joints; one reading for each component read."""
     pose, joints = np.array([row.pose for row in rows]), np.array([row.joints for row in rows])
-    stance, assumed = _stances(machine, pose, joints, rows)
-    turn = np.broadcast_to(np.eye(3) if stance.rotation is None else stance.rotation, (len(rows), 3, 3))
+    stance, assumed = standing(machine, pose, joints, [(row.file, row.line) for row in rows])
+    turn = stance.axes
     pull, target = (np.einsum("nij,nj->ni", turn, [getattr(row, name) for row in rows]) for name in ("pull", "target"))
     cable = np.array([row.pulley for row in rows]) - stance.position - pull
     by_cable = np.array([[row.tension] for row in rows]) * cable / np.linalg.norm(cable, axis=1, keepdims=True)
-    in_tip = np.array([row.in_tip for row in rows])[..., None, None]
-    of_force, of_sensor = (np.where(in_tip[:, i], turn, np.eye(3)) for i in range(len(FRAMES)))
+    base = np.broadcast_to(np.eye(3), turn.shape)
+    every = np.stack([base, turn, base if stance.work_axes is None else stance.work_axes])
+    of_force, of_sensor = (every[[row.frames[i] for row in rows], range(len(rows))] for i in range(len(FRAMES)))
     given, moment = (
         np.einsum("nij,nj->ni", of_force, [getattr(r, name) for r in rows]) for name in ("force", "moment")
     )
@@ -316,54 +337,8 @@ def _of_rows(rows: Sequence[_Pull], machine: MachineTool, notes: Sequence[str]) 
     )
 
 
-def _stances(
-    machine: MachineTool, pose: FloatArray, joints: FloatArray, rows: Sequence[_Pull]
-) -> tuple[Stance, list[str]]:
-    """At the joints where they are given, else at the pose, and what was assumed.
-
-    Raises `InputErrors` for rows that cannot be.
-    """
-    by_joints, errors, notes = ~np.isnan(joints).any(axis=1), list[MeasurementError](), list[str]()
-    position, rotation, joints = pose[:, :3], rotation_matrices(np.nan_to_num(pose[:, 3:])), joints.copy()
-    apart, turned = np.full((2, len(rows)), np.nan)
-    if by_joints.any():
-        at, turn = machine.forward(joints[by_joints])
-        apart[by_joints] = np.linalg.norm(at - position[by_joints], axis=1)
-        cosine = (np.einsum("nij,nij->n", turn, rotation[by_joints]) - 1.0) / 2.0
-        turned[by_joints] = np.arccos(np.clip(cosine, -1.0, 1.0)) + 0.0 * pose[by_joints, 3]
-
-    def refuse(row: int, text: str) -> None:
-        hint = "" if np.isnan(pose[row, 3]) else ROLL_FIRST
-        errors.append(MeasurementError(text, hint=hint, file=rows[row].file, line=rows[row].line))
-
-    for row in np.flatnonzero((apart > NEAR_PLACE) | (turned > NEAR_TURN)).tolist():
-        by = [f"{mm_from_m(float(apart[row])):.1f} mm", f"{deg_from_rad(float(turned[row])):.1f} degrees"]
-        refuse(row, f"pose and joints are {by[not apart[row] > NEAR_PLACE]} apart")
-    if (apart > SAME_PLACE).any():
-        notes.append(f"poses and joints are up to {mm_from_m(float(np.nanmax(apart))):.1f} mm apart: the joints count")
-    if not by_joints.all():  # one configuration for all poses: of those that reach most, that farthest from limits
-        alone = position[~by_joints], rotation[~by_joints]
-        tried = [machine.solve(*alone, configuration=i).joints for i in range(len(machine.configurations))]
-        room = [joint_margin(values.T, machine.joint_limits) for values in tried]
-        kept = max(range(len(tried)), key=lambda i: (int((room[i] >= 0.0).sum()), float(room[i].min())))
-        missed = np.isnan(tried[kept]).any(axis=1, keepdims=True)
-        joints[~by_joints] = np.where(missed, machine.solve(*alone).joints, tried[kept])
-        if machine.configurations[kept]:
-            notes.append(f"poses without joint values: taken in the configuration {machine.configurations[kept]}")
-    for row in np.flatnonzero(np.isnan(joints).any(axis=1)).tolist():
-        refuse(row, "no joint values lead to the pose")
-    turning = joints[by_joints][:, [kind != "linear" for kind in machine.joint_kinds]]
-    if len(np.unique(turning, axis=0)) >= SEVERAL and turning.any() and np.abs(turning).max() < SMALL_TURNS:
-        small = f"no joint turns by more than {deg_from_rad(float(np.abs(turning).max())):.3g} deg"
-        hint = 'columns in radians are named by --columns "joint_1=joint_1_deg:rad, ..." (columns=)'
-        errors.append(MeasurementError(small, expected="degrees", hint=hint, file=rows[0].file))
-    if errors:
-        raise InputErrors(errors)
-    return machine.standing(joints), notes
-
-
 def _of_stiffnesses(files: Sequence[str], machine: MachineTool, mapping: Mapped) -> Pulls:
-    """Readings of force over displacement along a direction, as pulls by that force with a dial along it."""
+    """Force over displacement along a direction, as pulls by that force read with a dial along it."""
     data = read_measurements(files, machine, columns=mapping)
     wrench, along = (np.hstack([part, np.zeros((len(data), 3))]) for part in (data.direction * data.force[:, None],
                                                                              data.direction))  # fmt: skip

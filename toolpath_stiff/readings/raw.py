@@ -28,12 +28,12 @@ from toolpath_stiff.units import n_per_m_from_n_per_mm
 
 READ = (".csv", ".txt", ".dat", ".asc", ".tsv", ".xlsx", ".xlsm")  # of a folder
 OWN_OUTPUT = "_measurements.csv"
-FAILED = 0.05  # of the rows of such a table: tests that may have failed, near zero; of more the unit is wrong; assumed
+FAILED = 0.05  # share of a table's rows that may be failed tests, near zero; if more, the unit is wrong; assumed
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Reduction(Result):
-    """Raw records of force and displacement as measured stiffnesses, and what each loop says of play and friction.
+    """Raw records of force and displacement as measured stiffnesses, with play and friction of each loop.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Reduction(Result):
     notes
         What was assumed in reading them.
     read_as
-        One line a file: which columns were read as what.
+        One line per file: which columns were read as what.
     history
         Of struts measured alone, over their dates.
 
@@ -80,28 +80,28 @@ class Reduction(Result):
 
     @property
     def recorded(self) -> list[LoopFigures]:
-        """Loops with their records, and what they say; rows of a table of stiffnesses have none."""
+        """Figures of the loops with records; rows of a table of stiffnesses have none."""
         return [figures for figures in self.figures if len(figures.loop.force)]
 
     @property
     def title(self) -> str:
-        """The first file, and how many others there are."""
+        """Name of the first file, and the number of others."""
         name, others = Path(self.raw[0]).name, len(self.raw) - 1
         return f"{name} and {others} more" if others else name
 
     def to_dict(self) -> dict[str, Any]:
-        """One entry a loop, under "loops"; struts measured alone over their dates, under "history"."""
+        """One entry per loop, under "loops"; struts measured alone over their dates, under "history"."""
         return {"loops": [loop_entry(figures) for figures in self.figures], "history": to_dict(self.history)}
 
     def to_frame(self) -> DataFrame:
-        """One row a loop."""
+        """One row per loop."""
         return frame_of(self.to_dict()["loops"])
 
     def _short(self) -> str:
         return f"{self.title}, {len(self.figures)} loops"
 
     def files(self, file: str | Path, *, plots: bool = True) -> Mapping[Path, Content]:
-        """The measurement file; beside it the picture of the loops, and of dated struts that over their dates."""
+        """The measurement file; beside it pictures of the loops and, for dated struts, of their course over time."""
         out, pictures = Path(file), self.view.pictures(self) if plots else {}
         beside = {out.with_name(f"{out.stem}_{name}"): content for name, content in pictures.items()}
         return {out: measurement_csv(self.figures, self.history), **beside}
@@ -119,7 +119,7 @@ def reduce(*raw: str | Path, columns: Mapped = None, compression_positive: bool 
     raw
         Files and folders of them: CSV, or FILE.xlsx[#SHEET]. Of struts on a bench also tables of their stiffnesses.
     columns
-        Which columns the files call otherwise: "strut=hp, date=day_ms:ms, force=Kraft:kN", or such a dict; unless
+        Columns that the files name differently: "strut=hp, date=day_ms:ms, force=Kraft:kN", or such a dict; unless
         given, as FILE.columns.toml beside a file says.
     compression_positive
         Whether the forces of struts on a bench count compression positive.
@@ -174,7 +174,7 @@ def reduce(*raw: str | Path, columns: Mapped = None, compression_positive: bool 
 
 
 def _files(name: str) -> list[str]:
-    """A file, or those of a folder and the folders in it, in the order of their names."""
+    """A file, or the files of a folder and its subfolders, in order of name."""
     if not Path(name).is_dir():
         return [name]
     paths = sorted(p for p in Path(name).rglob("*") if p.suffix.lower() in READ and not p.name.startswith((".", "~")))

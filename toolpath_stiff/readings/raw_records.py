@@ -1,4 +1,4 @@
-"""Raw records of force and displacement, read: which of them are one loop, and what was set step by step."""
+"""Raw records of force and displacement: reading them, grouping them into loops, finding what was set in steps."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ from toolpath_stiff.tables import Columns, Table
 from toolpath_stiff.units import m_from_um
 
 READINGS = ("jog_um", "force_N", "displacement_um")
-LARGEST = (-1e7, 1e7)  # of each of them, either sign
+LARGEST = (-1e7, 1e7)  # bounds of each number
 STIFFNESS = ("stiffness_N_per_mm", "strut_force_N")  # of a table of struts that were reduced elsewhere
-# What one loop has in common.
+# Columns that the records of a loop share.
 PLACE = (*POSITION, *ANGLES, "direction", *VECTOR, *LABELS, "tool_extension_mm", "length_mm", DATE)
 COLUMNS = Columns(
     numbers=(*POSITION, *ANGLES, *VECTOR, "tool_extension_mm", "length_mm", *READINGS, *STIFFNESS),
     texts=("direction", *LABELS, DATE, "strut"),
 )
-LOST = ("", "-", "nan", "n/a")  # what is written for a lost reading
+LOST = ("", "-", "nan", "n/a")  # cells of a lost reading
 LAYOUTS = (
     "x_mm,y_mm,z_mm,direction,jog_um,force_N,displacement_um, or strut,date,force_N,displacement_um of a strut on a "
     "bench, or strut,date,stiffness_N_per_mm of struts alone"
 )
-ONE_SIDE = 0.05  # of the range: a force set on a bench that goes less far to the other side is of one side
-NEAR_END = 0.02  # of the range of a force set on a bench: records this close are at its extreme, and averaged
+ONE_SIDE = 0.05  # share of the range: a bench force that reaches less far to the other side is one-sided
+NEAR_END = 0.02  # share of the range of a bench force: records this close to its extreme are averaged there
 SAME_JOG = 1e-9  # m: jogs this close are the same step
 DAY = len("2024-03-31")
 
@@ -52,7 +52,7 @@ Record = tuple[int, dict[str, str], list[float]]  # line, cells, `READINGS`
 
 @dataclass(frozen=True)
 class Loop:
-    """One test: records in the order in which they were taken. SI.
+    """One test, its records in the order taken. SI.
 
     Attributes
     ----------
@@ -73,45 +73,45 @@ class Loop:
 
     @property
     def deflection(self) -> FloatArray:
-        """(m,) m, what the machine gave way: jog less displacement; on a bench the displacement itself."""
+        """(m,) m, give of the machine: jog less displacement; on a bench the displacement itself."""
         return self.displacement if self.jog is None else self.jog - self.displacement
 
     @property
     def drive(self) -> FloatArray:
-        """(m,) what was set step by step: the jog in m; on a bench the force in N."""
+        """(m,) quantity set step by step: the jog in m; on a bench the force in N."""
         return self.force if self.jog is None else self.jog
 
     @property
     def same(self) -> float:
-        """How close two records' `drive` is at one step."""
+        """Largest difference in `drive` between records of one step."""
         return NEAR_END * float(np.ptp(self.force)) if self.jog is None else SAME_JOG
 
     @property
     def strut(self) -> str:
-        """The strut that was measured alone, as "strut 3 alone"."""
+        """Strut measured alone, as "strut 3 alone"."""
         return self.place.get("loop", "")
 
     @property
     def date(self) -> str:
-        """As in the file; "" without one."""
+        """Date as in the file; "" if there is none."""
         return self.place.get(DATE, "")
 
     @property
     def side(self) -> float:
-        """1 of a bench record under tension alone, -1 under compression alone, 0 of any other loop."""
+        """1 for a bench record under tension alone, -1 under compression alone, 0 for any other loop."""
         if self.jog is not None or not len(self.force):
             return 0.0
         least = ONE_SIDE * float(np.ptp(self.force))
         return 1.0 if self.force.min() >= -least else -1.0 if self.force.max() <= least else 0.0
 
     def part(self, records: slice) -> Loop:
-        """The same test, of some of its records."""
+        """The test with some of its records only."""
         jog = None if self.jog is None else self.jog[records]
         return replace(self, jog=jog, force=self.force[records], displacement=self.displacement[records])
 
     @property
     def title(self) -> str:
-        """Point or position, direction, set-up, repeat: whatever is there."""
+        """Point or position, direction, set-up, repeat, as far as known."""
         rest = [f"{name} {self.place[name]}" for name in ("setup", "clamp", "repeat") if self.place.get(name)]
         where, way = self.strut, self.place.get("point", "")
         if self.jog is not None:
@@ -121,7 +121,7 @@ class Loop:
 
 
 def read_raw(table: Table) -> tuple[list[Loop], list[str]]:
-    """Loops of a file of raw records (`tables.read_table` with `COLUMNS`), by their first record; and remarks.
+    """Loops of a file of raw records (`tables.read_table` with `COLUMNS`), in order of first record; and remarks.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def _needed(heading: Sequence[str]) -> tuple[str, ...]:
 
 
 def _record(line: int, record: dict[str, str]) -> Record:
-    """A record with jog (nan on a bench), force and displacement; without values if it has lost them."""
+    """Record with jog (nan on a bench), force and displacement; without values if they were lost."""
     if not record.get("jog_um") and any(record.get(name, "").lower() in LOST for name in READINGS[1:]):
         return line, record, []
     on_bench = strut_or_loop(record).kind == "alone" and not record.get("jog_um")
@@ -179,7 +179,7 @@ def _record(line: int, record: dict[str, str]) -> Record:
 
 
 def strut_or_loop(record: dict[str, str]) -> MeasuringLoop:
-    """The loop of a record; `strut` 3 is the loop "strut 3 alone", and the record says so afterwards.
+    """Loop of a record; `strut` 3 becomes the loop "strut 3 alone", also in the record.
 
     Raises `InputError` for no such strut, and for a date or a length that is none.
     """

@@ -1,4 +1,4 @@
-"""Reduced loops as they are written: entries of a document, rows of a measurement file, struts over their dates."""
+"""Reduced loops in writing: entries of a document, rows of a measurement file, struts over their dates."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ from toolpath_stiff.units import n_per_mm_from_n_per_m, um_from_m
 
 
 def struts_over_dates(figures: Sequence[LoopFigures]) -> StrutHistory:
-    """Struts measured alone over their dates; those of several lengths by length, as a strut's stiffness varies."""
+    """Struts measured alone over their dates; several lengths apart, as a strut's stiffness depends on length."""
     alone = [record for record in figures if record.loop.jog is None]
     kinds: dict[str, set[tuple[str, float]]] = {}
     for record in alone:
@@ -25,7 +25,7 @@ def struts_over_dates(figures: Sequence[LoopFigures]) -> StrutHistory:
     def name(record: LoopFigures) -> str:
         strut, length = record.loop.strut, record.loop.place.get("length_mm")
         parts = [strut, f"{length} mm" if length and len({kind[0] for kind in kinds[strut]}) > 1 else ""]
-        # A record of one side alone is not held against those of both.
+        # A one-sided record is not compared with two-sided ones.
         if record.loop.side and 0.0 in {kind[1] for kind in kinds[strut]}:
             parts.append("in tension alone" if record.loop.side > 0.0 else "in compression alone")
         return ", ".join(filter(None, parts))
@@ -45,13 +45,13 @@ def struts_over_dates(figures: Sequence[LoopFigures]) -> StrutHistory:
 
 
 def _sided(figures: Sequence[LoopFigures], over_time: StrutHistory) -> set[str]:
-    """Struts that differ in tension and compression and whose loops all say so: rows of both would not be alike."""
+    """Struts that differ in tension and compression, with both sides in all loops: they get a row for each side."""
     lacking = {record.loop.strut for record in figures if math.isnan(record.tension)}
     return {strut.strut for strut in over_time.struts if strut.sides is not None and strut.sides.p < SURE} - lacking
 
 
 def remarks(figures: Sequence[LoopFigures], over_time: StrutHistory) -> Iterator[str]:
-    """What stands in a measurement file in place of a secant, and which of its rows are outdated."""
+    """Remarks on rows that replace a secant in the measurement file, and on rows that are outdated."""
     both = sorted(_sided(figures, over_time))
     if both:
         yield f"tension and compression differ: a row of each side for {', '.join(both)}"
@@ -63,12 +63,12 @@ def remarks(figures: Sequence[LoopFigures], over_time: StrutHistory) -> Iterator
             )
 
 
-# Columns of a measurement file that say more than the stiffness.
+# Columns of a measurement file beyond the stiffness.
 FURTHER = ("lost_motion_um", "loop_width_um", "linearity_percent", "closure_um")
 
 
 def _in_shop_units(figures: LoopFigures) -> dict[str, float]:
-    """What a loop says by the names that documents have; nan for what it cannot say."""
+    """Figures of a loop by their names in documents; nan for unknown ones."""
     return {
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(figures.stiffness),
         "force_N": figures.force,
@@ -83,14 +83,14 @@ def _in_shop_units(figures: LoopFigures) -> dict[str, float]:
 
 
 def loop_entry(figures: LoopFigures) -> Document:
-    """A loop in the shop's units; what it cannot say is None."""
+    """A loop in the shop's units; None for unknown figures."""
     numbers = _in_shop_units(figures).items()
     rounded = {name: round(value, 6) if math.isfinite(value) else None for name, value in numbers}
     return {"loop": figures.loop.title, "line": figures.loop.line, **rounded}
 
 
 def measurement_csv(reduced: Sequence[LoopFigures], over_time: StrutHistory) -> str:
-    """A measurement file, one row a loop; of a strut that differs in tension and compression a row of each.
+    """A measurement file with one row per loop, or per side of a strut that differs in tension and compression.
 
     A figure that some loop lacks is left out as a column.
     """
@@ -104,7 +104,7 @@ def measurement_csv(reduced: Sequence[LoopFigures], over_time: StrutHistory) -> 
         figures += [replace(record, stiffness=stiffness, force=force) for stiffness, force in rows]
     numbers = [_in_shop_units(record) for record in figures]
     place = [name for name in PLACE if any(record.loop.place.get(name) for record in figures)]
-    # The force of a strut measured alone is along it, else at the tool tip.
+    # The force of a strut measured alone is along it, otherwise it is at the tool tip.
     of_force = ["strut_force_N" if record.loop.jog is None else "force_N" for record in figures]
     forces = sorted(set(of_force))
     further = [name for name in FURTHER if all(math.isfinite(values[name]) for values in numbers)]

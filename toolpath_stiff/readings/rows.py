@@ -1,4 +1,4 @@
-"""Rows of a measurement file: one measured stiffness each, every cell read and judged, in SI.
+"""Rows of a measurement file: one measured stiffness each, every cell read and checked, in SI.
 
 A bad row is named with its line; all bad rows of a file are reported together.
 """
@@ -24,7 +24,7 @@ POSITION = ("x_mm", "y_mm", "z_mm")
 ANGLES = ("a_deg", "b_deg", "c_deg")
 VECTOR = ("dx", "dy", "dz")
 LABELS = ("setup", "clamp", "repeat", "point", "loop")
-LOOP_COLUMNS = ("sd_um", "strut_force_N", "length_mm")  # of loops beside the tip alone
+LOOP_COLUMNS = ("sd_um", "strut_force_N", "length_mm")  # only of loops beside the tip
 OPTIONAL = ("force_N", "sd_N_per_mm", *LABELS, "time_min", "tool_extension_mm", "temperature_C")
 COLUMNS = Columns(
     numbers=(
@@ -50,7 +50,7 @@ BOUNDS = {
     "strut_force_N": (-1e7, 1e7),
     "length_mm": (1.0, 1e5),
 }
-# Of a loop beside the tip, which may read nothing, or backwards.
+# Bounds of a loop beside the tip, which may read zero, or backwards.
 LOOP_BOUNDS = {"stiffness_N_per_mm": (-1e12, 1e12), "displacement_um": (-1e6, 1e6)}
 LEAST_FORCE = 1e-3  # N, of either sign
 AGREEMENT = 0.01  # a stiffness printed beside force and displacement must be their quotient, rounding allowed
@@ -58,7 +58,7 @@ AGREEMENT = 0.01  # a stiffness printed beside force and displacement must be th
 
 @dataclass(frozen=True)
 class Row:
-    """One reading: what `Readings` has of each. SI; a cell that is absent or empty is nan or "".
+    """One reading as `Readings` has it. SI; nan or "" for a cell that is absent or empty.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Row:
 
 
 def refuse_pulls(table: Table) -> None:
-    """Raise `InputError` for a table of forces as vectors, which is no table of stiffnesses or of raw records."""
+    """Raise `InputError` for a table of force vectors, which is neither of stiffnesses nor of raw records."""
     if not {"fx_n", "fy_n", "fz_n", "tension_n"}.isdisjoint(map(heading_key, table.heading)):
         raise MeasurementError(
             "forces as vectors, or by a cable: pulls on a machine of elements",
@@ -107,7 +107,7 @@ def refuse_pulls(table: Table) -> None:
 
 
 def read_rows(table: Table, planned: bool = False, softest: float = SOFTEST) -> tuple[list[Row], list[str]]:
-    """Rows of a measurement file; and what was not used, in words.
+    """Rows of a measurement file; and remarks on what was not used.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def read_rows(table: Table, planned: bool = False, softest: float = SOFTEST) -> 
 
 
 def parsed_rows(table: Table, parse: Callable[[int, dict[str, str]], Parsed]) -> tuple[list[Parsed], list[InputError]]:
-    """What `parse` makes of each row's line and record, and the errors of the others."""
+    """Results of `parse` for each row's line and record, and the errors of the other rows."""
     parsed: list[Parsed] = []
     errors: list[InputError] = []
     for line, cells in table.rows:
@@ -155,9 +155,9 @@ def parsed_rows(table: Table, parse: Callable[[int, dict[str, str]], Parsed]) ->
 
 
 def _needed(heading: Sequence[str], planned: bool) -> tuple[str, ...]:
-    """Columns that a heading needs: three angles and three components of a direction, or none."""
+    """Columns that a heading needs: three angles and three components of a direction, or none of them."""
     groups = tuple(name for group in (ANGLES, VECTOR) if not {*group}.isdisjoint(heading) for name in group)
-    bench = "loop" in heading  # a strut on a bench has neither place nor direction
+    bench = "loop" in heading  # a strut on a bench has neither pose nor direction
     loaded = "displacement_um" in heading and ("force_N" in heading or "strut_force_N" in heading)
     return (
         *(() if bench else POSITION),
@@ -176,7 +176,7 @@ def _all_numbers(table: Table, column: int) -> bool:
 
 def _row(record: Mapping[str, str], further: Sequence[str], file: str, line: int, planned: bool, softest: float) -> Row:
     loop = loop_of(record.get("loop", ""))
-    day_of(record.get(DATE, ""))  # refuses what is no date
+    day_of(record.get(DATE, ""))  # raises for a text that is no date
     # A strut on a bench has neither pose nor direction.
     poseless = loop.kind == "alone" and not any(record.get(name) for name in (*POSITION, *ANGLES))
     undirected = loop.kind == "alone" and not (record.get("direction") or VECTOR[0] in record)
@@ -205,7 +205,7 @@ def _angle(record: Mapping[str, str], name: str) -> float:
 
 
 def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planned: bool) -> Row:
-    """A row with what an indicator beside the tip read.
+    """Row with the reading of an indicator beside the tip.
 
     Raises
     ------
@@ -232,7 +232,7 @@ def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planne
     compliance = math.nan
     if given:
         compliance = m_from_um(values[0]) / force if given == ["displacement_um"] else 1e-3 / values[0]
-    # A sign of the direction turns what does not read along the load.
+    # A signed direction reverses a reading that is not taken along the load.
     if record.get("direction", "").startswith("-") and not (loop.along_load or alone):
         compliance = -compliance
     if alone and not (planned or 1e-3 / STIFFEST <= compliance <= 1e-3 / SOFTEST):
@@ -249,7 +249,7 @@ def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planne
 
 
 def _stiffness(record: Mapping[str, str], force: float, planned: bool, softest: float) -> float:
-    """N/mm of a reading of the tip; nan of a plan's."""
+    """N/mm of a reading of the tip; nan for a planned one."""
     given = record.get("stiffness_N_per_mm")
     printed = number(record, "stiffness_N_per_mm", (softest, STIFFEST)) if given else math.nan
     displacement = optional_number(record, "displacement_um")
@@ -265,7 +265,7 @@ def _stiffness(record: Mapping[str, str], force: float, planned: bool, softest: 
 
 
 def direction_of(record: Mapping[str, str]) -> tuple[float, ...]:
-    """Unit vector of `direction`, or of dx,dy,dz."""
+    """Unit vector of `direction`, or of dx, dy, dz."""
     if "direction" not in record and VECTOR[0] not in record:
         raise MeasurementError("no direction", expected="direction, or dx,dy,dz")
     if "direction" in record:
@@ -286,7 +286,7 @@ def number(record: Mapping[str, str], name: str, bounds: tuple[float, float] | N
         raise MeasurementError(f"no column {name}", expected="x_mm,y_mm,z_mm; only a strut measured alone has no pose")
     text = record[name]
     try:
-        value = math.nan if "_" in text else float(text)  # Python's own "1_000" is no number of an office
+        value = math.nan if "_" in text else float(text)  # Python's "1_000" is not a number in a table
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
@@ -298,18 +298,18 @@ def number(record: Mapping[str, str], name: str, bounds: tuple[float, float] | N
 
 
 def optional_number(record: Mapping[str, str], name: str) -> float:
-    """A number, or nan where the column is absent or the cell empty."""
+    """A number, or nan if the column is absent or the cell empty."""
     return number(record, name) if record.get(name) else math.nan
 
 
 def duplicates(rows: list[Row]) -> list[InputError]:
-    """Rows that say the same as an earlier one: all cells alike or, within a file, one repeat number twice."""
+    """Errors for rows that repeat an earlier one: all cells equal or, within a file, the same repeat number."""
     first: dict[str, Row] = {}
     errors: list[InputError] = []
     for row in rows:
         cells = replace(row, temperature=math.nan, extra={}, file="", line=0)
         cells = cells if row.loop else replace(cells, sd=math.nan, stiffness=math.nan)
-        # repr: nan differs from itself, its text does not.
+        # Compared by repr, as nan differs from itself but its text does not.
         keys = [repr((cells, row.stiffness)), *([repr((cells, row.file))] if row.repeat else [])]
         earlier = next((first[key] for key in keys if key in first), None)
         first |= {key: row for key in keys if key not in first}

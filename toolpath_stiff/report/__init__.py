@@ -1,1 +1,1 @@
-"""Pictures, pages and tables of results, alike on terminal, pictures and pages."""
+"""Pictures, pages and tables of results, with the same words on terminal, pictures and pages."""

@@ -1,4 +1,4 @@
-"""The results of an analysis: what a terminal shows, page and files."""
+"""Views of an analysis: terminal text, page and files."""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ from toolpath_stiff.report.tables import LABEL
 from toolpath_stiff.report.words import WIDTH, labelled
 from toolpath_stiff.results import one_of
 
-# Of `samples.csv`, Parquet and the DataFrame, with their decimals; of joints those of lengths, or 6.
+# Columns of `samples.csv`, Parquet and the DataFrame, with their decimals; joints have those of lengths, or 6.
 COLUMNS: dict[str, int | None] = {
     **PATH_COLUMNS,
     "stiffness_N_per_mm": 4,
@@ -35,7 +35,7 @@ MOST_OPERATIONS = 12  # on the terminal; all are in summary.json
 
 
 def unwritten(table: str, cut: bool) -> tuple[str, ...]:
-    """The files that are not written. Raises `InputError` where the format is unknown or not installed."""
+    """Files that are not written. Raises `InputError` if the format is unknown or not installed."""
     if one_of("table", table, ("csv", "parquet")) == "parquet":
         check_parquet()
     others = tuple(name for name in ("samples.csv", "samples.parquet") if not name.endswith(table))
@@ -43,7 +43,7 @@ def unwritten(table: str, cut: bool) -> tuple[str, ...]:
 
 
 def samples_csv(analysis: Analysis) -> Iterator[bytes]:
-    """`samples.csv` in pieces: the heading, then blocks of rows. A value that does not exist is an empty cell."""
+    """`samples.csv` in pieces: the heading, then blocks of rows. A missing value is an empty cell."""
     names = sample_columns(analysis, slice(0))
     decimals = {name: COLUMNS.get(name, decimals_of(name)) for name in names}
     rows = table_rows(analysis)
@@ -51,7 +51,7 @@ def samples_csv(analysis: Analysis) -> Iterator[bytes]:
 
 
 def samples_parquet(analysis: Analysis) -> Iterator[bytes]:
-    """`samples.parquet` in pieces, full precision. A value that does not exist is null."""
+    """`samples.parquet` in pieces, full precision. A missing value is null."""
     rows = table_rows(analysis)
     return parquet_pieces(lambda some: sample_columns(analysis, rows[some]), len(rows))
 
@@ -69,7 +69,7 @@ PAGE, page = "report.html", analysis_page.page
 
 
 def text(analysis: Analysis) -> str:
-    """What the terminal shows: the figures, the other machine beside them, the lines below the required stiffness."""
+    """Text for the terminal: the figures, the other machine beside them, the lines below the required stiffness."""
     summary = analysis.to_dict()
     lines = [terminal_text(summary)]
     if analysis.on_other is not None:
@@ -83,7 +83,7 @@ def text(analysis: Analysis) -> str:
 
 
 def terminal_text(summary: Document) -> str:
-    """The figures of one analysis, of its `summary.json`."""
+    """Figures of one analysis, from its `summary.json`."""
     tools, operations = tool_table(summary["per_tool"]), operation_table(summary["per_operation"], MOST_OPERATIONS)
     lines = [line for label, words in facts(summary) for line in labelled(label, words, LABEL) or [label]]
     if len(tools.rows) > 1:
@@ -102,7 +102,7 @@ def terminal_text(summary: Document) -> str:
 
 
 def _only_plunges(parts: Sequence[Document], names: Sequence[str]) -> list[str]:
-    """A note on the parts whose figures are of plunges, where not all are."""
+    """Note on the parts that only plunge, if not all do."""
     plunging = [name for part, name in zip(parts, names, strict=True) if only_plunges(part)]
     if not plunging or len(plunging) == len(parts):
         return []

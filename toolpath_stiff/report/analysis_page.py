@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.analysis.statistics import stiffness_figures
 from toolpath_stiff.arrays import FloatArray, IntArray
-from toolpath_stiff.cutting.cut import Cut
 from toolpath_stiff.documents import Document, number
 from toolpath_stiff.nc.moves import MOTION_NAMES
 from toolpath_stiff.report import analysis_tables as words
@@ -24,7 +23,6 @@ from toolpath_stiff.report.curves import beyond_scale, cutting_box, extremes_by_
 from toolpath_stiff.report.cut import cut_tables
 from toolpath_stiff.report.pages import Part, markup, part, render
 from toolpath_stiff.report.scene import machine_scene
-from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
@@ -34,7 +32,8 @@ SCRIPTS = ("stage.js", "viewer.js", "solids.js", "machine.js", "profile.js", "li
 
 def page(analysis: Analysis, drawn: Mapping[str, bytes]) -> Iterator[str]:
     """The page in pieces of text."""
-    summary, data = analysis.to_dict(), page_data(analysis)
+    summary, rows = analysis.to_dict(), page_rows(analysis)
+    data = _data(analysis, rows)
     machine, load = f"machine {summary['machine']}", f"load {summary['load']}, {summary['force_N']:g} N"
     return render(
         "analysis.html",
@@ -50,7 +49,7 @@ def page(analysis: Analysis, drawn: Mapping[str, bytes]) -> Iterator[str]:
         heading=" · ".join([machine, load, words.headline_text(summary, " · ")]),
         warnings=summary["warnings"],
         note=_thinned_note(data["count"], len(analysis.samples)),
-        tables=_tables(analysis, data["weakest"], page_rows(analysis)),
+        tables=_tables(analysis, data["weakest"], rows),
     )
 
 
@@ -64,7 +63,7 @@ def _thinned_note(shown: int, samples: int) -> str:
 
 
 def _tables(analysis: Analysis, weakest: Sequence[int], rows: IntArray) -> list[tuple[str, Markup, bool]]:
-    """Title, content and whether it is wide, of each table; `weakest` of the page's `rows`: the weakest places."""
+    """Title, content and True if wide, of each table; `weakest` of the page's `rows`: the weakest places."""
     summary, other = analysis.to_dict(), analysis.on_other
     operations, unsupported = summary["per_operation"], summary["unsupported"]
     more = words.and_more(operations, words.MOST_ROWS, "operations")
@@ -109,19 +108,20 @@ def _places(places: Sequence[Document], weakest: Sequence[int]) -> ShownTable:
 
 MOST_QUADS = 8_000  # of walls and of floors on the page
 MOST_SAMPLES = 200_000  # on the page: some 5 MB; the tables are always of all samples
-OTHER_COLUMNS = 4000  # columns of pixels that the other machine's curve is thinned to
-NONE = 65535  # a value that does not exist
+OTHER_COLUMNS = 4000  # columns of pixels to which the other machine's curve is thinned
+NONE = 65535  # stands for a missing value
 OUT_OF_REACH, PLUNGE = 8, 16  # flags beside the motion
 
 
-def page_data(analysis: Analysis) -> Document:
-    """What the page's script reads: lengths in mm, angles in degrees, stiffness in N/mm.
+def _data(analysis: Analysis, rows: IntArray) -> Document:
+    """Data of some samples for the page's script: lengths in mm, angles in degrees, stiffness in N/mm.
 
     Positions are 16-bit fractions of the path's own box (`frame`: a 1 m box gives 0.015 mm), stiffness and margin of
     their own ranges, NONE where there is none.
     """
-    rows = page_rows(analysis)
     samples, evaluation = analysis.samples.take(rows), analysis.at
+    plunges, limits = stiffness_figures(analysis, analysis.set_aside), scale_limits(analysis)
+    below, above = beyond_scale(analysis, limits)
     points = mm_from_m(samples.position)
     frame = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
     stiffness, stiffness_range = _fractions(n_per_mm_from_n_per_m(evaluation.stiffness[rows]))
@@ -148,18 +148,21 @@ def page_data(analysis: Analysis) -> Document:
         "tools": [[int(i), int(samples.tool[i])] for i in np.flatnonzero(np.diff(samples.tool, prepend=-1))],
         "operations": _operation_starts(analysis, samples.move),
         "weakest": [int(np.searchsorted(rows, row)) for row in analysis.weakest_rows],
-        "scale": _scale(analysis),
-        "plunges": [stiffness_figures(analysis, analysis.set_aside)[f"{end}_N_per_mm"] for end in ("min", "max")],
+        "scale": {"ends": limits, "beyond_low": below, "beyond_high": above},
+        "plunges": [plunges["min_N_per_mm"], plunges["max_N_per_mm"]],
         "mean": stiffness_figures(analysis, analysis.headline)["mean_N_per_mm"],
         "required": None if analysis.required is None else n_per_mm_from_n_per_m(analysis.required),
         "other": None if analysis.on_other is None else _other_curve(analysis.on_other),
-        **({} if analysis.cut is None else {"part": _part(analysis, analysis.cut, rows)}),
+        **({} if analysis.cut is None else {"part": _part(analysis, rows)}),
     }
 
 
-def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
-    """The finished part in machine coordinates, its error in um, the page's row of the sample that made each place."""
-    quads, error, sample = surface_of(cut, MOST_QUADS)
+def _part(analysis: Analysis, rows: IntArray) -> Document:
+    """Finished part in machine coordinates, its error in um, and the page's row of the sample that made each place."""
+    from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
+
+    assert analysis.cut is not None
+    quads, error, sample = surface_of(analysis.cut, MOST_QUADS)
     corners = mm_from_m(in_machine(quads.reshape(-1, 3), analysis.origin))
     frame = np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)
     fractions, ends = _fractions(um_from_m(error))
@@ -169,28 +172,21 @@ def _part(analysis: Analysis, cut: Cut, rows: IntArray) -> Document:
         "frame": frame.tolist(),
         "error": fractions,
         "error_range": ends,
-        "limit": um_from_m(error_limit(cut)),
+        "limit": um_from_m(error_limit(analysis.cut)),
         "sample": _base64(np.where(sample < 0, -1, nearest).astype("<i4")),
     }
 
 
-def _scale(analysis: Analysis) -> Document:
-    """Ends of the colour scale, N/mm, and whether values lie beyond them."""
-    limits = scale_limits(analysis)
-    below, above = beyond_scale(analysis, limits)
-    return {"ends": limits, "beyond_low": below, "beyond_high": above}
-
-
 def page_rows(analysis: Analysis) -> IntArray:
-    """Rows of the samples that the page holds: all of them, or the extremes of equal stretches of rows."""
+    """Rows of the samples on the page: all, or the extremes of equal stretches of rows."""
     n = len(analysis.samples)
     if n <= MOST_SAMPLES:
         return np.arange(n)
     change = np.flatnonzero(np.diff(analysis.samples.motion) != 0)
     ends = np.concatenate([change, change + 1]) if 2 * len(change) < MOST_SAMPLES // 4 else change[:0]
     stiffness = np.where(analysis.samples.cutting, analysis.at.stiffness, np.nan)
-    curves = [(stiffness, 6)]  # and the share of the page's samples that a curve gets a column of pixels for
-    if analysis.set_aside.any():  # a column's extremes may be plunges: the headline has its own
+    curves = [(stiffness, 6)]  # with one in how many of the page's samples a curve gets a column of pixels
+    if analysis.set_aside.any():  # a column's extremes may be plunges, so the headline gets its own columns
         curves = [(np.where(analysis.set_aside, np.nan, stiffness), 8), (stiffness, 24)]
     extremes = [extremes_by_column(np.arange(n, dtype=float), k, MOST_SAMPLES // part) for k, part in curves]
     even = np.linspace(0, n - 1, MOST_SAMPLES // 12).astype(np.int64)  # rapids and gaps keep their shape too

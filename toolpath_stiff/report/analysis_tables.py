@@ -1,4 +1,4 @@
-"""The figures of an analysis in words and tables, the same on the terminal, in pictures and on pages."""
+"""Figures of an analysis in words and tables, the same on the terminal, in pictures and on pages."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from toolpath_stiff.report.pages import markup
 from toolpath_stiff.report.tables import LABEL, ShownTable
 from toolpath_stiff.report.words import WIDTH, counted, duration, machine_text, shortened
 
-# Who read a program, for headings (`Program.interpreter`).
+# Interpreter that read a program (`Program.interpreter`) -> words for headings.
 READERS = {"builtin": "the built-in reader", "linuxcnc": "LinuxCNC's interpreter (rs274)"}
 SOURCES = {"option": "as asked for", "program": "from the program", "default": "the machine's default"}
 TITLES = ("mean N/mm", "min N/mm", "max N/mm", "range N/mm", "deflection um")
@@ -19,7 +19,7 @@ MOST_ROWS = 200  # of any table
 
 
 def facts(summary: Document) -> list[tuple[str, str]]:
-    """The figures of one analysis in words, each with its label."""
+    """Figures of one analysis in words, each with its label."""
     origin = [f"{axis}{value:.10g}" for axis, value in zip("XYZABC", summary["origin_mm_deg"], strict=True)]
     origin = origin if any(summary["origin_mm_deg"][3:]) else origin[:3]
     mean, low, high, span = (number(summary[name]) for name in FIGURES[:4])
@@ -47,7 +47,7 @@ def facts(summary: Document) -> list[tuple[str, str]]:
 
 
 def _of_kind(summary: Document) -> list[tuple[str, str]]:
-    """The range of a strut law, or the configuration of joints."""
+    """Fact on the range of a strut law, or on the configuration of joints."""
     if "extrapolated_share" in summary:
         share = summary["extrapolated_share"]
         return [("extrapolated", f"{share:.1%} of the cutting samples are outside the strut law")]
@@ -86,24 +86,24 @@ def _weakest(place: Document | None) -> list[tuple[str, str]]:
 
 
 def position(place: Document, decimals: int) -> str:
-    """The position of a weakest place, with the angles where there are any: "X10.00 Y0.00 Z-2.00"."""
+    """Position of a weakest place, with angles if there are any: "X10.00 Y0.00 Z-2.00"."""
     axes = "xyzabc" if any(place[f"{axis}_deg"] for axis in "abc") else "xyz"
     values = [place[f"{axis}_mm" if axis in "xyz" else f"{axis}_deg"] for axis in axes]
     return " ".join(f"{axis.upper()}{value:.{decimals}f}" for axis, value in zip(axes, values, strict=True))
 
 
 def only_plunges(figures: Document) -> bool:
-    """True where the figures of a program, a tool or an operation are those of plunges, for it does nothing else."""
+    """True if the figures of a program, a tool or an operation are those of plunges, as it does nothing else."""
     return bool(figures.get("headline") == PLUNGES_ONLY)
 
 
 def beside(figures: Document) -> Document | None:
-    """The plunges that the headline figures leave out; None where there are none, or where there is nothing else."""
+    """Figures of the plunges that the headline leaves out; None if there are none, or nothing else."""
     return None if only_plunges(figures) else figures["plunges"]
 
 
 def headline_text(figures: Document, between: str) -> str:
-    """Mean and range for a heading, and what they are about where that is not every cut; `between` the parts."""
+    """Mean and range for a heading, and what they are about unless it is every cut; `between` separates the parts."""
     span, plunges = "{} N/mm ({} to {})", beside(figures)
     text = f"mean {span.format(*(number(figures[name]) for name in FIGURES[:3]))}"
     if plunges is None:
@@ -131,7 +131,7 @@ PART_TITLES = (">cutting mm", ">time", *(f">{title}" for title in (*TITLES, PLUN
 
 
 def tool_table(per_tool: Sequence[Document]) -> ShownTable:
-    """A row a tool."""
+    """Table with one row per tool."""
     rows = [
         (
             f"T{row['tool']}",
@@ -145,7 +145,7 @@ def tool_table(per_tool: Sequence[Document]) -> ShownTable:
 
 
 def operation_table(per_operation: Sequence[Document], most: int = MOST_ROWS) -> ShownTable:
-    """A row an operation."""
+    """Table with one row per operation."""
     digits = len(str(min(len(per_operation), most)))
     rows = [
         (
@@ -161,12 +161,12 @@ def operation_table(per_operation: Sequence[Document], most: int = MOST_ROWS) ->
 
 
 def and_more(entries: Sequence[object], most: int, things: str) -> list[str]:
-    """That there are more entries than are shown."""
+    """Line that says how many entries are not shown."""
     return [f"and {len(entries) - most} more {things} in summary.json"] if len(entries) > most else []
 
 
 def required(analysis: Analysis) -> tuple[str, ShownTable]:
-    """Whether every cut has the required stiffness, and the lines that have not, weakest first."""
+    """Sentence on whether every cut has the required stiffness, and the lines that have not, weakest first."""
     entry, source = analysis.to_dict()["required"], analysis.program.source
     level, below = number(entry["required_N_per_mm"]), entry["below"]
     if not below:
@@ -185,7 +185,7 @@ def required(analysis: Analysis) -> tuple[str, ShownTable]:
 
 
 def comparison(summary: Document, other: Document) -> ShownTable:
-    """Two machines side by side, the difference in percent of the first."""
+    """Table of two machines side by side, with the difference in percent of the first."""
     compared, sides = compare_summaries(summary, other), (summary, other)
     changes = [*compared["difference_percent"].values(), compared["plunges_difference_percent"]]
     shown = ["-" if change is None else f"{change:+.1f} %" for change in changes]

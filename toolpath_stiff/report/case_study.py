@@ -1,4 +1,4 @@
-"""The results of a case study, the paper's or one's own: text and table."""
+"""Views of a case study, the paper's or one's own: text and table."""
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.documents import Document, number

@@ -4,7 +4,7 @@ from toolpath_stiff.analysis.program_check import ProgramCheck
 
 
 def text(check: ProgramCheck) -> str:
-    """The document of `--json`, for people."""
+    """The findings of `tps check` as text."""
     lines = [f"{check.program}, read as {check.dialect}"]
     if check.kinematics:
         lines[0] += f", posted for {check.kinematics}"

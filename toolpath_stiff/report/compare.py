@@ -1,4 +1,4 @@
-"""The results of a comparison with measurements: page, text, and residuals as a table."""
+"""Views of a comparison with measurements: page, text, and residuals as a table."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, plain
 from toolpath_stiff.units import n_per_mm_from_n_per_m
 
-# Picture -> the question that it answers, and how it is read.
+# Picture -> the question that it answers, and how to read it.
 QUESTIONS = {
     "measured_modelled.png": (
         "How wrong is the model, biased or scattered?",
@@ -44,7 +44,7 @@ BIAS = f"mean of {DEVIATION}, {MINUS_IS_SOFTER}"
 
 
 def page(comparison: Comparison, drawn: Mapping[str, bytes]) -> str:
-    """The page, the pictures within."""
+    """The page, with the pictures in it."""
     summary = comparison.summary
     base, refit = summary.baseline, summary.baseline.strut_law_refitted
     findings = summary.findings
@@ -103,7 +103,7 @@ def _load_path(comparison: Comparison) -> ShownTable:
 
 
 def _measured(comparison: Comparison, axis: str, modelled: float) -> str:
-    """The mean compliance along an axis at the readings along it, as far from the model's as there."""
+    """Mean compliance along an axis at the readings along it, as far off the model's as these are."""
     rows = directions(comparison.data) == axis
     if not rows.any():
         return "-"
@@ -112,7 +112,7 @@ def _measured(comparison: Comparison, axis: str, modelled: float) -> str:
 
 
 def groups(summary: ComparisonSummary, each: bool = False) -> list[tuple[str, GroupErrors]]:
-    """All readings, and those by direction, plane and set-up where there are several; planes need no title.
+    """All readings, and groups by direction, plane and set-up if there are several; planes need no title.
 
     With `each`, every plane direction by direction too.
     """
@@ -130,7 +130,7 @@ def groups(summary: ComparisonSummary, each: bool = False) -> list[tuple[str, Gr
 
 
 def errors(summary: ComparisonSummary, each: bool = False) -> ShownTable:
-    """Errors by direction, plane and set-up, beside those of scatter alone."""
+    """Table of errors by direction, plane and set-up, with those of scatter alone."""
     rows = [
         (
             name,
@@ -147,7 +147,7 @@ def errors(summary: ComparisonSummary, each: bool = False) -> ShownTable:
 
 
 def far_off(summary: ComparisonSummary, most: int) -> ShownTable:
-    """Readings far off."""
+    """Table of readings far off."""
     rows = [
         (
             f"{reading.file}:{reading.line}",
@@ -162,7 +162,7 @@ def far_off(summary: ComparisonSummary, most: int) -> ShownTable:
 
 
 def _model_free(summary: ComparisonSummary) -> ShownTable:
-    """Checks that need no stiffness model, and why others cannot be made."""
+    """Table of checks that need no stiffness model, and why others cannot be made."""
     checks, cannot = summary.model_free, summary.not_checked
     rows = [(check.check, check.text, f"{check.statistic:+.1f}", f"{check.p_adjusted:.2g}") for check in checks]
     rows += [(check, f"not checked: {reason}", "", "") for check, reason in cannot.items()]
@@ -189,7 +189,7 @@ def _noise(summary: ComparisonSummary) -> ShownTable:
 
 
 def text(comparison: Comparison) -> str:
-    """Errors, findings, checks, in lines, and the commands that go on from here."""
+    """Errors, findings, checks, line by line, and the commands to go on with."""
     summary = comparison.summary
     lines = [summary.text, "", f"machine file as given; bias: {BIAS}", *errors(summary).lines()]
     lines += ["", "findings"]
@@ -214,13 +214,13 @@ def text(comparison: Comparison) -> str:
 
 
 def _with_unit(variable: Variable) -> str:
-    """A heading: "tilt_deg", unless the name says the unit already."""
+    """Heading with unit: "tilt_deg", unless the name includes the unit already."""
     suffix = variable.unit.replace("/", "_per_").replace("%", "percent")
     return variable.name if variable.name.endswith(suffix) else f"{variable.name}_{suffix}"
 
 
 def residuals_csv(comparison: Comparison) -> str:
-    """One row a reading: measured, modelled, deviation, scatter, every variable that residuals were held against."""
+    """One row per reading: measured, modelled, deviation, scatter, and every variable tested against the residuals."""
     data = comparison.data
     further = [variable for variable in comparison.numbers if variable.name not in ("x", "y", "height", "order")]
     names = {"setup": data.setup, "clamp": data.clamp, "plane": planes(data), "direction": directions(data)}

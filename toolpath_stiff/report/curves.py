@@ -1,4 +1,4 @@
-"""Stiffness along a path as page and pictures draw it: curves of few points, ends of scales, boxes."""
+"""Stiffness along a path as drawn on page and pictures: curves of few points, ends of scales, boxes."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ FENCE = 3.0  # interquartile ranges beyond the quartiles; Tukey, Exploratory Dat
 
 
 def profile_curve(analysis: Analysis) -> tuple[FloatArray, FloatArray]:
-    """Path length in mm and stiffness in N/mm of every sample; nan on rapids, out of reach, on plunges set aside."""
+    """Path length in mm and stiffness in N/mm of every sample; nan on rapids, out of reach, and plunges set aside."""
     stiffness = n_per_mm_from_n_per_m(analysis.at.stiffness)
     drawn = analysis.samples.cutting & ~analysis.set_aside
     return mm_from_m(analysis.samples.s), np.where(drawn, stiffness, np.nan)
@@ -29,7 +29,7 @@ def profile_band(analysis: Analysis) -> tuple[FloatArray, FloatArray] | None:
 
 
 def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
-    """Rows that draw the same picture as all of them on `columns` pixels, in order.
+    """Rows, in order, that draw the same picture as all rows on `columns` pixels.
 
     Of every run of rows in one column of pixels the first, the last, the lowest and the highest are kept, so no
     extreme is lost; of a run of nan the first, which keeps the gap. x ascends.
@@ -53,22 +53,22 @@ def extremes_by_column(x: FloatArray, y: FloatArray, columns: int) -> IntArray:
 
 
 def cutting_box(samples: Samples) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest (3,) of the positions of the cutting samples, mm."""
+    """Lowest and highest position (3,) of the cutting samples, mm."""
     low, high = np.empty(3), np.empty(3)
-    for axis in range(3):  # one by one, as a copy of all positions is a tenth of what a long path takes
+    for axis in range(3):  # one by one, as a copy of all positions is a tenth of a long path's memory
         along = samples.position[samples.cutting, axis]
         low[axis], high[axis] = mm_from_m(float(along.min())), mm_from_m(float(along.max()))
     return low, high
 
 
 def _charted(analysis: Analysis) -> FloatArray:
-    """N/mm of the headline samples; of a program that only turns rotary axes of every one in reach."""
+    """N/mm of the headline samples; if the program only turns rotary axes, of every sample in reach."""
     rows = analysis.headline if analysis.headline.any() else analysis.samples.cutting & analysis.at.reachable
     return n_per_mm_from_n_per_m(analysis.at.stiffness[rows])
 
 
 def scale_limits(analysis: Analysis) -> tuple[float, float]:
-    """Ends of the colour scale in N/mm: lowest and highest of the headline, values far out set aside.
+    """Ends of the colour scale in N/mm: lowest and highest headline value, outliers set aside.
 
     A few short cuts, stiffer by far than the rest, would otherwise take all the contrast. The legend marks an end
     that values lie beyond.
@@ -85,6 +85,6 @@ def scale_limits(analysis: Analysis) -> tuple[float, float]:
 
 
 def beyond_scale(analysis: Analysis, limits: tuple[float, float]) -> tuple[bool, bool]:
-    """Whether headline values lie below the scale, and above."""
+    """True if headline values lie below the scale; True if they lie above."""
     stiffness = _charted(analysis)
     return bool(stiffness.min() < limits[0]), bool(stiffness.max() > limits[1])

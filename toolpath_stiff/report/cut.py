@@ -1,4 +1,4 @@
-"""The cut of an analysis in words and tables, on the terminal and on its page."""
+"""Views of the cut of an analysis in words and tables, on the terminal and on its page."""
 
 from collections.abc import Sequence
 
@@ -28,7 +28,7 @@ def text(analysis: Analysis) -> list[str]:
 
 
 def facts(document: Document) -> list[tuple[str, str]]:
-    """The figures of a cut in words, each with its label; of the entry `cut` of `summary.json`."""
+    """Figures of a cut in words, each with its label; from the entry `cut` of `summary.json`."""
     tools = [
         f"T{tool['tool']} D{tool['diameter_mm']:g}, {number(tool['lateral_nm_per_N'], 1)} nm/N"
         for tool in document["tools"]
@@ -44,7 +44,7 @@ def facts(document: Document) -> list[tuple[str, str]]:
 
 
 def errors_in_words(errors: Document | None) -> str:
-    """Mean, what 95 % keep within, and the extremes; + is material left."""
+    """Mean, limits that 95 % keep, and extremes; + is material left."""
     if errors is None:
         return "none is finished"
     mean, least, most = (f"{errors[name]:+.1f}" for name in ("mean_um", "least_um", "most_um"))
@@ -54,7 +54,7 @@ def errors_in_words(errors: Document | None) -> str:
 
 
 def places(entries: Sequence[Document], rows: Sequence[int] = ()) -> ShownTable:
-    """The worst surfaces; with the page's `rows` of their samples a button each."""
+    """Table of the worst surfaces; with the page's `rows` of their samples, a button each."""
     button = '<button type="button" class="place" data-line="{}" data-sample="{}">line {}</button>'
     shown = [
         (
@@ -71,7 +71,7 @@ def places(entries: Sequence[Document], rows: Sequence[int] = ()) -> ShownTable:
 
 
 def tolerance(analysis: Analysis) -> tuple[str, ShownTable]:
-    """Whether every surface is within the tolerance, and the lines that leave it, worst first."""
+    """Sentence on whether every surface is within tolerance, and the lines that leave it, worst first."""
     entry, source = analysis.to_dict()["cut"]["tolerance"], analysis.program.source
     beyond, level = entry["beyond"], f"{entry['tolerance_um']:g} um"
     if not beyond:
@@ -102,7 +102,7 @@ PART = (
 
 
 def part_table(heading: str, names: Sequence[str], parts: Sequence[Document]) -> ShownTable:
-    """A row for each operation or tool."""
+    """Table with one row for each operation or tool."""
 
     def cells(errors: Document | None, *keys: str) -> list[str]:
         return [f"{errors[f'{key}_um']:+.1f}" if errors else "-" for key in keys]
@@ -121,7 +121,7 @@ def part_table(heading: str, names: Sequence[str], parts: Sequence[Document]) ->
 
 
 def cut_tables(analysis: Analysis, rows: IntArray) -> list[tuple[str, Sequence[Part], bool]]:
-    """Title, content and whether it is wide, of the page's tables; `rows` are the samples that the page holds."""
+    """Title, content and True if wide, of the page's tables; `rows` are the samples on the page."""
     if analysis.cut is None:
         return []
     summary = analysis.to_dict()

@@ -1,4 +1,4 @@
-"""The files of a cut: its stations and lines as CSV, the finished surface for programs that show bodies."""
+"""Files of a cut: stations and lines as CSV, the finished surface for viewers of bodies."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -9,13 +9,12 @@ from toolpath_stiff.analysis.cut_figures import cut_columns, line_columns
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import AnyArray
 from toolpath_stiff.column_files import csv_pieces
-from toolpath_stiff.report.surface import surface_of
 from toolpath_stiff.report.words import shortened
 from toolpath_stiff.units import mm_from_m, um_from_m
 
 DECIMALS = {"mm": 6, "um": 4, "N": 4, "deg": 4, "mm3": 6}
 MOST_QUADS = 60_000  # of walls and of floors in the file
-VTK_BLOCK = 20_000  # lines of a file at a time
+VTK_BLOCK = 20_000  # lines of the file written at a time
 
 
 def _decimals(name: str) -> int | None:
@@ -23,14 +22,14 @@ def _decimals(name: str) -> int | None:
 
 
 def stations_csv(analysis: Analysis) -> Iterator[bytes]:
-    """`cut.csv` in pieces: a row for each sample; an empty cell where there is no such surface."""
+    """`cut.csv` in pieces: one row per sample; an empty cell where there is no such surface."""
     assert analysis.cut is not None
     columns = partial(cut_columns, analysis, analysis.cut)
     return csv_pieces(columns, len(analysis.samples), {name: _decimals(name) for name in columns(slice(0, 1))})
 
 
 def lines_csv(analysis: Analysis) -> Iterator[bytes]:
-    """`cut_lines.csv`: a row for each line that cuts."""
+    """`cut_lines.csv`: one row for each line that cuts."""
     assert analysis.cut is not None
     columns = line_columns(analysis.cut)
     decimals = {name: _decimals(name) for name in columns}
@@ -42,6 +41,8 @@ def surface_vtk(analysis: Analysis) -> Iterator[str]:
 
     VTK's legacy format (The VTK User's Guide, 11th ed., "Simple Legacy Formats").
     """
+    from toolpath_stiff.report.surface import surface_of
+
     assert analysis.cut is not None
     quads, error, sample = surface_of(analysis.cut, MOST_QUADS)
     n = len(quads)

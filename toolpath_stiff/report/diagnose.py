@@ -21,10 +21,10 @@ from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, plain, significant
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
-text = words.text  # what a terminal shows
+text = words.text  # the view's text for the terminal
 document = document_of  # what diagnose.json holds
 PAGE = "report.html"
-# Picture -> the question that it answers, and how it is read.
+# Picture -> the question that it answers, and how to read it.
 QUESTIONS = {
     "ladder.png": (
         "Which effect explains the data, and how surely?",
@@ -45,7 +45,7 @@ QUESTIONS = {
 
 
 def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
-    """The page, the pictures within."""
+    """The page, with the pictures in it."""
     about, beside = words.data_text(diagnosis), beside_text(diagnosis.beside)
     head = Head(
         title=f"Diagnosis: {about[1]}",
@@ -123,7 +123,7 @@ def _votes(diagnosis: Diagnosis) -> list[Part]:
         rows.append((rival, gain, chance, "outvoted" if outvoted(votes) else "not beyond chance"))
     first = next((name for name in diagnosis.explanations if name in diagnosis.fits), "")
     remark = (
-        f"By how much {plain(first)} foretells pose after pose better than each rival of another part: log "
+        f"By how much {plain(first)} predicts pose after pose better than each rival of another part: log "
         "probability, summed over the poses; and how often not, in draws of the poses. A name needs all of these."
     )
     return [remark if rows else "", ShownTable(("rival", ">gain", ">chance of none", ""), rows)]
@@ -211,7 +211,7 @@ def _noise(diagnosis: Diagnosis) -> list[Part]:
 
 
 def residuals_csv(diagnosis: Diagnosis) -> str:
-    """One row a reading: measured, modelled as given, with the law refitted, with the best explanation."""
+    """One row per reading: measured, modelled as given, with the law refitted, with the best explanation."""
     measured = n_per_mm_from_n_per_m(diagnosis.data.stiffness)
     steps = (diagnosis.as_given.residual, diagnosis.base.residual, diagnosis.after)
     residuals = dict(zip(("as_given", "law_refitted", "after"), steps, strict=True))

@@ -40,7 +40,7 @@ def text(result: ElementDiagnosis) -> str:
 
 
 def residuals_csv(result: ElementDiagnosis | ElementUpdate) -> str:
-    """`residuals.csv`: one row a reading."""
+    """`residuals.csv`: one row per reading."""
     return _csv(result.columns())
 
 

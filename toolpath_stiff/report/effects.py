@@ -1,4 +1,4 @@
-"""Effects that a machine can carry, and trials of them, as text and for JSON."""
+"""Effects that a machine can have, and trials of them, as text and for JSON."""
 
 import math
 
@@ -12,7 +12,7 @@ TRIAL_WORDS = {True: "good", False: "FAILS", None: "note"}
 
 
 def trials_text(check: EffectCheck) -> str:
-    """What the trial of each effect of a file showed."""
+    """Results of the trial of each effect in a file, as text."""
     lines = []
     for row in check.to_dict()["effects"]:
         lines.append(f"{row['effect']}, on machine {check.machine}: {'good' if row['passed'] else 'FAILS'}")
@@ -23,7 +23,7 @@ def trials_text(check: EffectCheck) -> str:
 
 
 def describe_effect(effect: Effect) -> dict[str, object]:
-    """What the effect declares, in its own units; JSON has no infinity, so that "inf" stands for it."""
+    """Declarations of an effect, in its own units; "inf" stands for infinity, which JSON lacks."""
     of_parameter = ("name", "key", "unit", "bounds", "typical", "neutral", "kind", "meaning", "source")
     return {
         **{name: getattr(effect, name) for name in ("name", "title", "link", "equation", "source", "load_dependent")},
@@ -39,7 +39,7 @@ def _plain(value: object) -> object:
 
 
 def text(catalogue: EffectCatalogue) -> str:
-    """One line an effect: link, name, title, parameters with their units."""
+    """One line per effect: link, name, title, parameters with their units."""
     rows = []
     for effect in catalogue.effects:
         parameters = ", ".join(f"{p.name} ({p.unit})" if p.unit else p.name for p in effect.parameters)
@@ -48,7 +48,7 @@ def text(catalogue: EffectCatalogue) -> str:
 
 
 def effect_details(effect: Effect) -> str:
-    """The whole effect, for people, with the lines for a machine file."""
+    """The whole effect as text, with the lines for a machine file."""
     lines = [f"{effect.name}: {effect.title}"]
     lines += [f"  {name:<10} {getattr(effect, name)}" for name in ("link", "equation", "source")]
     if effect.load_dependent:

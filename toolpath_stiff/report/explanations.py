@@ -1,4 +1,4 @@
-"""The words and figures of a diagnosis, the same on the terminal, in the pictures and on the page."""
+"""Words and figures of a diagnosis, the same on the terminal, in the pictures and on the page."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,7 @@ HEADLINES = {
 
 
 def probability_text(value: float | None) -> str:
-    """A probability from 0 to 1 as per cent; what rounds to 0 or 100 without being it says so."""
+    """A probability from 0 to 1 as per cent; marked if it only rounds to 0 or 100."""
     if value is None:
         return "-"
     if 0.0 < value < 0.005:
@@ -32,7 +32,7 @@ def probability_text(value: float | None) -> str:
 
 
 def size_texts(row: HypothesisRow, intervals: bool = True) -> list[str]:
-    """Each fitted size in words: "radial 5.12 nm/N (4.40 to 5.90)"; of a pair its effect before it."""
+    """Each fitted size in words: "radial 5.12 nm/N (4.40 to 5.90)"; of a pair, preceded by its effect."""
     return [
         plain(f"{effect if len(row.sizes) > 1 else ''} {_size_text(key, size, intervals)}".strip())
         for effect, sizes in row.sizes.items()
@@ -41,7 +41,7 @@ def size_texts(row: HypothesisRow, intervals: bool = True) -> list[str]:
 
 
 def _size_text(key: str, size: FittedSize, intervals: bool) -> str:
-    """`key` is a machine file's, `bar_stiffness_N_per_m`: it ends with the unit."""
+    """A fitted size in words; `key` as in machine files, `bar_stiffness_N_per_m`, ends with the unit."""
     tail = size.unit.replace("/", "_per_").replace(" ", "_").replace("%", "percent")
     name = (key.removesuffix(f"_{tail}") if tail else key).replace("_", " ")
     text = f"{name} {significant(size.value)} {size.unit}".rstrip()
@@ -50,7 +50,7 @@ def _size_text(key: str, size: FittedSize, intervals: bool) -> str:
 
 
 def remark_text(row: HypothesisRow) -> str:
-    """How a hypothesis stands, and what is against it."""
+    """Words on how a hypothesis stands, and what is against it."""
     if not row.eligible and (row.probability or 0.0) < SHOWN:
         return plain(row.remark)
     leaves = row.adequate is False and row.words not in ("does not fit", "ruled out")
@@ -68,13 +68,13 @@ def bound_text(hidden: Unexcluded) -> str:
 
 
 def floor_text(diagnosis: Diagnosis) -> str:
-    """The mean error that scatter alone would leave; a guess says so."""
+    """Mean error that scatter alone would leave, marked if it is a guess."""
     guess = f" ({diagnosis.noise.guess} guess)" if diagnosis.noise.guess else ""
     return percent(json_number(diagnosis.noise.floor_percent), 2) + guess
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """The verdict as one sentence: the cause where one was found."""
+    """The verdict as one sentence, with the cause if one was found."""
     cause, standing = diagnosis.rows.best.finding if diagnosis.rows.best else "", diagnosis.explanations
     if diagnosis.main.question:
         return plain(diagnosis.main.question)
@@ -92,7 +92,7 @@ _UNTRIED = "--program PART tells how much the choice matters along that program"
 
 
 def path_text(path: Document | None) -> str:
-    """How far apart the plausible explanations are on a tool path, in one sentence; "" where it was not tried."""
+    """Sentence on how far the plausible explanations differ on a tool path; "" if it was not tried."""
     if path is None:
         return ""
     program = f"{path['program']} in set-up {path['setup']}" if path.get("setup") else path["program"]
@@ -113,13 +113,13 @@ def plausible_text(names: Sequence[str]) -> str:
 
 
 def data_text(diagnosis: Diagnosis) -> list[str]:
-    """Number of readings, their files, the machine with what acts on it."""
+    """Number of readings, their files, the machine with its active effects."""
     machine = machine_text({"machine": diagnosis.machine.name, "effects": diagnosis.predictor.effects_that_act})
     return [counted(len(diagnosis.data), "reading"), ", ".join(diagnosis.names), f"machine {machine}"]
 
 
 LABEL = 12  # columns of the left-hand words
-FEW_REASONS = 3  # of the poses proposed, on the terminal
+FEW_REASONS = 3  # of proposed poses, shown on the terminal
 MOST_CANDIDATES = 5  # in table and ladder; all are in diagnose.json
 MOST_PAIRS = 2
 LONGEST_NAME = 45
@@ -159,13 +159,13 @@ def text(diagnosis: Diagnosis) -> str:
 
 
 def _listed(label: str, sentences: Sequence[str]) -> list[str]:
-    """One entry a sentence, the label before the first."""
+    """One entry per sentence, with the label before the first."""
     texts = filter(None, sentences)
     return [line for place, text in enumerate(texts) for line in labelled("" if place else label, text, LABEL)]
 
 
 def _hints(label: str, hints: Sequence[str]) -> list[str]:
-    """As `_listed`; a command stands on a line of its own, never wrapped, so that it can be pasted."""
+    """Hints as `_listed` lists sentences; a command gets an unwrapped line of its own, so that it can be pasted."""
     lines: list[str] = []
     for sentence, command in map(parted, filter(None, hints)):
         lines += labelled("" if lines else label, sentence, LABEL)
@@ -185,7 +185,7 @@ def _error(diagnosis: Diagnosis) -> str:
 
 
 def leading_rows(diagnosis: Diagnosis) -> tuple[list[HypothesisRow], int]:
-    """As given, strut law refitted, pairs and best candidates, all that stand; how many more there are."""
+    """Rows to show: as given, strut law refitted, pairs and best candidates, all that stand; number of the others."""
     every = diagnosis.rows
     shown = [every.as_given, every.refitted, *every.pairs[:MOST_PAIRS], *every.candidates[:MOST_CANDIDATES]]
     shown += [row for row in every.candidates[MOST_CANDIDATES:] if row.standing]
@@ -193,7 +193,7 @@ def leading_rows(diagnosis: Diagnosis) -> tuple[list[HypothesisRow], int]:
 
 
 def _table(diagnosis: Diagnosis) -> list[str]:
-    """The leading rows; an asterisk marks what is left standing."""
+    """The leading rows; an asterisk marks those left standing."""
     shown, more = leading_rows(diagnosis)
     cells = [
         (

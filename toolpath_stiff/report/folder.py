@@ -1,4 +1,4 @@
-"""The one door to views and pictures: what a result shows of itself is found by its name, `shown_by`.
+"""Single entry to views and pictures: the view of a result is found by its name, `shown_by`.
 
 A view is a module of this room: `text(result)`, and of a result that is a folder `DATA`, file name -> what makes it of
 the result; `PAGE`, the name of its page, `page(result, drawn, **look)`, which makes it, and `QUESTIONS`,
@@ -21,23 +21,24 @@ if TYPE_CHECKING:
 
 
 def view_of(shown_by: str) -> ModuleType:
-    """The view of results of this name."""
+    """View module of this name."""
     return import_module(f"toolpath_stiff.report.{shown_by}")
 
 
 def pictures_of(shown_by: str) -> Mapping[str, Callable[..., Figure | None]]:
-    """File name -> function that draws the picture of a result; it returns None where there is nothing to show."""
+    """File name -> function that draws the picture of a result; it returns None if there is nothing to show."""
     module = f"toolpath_stiff.report.pictures.{shown_by}"
     pictures: Mapping[str, Callable[..., Figure | None]] = import_module(module).PICTURES if find_spec(module) else {}
     return pictures
 
 
 def skip_docstrings() -> None:
-    """Leave the lists of properties out of matplotlib's docstrings, in a process where nobody reads them.
+    """Keep lists of properties out of matplotlib's docstrings and signatures, in a process where nobody reads them.
 
-    They are written while it is imported, and take more than half of that. To be called before the first picture.
+    They are made while it is imported, and take two thirds of that. To be called before the first picture.
     """
     artist: Any = import_module("matplotlib.artist")
+    artist.Artist._update_set_signature_and_docstring = lambda *_: None  # where it is gone, nothing happens
     artist.kwdoc = lambda _: ""
 
 
@@ -58,7 +59,7 @@ def names(shown_by: str, plots: bool = True, omit: Collection[str] = ()) -> tupl
 def files(
     result: Any, *, plots: bool = True, omit: Collection[str] = (), **look: Any
 ) -> dict[str, Content | Callable[[], Content]]:
-    """Name -> content, or what makes it, of a result's files but for `omit`: data, with `plots` pictures and page."""
+    """Name -> content, or its maker, of a result's files except `omit`; `plots`: also pictures and page."""
     view = view_of(result.shown_by)
     contents: dict[str, Content | Callable[[], Content]] = {
         name: partial(make, result) for name, make in view.DATA.items() if name not in omit
@@ -84,7 +85,7 @@ def picture(result: Any, **look: Any) -> bytes:
 
 
 def figure(result: Any, name: str = "", **look: Any) -> Figure | None:
-    """A picture of a result as a figure, the first that shows something unless named; None where none does."""
+    """A picture of a result as a figure, by default the first that shows something; None if none does."""
     with _writer().house_style():
         draws = (draw for file, draw in pictures_of(result.shown_by).items() if name in ("", file))
         return next(filter(None, (draw(result, **look) for draw in draws)), None)

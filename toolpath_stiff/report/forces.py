@@ -1,4 +1,4 @@
-"""Coefficients fitted to records of forces: as text, names of files."""
+"""Views of coefficients fitted to force records: text and file names."""
 
 from collections.abc import Callable, Mapping
 
@@ -16,7 +16,7 @@ UNITS = ("N/mm2",) * 3 + ("N/mm",) * 3
 
 
 def text(fit: CoefficientFit) -> str:
-    """Coefficients with their intervals, how far the slots are off, run-out, what the records do not tell."""
+    """Coefficients with intervals, errors of the slots, run-out, and what the records do not tell."""
     values, half = fit.coefficients.values * SHOWN, fit.coefficients.deviation * SHOWN * fit.reach
     rows = [
         (symbol, f"{value:.4g}", f"+- {reach:.2g}" if known else "not determined", unit)
@@ -27,7 +27,7 @@ def text(fit: CoefficientFit) -> str:
     lines += ShownTable(("coefficient", ">value", ">95 %", "unit"), rows).lines(2)
     lines += ["", f"  largest residual          {_largest(fit.force - fit.fitted)}"]
     lines += [f"  a feed left out is off by {_largest(fit.left_out)}"]
-    if fit.cutter.flutes > 1:
+    if np.isfinite(fit.run_out).any():
         low, high = (um_from_m(float(end)) for end in (fit.run_out.min(), fit.run_out.max()))
         lines += [f"  run-out, by what differs from tooth to tooth: {low:.1f} to {high:.1f} um"]
     lines += ["", "  the records do not tell", *(f"    {sentence}" for sentence in fit.silent)]
@@ -35,13 +35,13 @@ def text(fit: CoefficientFit) -> str:
 
 
 def _largest(forces: FloatArray) -> str:
-    """The largest of forces (n, 3) in each direction that was recorded."""
+    """Largest of forces (n, 3) in each direction that was recorded."""
     sizes = {axis: np.abs(column) for axis, column in zip(AXES, forces.T, strict=True) if np.isfinite(column).any()}
     return ", ".join(f"{np.nanmax(size):.2g} N along {axis}" for axis, size in sizes.items()) or "- (too few feeds)"
 
 
 def forces_csv(fit: CoefficientFit) -> str:
-    """One row a record."""
+    """One row per record."""
     columns = fit.columns()
     return csv_text(columns, zip(*columns.values(), strict=True))
 

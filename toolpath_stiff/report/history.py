@@ -8,10 +8,6 @@ TITLE = "Struts measured alone, over their dates"
 HEAD = ("strut", ">readings", ">dates", ">N/mm", ">scatter %", ">drift, % a year", ">tension", ">compression")
 
 
-def _shown(history: StrutHistory) -> bool:
-    return any(len(strut.dates) > 1 or strut.sides for strut in history.struts)
-
-
 def _row(strut: StrutOverTime) -> tuple[str, ...]:
     drift, sides = strut.drift_percent_per_year, strut.sides
     return (
@@ -25,18 +21,11 @@ def _row(strut: StrutOverTime) -> tuple[str, ...]:
     )
 
 
-def _table(history: StrutHistory) -> ShownTable:
-    return ShownTable(HEAD, [*map(_row, history.struts)])
-
-
-def _remark(history: StrutHistory) -> str:
-    scatter = history.scatter_percent
-    return "" if scatter is None else f"scatter from date to date {scatter:.2g} %: {history.scatter_from}"
-
-
 def history_text(history: StrutHistory, undated: bool = False) -> list[str]:
-    """Lines for the terminal; without dates and without both signs of the force only where `undated` are wanted."""
-    if not (undated or _shown(history)):
+    """Lines for the terminal; without dates and without both signs of the force, only if `undated` are wanted."""
+    if not (undated or any(len(strut.dates) > 1 or strut.sides for strut in history.struts)):
         return []
-    sentences = [f"  {plain(line)}" for line in (_remark(history), *history.sentences) if line]
-    return ["", TITLE.lower(), *_table(history).lines(2, 0), *sentences]
+    scatter = history.scatter_percent
+    remark = "" if scatter is None else f"scatter from date to date {scatter:.2g} %: {history.scatter_from}"
+    sentences = [f"  {plain(line)}" for line in (remark, *history.sentences) if line]
+    return ["", TITLE.lower(), *ShownTable(HEAD, [*map(_row, history.struts)]).lines(2, 0), *sentences]

@@ -1,4 +1,4 @@
-"""Readings of indicators beside the tip: on pages and on the terminal."""
+"""Readings of indicators beside the tip, on pages and on the terminal."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ REMARK = (
 
 
 def loops_section(loops: Sequence[LoopMean]) -> Section:
-    """The section of a page, by loop."""
+    """Section of a page, loop by loop."""
     by_loop = ShownTable.of(
         loops,
         {
@@ -30,6 +30,6 @@ def loops_section(loops: Sequence[LoopMean]) -> Section:
 
 
 def loops_text(loops: Sequence[LoopMean]) -> list[str]:
-    """Lines for the terminal; none without such readings."""
+    """Lines for the terminal; none if there are no such readings."""
     lines = [f"  {plain(mean.text)}" for mean in loops]
     return ["", "indicators beside the tip", *lines] if lines else []

@@ -17,7 +17,7 @@ from toolpath_stiff.units import deg_from_rad, mm_from_m, mm_per_min_from_m_per_
 
 
 class MachineFigure(NamedTuple):
-    """A figure in the shop's units, where it comes from, and a remark."""
+    """A figure in the shop's units, its origin, and a remark."""
 
     quantity: str
     value: str
@@ -87,7 +87,7 @@ def _hexapod_rows(machine: Hexapod) -> list[Row]:
 
 
 def page(machine: MachineTool, pose: FloatArray, stand: Reach) -> str:
-    """The machine at a pose (6,), m and rad, to be turned, with its reach and its figures."""
+    """Page with the machine at a pose (6,), m and rad, that can be turned, its reach and its figures."""
     at = pose_in_mm(pose.tolist())
     where = "drawn at X{:g} Y{:g} Z{:g} mm, A{:g} B{:g} C{:g} deg".format(*at)
     data = {"scene": {**machine_scene(machine, pose[None]), "reach": reach_boundary(machine)}, "pose": at}
@@ -107,7 +107,7 @@ def page(machine: MachineTool, pose: FloatArray, stand: Reach) -> str:
 
 
 def text(machine: MachineTool, stand: Reach) -> str:
-    """Figures with their origin, remarks, and how the pose that is drawn stands to the limits."""
+    """Figures with their origin, remarks, and the margins of the drawn pose to the limits."""
     rows = machine_figures(machine)
     width = max(len(row[0]) for row in rows)
     lines = [f"{machine.title}\n{machine.source}\n"]

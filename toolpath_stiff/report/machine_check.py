@@ -1,4 +1,4 @@
-"""A check of a machine file in words."""
+"""Text of a check of a machine file."""
 
 from toolpath_stiff import defaults
 from toolpath_stiff.analysis.machine_check import BEYOND, MACHINING_CENTRE, ROBOT, MachineCheck
@@ -11,7 +11,7 @@ from toolpath_stiff.units import n_per_mm_from_n_per_m, n_per_um_from_n_per_m, u
 
 
 def text(check: MachineCheck) -> str:
-    """What is wrong or doubtful in a machine file, what acts, how stiff it is."""
+    """Text on what is wrong or doubtful in a machine file, which effects act, how stiff it is."""
     model, machine = check.model, check.model.machine
     verdict = "the file is good" if check.good else f"{counted(len(check.wrong), 'thing')} cannot be right"
     if check.good and check.doubtful:
@@ -33,7 +33,7 @@ def text(check: MachineCheck) -> str:
 
 
 def neutral_words(machine: MachineTool, report: PoseStiffness) -> str:
-    """Stiffness at the neutral pose as one would say it."""
+    """Stiffness at the neutral pose, in words."""
     neutral = pose_in_mm(machine.limits.neutral_pose)
     pose = [f"{axis}{value + 0.0:g}" for axis, value in zip("XYZABC", neutral, strict=True)][
         : 6 if any(neutral[3:]) else 3

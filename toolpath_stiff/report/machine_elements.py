@@ -1,4 +1,4 @@
-"""Figures of a machine of elements: joints and their limits, what gives way and by how much, limits, set-up."""
+"""Figures of a machine of elements: joints and their limits, compliant elements, other limits, set-up."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ Row = tuple[str, str, str, str]  # section, quantity, value, unit
 
 
 def element_rows(machine: MachineTool) -> list[Row]:
-    """Rows of its joints and elements; compliances at the neutral pose where they change with the pose."""
+    """Rows of its joints and elements; compliances that change with the pose are those at the neutral pose."""
     rows: list[Row] = []
     for name, kind, ends in zip(machine.joint_names, machine.joint_kinds, machine.joint_limits, strict=True):
         linear = kind == "linear"

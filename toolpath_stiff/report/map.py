@@ -1,4 +1,4 @@
-"""The results of a stiffness map: figures, table and page."""
+"""Views of a stiffness map: figures, table and page."""
 
 from collections.abc import Iterator
 
@@ -17,7 +17,7 @@ PAGE = "map.html"
 
 
 def heading(planes: StiffnessMap) -> list[str]:
-    """The machine with what acts on it, and how the platform is turned."""
+    """The machine with its active effects, and the orientation of the platform."""
     machine = machine_text({**planes.to_dict(), "machine": planes.model.machine.title})
     tilt = "roll {:g}, pitch {:g}, yaw {:g} degrees".format(*map(deg_from_rad, planes.abc))
     return [machine, *([tilt] if any(planes.abc) else [])]
@@ -57,7 +57,7 @@ DATA = {"map.csv": map_csv, "map.json": StiffnessMap.to_json}
 
 
 def text(planes: StiffnessMap) -> str:
-    """The extremes of each slice, for the terminal."""
+    """Extremes of each slice, for the terminal."""
     summary = planes.to_dict()
     lines = [f"machine {machine_text(summary)}, load {summary['load']}, {summary['points']} points"]
     lines += [f"warning: {plain(warning)}" for warning in summary["warnings"]]

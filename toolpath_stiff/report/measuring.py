@@ -1,4 +1,4 @@
-"""Raw records reduced to stiffnesses: figures for the terminal, names of files."""
+"""Views of raw records reduced to stiffnesses: figures for the terminal, names of files."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -21,7 +21,7 @@ def pictures(reduction: Reduction) -> dict[str, Content]:
 
 
 def text(reduction: Reduction) -> str:
-    """The figures of the loops and the struts' histories; rows of a table of stiffnesses say nothing themselves."""
+    """Figures of the loops and the struts' histories; rows of a table of stiffnesses have no loops to show."""
     recorded = [loop_entry(figures) for figures in reduction.recorded]
     return "\n".join([*_loops(recorded), *history_text(reduction.history, undated=not recorded)]).lstrip("\n")
 

@@ -1,4 +1,4 @@
-"""Pages: a list of sections below a head, put into the templates of `assets/`.
+"""Pages: a head and a list of sections, put into the templates of `assets/`.
 
 A page is one file that loads nothing. Whatever is put into a template is escaped and cleared of control characters
 unless it is `Markup`; a content security policy lets nothing run but the page's own script.
@@ -28,17 +28,17 @@ from toolpath_stiff.report.words import counted, machine_text, plain
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-DATA = Markup("<data>")  # where the data of a page go; what is not `Markup` has no such letters in a page
+DATA = Markup("<data>")  # placeholder of a page's data; text that is not `Markup` is escaped and cannot contain it
 LONG_LIST = 20_000  # entries
-FINER = 1.5  # pixels of a picture to one of the page
-# Of a section: a table, a list of sentences, a remark, or HTML.
+FINER = 1.5  # pixels of a picture per pixel of the page
+# Part of a section: a table, a list of sentences, a remark, or HTML.
 Part = ShownTable | Sequence[object] | str | Markup
 Section = tuple[str, *tuple[Part, ...]] | str  # its title and its parts; or a picture's file name
 
 
 @dataclass(frozen=True)
 class Head:
-    """What stands above the sections; `figures`: the few that say it all, each with what it is."""
+    """Content above the sections; `figures`: the few key figures, each with its label."""
 
     title: str
     verdict: str
@@ -57,7 +57,7 @@ def page_of(
     drawn: Mapping[str, bytes],
     questions: Mapping[str, tuple[str, str]],
 ) -> str:
-    """A page of sections below each other; what has nothing to show is left out.
+    """A page of sections one below the other; parts with nothing to show are left out.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def page_of(
 def readings_head(
     command: str, document: Document, verdict: str, headline: str, figures: Sequence[tuple[str, str]]
 ) -> Head:
-    """The head of a page on readings: text, data, machine, warnings and seed are those of its document."""
+    """Head of a page on readings: text, data, machine, warnings and seed come from its document."""
     files = ", ".join(document["data"])
     return Head(
         title=f"{command.capitalize()}: {files}",
@@ -101,7 +101,7 @@ def _section(title: str, parts: Iterable[Part]) -> Markup:
 
 
 def part(content: Part) -> Markup:
-    """A part of a section; nothing where it has nothing to show."""
+    """A part of a section as HTML; empty if it has nothing to show."""
     if isinstance(content, ShownTable):
         rows = [*zip(content.kinds or [""] * len(content.rows), content.rows, strict=True)]
         return _macro("table", content.titles, rows, content.right) if rows else Markup()
@@ -113,22 +113,22 @@ def part(content: Part) -> Markup:
 
 
 def hints(texts: Sequence[str]) -> Markup:
-    """Sentences, the command of each set as one, to be copied."""
+    """Sentences followed by their commands, each marked as one that can be copied."""
     return _macro("hints", [parted(text) for text in texts]) if texts else Markup()
 
 
 def _picture(name: str, drawn: Mapping[str, bytes], questions: Mapping[str, tuple[str, str]]) -> Markup:
-    """A picture under the question that it answers, with how it is read; nothing where it was not drawn."""
+    """A picture under the question that it answers, with how to read it; empty if it was not drawn."""
     if not (picture := drawn.get(name)):
         return Markup()
-    (width,) = struct.unpack(">I", picture[16:20])  # of the header, in pixels of the PNG
+    (width,) = struct.unpack(">I", picture[16:20])  # width from the PNG's header, pixels
     return _macro("picture", name, *questions[name], base64.b64encode(picture).decode("ascii"), round(width / FINER))
 
 
 def render(
     template: str, *, styles: Sequence[str] = (), scripts: Sequence[str] = (), data: Any = None, **values: Any
 ) -> Iterator[str]:
-    """A page in pieces: the data of a long program are most of it, and stand in memory once.
+    """A page in pieces: a long program's data are most of it, and are held in memory once only.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def render(
     data
         What they read, as JSON.
     values
-        What the template names.
+        What the template names; `connect`: what the policy says of servers that scripts may ask, where they may.
     """
     script = '\n"use strict";\n(() => {\n' + "".join(asset(file) for file in scripts) + "})();\n" if scripts else ""
     text = _templates().get_template(template).render(
@@ -170,7 +170,7 @@ def _templates() -> Environment:
 
 
 def _shown(value: object) -> object:
-    """What a template shows of a value: text without control characters, HTML as it is."""
+    """A value as a template shows it: text without control characters, HTML unchanged."""
     return value if isinstance(value, Markup) else plain(str(value))
 
 
@@ -180,17 +180,18 @@ def _macro(name: str, *values: object) -> Markup:
 
 
 def asset(name: str) -> str:
-    """Text of a file in `assets/`."""
-    return Path(__file__).with_name("assets").joinpath(name).read_text(encoding="utf-8")
+    """Text of a file in `assets/`, or, as "studio/NAME", in those of another room."""
+    room, _, file = name.rpartition("/")
+    return Path(__file__).parents[1].joinpath(room or "report", "assets", file).read_text(encoding="utf-8")
 
 
 def script_hash(script: str) -> str:
-    """The source expression of Content Security Policy Level 3, section 2.3.1."""
+    """Source expression of a script by Content Security Policy Level 3, section 2.3.1."""
     return "sha256-" + base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
 def json_pieces(value: Any) -> Iterator[str]:
-    """JSON that can stand inside a script element: nothing in it ends the element, or a line of JavaScript.
+    """JSON that is safe inside a script element: nothing in it ends the element or a JavaScript line.
 
     In pieces: the values of an object and the entries of a long list one by one.
     """
@@ -213,7 +214,7 @@ def json_pieces(value: Any) -> Iterator[str]:
 
 def _json(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    if text.isascii() and not any(character in text for character in "<>&"):  # a long text is searched, not copied
+    if text.isascii() and not any(character in text for character in "<>&"):  # searches, without a copy
         return text
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
@@ -222,5 +223,5 @@ def _json(value: Any) -> str:
 
 
 def markup(template: str, *values: object) -> Markup:
-    """A bit of HTML with values in the place of {}: as a template, for what is smaller than one."""
+    """A piece of HTML with values in the places of {}, for pieces too small for a template."""
     return Markup(template).format(*map(_shown, values))

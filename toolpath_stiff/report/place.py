@@ -1,4 +1,4 @@
-"""The results of a search for a placement: page, files and text."""
+"""Views of a search for a placement: page, files and text."""
 
 from collections.abc import Iterator, Mapping
 
@@ -17,7 +17,7 @@ COSTS = ("best_on_front_N_per_mm", "chosen_N_per_mm")
 
 
 def text(placed: Placement) -> str:
-    """A placement in words: what got worse, the placement, what it brings, what it costs."""
+    """A placement in words: what got worse, the placement, its benefits, its cost."""
     first = len(placed.alarms)
     before, after = (
         [("warning", text) for text in part] for part in (placed.warnings[:first], placed.warnings[first:])
@@ -27,14 +27,14 @@ def text(placed: Placement) -> str:
 
 
 def facts(placed: Placement) -> list[tuple[str, str]]:
-    """The chosen placement in words, each with its label."""
+    """The chosen placement in words, each fact with its label."""
     best, present, blocks = placed.chosen, placed.present, placed.offsets
     which = f"(objective {placed.task.rules.objective})"
     zero = f"X{best.x_mm:.3f} Y{best.y_mm:.3f} Z{best.z_mm:.3f}, turned by {best.rotation_deg:.3f} degrees {which}"
     turned = f"the tool turned about its axis by {best.tool_turn_deg:.3f} degrees" if best.tool_turn_deg else ""
     tilt = f"set-up tilted by A{best.a_deg:.3f} B{best.b_deg:.3f} degrees"
     mean, now = best.plunge_mean_N_per_mm, f", before {number(present.plunge_mean_N_per_mm)}" if present else ""
-    margin = min(1.0, float(placed.best.at.reach.margin.min()))  # of moves too that do not follow the work
+    margin = min(1.0, float(placed.best.at.reach.margin.min()))  # includes moves that do not follow the work
     costs = [
         (f"  best {goal:<9} ", "{} on the front, {} here, N/mm".format(*(number(cost[name]) for name in COSTS)))
         for goal, cost in placed.trade_offs.items()
@@ -106,7 +106,7 @@ def page(placed: Placement, drawn: Mapping[str, bytes]) -> Iterator[str]:
         **path,
     }
     weakest = [row.min_N_per_mm for row in rows]
-    digits = max(0, 2 - int(np.log10(path["scale"][1] - path["scale"][0])))  # soft machines have decimals
+    digits = max(0, 2 - int(np.log10(path["scale"][1] - path["scale"][0])))  # soft machines need decimals
     return render(
         "place.html",
         styles=["viewer.css", "place.css"],

@@ -1,4 +1,4 @@
-"""The path as the page of a search for placements draws it.
+"""The path as drawn on the page of a search for placements.
 
 A page cannot hold every sample of a long program at sixty placements. The ends of every cut and its corners are kept
 first, then samples evenly along the path; the stiffness is evaluated at just these.
@@ -21,13 +21,13 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
 POINTS = (150, 800)  # of the path on the page, fewest and most
 VALUES = 48_000  # points times placements that the page holds, some 300 kB
-ENDS = (0.05, 0.95)  # of the points drawn, all placements together, between which the colours run
-CORNER = rad_from_deg(10.0)  # a sharper one is kept before samples along straight cuts are
-SHARE_OF_CORNERS = 0.6  # at most, of the points drawn
+ENDS = (0.05, 0.95)  # quantiles of the points drawn at all placements, between which the colours run
+CORNER = rad_from_deg(10.0)  # sharper corners are kept in preference to samples along straight cuts
+SHARE_OF_CORNERS = 0.6  # largest share of corners among the points drawn
 
 
 def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[Document, str]:
-    """The path in the program's axes and its stiffness at some placements, and what is left out of it, in words."""
+    """Path in the program's axes with its stiffness at some placements, and words on what is left out."""
     best, samples = placed.best, sample_moves(placed.best.program.moves, placed.best.step)
     counted = samples.cutting & (samples.weight > 0.0)
     cuts = np.flatnonzero(counted if counted.any() else samples.cutting)
@@ -44,7 +44,7 @@ def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[Documen
     plunge &= ~headline_rows(counting, plunge)
     about = np.isfinite(stiffness) & ~plunge
     about = about if about.any() else np.isfinite(stiffness)
-    low, high = (float(end) for end in np.quantile(stiffness[about], ENDS))  # a few corners would take all contrast
+    low, high = (float(end) for end in np.quantile(stiffness[about], ENDS))  # a few corners would take the contrast
     if high <= low * (1.0 + 1e-6):
         low, high = low * (1.0 - 1e-3), high * (1.0 + 1e-3)
     digits = max(0, 5 - int(np.log10(max(float(stiffness[about].max()), 1.0))))  # six digits
@@ -75,7 +75,7 @@ def drawn_path(placed: Placement, rows: Sequence[PlacementRow]) -> tuple[Documen
 
 
 def thinned_rows(samples: Samples, cut: IntArray, points: int) -> IntArray:
-    """Rising rows of at most `points` samples: ends of cuts, then corners, then evenly along the path.
+    """Rows of at most `points` samples, ascending: ends of cuts, then corners, then evenly along the path.
 
     Of more cuts than there is room for, some are left out whole.
     """
@@ -91,7 +91,7 @@ def thinned_rows(samples: Samples, cut: IntArray, points: int) -> IntArray:
     cosine = np.einsum("ij,ij->i", samples.tangent[1:], samples.tangent[:-1])
     corners = np.flatnonzero((np.diff(cut) == 0) & (np.diff(samples.move) != 0) & (cosine < np.cos(CORNER)))
     corners = _evenly(corners, max(0, int(SHARE_OF_CORNERS * points) - len(kept)) // 2)
-    kept = np.unique(np.concatenate([kept, corners, corners + 1]))  # both of a corner's samples: the tangent jumps
+    kept = np.unique(np.concatenate([kept, corners, corners + 1]))  # both samples of a corner, as the tangent jumps
     return np.sort(np.concatenate([kept, _evenly(np.setdiff1d(np.arange(n), kept), points - len(kept))]))
 
 

@@ -1,11 +1,11 @@
-"""A plan in text, and its files."""
+"""Text of a plan, and its files."""
 
 from toolpath_stiff.planning.plan import RivalPlan
 from toolpath_stiff.planning.result import Plan, plan_csv
 
 
 def text(plan: Plan) -> str:
-    """The visits in measuring order, then what is to be expected; that before them where it is nothing."""
+    """Visits in measuring order, then the expected outcome; the outcome first if there is nothing to gain."""
     promise, between = plan.choice.sentences, isinstance(plan.choice, RivalPlan)
     lines = [promise.pop(0), ""] if isinstance(plan.choice, RivalPlan) and not plan.choice.gains else []
     lines += [

@@ -1,4 +1,4 @@
-"""Stiffness at a pose as text."""
+"""Text on the stiffness at a pose."""
 
 from toolpath_stiff.analysis.evaluation import joint_columns
 from toolpath_stiff.analysis.poses import POSE_COLUMNS, PoseStiffness
@@ -9,7 +9,7 @@ from toolpath_stiff.units import mm_from_m, nm_from_m
 
 
 def text(poses: PoseStiffness) -> str:
-    """A single pose: stiffnesses, joints, the nearest limit."""
+    """Text on a single pose: stiffnesses, joints, the nearest limit."""
     model, values = poses.model, {name: column[0] for name, column in poses.columns.items()}
     x, y, z, a, b, c = (values[name] for name in POSE_COLUMNS)
     named = machine_text({"machine": model.machine.title, **effects_stated(model)})

@@ -1,4 +1,4 @@
-"""`residuals.csv`: one row a reading, where it was taken and what it is held against."""
+"""`residuals.csv`: one row per reading, its pose and the values it is compared with."""
 
 from collections.abc import Iterable, Mapping
 
@@ -15,7 +15,7 @@ PLACE = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz")
 def residual_rows(
     data: Readings, names: Mapping[str, Iterable[object]], figures: Mapping[str, tuple[FloatArray, str]]
 ) -> str:
-    """The table: file, line, point, further names, pose, direction, figures (n,) with their formats; nan is empty."""
+    """Table: file, line, point, further names, pose, direction, figures (n,) with their formats; nan is empty."""
     place = np.concatenate([mm_from_m(data.position), deg_from_rad(data.angles), data.direction], axis=1)
     every = {name: (place[:, k], ".6g") for k, name in enumerate(PLACE)} | dict(figures)
     named = {"file": data.file, "line": data.line, "point": data.point, **names}

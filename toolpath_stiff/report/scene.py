@@ -1,4 +1,4 @@
-"""A machine as the viewer of pages and studio draws it: its bodies at some poses, and how far its tip goes."""
+"""A machine as drawn by the viewer of pages and studio: its bodies at some poses, and the reach of its tip."""
 
 import numpy as np
 
@@ -12,11 +12,11 @@ from toolpath_stiff.rotations import rotation_matrices
 from toolpath_stiff.units import mm_from_m
 
 MOST_POSES = 300
-MERIDIANS, PARALLELS = 36, 9  # of the reach boundary
+MERIDIANS, PARALLELS = 36, 9  # lines of the reach boundary
 
 
 def machine_scene(machine: MachineTool, poses: FloatArray) -> Document:
-    """What the viewer draws of a machine: of a hexapod its joints in mm, at any pose; of other kinds their bodies.
+    """Scene of a machine for the viewer: of a hexapod its joints in mm, for any pose; of other kinds their bodies.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def machine_scene(machine: MachineTool, poses: FloatArray) -> Document:
     stance = machine.solve(poses[:, :3], machine.rotation_of(poses[:, 3:]))
     there = np.isfinite(stance.joints).all(axis=1) if stance.joints.size else np.isfinite(stance.position[:, 0])
     turn = np.broadcast_to(np.eye(3) if stance.work_axes is None else stance.work_axes, (len(poses), 3, 3))
-    zero = stance.position[:, None] - poses[:, None, :3] @ np.swapaxes(turn, 1, 2)  # the work's, in base axes
+    zero = stance.position[:, None] - poses[:, None, :3] @ np.swapaxes(turn, 1, 2)  # zero of the work, in base axes
     bodies = [
         (name, np.round(mm_from_m((points - zero) @ turn)[there], 1).tolist())
         for name, points in _standing(machine, stance)
@@ -46,19 +46,19 @@ def machine_scene(machine: MachineTool, poses: FloatArray) -> Document:
 
 
 def _standing(machine: MachineTool, stance: Stance) -> list[tuple[str, FloatArray]]:
-    """Bodies by name, (n, p, 3) m, base axes: a spindle that ends at the tip is seen, a machine of slides has a bed."""
+    """Bodies by name, (n, p, 3) m, base axes: a spindle that ends at the tip is shown, slides get a bed."""
     bodies = {name: points.copy() for name, points in machine.lines(stance)}
     every = np.concatenate([*bodies.values()], axis=1)[0]
     low, high = np.nanmin(every, axis=0), np.nanmax(every, axis=0)
     names, size = [*bodies], 0.2 * float((high - low).max())
     tool, before = bodies["tool"], bodies[names[names.index("tool") - 1]]
     if np.allclose(tool[:, 0], tool[:, 1]):
-        tool[:, 0] += size * (np.array([0.0, 0.0, 1.0]) if stance.rotation is None else stance.rotation[:, :, 2])
+        tool[:, 0] += size * stance.axes[:, :, 2]
         before[:, -1] = tool[:, 0]
     if names[0] in machine.joint_names or "platform" in bodies:
         return [*bodies.items()]
     base, floor = bodies[names[0]][:, 0].copy(), low[2] - size
-    for points in bodies.values():  # what begins at the base's axes stands on the bed
+    for points in bodies.values():  # bodies that begin at the base's axes stand on the bed
         if np.array_equal(points[:, 0], base):
             points[:, 0] = [*points[0, 1, :2], floor]
     (x, y), (right, back) = low[:2] - size, high[:2] + size
@@ -67,7 +67,7 @@ def _standing(machine: MachineTool, stance: Stance) -> list[tuple[str, FloatArra
 
 
 def reach_boundary(machine: MachineTool) -> list[list[list[float]]]:
-    """(parallels, meridians, 3) mm: how far the tip goes from the default origin along rays, unturned."""
+    """(parallels, meridians, 3) mm: farthest tip positions along rays from the default origin, unturned."""
     origin = np.array(machine.default_origin)
     heights = np.radians(np.linspace(-90.0, 90.0, PARALLELS))[:, None]
     azimuths = 2.0 * np.pi * np.arange(MERIDIANS) / MERIDIANS

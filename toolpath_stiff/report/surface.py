@@ -1,4 +1,4 @@
-"""The finished part as quadrangles with the error on each: for pictures, the page and a file to take away."""
+"""The finished part as quadrangles with their error: for pictures, the page and a file to take away."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +10,7 @@ from toolpath_stiff.cutting.tip import axes_at, walls_beside
 from toolpath_stiff.rotations import rotation_matrices
 
 Quads = tuple[FloatArray, FloatArray, IntArray]
-STEEP = 2.0  # rise over the width of a cell beyond which it is a wall, which has quadrangles of its own
+STEEP = 2.0  # rise over width of a cell beyond which it is a wall, drawn by its own quadrangles
 
 
 def surface_of(cut: Cut, most: int) -> Quads:
@@ -27,19 +27,19 @@ def surface_of(cut: Cut, most: int) -> Quads:
 
 
 def in_machine(points: FloatArray, origin: ArrayLike) -> FloatArray:
-    """(k, 3) m in machine coordinates, of points of the set-up frame whose zero sits at `origin` (m, rad)."""
+    """(k, 3) m in machine coordinates, from points of the set-up frame whose zero is at `origin` (m, rad)."""
     zero = np.asarray(origin, dtype=float)
     return np.asarray(product(points, rotation_matrices(zero[3:]).T) + zero[:3])
 
 
 def error_limit(cut: Cut) -> float:
-    """End of a scale of colours, m: what 99 % of the walls keep within, or of the floors if that is more."""
+    """End of a colour scale, m: limit that 99 % of the walls keep, or of the floors if that is larger."""
     known = [np.abs(error[np.isfinite(error)]) for error in (cut.wall_mean, cut.errors[:, 2])]
     return max([1e-9, *(float(np.quantile(size, 0.99)) for size in known if len(size))])
 
 
 def _walls(cut: Cut, side: int, most: int) -> Quads:
-    """Strips between samples of a move that leave the wall of a side; of several the error of the largest size."""
+    """Strips between samples of a move that leave a side's wall; of several at a place, the largest error."""
     samples = cut.samples
     made = np.isfinite(cut.errors[:, side]) & (samples.weight > 0.0)
     rows = np.flatnonzero(made[:-1] & made[1:] & (samples.move[:-1] == samples.move[1:]))
@@ -59,15 +59,15 @@ def _walls(cut: Cut, side: int, most: int) -> Quads:
 
 
 def _foot_and_top(cut: Cut, side: int, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-    """(k, 3) m, lowest and highest point of the wall beside some samples."""
+    """(k, 3) m each, lowest and highest point of the wall beside some samples."""
     foot, _ = walls_beside(cut.samples, cut.cutters, rows, np.full(len(rows), side))
     up, heights = axes_at(cut.samples.take(rows))[:, :, 2], cut.wall_heights[rows, side]
     return foot + heights[:, :1] * up, foot + heights[:, 1:] * up
 
 
 def _floors(cut: Cut, most: int) -> Quads:
-    """Cells of the surface seen from above that are no walls."""
-    size = cut.stock.cell * cut.stock.top.shape
+    """Cells of the surface, seen from above, that are not walls."""
+    size = cut.work.stock.cell * cut.work.stock.top.shape
     x, y, top, owner = finished_surface(cut.work, cut.samples, float(np.sqrt(size.prod() / most)))
     corners = [(slice(None, -1), slice(None, -1)), (slice(1, None), slice(None, -1)), (slice(1, None), slice(1, None))]
     corners.append((slice(None, -1), slice(1, None)))

@@ -1,4 +1,4 @@
-"""A table, said once: lines of a terminal, or a part of a page."""
+"""A table in one form: lines on a terminal, or part of a page."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class ShownTable:
-    """Rows under their titles; ">" before a title puts its column to the right.
+    """Rows under titles; ">" before a title aligns its column to the right.
 
     Attributes
     ----------
@@ -35,26 +35,26 @@ class ShownTable:
     def of(
         cls, items: Iterable[Item], columns: Mapping[str, Callable[[Item], object]], kinds: Sequence[str] = ()
     ) -> Self:
-        """A row for each item; `columns`: what each shows of it, under its title."""
+        """Table with a row for each item; `columns`: title -> function of the item for the cell."""
         return cls([*columns], [[show(item) for show in columns.values()] for item in items], kinds)
 
     @property
     def titles(self) -> list[str]:
-        """The titles without their marks."""
+        """Titles without their marks."""
         return [title.removeprefix(">") for title in self.head]
 
     @property
     def right(self) -> list[int]:
-        """Columns that stand to the right."""
+        """Columns aligned to the right."""
         return [i for i, title in enumerate(self.head) if title.startswith(">")]
 
     def columns(self, *titles: str) -> Self:
-        """Some of the columns."""
+        """Table of some of the columns."""
         places = [self.titles.index(title) for title in titles]
         return replace(self, head=[self.head[i] for i in places], rows=[[row[i] for i in places] for row in self.rows])
 
     def lines(self, indent: int = 0, least: int = LABEL, width: int = WIDTH) -> list[str]:
-        """Lines for a terminal; the first column, at least so wide, gives way to the others."""
+        """Lines for a terminal; the first column, of width `least` or more, gives way to the others."""
         rows = [[_plain(cell) for cell in row] for row in (self.titles, *self.rows)]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         room = width - indent - sum(other + 2 for other in widths[1:])

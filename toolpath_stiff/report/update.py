@@ -1,4 +1,4 @@
-"""The results of an update: page and text."""
+"""Views of an update: page and text."""
 
 from collections.abc import Mapping
 from textwrap import fill
@@ -29,7 +29,7 @@ LADDER_REMARK = (
     "this mean. "
     "Effects that only together lower it are one step. An error below the noise floor is chance."
 )
-# Picture -> the question that it answers, and how it is read.
+# Picture -> the question that it answers, and how to read it.
 QUESTIONS = {
     "before_after.png": (
         "Did the error fall, and what remains?",
@@ -40,7 +40,7 @@ QUESTIONS = {
 
 
 def page(update: Update, drawn: Mapping[str, bytes]) -> str:
-    """The page, the pictures within."""
+    """The page, with the pictures in it."""
     document, provenance = update.document, update.provenance
     record = [
         f"command: {provenance['command']}",
@@ -82,7 +82,7 @@ def _figures(update: Update) -> list[tuple[str, str]]:
 
 
 def _result(update: Update) -> LadderStep:
-    """The model that comes out: the last step, the machine file as given where nothing is added."""
+    """Resulting model: the last step, or the machine file as given if nothing is added."""
     return update.steps[0 if update.verdict == NOTHING else -1]
 
 
@@ -127,7 +127,7 @@ def _fitted(update: Update) -> ShownTable:
 
 
 def support_table(update: Update) -> ShownTable:
-    """What speaks for and against each effect."""
+    """Table of the evidence for and against each effect."""
     rows = [
         (
             support.effect,
@@ -143,7 +143,7 @@ def support_table(update: Update) -> ShownTable:
 
 
 def residuals_csv(update: Update) -> str:
-    """One row a reading of the tip: measured, modelled as given and after, deviations, that with its point left out."""
+    """One row per tip reading: measured, modelled as given and after, deviations, also with its point left out."""
     data, given, last = update.task.data.of_tip, update.steps[0].residual, update.last
     measured = n_per_mm_from_n_per_m(data.stiffness)
     wild = np.isin(np.flatnonzero(update.task.data.tip), last.fit.scatter.wild)
@@ -182,7 +182,7 @@ def _value(value: float | None) -> str:
 
 
 def text(update: Update) -> str:
-    """Ladder, errors by direction before and after, parameters, what was turned down."""
+    """Ladder, errors by direction before and after, parameters, rejected effects."""
     document, fitted = update.document, _fitted(update)
     data = f"{counted(document['readings'], 'reading')} of {', '.join(map(plain, update.task.files))}"
     lines = [

@@ -1,4 +1,4 @@
-"""An update of a machine of elements in words, and its files."""
+"""Text of an update of a machine of elements, and its files."""
 
 from toolpath_stiff.correction.on_elements import ElementUpdate
 from toolpath_stiff.report.diagnose_elements import residuals_csv
@@ -7,7 +7,7 @@ from toolpath_stiff.report.update import support_table
 
 
 def text(update: ElementUpdate) -> str:
-    """What was done, the errors of each step, what speaks for and against it."""
+    """Text on what was done, the errors of each step, and the evidence for and against it."""
     names = ("mean_abs_error_percent", "held_out_error_percent", "rms_error_percent",
              "rms_error_at_left_out_poses_percent")  # fmt: skip
     rows = [(step["name"], *(f"{step[name]:.2f} %" for name in names)) for step in update.document["steps"]]

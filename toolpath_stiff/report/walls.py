@@ -1,4 +1,4 @@
-"""Measured walls against foretold errors, in words and tables."""
+"""Text and tables on measured walls against predicted errors."""
 
 from toolpath_stiff.column_files import csv_text
 from toolpath_stiff.comparison.walls import WallComparison
@@ -6,14 +6,14 @@ from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import figure
 
 COLUMNS = {
-    "line": "line", "side": "side", ">points": "points", ">measured um": "measured_um", ">foretold": "foretold_um",
+    "line": "line", "side": "side", ">points": "points", ">measured um": "measured_um", ">predicted": "predicted_um",
     ">residual": "residual_um", ">sure beyond": "sure_um", "verdict": "fails",
 }  # fmt: skip
-VERDICT = {True: "the model fails", False: "as foretold"}
+VERDICT = {True: "the model fails", False: "as predicted"}
 
 
 def text(comparison: WallComparison) -> str:
-    """What was measured and foretold together, each line with its verdict, notes; for the terminal."""
+    """Text for the terminal on measured and predicted errors, each line with its verdict, and notes."""
     document, (factor, spread) = comparison.to_dict(), comparison.factor
     rows = sorted(document["lines"], key=lambda row: -abs(row["residual_um"]))
     rows = [{**row, "fails": VERDICT[row["fails"]]} for row in rows]
@@ -23,8 +23,8 @@ def text(comparison: WallComparison) -> str:
         [
             f"{document['points']} points on final walls{others}",
             f"  measured    {document['mean_measured_um']:.2f} um in the mean of sizes",
-            f"  residual    {document['mean_residual_um']:.2f} um, measured less foretold at the height of each point",
-            f"  factor      {factor:.2f} +- {2.0 * spread:.2f}, measured over foretold",
+            f"  residual    {document['mean_residual_um']:.2f} um, measured less predicted at the height of each point",
+            f"  factor      {factor:.2f} +- {2.0 * spread:.2f}, measured over predicted",
             "",
             *ShownTable([*COLUMNS], cells).lines(least=4),
             *(f"note: {note}" for note in comparison.notes),

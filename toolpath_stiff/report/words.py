@@ -1,4 +1,4 @@
-"""How figures are written for people: the same on the terminal, in the pictures and on the page."""
+"""Figures as written for people, the same on the terminal, in the pictures and on the page."""
 
 import math
 import textwrap
@@ -7,19 +7,19 @@ from toolpath_stiff.documents import Document, number
 from toolpath_stiff.stiffness.model import machine_words
 
 WIDTH = 100  # columns of the terminal
-# The sign of every residual that is shown, for axes and legends.
+# Sign of all residuals shown, for axes and legends.
 DEVIATION = "(measured - modelled) / modelled"
 MINUS_IS_SOFTER = "minus: softer than modelled"
 RESIDUAL_AXIS = f"{DEVIATION}, %; {MINUS_IS_SOFTER}"
 
 
 def counted(count: float, thing: str) -> str:
-    """So many of a thing: "1 line", "1 405 lines"."""
+    """A number of things: "1 line", "1 405 lines"."""
     return f"{number(count)} {thing}{'' if count == 1 else 's'}"
 
 
 def significant(value: float | None, digits: int = 3) -> str:
-    """Three significant digits, in thousands as usual, with an exponent where there would be rows of zeros."""
+    """Figure with three significant digits, thousands as usual, with an exponent instead of rows of zeros."""
     if value is None or not math.isfinite(value):
         return "-"
     if value == 0.0:
@@ -37,12 +37,12 @@ def figure(value: object) -> str:
 
 
 def percent(value: float | None, digits: int = 1) -> str:
-    """A figure that is in per cent already."""
+    """Text of a figure that is already in per cent."""
     return "-" if value is None else f"{value:.{digits}f} %"
 
 
 def duration(seconds: float) -> str:
-    """Time as h:mm:ss, in seconds below a minute."""
+    """Time as h:mm:ss, or in seconds below a minute."""
     if seconds < 60.0:
         return f"{seconds:.1f} s"
     whole = round(seconds)
@@ -50,24 +50,24 @@ def duration(seconds: float) -> str:
 
 
 def plain(text: str) -> str:
-    """Text from a program or a file name without control characters: it cannot steer a terminal."""
-    if text.isprintable():  # nearly all; a picture in a page has a hundred thousand characters
+    """Text from a program or file name without control characters, so that it cannot steer a terminal."""
+    if text.isprintable():  # the common case, quick for the hundred thousand characters of a picture in a page
         return text
     return "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text)
 
 
 def shortened(text: str, width: int) -> str:
-    """At most `width` characters, the cut marked by three dots."""
+    """Text of at most `width` characters, a cut marked by three dots."""
     return text if len(text) <= width else text[: max(width - 3, 0)] + "..."
 
 
 def machine_text(document: Document) -> str:
-    """The machine of a result for headings, with the effects that act on it and the set-up."""
+    """Machine of a result for headings, with its active effects and the set-up."""
     return plain(machine_words(document))
 
 
 def labelled(label: str, text: str, column: int) -> list[str]:
-    """An entry of a list on the terminal, wrapped and indented; the label is `column` wide."""
+    """Entry of a list on the terminal, wrapped and indented; the label is `column` wide."""
     return textwrap.wrap(
         plain(text),
         WIDTH,

@@ -22,7 +22,7 @@ LINEARISE = "give --linearise MM to have straight moves within MM of it, or plac
 
 
 def rewrite_block(controls: Controls, block: Block, text: str) -> tuple[list[str], bool]:
-    """The lines that take a block's place, and whether the program goes on."""
+    """Lines that replace a block, and True if the program continues after it."""
     if not block.words:
         return [text], True
     source, out = controls.source, controls.out
@@ -122,7 +122,7 @@ def _arc(controls: Controls, plane: str, move: Move, arc: Arc) -> None:
 
 
 def _write_center(controls: Controls, plane: str, arc: Arc) -> None:
-    """I, J, K of the centre, in place of R too."""
+    """Write the centre as I, J, K, replacing R if the block has it."""
     out, edit = controls.out, controls.edit
     first, second, normal = geometry.PLANES[plane]
     here = out.frames.to_program(out.frames.position)
@@ -136,7 +136,7 @@ def _write_center(controls: Controls, plane: str, arc: Arc) -> None:
 
 
 def _cycle(controls: Controls, plane: str) -> None:
-    """The hole's place turns and moves, bottom and R plane (in G90) move along the drilling axis."""
+    """Turn and move the hole's position; its bottom and R plane (in G90) move along the drilling axis."""
     source, out, edit = controls.source, controls.out, controls.edit
     first, second, normal = geometry.PLANES[source.plane]
     if source.plane != plane:
@@ -157,7 +157,7 @@ def _cycle(controls: Controls, plane: str) -> None:
 
 
 def _piece_count(controls: Controls, move: Move) -> int:
-    """Number of pieces into which a move must be cut; those that must be are refused, unless it was asked for."""
+    """Number of pieces into which a move must be cut. Refuse a move that must be cut unless that was asked for."""
     motion, start, end, arc = move.motion, move.start, move.end, move.arc
     plane, leaning = controls.source.plane, 0.0
     off_plane = arc is not None and controls.image(plane) is None
@@ -185,7 +185,7 @@ def _piece_count(controls: Controls, move: Move) -> int:
 
 
 def _lead(controls: Controls) -> str:
-    """How the further lines in a block's place begin; its words that belong to a whole move are taken out."""
+    """Text that begins the further lines in a block's place; words that belong to the whole move are taken out."""
     stop, edit = controls.current and controls.current.code("M stop"), controls.edit
     several = f"{stop[0] if stop else 'inverse-time feed (G93)'} in a block that is written as several"
     controls.refuse_if(stop or controls.out.feed_mode == "G93", several, "give it a block of its own, or G94")
@@ -212,7 +212,7 @@ def _shifted(controls: Controls, plane: str, course: Course) -> list[str]:
 
 
 def _one_by_one(controls: Controls, pieces: Sequence[Piece]) -> list[str]:
-    """Straight moves, the first in the block's own line."""
+    """Straight moves in a block's place, the first in its own line."""
     lead, edit, lines = _lead(controls), controls.edit, []
     for number, (code, point, dwell) in enumerate(pieces):
         if number:

@@ -70,18 +70,18 @@ class LineEdit:
             self._put(word, text)
 
     def write_code(self, code: str, word: Word | None = None) -> None:
-        """Add a G code, `G1` say, before the other words, or put it in a word's place."""
+        """Add a G code such as `G1` before the other words, or put it in place of a word."""
         if word is None:
             self._add("G", code.lower() if self._lower else code)
         else:
             self._put(word, code[1:])
 
     def _put(self, word: Word, text: str) -> None:
-        """Another number in a word."""
+        """Replace the number in a word."""
         self._texts[self._words.index(word)] = word.text[0] + text
 
     def remove(self, letters: Iterable[str]) -> None:
-        """Take out the words of these letters, and the blanks beside them that are then one too many."""
+        """Remove the words of these letters, with the blanks beside them that are then superfluous."""
         for letter in letters:
             word = self.word(letter)
             if word is not None:
@@ -94,7 +94,7 @@ class LineEdit:
         return self._gaps[0] + "".join(map("".join, zip(self._texts, self._gaps[1:], strict=True)))
 
     def next_line(self, lead: str) -> LineEdit:
-        """A further line in this one's style, with no words yet; `lead` stands before them."""
+        """A further line in the style of this one, still without words; it begins with `lead`."""
         line = LineEdit(lead, Block(self.block.line, ()))
         line._between, line._points, line._lower = self._between, self._points, self._lower
         return line
@@ -114,7 +114,7 @@ OFF = 0.75
 
 
 class Controls:
-    """The controls, and what is known of them.
+    """The two controls and what is known of their state.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class Controls:
 
     @property
     def unit(self) -> float:
-        """The last decimal in mm."""
+        """Size in mm of the last decimal written."""
         return 10.0**-self.digits * self.scale(0)
 
     def scale(self, axis: int) -> float:
@@ -175,17 +175,17 @@ class Controls:
 
     @property
     def matrix(self) -> FloatArray:
-        """The turn in the program axes in force."""
+        """Turn of the work in the program axes in force."""
         return self.turn.in_program(self.out.frames.turned)
 
     def image(self, plane: str) -> tuple[str, float] | None:
-        """The plane that a plane is turned into, and the sign of its normal; None if it is none of the three."""
+        """Plane into which a plane is turned, and the sign of its normal; None unless it is one of G17 to G19."""
         column = self.matrix[:, geometry.PLANES[plane][2]]
         images = [(name, float(column[axes[2]])) for name, axes in geometry.PLANES.items()]
         return next(((name, sign) for name, sign in images if abs(sign) == 1.0), None)
 
     def plane_word(self, before: str) -> str:
-        """Turn the plane word of the block, if it has one; the plane that will be in force."""
+        """Turn the block's plane word, if it has one, and return the plane that will then be in force."""
         given = self.current.code("plane") if self.current else None
         if given is None:
             return before
@@ -195,7 +195,7 @@ class Controls:
         return plane
 
     def motion_word(self, wanted: str) -> None:
-        """Make sure that the block is executed in the motion mode wanted."""
+        """Make sure that the block runs in the motion mode `wanted`."""
         mode, word = (self.current.code("motion") if self.current else None) or (self.out.motion, None)
         if mode != wanted:
             self.edit.write_code(wanted, word)
@@ -211,7 +211,7 @@ class Controls:
         return [*point, *self.turn.angles(setup[3:], self.out.frames.position[3:])]
 
     def go(self, target: list[float], axes: Sequence[str], only: Sequence[int] = range(6), parts: int = 1) -> None:
-        """Words of the axes `only`, so that `out` goes to a point in control coordinates, in `parts` equal steps.
+        """Write words of the axes `only` that take `out` to a point in control coordinates, in `parts` equal steps.
 
         `axes` are those that the untouched block names; another one gets a word only where it has to move too.
         """
@@ -230,7 +230,7 @@ class Controls:
             self.edit.write(letter, goal / scale, self.digits)
 
     def emit(self) -> str:
-        """Have `out` execute the edited line; its text."""
+        """Execute the edited line on `out` and return its text."""
         text = self.edit.render()
         try:
             block = read_block(text, self.edit.block.line, self.source.name)
@@ -244,7 +244,7 @@ class Controls:
         return text
 
     def check(self, first: int, first_out: int, pieces: bool) -> None:
-        """Every cutting move of the block must be the placed one within the rounding; of one in `pieces` the ends."""
+        """Check that each cutting move of the block is the placed one within rounding; of `pieces`, only their ends."""
         source, out = self.source.recorder.recent[first:], self.out.recorder.recent[first_out:]
         rows = range(first, first + len(source))
         self.row_of += rows if len(source) == len(out) else [first] * len(out)

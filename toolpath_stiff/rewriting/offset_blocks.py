@@ -29,7 +29,7 @@ USE_WRITE = "use --write, which transforms the program itself"
 
 @dataclass(frozen=True)
 class OffsetBlocks:
-    """Blocks to key in, "" where the control cannot express the placement; the reason is then beside it."""
+    """Blocks to key in, each "" where that control cannot express the placement, with the reason beside it."""
 
     linuxcnc: str
     fanuc: str

@@ -38,7 +38,7 @@ HINT = "place it without --write, and set the datum or offset that is printed"
 
 
 def write_placed(program: ReadProgram, text: str, turn: Turn, decimals: int | None, control: Controller) -> str:
-    """The program's text at its new place, read again. Raises `InputError` where that cannot be said by a frame."""
+    """Text of the program at its new place, read again to check it. Raises `InputError` where no frame can do it."""
     lines, moves, name = split_lines(text, program.name), program.moves, program.name
     inch = INCH.search(text) if program.dialect == "siemens" else in_inches(lines)
     unit, usual = (MM_PER_INCH, DECIMALS_INCH) if inch else (1.0, DECIMALS_MM)
@@ -67,7 +67,7 @@ def write_placed(program: ReadProgram, text: str, turn: Turn, decimals: int | No
 
 
 def _differs(moves: Moves, again: Moves, turn: Turn, largest_mm: float) -> IntArray:
-    """Rows of the cuts that end elsewhere than at the placed point, or with another tool axis."""
+    """Rows of the cuts that end away from the placed point, or with another tool axis."""
     if len(again) != len(moves):  # a turned tool axis may take other parts to a move
         again, moves = (m.take(np.append(np.diff(m.line) != 0, True)) for m in (again, moves))
     if not np.array_equal(again.motion, moves.motion):

@@ -149,7 +149,7 @@ def shift_program(
     decimals: int | None = None,
     control: Controller = UNKNOWN_CONTROL,
 ) -> tuple[RewrittenProgram, list[int], dict[int, str]]:
-    r"""A program with some moves on other courses, what each of its moves stands for, what must stay.
+    r"""A program with some moves on other courses; where each of its moves comes from; which moves must stay.
 
     The second is, for each of its moves, the row of the move that was there before; the third, for each row that no
     course may change, the reason.
@@ -216,7 +216,7 @@ def _rewritten(program: ReadProgram, controls: Controls, control: Controller) ->
 
 
 def check_rewritable(program: ReadProgram, shifted: bool = False) -> None:
-    """Raise `InputError` for a program whose blocks are not what a control of this machine executes.
+    """Raise `InputError` for a program whose blocks are not those that a control of this machine executes.
 
     A frame places programs of Heidenhain's and Siemens' languages; `shifted` to one side they cannot be written.
     """
@@ -242,7 +242,7 @@ def check_rewritable(program: ReadProgram, shifted: bool = False) -> None:
 
 
 def _rewritten_lines(controls: Controls, text: str, name: str, switches: frozenset[int]) -> Iterator[str]:
-    """Lines with their ends; what follows the program's end stays as it is."""
+    """Rewritten lines with their line ends; text after the program's end is left as it is."""
     lines, raw_lines, ends = split_lines(text, name), LINE_END.split(text), [*LINE_END.findall(text), ""]
     running, started = True, False
     for number, (line, raw, end) in enumerate(zip(lines, raw_lines, ends, strict=False), 1):

@@ -91,17 +91,14 @@ class SideShift:
             self._shifts = {row: knots for row, knots in shifts.items() if row not in self.refused}
             self._joint = self._joints()
             self._ramp_neighbours()
-            moved = sorted({*self._shifts, *self._joint, *(row - 1 for row in self._joint)})
-            self.courses = {row: self._course(row) for row in moved if self._moves(row)}
+            shifted = {row for row, (_, shift) in self._shifts.items() if shift.any()}
+            moved = sorted(shifted | {row for joint, by in self._joint.items() if by for row in (joint - 1, joint)})
+            self.courses = {row: self._course(row) for row in moved}
             turned = {row for row, course in self.courses.items() if self._turned(row, course)}
             if not turned:
                 break
             near = {other for row in turned for other in (row - 1, row, row + 1) if other in self._shifts}
             self.refused |= dict.fromkeys(near or self._shifts, "it, or its neighbour, is shorter than the shift")
-
-    def _moves(self, row: int) -> bool:
-        shifted = row in self._shifts and bool(self._shifts[row][1].any())
-        return shifted or bool(self._joint.get(row) or self._joint.get(row + 1))
 
     def _left(self, row: int, point: complex) -> complex:
         """Unit vector to the left of the feed of a move at a point of its plan."""
@@ -112,14 +109,14 @@ class SideShift:
         return complex(inward / abs(inward))
 
     def _shift_at(self, row: int, point: complex, moved: complex) -> float:
-        """How far left of a move's course a point is that was moved from a point of it."""
+        """Shift to the left of the feed, mm, of a point of a move that was displaced by `moved`."""
         if self._sweep[row] == 0.0:
             return float((moved * self._left(row, point).conjugate()).real)
         center = self._center[row]
         return math.copysign(1.0, self._sweep[row]) * float(abs(point - center) - abs(point + moved - center))
 
     def _joints(self) -> dict[int, complex]:
-        """Row -> by how much its start moves, where it meets the end of the row before."""
+        """Row -> displacement of its start, where it meets the end of the row before."""
         joints = {}
         for joint in sorted({*self._shifts, *(row + 1 for row in self._shifts)}):
             if not self._joined[joint] or not all(map(self._carries, (joint - 1, joint))):
@@ -135,12 +132,12 @@ class SideShift:
                 moved += complex(*step)
             still = [row for row, _ in wanted if not self._shifts[row][1].any()]
             if abs(moved) < NOTHING or any(abs(self._shift_at(row, point, moved)) > TOLERANCE for row in still):
-                moved = 0j  # a move that is to stay does
+                moved = 0j  # a move that must stay is not displaced
             joints[joint] = moved * min(1.0, most / abs(moved)) if moved else 0j
         return joints
 
     def _ramp_neighbours(self) -> None:
-        """Joints of moves without a shift of their own, along which that of a neighbour ends."""
+        """Displace the joints of unshifted moves over which a neighbour's shift runs out."""
         for joint, moved in [*self._joint.items()]:
             for step in (-1, 1):
                 joints, way = [], 0.0
@@ -159,7 +156,7 @@ class SideShift:
                         self._joint[following] = self._joint.get(following, 0j) + moved * (1.0 - along / way)
 
     def _carries(self, row: int) -> bool:
-        """Whether a move can follow a neighbour's shift: one of its own, a straight one, an arc that is not closed."""
+        """True if a move can follow a neighbour's shift: it has one of its own, is straight, or is an open arc."""
         return row in self._shifts or not self._sweep[row] or abs(self._end[row] - self._start[row]) > RAMP
 
     def _course(self, row: int) -> Course:
@@ -202,7 +199,7 @@ class SideShift:
     def _with_ramps(
         self, row: int, shares: FloatArray, shift: FloatArray, moved: tuple[complex, complex]
     ) -> tuple[FloatArray, FloatArray]:
-        """Knots of a move's shift, bent within `RAMP` of its ends to what its neighbours let it have there."""
+        """Knots of a move's shift, bent within `RAMP` of each end to the shift that its neighbour allows there."""
         length, ends = float(self._length[row]), (complex(self._start[row]), complex(self._end[row]))
         missing = [self._shift_at(row, p, d) - float(e) for p, d, e in zip(ends, moved, shift[[0, -1]], strict=True)]
         ramp = min(RAMP / length, 0.5)
@@ -243,7 +240,7 @@ class SideShift:
         return [start.real, start.imag, *first[2:]], [end.real, end.imag, *last[2:]], arc
 
     def _turned(self, row: int, course: Course) -> bool:
-        """Whether a shift has turned a move, or a part of it, around."""
+        """True if a shift has reversed a move or part of it."""
         if self._sweep[row]:
             return any(
                 arc is not None and arc.sweep * self._normal[row] * self._sweep[row] <= 0.0 for *_, arc in course
@@ -253,7 +250,7 @@ class SideShift:
 
 
 def _arc_through(start: complex, middle: complex, end: complex) -> tuple[complex, float]:
-    """Centre and sweep of the arc through three points; a sweep of 0 where it is as good as straight."""
+    """Centre and sweep of the arc through three points; a sweep of 0 if they are practically in line."""
     a, b = middle - start, end - start
     cross = (a.conjugate() * b).imag
     if abs(cross) * STRAIGHT < abs(a) * abs(b) * abs(b - a):

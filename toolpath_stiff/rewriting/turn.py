@@ -57,7 +57,7 @@ class Turn:
         return self.turn @ rotation_matrices(np.radians(abc)) @ self._yaw
 
     def angles(self, abc: Sequence[float], near: Sequence[float]) -> list[float]:
-        """Rotary words a, b, c in degrees; of the many that are the same rotation, those next to `near`."""
+        """Rotary words a, b, c in degrees; of the many triples with the same rotation, the one closest to `near`."""
         if self.keeps(abc):
             return list(abc)
         a, b, c = np.degrees(roll_pitch_yaw(self.rotations(np.array([abc], dtype=float))[0]))
@@ -67,17 +67,17 @@ class Turn:
         return [float(v) for v in best]
 
     def keeps(self, abc: Sequence[float]) -> bool:
-        """True where rotary words stay as they are: a vertical platform never yaws with the work."""
+        """True if rotary words stay as they are: a vertical platform never yaws with the work."""
         return self._never_yaws and (not self.turns or max(abs(abc[0]), abs(abc[1])) < UPRIGHT)
 
     def in_program(self, rotation: float) -> FloatArray:
-        """(3, 3) turn as it looks in program axes that a work offset's rotation (degrees) turned already."""
+        """(3, 3) the turn in program axes that the rotation of a work offset (degrees) has already turned."""
         inner = rotation_about_z(np.radians(rotation))
         return _clean(inner.T @ self.turn @ inner)
 
 
 def _clean(matrix: FloatArray) -> FloatArray:
-    """Direction cosines with the noise about 0 and +-1 taken off, so that what is unturned stays so exactly."""
+    """Direction cosines rounded to exactly 0 or +-1 where they differ by noise only, so unturned axes stay exact."""
     whole = np.round(matrix)
     return np.where(np.abs(matrix - whole) < NOISE, whole, matrix) + 0.0
 
@@ -91,13 +91,13 @@ def chords(arc: Arc, start: Sequence[float], end: Sequence[float], tolerance: fl
 
 
 def point_at(start: Sequence[float], end: Sequence[float], arc: Arc | None, share: float) -> list[float]:
-    """The point (6) at a share of a move."""
+    """Point (6) at a share of a move."""
     point = [first + share * (last - first) for first, last in zip(start, end, strict=True)]
     return point if arc is None else [*point_on_arc(arc, start, end, share), *point[3:]]
 
 
 def lean(turn: Turn, programmed: Sequence[Sequence[float]], written: Sequence[Sequence[float]]) -> float:
-    """Largest angle (degrees) between the tool as placed and as written, midway in a move; rotary words of both ends.
+    """Largest angle (degrees) between the tool as placed and as written, within a move given by its end rotary words.
 
     Both controls go evenly from the first angles to the last; only at the ends are these the same rotation.
     """
@@ -125,7 +125,7 @@ PLACES = (
 
 
 def differences(turn: Turn, wanted: list[Move], written: list[Move], unit: float) -> str:
-    """How a block's written cutting moves differ from the placed ones beyond the rounding to `unit` mm; "" if nowhere.
+    """Difference between a block's written and placed cutting moves beyond the rounding to `unit` mm; "" if none.
 
     Straight moves of a few units may vanish by rounding, or come to be.
     """
@@ -138,13 +138,13 @@ def differences(turn: Turn, wanted: list[Move], written: list[Move], unit: float
 
 
 def _short(move: Move, unit: float) -> bool:
-    """Whether rounding to `unit` may make a move vanish."""
+    """True if rounding to `unit` may make a move vanish."""
     longest = max(abs(e - s) for s, e in zip(move.start, move.end, strict=True))
     return move.arc is None and longest < SHORTEST_UNITS * unit
 
 
 def _difference(turn: Turn, wanted: Move, written: Move, unit: float) -> str:
-    """For the steps of one word, as those of a cycle with L in G91, `unit` is that of all of them."""
+    """Difference between a written and a placed move, "" if none; `unit` is that of all steps of a word (L in G91)."""
     for where, share, units in PLACES if wanted.arc or written.arc else PLACES[:2]:
         placed, point = (point_at(move.start, move.end, move.arc, share) for move in (wanted, written))
         apart = math.dist(turn.point(placed[:3]), point[:3])

@@ -1,1 +1,1 @@
-"""Blind simulator of a measuring campaign on a machine that hides something; shares nothing with the stack."""
+"""Blind simulator of measuring campaigns on a machine with a hidden fault; shares no mechanics with the stack."""

@@ -82,7 +82,7 @@ def beams(
 
 
 def add(total: FloatArray, nodes: Sequence[int], stiffness: FloatArray) -> None:
-    """Adds the stiffness of an element, six rows a node, where it belongs; `total` and it may be stacks."""
+    """Add an element's stiffness, six rows a node, at its nodes in `total`; both may be stacks."""
     where = np.concatenate([np.arange(NODE * node, NODE * node + NODE) for node in nodes])
     total[..., where[:, None], where] += stiffness
 
@@ -97,13 +97,13 @@ def arm(reach: FloatArray) -> FloatArray:
 
 
 def springs(stiffness: FloatArray, reach: FloatArray) -> FloatArray:
-    """(12, 12) of springs (6, 6) between the second node and the first, whose rigid arm `reach` (3,) m goes there."""
+    """(12, 12) of springs (6, 6) between the first node's rigid arm `reach` (3,) m and the second node."""
     both = np.concatenate([-arm(reach), np.eye(NODE)], axis=1)
     return np.asarray(both.T @ stiffness @ both)
 
 
 def condensed(stiffness: FloatArray, kept: Sequence[int]) -> FloatArray:
-    """Stiffness seen at the kept nodes when nothing loads the others (static condensation, Guyan 1965)."""
+    """Stiffness seen at the kept nodes when the others carry no load (static condensation, Guyan 1965)."""
     rows = (NODE * np.array(kept)[:, None] + np.arange(NODE)).ravel()
     rest = np.setdiff1d(np.arange(len(stiffness)), rows)
     inner = np.linalg.solve(stiffness[np.ix_(rest, rest)], stiffness[np.ix_(rest, rows)])

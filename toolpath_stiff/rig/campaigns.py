@@ -1,4 +1,4 @@
-"""Campaigns: which poses, loads, tools and set-ups are measured in which order.
+"""Campaigns: poses, loads, tools and set-ups measured, and their order.
 
 A `Table` maps column names of measurement files to arrays or lists of one length, in shop units.
 """
@@ -36,7 +36,7 @@ RISER_EVERY = 3  # each third pose is taken on a riser
 
 
 def campaign(layout: str, nominal: Nominal, plan: Table | None, rng: Generator) -> Table:
-    """The campaign of a layout. Raises `InputError`."""
+    """Campaign of a layout. Raises `InputError`."""
     if layout not in LAYOUTS:
         raise InputError(f"layout {layout!r}", expected=", ".join(LAYOUTS))
     if (layout == "campaign") != (plan is not None):
@@ -86,12 +86,12 @@ _TILTED_COLUMNS = (
 
 
 def _extension(pose: int) -> float:
-    """Mm by which the tool at a pose is longer: poses 0, 7, 14, 21, two of them on the riser."""
+    """Extra length, mm, of the tool at a pose: poses 0, 7, 14, 21, two of them on the riser."""
     return LONG_TOOL if pose % 6 == pose // 6 else 0.0
 
 
 def _tilted_poses(nominal: Nominal, rng: Generator) -> FloatArray:
-    """(24, 6) mm and degrees, reachable, drawn until each height has its share; tilts of 5 to 25 degrees."""
+    """(24, 6) mm and degrees, all reachable, drawn until each height has its share; tilts of 5 to 25 degrees."""
     poses: list[FloatArray] = []
     for _ in range(20_000):
         pose = len(poses)

@@ -1,4 +1,4 @@
-"""A case: a campaign on a machine that hides something, drawn from a seed, with the truth beside it.
+"""A case: a campaign on a machine with something hidden, drawn from a seed, with the truth beside it.
 
 Each purpose has its own stream of random numbers, so that a case and its control (`hidden="none"`) differ by the
 effect alone.
@@ -31,7 +31,7 @@ from toolpath_stiff.rig.unknowns import ODDITIES, OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
 BUILT = ("springs", "fem")  # ways to build a machine, the first by default
-# How often a blind draw hides what, where nothing is said (assumed).
+# Shares of blind draws that hide each kind, unless one is requested (assumed).
 BLIND = {"none": 0.2, "one": 0.45, "two": 0.15, "outside": 0.2}
 
 # One stream of random numbers for each purpose, so that a change in one leaves the others as they were.
@@ -47,7 +47,7 @@ def rows_of(table: Table, elapsed: FloatArray | None = None) -> Rows:
 
     if "dx" in table:
         direction = np.stack([column(name, 0.0) for name in ("dx", "dy", "dz")], axis=1)
-        with np.errstate(invalid="ignore"):  # nan of no length
+        with np.errstate(invalid="ignore"):  # a direction of no length gives nan
             direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
     else:
         direction = np.array([AXES[name] for name in table["direction"]])
@@ -65,7 +65,7 @@ def rows_of(table: Table, elapsed: FloatArray | None = None) -> Rows:
 
 
 def clamp_of(table: Table) -> IntArray:
-    """(n,) group of each row: its clamp, or without that column its pose and set-up."""
+    """(n,) clamping group of each row: its clamp or, without that column, its pose and set-up."""
     columns = ["clamp"] if "clamp" in table else [name for name in (*POSE, "setup") if name in table]
     keys = list(zip(*(np.asarray(table[name]).tolist() for name in columns), strict=True))
     numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
@@ -74,7 +74,7 @@ def clamp_of(table: Table) -> IntArray:
 
 @dataclass(frozen=True)
 class DrawnCase:
-    """A campaign and its truth.
+    """A campaign and the truth behind it.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class DrawnCase:
     layout: str = ""
 
     def measure(self, table: Table, rows: Rows, rng: Generator, stated_sd: bool = False) -> Table:
-        """A table with the column `stiffness_N_per_mm`, and `sd_N_per_mm` if it is to be stated; `rows` in SI."""
+        """Measured table with column `stiffness_N_per_mm`, and `sd_N_per_mm` if it is to be stated; `rows` in SI."""
         shown, nuisances = readings(self.nominal, self.machine, rows), self.nuisances
         bad = np.flatnonzero(~(np.isfinite(shown) & (shown > 0.0)))
         if len(bad):
@@ -125,7 +125,7 @@ class DrawnCase:
 
 
 def make_case(seed: int, *args: Any, **named: Any) -> tuple[Table, Document]:
-    """Rows and truth of the same as `draw_case`."""
+    """Rows and truth of `draw_case`."""
     case = draw_case(seed, *args, **named)
     return case.rows, case.truth
 
@@ -140,7 +140,7 @@ def draw_case(
     size: float | Sequence[float] | None = None,
     built: str = BUILT[0],
 ) -> DrawnCase:
-    """A blind campaign on a machine that hides something; the same arguments give the same rows.
+    """A blind campaign on a machine with something hidden; the same arguments give the same rows.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def draw_case(
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
             parameters, strength = scale.draw(name, wanted, rng)
             true = with_effect(true, name, parameters)
-            kind = UNKNOWNS.get(name)  # what a description may name
+            kind = UNKNOWNS.get(name)  # names that a description may use
             words = {} if kind is None else {"links": sorted(kind.links), "variables": sorted(kind.variables)}
             if name in FAULTS:
                 words = {"links": sorted(FAULTS[name].links), "names": sorted(FAULTS[name].names)}
@@ -201,7 +201,7 @@ def draw_case(
         "effects": effects,
     }
     if isinstance(true, FemMachine):
-        if nuisances.joint_error > 0.0:  # no machine is quite like its drawing, unless none of it shall be
+        if nuisances.joint_error > 0.0:  # no machine matches its drawing exactly, unless joint errors are switched off
             true = true.scattered(streams["machine"])
         truth["path"] = path_truth(nominal, true, rows, np.random.default_rng([seed, len(_STREAMS)]))
     case = DrawnCase(table, truth, nominal, true, nuisances, seed, layout)
@@ -209,7 +209,7 @@ def draw_case(
 
 
 def _sizes(size: float | Sequence[float] | None, count: int) -> Sequence[float | None]:
-    """The size wanted of each of `count` effects."""
+    """Size wanted of each of `count` effects; None where it is drawn."""
     sizes = size if isinstance(size, Sequence) else (size,) * count
     if len(sizes) != count:
         raise InputError(f"{len(sizes)} sizes for {count} hidden effects", expected="one size, or one for each effect")
@@ -217,7 +217,7 @@ def _sizes(size: float | Sequence[float] | None, count: int) -> Sequence[float |
 
 
 def hideable(columns: Container[str], *, fem: bool) -> tuple[list[str], list[str], list[str]]:
-    """What a campaign with these columns shows: names in the catalogue, outside it, and unknowns.
+    """Names that a campaign with these columns can show: in the catalogue, outside it, and unknowns.
 
     `fem`: on a machine of finite elements, where what lies outside is unknown.
     """
@@ -230,7 +230,7 @@ def hideable(columns: Container[str], *, fem: bool) -> tuple[list[str], list[str
 
 
 def _names(hidden: str | Sequence[str] | None, table: Table, rng: Generator, *, fem: bool) -> tuple[str, ...]:
-    """Names of what is hidden, in a machine of finite elements or of springs."""
+    """Names of the hidden effects, in a machine of finite elements or of springs."""
     if hidden is None:
         hidden = str(rng.choice(list(BLIND), p=list(BLIND.values())))
     known, outside, unknown = hideable(table, fem=fem)

@@ -1,4 +1,4 @@
-"""Where the platform really stands when the control, with the nominal geometry, commands a pose."""
+"""True poses of the platform when the control commands poses with the nominal geometry."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -7,7 +7,7 @@ from toolpath_stiff.arrays import FloatArray
 
 
 class ClosureError(RuntimeError):
-    """Struts of the commanded lengths carry the true platform nowhere near the commanded pose."""
+    """Struts of the commanded lengths do not carry the true platform anywhere near the commanded pose."""
 
 
 def true_poses(

@@ -1,4 +1,4 @@
-"""What is drawn of something hidden beside its size: which strut, which axis, where."""
+"""Draws of everything about a hidden effect but its size: its strut, axis, place."""
 
 from collections.abc import Callable
 from typing import Any
@@ -8,22 +8,22 @@ Draw = Callable[..., Shape]  # of a generator, how many vertices the frame has, 
 
 
 def uniform(name: str, low: float, high: float) -> Draw:
-    """One number, drawn from a range."""
+    """Draw of one number from a range."""
     return lambda rng, *_: {name: float(rng.uniform(low, high))}
 
 
 def whole(name: str, low: int, beyond_high: int) -> Draw:
-    """One whole number, from the lowest to below the last."""
+    """Draw of one whole number from `low` to below `beyond_high`."""
     return lambda rng, *_: {name: int(rng.integers(low, beyond_high))}
 
 
 def either(name: str) -> Draw:
-    """1 or -1."""
+    """Draw of 1 or -1."""
     return lambda rng, *_: {name: float(rng.choice([-1.0, 1.0]))}
 
 
 def drawn(*draws: Draw) -> Draw:
-    """Several, one after the other."""
+    """Several draws, one after the other."""
     return lambda rng, *there: {name: value for draw in draws for name, value in draw(rng, *there).items()}
 
 

@@ -26,7 +26,7 @@ Grow = Callable[[float, Shape], Shape]
 
 
 def _shares(*names: str) -> Draw:
-    """Relative sizes of several components: one is 1, each other one is absent in a third of the cases."""
+    """Draw of relative sizes of several components: one is 1, each other is absent in a third of the cases."""
 
     def draw(rng: Generator, vertices: int, setups: list[str]) -> Shape:
         weights = np.where(rng.random(len(names)) < 1.0 / 3.0, 0.0, rng.uniform(0.2, 1.0, len(names)))
@@ -37,12 +37,12 @@ def _shares(*names: str) -> Draw:
 
 
 def _vertex(rng: Generator, vertices: int, setups: list[str]) -> Shape:
-    """All vertices alike in half of the cases, else a single one."""
+    """Draw of vertices: all alike in half of the cases, otherwise a single one."""
     return {"vertex": 0 if rng.random() < 0.5 else int(rng.integers(1, vertices + 1))}
 
 
 def _gauge_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
-    """The direction or the set-up whose readings are scaled."""
+    """Draw of the direction or set-up whose readings are scaled."""
     target = str(rng.choice(["X", "Y", "Z", *(setups if len(setups) > 1 else [])]))
     axis = target in ("X", "Y", "Z")
     direction = {"direction": "XYZ".index(target) + 1 if axis else 0, "setup": "" if axis else target}
@@ -50,7 +50,7 @@ def _gauge_shape(rng: Generator, vertices: int, setups: list[str]) -> Shape:
 
 
 def _scaled(limit: float, *names: str) -> Grow:
-    """Parameters in proportion to the strength and to share or sign in the shape, beside what else that has."""
+    """Parameters proportional to the strength and to the share or sign in the shape, plus the shape's other entries."""
 
     def grow(strength: float, shape: Shape) -> Shape:
         shares = {**dict.fromkeys(names, shape.get("sign", 1.0)), **shape}
@@ -138,19 +138,19 @@ BEYOND = {*OUTSIDE, *(name for name, fault in FAULTS.items() if not fault.names)
 
 
 def draw_shape(name: str, rng: Generator, vertices: int, setups: list[str]) -> Shape:
-    """What is drawn of anything that can be hidden, beside its strength."""
+    """Draw everything about a hidden effect but its strength."""
     return (CATALOGUE.get(name) or FAULTS.get(name) or OUTSIDE[name]).shape(rng, vertices, setups)
 
 
 def at_strength(name: str, shape: Shape, strength: float) -> Shape:
-    """Shape in shop units, by the catalogue's names, for a strength in (0, 1]."""
+    """Parameters in shop units, by the catalogue's names, of a shape at a strength in (0, 1]."""
     if name in CATALOGUE:
         return CATALOGUE[name].grow(strength, shape)
     return _scaled((FAULTS.get(name) or OUTSIDE[name]).limit, "size")(strength, shape)
 
 
 def with_effect(hidden: HiddenMachine, name: str, parameters: Shape) -> HiddenMachine:
-    """The machine with one more effect; parameters in shop units by the catalogue's names."""
+    """The machine with one more effect; parameters in shop units, by the catalogue's names."""
     if known := CATALOGUE.get(name) or FAULTS.get(name):
         return dataclasses.replace(hidden, **known.change(hidden, parameters))
     return dataclasses.replace(hidden, unknown=Unknown(name, parameters["size"], dict(parameters)))

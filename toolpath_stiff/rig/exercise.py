@@ -58,8 +58,8 @@ TEXTS = {  # column -> what matches, in words as well
     **dict.fromkeys(("repeat", "point", "setup"), ("(?s).*", "any text")),
 }
 RESULTS = ("stiffness_N_per_mm", "sd_N_per_mm", "displacement_um")
-# Claims, verdicts of a diagnosis among them: that nothing is hidden, and that something is which the catalogue lacks.
-# Of a `described` effect the form was drawn from the readings: it is none of the catalogue.
+# Claims, including verdicts of a diagnosis: nothing is hidden, or something that the catalogue lacks.
+# `described`: the effect's form was read off the readings, so it is not one of the catalogue.
 SOUND, OTHER = ("none", "adequate"), ("outside", "unexplained", "described")
 MEASUREMENTS, MACHINE, SEALED = FILES = "measurements.csv", "machine.toml", "sealed.bin"
 NO_OTHER = Rules(fresh=True)
@@ -83,14 +83,14 @@ def seal(case: DrawnCase) -> bytes:
 
 
 def sealed_bytes(content: Document) -> bytes:
-    """`sealed.bin` of what it holds."""
+    """Content of `sealed.bin` for a document."""
     packed = zlib.compress(json.dumps(content, sort_keys=True).encode(), 9)
     body = packed + hashlib.shake_256(packed).digest(-len(packed) % BLOCK)
     return MAGIC + hashlib.sha256(body).digest() + body
 
 
 def opened(file: str | Path) -> Document:
-    """What was sealed. Raises `InputError` if the file was changed."""
+    """Document that was sealed. Raises `InputError` if the file was changed."""
     content = read_bytes(file, "the sealed truth")
     digest, body = content[len(MAGIC) : len(MAGIC) + DIGEST], content[len(MAGIC) + DIGEST :]
     if not content.startswith(MAGIC) or hashlib.sha256(body).digest() != digest:
@@ -100,7 +100,7 @@ def opened(file: str | Path) -> Document:
 
 
 def unseal(file: str | Path) -> tuple[DrawnCase, Document]:
-    """The case (without its rows) and what else was sealed. Raises `InputError` if the file was changed."""
+    """The case (without its rows) and the rest of the sealed document. Raises `InputError` if the file was changed."""
     sealed = opened(file)
     if sealed.get("built") == "serial":
         raise InputError("a robot is pulled once", hint="make another exercise, with another --seed", file=str(file))
@@ -128,7 +128,7 @@ def score(hidden: list[str], claim: list[str]) -> str:
 
 
 def csv_text(table: Table) -> str:
-    """The table as CSV; numbers as short as they are exact to ten digits."""
+    """The table as CSV, each number in the shortest form that is exact to ten digits."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(table)
@@ -138,7 +138,7 @@ def csv_text(table: Table) -> str:
 
 
 def read_plan(file: str, nominal: Nominal) -> Table:
-    """Table of a plan; stiffness and its sd may be there, empty or not, and are left out.
+    """Table of a plan; columns of stiffness and its sd may be there, empty or not, and are dropped.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def _check_heading(heading: Sequence[str], file: str) -> None:
 
 
 def _value(name: str, cell: str) -> float | int | str:
-    """The value of a cell; ValueError says what was expected."""
+    """Value of a cell; ValueError says what was expected."""
     if name in TEXTS:
         pattern, expected = TEXTS[name]
         if not re.fullmatch(pattern, cell):
@@ -245,7 +245,7 @@ def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[
 
 
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
-    """What was hidden, and how the claim scores: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
+    """Hidden truth and score of a claim: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
     claims = [name.strip() for name in claim.split(",") if name.strip()]
     of_robots = (*ROBOT_FAULTS, *(name for fault in ROBOT_FAULTS.values() for name in fault.names))
     known = tuple(dict.fromkeys((*SOUND, *OTHER, *CATALOGUE, *OUTSIDE, *FAULTS, *of_robots)))
@@ -254,7 +254,7 @@ def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
         raise InputError(f"a claim {claim!r}", expected=f"none, or one or several of {', '.join(known)}")
     sealed = opened(Path(folder) / SEALED)
     truth = sealed["truth"]
-    # A fault of elements that the catalogue has a name for is claimed by that.
+    # A fault of elements is claimed by the catalogue's name for it, if it has one.
     hidden = [
         next((name for name in claims if name in effect.get("names", ())), effect["effect"])
         for effect in truth["effects"]

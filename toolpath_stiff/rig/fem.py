@@ -42,7 +42,7 @@ SETTLED, STEPS = 1e-10, 300  # of the largest strut force
 
 @dataclass(frozen=True)
 class FemMachine(HiddenMachine):
-    """What the elements are; SI. The defaults are the sound machine without spread.
+    """Elements of the machine; SI. The defaults are the sound machine without spread.
 
     Of `HiddenMachine` it has geometry, struts, `joint`, `hertz`, `clearance`, gauge and drift; nothing else acts.
 
@@ -99,14 +99,14 @@ class FemMachine(HiddenMachine):
         return np.asarray(rows.force / between(nominal, self, rows, 0.0))
 
     def displacement(self, nominal: Nominal, rows: Rows) -> FloatArray:
-        """(n,) m that the indicator shows for what the load cell shows as the load."""
+        """(n,) m that the indicator shows while the load cell shows the load."""
         tall = np.maximum(rows.position[:, 2] - table_top(nominal), 0.0)
         stand = rows.force * self.stand * tall**3 * (1.0 - rows.direction[:, 2] ** 2)
         moved = between(nominal, self, rows, self.touches_above) + stand + self.drift * rows.time
         return np.asarray(moved / (1.0 + self.cell_curve * rows.force / CURVED_AT))
 
     def motions(self, nominal: Nominal, rows: Rows, lengths: FloatArray) -> Motions:
-        """As of a machine of springs; the joints of a strut are those at both its ends."""
+        """Motions under the loads of the rows, as of a machine of springs; a strut's joints are those at both ends."""
         state, pose, struts, give = solved(nominal, self, rows)
         columns, pull, extra = moved(self, rows, struts[pose], give[pose])
         down = (state.place.work_point - state.place.platform_joints.mean(axis=1))[pose]
@@ -125,7 +125,7 @@ class FemMachine(HiddenMachine):
         )  # fmt: skip
 
     def scattered(self, rng: Generator) -> Self:
-        """As one of many: no section is quite that of the drawing; clamping scatters otherwise in each direction."""
+        """One machine of many: sections differ a little from the drawing, and clamping scatters by direction."""
         factors = {
             name: before * np.exp(width * (rng.standard_normal() + 0.3 * rng.standard_normal(np.shape(before))))
             for name, width in SPREAD.items()
@@ -135,7 +135,7 @@ class FemMachine(HiddenMachine):
 
 
 def strut_give(machine: FemMachine, state: CommandedRows) -> tuple[FloatArray, FloatArray]:
-    """(n, 6) m/N along the struts, and of both their joints, all that is linear."""
+    """(n, 6) m/N along the struts, and (n, 6) m/N of both joints of each: the linear parts."""
     nominal, every = state.nominal, range(6)
     first, last = nominal.law_ends
     share = (state.lengths - first) / (last - first)
@@ -151,14 +151,14 @@ def strut_give(machine: FemMachine, state: CommandedRows) -> tuple[FloatArray, F
 
 
 def extra_give(machine: FemMachine, forces: FloatArray) -> FloatArray:
-    """(n, 6) m by which the joints give beside what is linear, at strut forces (n, 6) N, tension positive."""
+    """(n, 6) m of nonlinear give in the joints at strut forces (n, 6) N, tension positive."""
     contact = machine.hertz * HERTZ_LOAD * np.sign(forces) * np.cbrt(np.abs(forces) / HERTZ_LOAD) ** 2
     loose = 0.5 * machine.clearance * np.tanh(forces / SEAT_WIDTH)
     return np.asarray(contact + loose + machine.opening * forces * opened(forces))
 
 
 def solved(nominal: Nominal, machine: FemMachine, rows: Rows) -> tuple[CommandedRows, IntArray, FloatArray, FloatArray]:
-    """Every different pose of the rows, assembled and condensed.
+    """Assemble and condense every distinct pose of the rows.
 
     Returns
     -------
@@ -232,7 +232,7 @@ def _platforms(machine: FemMachine, state: CommandedRows) -> FloatArray:
 
 
 def _bending(length: FloatArray, turning: FloatArray) -> FloatArray:
-    """(n, 6, 4, 4) bending of struts whose ends turn against springs (6,) N m/rad; the struts' slopes condensed."""
+    """(n, 6, 4, 4) bending of struts with end springs `turning` (6,) N m/rad; the struts' end slopes condensed."""
     strut = beams.bending(np.full(length.shape, STEEL[0] * beams.bar(STRUT)[2]), length, np.zeros_like(length))
     spring = np.broadcast_to(turning, length.shape)[..., None, None] * np.eye(2)
     moves, slopes = np.ix_([0, 2], [0, 2]), np.ix_([1, 3], [1, 3])
@@ -271,7 +271,7 @@ def moved(
 
 
 def between(nominal: Nominal, machine: FemMachine, rows: Rows, above: float) -> FloatArray:
-    """(n,) m by which a point `above` m over the tip and the work move apart along the load."""
+    """(n,) m by which the work and a point `above` m over the tip move apart along the load."""
     state, pose, struts, give = solved(nominal, machine, rows)
     columns = moved(machine, rows, struts[pose], give[pose])[0]
     touched = columns[:, 6:9] + np.cross(columns[:, 9:12], above * state.place.rotation[pose, :, 2])
@@ -279,7 +279,7 @@ def between(nominal: Nominal, machine: FemMachine, rows: Rows, above: float) -> 
 
 
 def _work(machine: FemMachine, rows: Rows, state: CommandedRows, pose: IntArray) -> FloatArray:
-    """(n,) m by which table and riser give along the load."""
+    """(n,) m of give of table and riser along the load."""
     tips = state.place.work_point
     table = fem_parts.table_give(state.nominal, tips, machine.mounts, machine.plate, machine.floor)[pose]
     along = np.einsum("ni,nij,nj->n", rows.direction, table, rows.direction)
@@ -288,7 +288,7 @@ def _work(machine: FemMachine, rows: Rows, state: CommandedRows, pose: IntArray)
 
 
 def sound_machine(nominal: Nominal) -> FemMachine:
-    """The machine without fault or spread, whose struts make up for what the other parts give (least squares)."""
+    """The machine without fault or spread; its struts make up for the give of the other parts (least squares)."""
     return FemMachine(law=np.array(_calibrated(nominal.text, nominal.name)))
 
 

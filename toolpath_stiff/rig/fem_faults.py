@@ -1,4 +1,4 @@
-"""Faults of the machine of finite elements: what of it is soft, loose, worn, misplaced or misread.
+"""Faults of the machine of finite elements: soft, loose, worn, misplaced or misread parts.
 
 `links` are those whose give has this signature at the tip (words of `unknown.LINKS`), `names` the effects of the
 catalogue, by their titles, that are a right name of the fault; without one it lies outside the catalogue. Limits are
@@ -21,7 +21,7 @@ CRACKED = 1000.0  # an element's stiffness divided by one more than this is next
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault: its words, the fields it changes, the largest size (SI), what else is drawn, columns that it needs."""
+    """A fault: description, fields it changes, largest size (SI), further draws, columns needed to show it."""
 
     links: frozenset[str]
     names: frozenset[str]
@@ -36,17 +36,17 @@ def _fault(links: str, names: str, limit: float, change: Change, shape: Draw = n
 
 
 def _grown(name: str, *pattern: float) -> Change:
-    """The field grows by the size, times a pattern."""
+    """Add the size, times a pattern, to a field."""
     return lambda m, p: {name: getattr(m, name) + (p["size"] * np.array(pattern) if pattern else p["size"])}
 
 
 def _softened(name: str, hit: Callable[[Shape], Any] = lambda p: True) -> Change:
-    """Factors on stiffness fall to 1 / (1 + size), where they are hit."""
+    """Divide the stiffness factors of the affected elements by 1 + size."""
     return lambda m, p: {name: getattr(m, name) * np.where(hit(p), 1.0 / (1.0 + p["size"]), 1.0)}
 
 
 def _number(name: str, count: int) -> Callable[[Shape], Any]:
-    """The element of `count` that was drawn by a name."""
+    """Selector of the one element among `count` that was drawn under a name."""
     return lambda p: np.arange(count) == p[name]
 
 
@@ -55,14 +55,14 @@ def _both(*changes: Change) -> Change:
 
 
 def _unit(p: Shape) -> FloatArray:
-    """The unit vector that was drawn; a horizontal one without `upward`."""
+    """Drawn unit vector; horizontal unless the shape has `upward`."""
     upward = p.get("upward", 0.0)
     across = np.sqrt(1.0 - upward**2)
     return np.array([across * np.cos(p["azimuth"]), across * np.sin(p["azimuth"]), upward])
 
 
 def _about(name: str) -> Change:
-    """A compliance in or about one direction, as a vector whose square it is."""
+    """A compliance in or about one direction, as the vector whose square it is."""
     return lambda m, p: {name: np.sqrt(p["size"]) * _unit(p)}
 
 

@@ -1,4 +1,4 @@
-"""Parts of the machine of finite elements, each condensed to where something acts on it: frame, platform, table.
+"""Parts of the machine of finite elements, each condensed to the points where loads act: frame, platform, table.
 
 Every size is assumed, in proportion to the frame's and the platform's radius.
 """
@@ -20,22 +20,22 @@ HUB, NOSE, SHAFT, TIP = 6, 7, 8, 9  # nodes of the platform after its six joints
 
 
 def mean_radius(points: FloatArray) -> float:
-    """m, of points (n, 3) about the machine's axis."""
+    """Mean distance of points (n, 3) from the machine's axis, m."""
     return float(np.linalg.norm(points[:, :2], axis=1).mean())
 
 
 def scale(nominal: Nominal) -> float:
-    """Factor on the stiffness of all but the struts, which are the only ones to give in the nominal machine."""
+    """Factor on the stiffness of all parts but the struts, which alone give in the nominal machine."""
     return STIFFENED * float(nominal.law_stiffnesses.mean()) / 39.5e6 * 2.25 / mean_radius(nominal.frame_joints)
 
 
 def table_top(nominal: Nominal) -> float:
-    """m, height of the table: a third of the frame's radius below the neutral pose."""
+    """Height of the table, m: a third of the frame's radius below the neutral pose."""
     return float(nominal.neutral_pose[2] - 0.355 * mean_radius(nominal.frame_joints))
 
 
 def frame_corners(nominal: Nominal) -> FloatArray:
-    """(v, 3) m, corners of the frame's upper ring: amid the joints that each holds."""
+    """(v, 3) m, corners of the frame's upper ring: each amid the joints that it holds."""
     count = int(nominal.vertices.max()) + 1
     return np.array([nominal.frame_joints[nominal.vertices == k].mean(axis=0) for k in range(count)])
 

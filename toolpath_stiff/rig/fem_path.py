@@ -1,4 +1,4 @@
-"""Poses at which machines of finite elements are calibrated, and at which their true stiffness is told."""
+"""Poses at which machines of finite elements are calibrated, and poses at which the truth states their stiffness."""
 
 import numpy as np
 from numpy.random import Generator
@@ -30,7 +30,7 @@ def pulled(position: FloatArray, angles: FloatArray) -> Rows:
 def reference_rows(nominal: Nominal) -> Rows:
     """Poses of the calibration: three heights, around the axis, upright and tilted; loads along X, Y, Z."""
     size, number = mean_radius(nominal.platform_joints), np.arange(REFERENCE_POSES)
-    turn = 2.4 * number  # rad, the golden angle: no pattern of the machine's
+    turn = 2.4 * number  # rad, the golden angle: shares no symmetry with the machine
     radius = size * np.sqrt((number + 0.5) / REFERENCE_POSES)
     height = nominal.neutral_pose[2] + 1.3 * size * (number % 3 - 1.0)
     tilt = np.radians(15.0) * (number % 2)
@@ -62,7 +62,7 @@ def path_truth(nominal: Nominal, machine: HiddenMachine, rows: Rows, rng: Genera
 
 
 def _taken(nominal: Nominal, machine: HiddenMachine, pose: FloatArray) -> bool:
-    """Whether the true machine can take a pose (6,) that the nominal one reaches."""
+    """True if the true machine can take a pose (6,) that the nominal one reaches."""
     rows = pulled(pose[None, :3], pose[None, 3:])
     turned = rotations(rows.angles)
     try:

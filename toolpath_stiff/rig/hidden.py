@@ -1,4 +1,4 @@
-"""The hidden machine: everything in which the true machine differs from the nominal one, and what it then shows.
+"""The hidden machine: all differences between true and nominal machine, and the readings they lead to.
 
 `HiddenMachine` holds the differences; all of them zero is the nominal machine. `true_stiffness` turns it and the
 rows of a campaign into stiffnesses, `readings` adds what the instruments do to them. `Nuisances` are what every real
@@ -96,11 +96,11 @@ class HiddenMachine:
         return np.asarray(1.0 / solved(*assembled(nominal, self, rows), rows.direction, rows.force)[0])
 
     def displacement(self, nominal: Nominal, rows: Rows) -> FloatArray:
-        """(n,) m that the indicator shows."""
+        """(n,) m, reading of the indicator."""
         return np.asarray(rows.force / self.stiffness(nominal, rows) + self.drift * rows.time)
 
     def motions(self, nominal: Nominal, rows: Rows, lengths: FloatArray) -> Motions:
-        """What the loads of the rows move; `lengths` (n,) m of struts measured alone, nan: as the pose has it."""
+        """Motions under the rows' loads; `lengths` (n,) m of struts measured alone, nan: as in the pose."""
         n = len(rows.force)
         place, links = assembled(nominal, self, rows, np.repeat(np.nan_to_num(lengths)[:, None], 6, axis=1))
         compliance, moved, stretch = solved(place, links, rows.direction, rows.force)
@@ -120,7 +120,7 @@ class HiddenMachine:
 
 
 def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
-    """(n,) N/m that the gauge and the indicator show, before noise: k = factor F / (F / k_true + drift t)."""
+    """(n,) N/m as gauge and indicator show it, before noise: k = factor F / (F / k_true + drift t)."""
     shown = rows.force / hidden.displacement(nominal, rows) * gauge(hidden, rows)
     if hidden.unknown is not None and (read := OUTSIDE[hidden.unknown.kind].read) is not None:
         shown = shown * read(rows, hidden.unknown)
@@ -130,7 +130,7 @@ def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
 def assembled(
     nominal: Nominal, hidden: HiddenMachine, rows: Rows, struts: FloatArray | None = None
 ) -> tuple[Geometry, Links]:
-    """Where everything is, and how it gives way; `struts` (n, 6) m where they are not as long as the pose has them."""
+    """True geometry and compliant links; `struts` (n, 6) m replace the strut lengths of the pose where positive."""
     turned = rotations(rows.angles)
     lengths = commanded_lengths(nominal, rows.position, turned, rows.extension)
     place = true_geometry(nominal, hidden, rows, turned, lengths)
@@ -150,7 +150,7 @@ def assembled(
 def true_geometry(
     nominal: Nominal, hidden: HiddenMachine, rows: Rows, turned: FloatArray, lengths: FloatArray
 ) -> Geometry:
-    """Where joints and tip are when struts of the commanded lengths carry the true platform on the true frame."""
+    """Places of joints and tip when struts of the commanded lengths carry the true platform on the true frame."""
     frame = nominal.frame_joints + hidden.frame_errors
     platform = nominal.platform_joints + hidden.platform_errors
     radius = np.linalg.norm(nominal.platform_joints[:, :2], axis=1, keepdims=True)
@@ -174,7 +174,7 @@ def strut_stiffness(nominal: Nominal, hidden: HiddenMachine, lengths: FloatArray
     share = (lengths - first) / (last - first)
     points, stiffness = nominal.law_lengths, nominal.law_stiffnesses
     law = np.full_like(lengths, stiffness[0])
-    if len(points) > 1:  # its end pieces carry it on
+    if len(points) > 1:  # beyond its ends the law goes on along its end pieces
         piece = np.clip(np.searchsorted(points, lengths, side="right") - 1, 0, len(points) - 2)
         within = (lengths - points[piece]) / (points[piece + 1] - points[piece])
         law = stiffness[piece] + (stiffness[piece + 1] - stiffness[piece]) * within
@@ -184,7 +184,7 @@ def strut_stiffness(nominal: Nominal, hidden: HiddenMachine, lengths: FloatArray
 
 
 def _joint_law(hidden: HiddenMachine) -> Callable[[FloatArray], FloatArray]:
-    """Secant compliance along the struts: constant, Hertz's (elongation as F^(2/3)) and clearance (g at any load)."""
+    """Secant compliance along the struts: constant, Hertzian (elongation as F^(2/3)), clearance (g at any load)."""
 
     def secant(forces: FloatArray) -> FloatArray:
         size = np.maximum(np.abs(forces), SLACK_LOAD)
@@ -195,7 +195,7 @@ def _joint_law(hidden: HiddenMachine) -> Callable[[FloatArray], FloatArray]:
 
 
 def _ends(nominal: Nominal, hidden: HiddenMachine, rows: Rows, place: Geometry) -> tuple[End, ...]:
-    """Spindle in platform axes; table, its rocking about the base frame's x and y through its origin, and set-up."""
+    """Links that carry the whole load: spindle in platform axes; table; table rocking about base x and y; set-up."""
     n = len(rows.force)
     radial, axial = hidden.spindle
     grown = np.ones(n)
@@ -227,7 +227,7 @@ def gauge(hidden: HiddenMachine, rows: Rows) -> FloatArray:
 
 @dataclass(frozen=True)
 class Nuisances:
-    """Standard deviations. The sizes are the issue's; repeat noise is the caller's (2 % unless said).
+    """Standard deviations of disturbances in any campaign. Sizes are the issue's; repeat noise is the caller's, or 2 %.
 
     Attributes
     ----------
@@ -279,7 +279,7 @@ def disturb_readings(
     rng: Generator,
     apart: FloatArray | None = None,
 ) -> FloatArray:
-    """(n,) N/m as printed, from what undisturbed instruments would show; `clamps` (n,) numbers the clamps from 0.
+    """(n,) N/m as printed, from readings of undisturbed instruments; `clamps` (n,) numbers clampings from 0.
 
     `apart` (n, 3): shares in which three clampings, each scattering for itself, count in a row; None: one does.
     """

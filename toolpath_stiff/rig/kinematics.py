@@ -1,4 +1,4 @@
-"""Kinematics of the nominal machine: strut lengths of poses, what is in reach."""
+"""Kinematics of the nominal machine: strut lengths at poses, and reach."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -25,7 +25,7 @@ def platform_points(points: FloatArray, tips: FloatArray, turned: FloatArray, ex
 
 
 def reachable(nominal: Nominal, tips: FloatArray, angles: FloatArray, extension: FloatArray) -> BoolArray:
-    """(n,) whether strut lengths and joint swings stay within the nominal machine's limits."""
+    """(n,) True where strut lengths and joint swings stay within the nominal machine's limits."""
     turned = rotations(angles)
     lengths = commanded_lengths(nominal, tips, turned, extension)
     low, high = nominal.strut_range
@@ -49,6 +49,6 @@ def strut_directions(
 
 
 def neutral_directions(nominal: Nominal) -> tuple[FloatArray, FloatArray]:
-    """The same (1, 6, 3) at the neutral pose."""
+    """`strut_directions` at the neutral pose, (1, 6, 3) each."""
     pose = nominal.neutral_pose[None]
     return strut_directions(nominal, pose[:, :3], rotations(pose[:, 3:]), np.zeros(1))

@@ -1,4 +1,4 @@
-"""Indicators beside the tip: what they read of the assembled elements' displacements.
+"""Indicators beside the tip: their readings from the displacements of the assembled elements.
 
 An indicator reads the displacement of one point against another: the give of a joint, a vertex of the frame, the
 spindle, the table. The machine says what moves (`Motions`), whether it is built of springs or of finite elements.
@@ -58,7 +58,7 @@ def displacements(
 def with_loops(
     nominal: Nominal, hidden: HiddenMachine, measured: Table, rows: Rows, nuisances: Nuisances, rng: Generator
 ) -> Table:
-    """A measured table whose rows of loops beside the tip hold what their indicators read, in um, for a stiffness."""
+    """A measured table in which rows of loops beside the tip hold indicator readings, um, in place of a stiffness."""
     loops = list(measured.get("loop", ()))
     beside = np.array([loop not in TIP for loop in loops], dtype=bool)
     if not beside.any():

@@ -26,7 +26,7 @@ VERTEX_WIDTH = rad_from_deg(15.0)
 
 @dataclass(frozen=True)
 class Nominal:
-    """What the controller believes; SI.
+    """The machine as the controller believes it to be; SI.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Nominal:
 
     @property
     def law_ends(self) -> tuple[float, float]:
-        """Shortest and longest strut that the law is given for, m; of one point the travel."""
+        """Shortest and longest strut for which the law is given, m; for a law of one point, the travel."""
         if len(self.law_lengths) == 1:
             return self.strut_range
         return float(self.law_lengths[0]), float(self.law_lengths[-1])
@@ -130,7 +130,7 @@ def parse_nominal(text: str, file: str) -> Nominal:
 
 
 def _value(toml: TomlReader, where: str) -> Any:
-    """What stands under a dotted name; None where nothing does."""
+    """Value of a dotted name; None if there is none."""
     value: Any = toml.data
     for part in where.split("."):
         value = value.get(part) if isinstance(value, dict) else None
@@ -138,7 +138,7 @@ def _value(toml: TomlReader, where: str) -> Any:
 
 
 def _numbers(toml: TomlReader, where: str, *shape: int) -> FloatArray:
-    """The finite numbers under a dotted name, in an array of that shape; -1: of any length. Raises `InputError`."""
+    """Finite numbers of a dotted name, in an array of that shape; -1: any length. Raises `InputError`."""
     value = _value(toml, where)
     try:
         numbers = np.asarray(value, dtype=float)

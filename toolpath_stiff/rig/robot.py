@@ -29,7 +29,7 @@ HANGING = ((1, 2), (2, 3), (5, 6))  # joints, and the tip, between which these h
 GRAVITY = 9.81
 SHARES = 0.08, 0.25  # by which a fault moves the readings, root mean square
 TOOL = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])  # its x along the flange's z, its z against x
-TAKEN_UP = 60.0  # N m that close a gear's gap to three quarters
+TAKEN_UP = 60.0  # N m at which three quarters of a gear's gap are taken up
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,13 @@ class Robot:
 
 
 def _soft(field: str) -> Callable[[Robot, int, float], Document]:
-    """Compliances grow by a factor of 1 + size, that of one joint."""
+    """Change that multiplies the compliances of a field, of one joint, by 1 + size."""
     return lambda r, i, size: {field: getattr(r, field) * (1.0 + size * (np.arange(6) == i))}
 
 
 @dataclass(frozen=True)
 class RobotFault:
-    """Right names of the catalogue, parts that it may sit in, what it changes by a size, and the largest size."""
+    """A fault: right names in the catalogue, parts where it may sit, its change for a size, its largest size."""
 
     names: tuple[str, ...]
     parts: tuple[int, ...]
@@ -109,7 +109,7 @@ ELEMENTS = {**dict.fromkeys(("joint_torsion", "joint_bending", "backlash"), "joi
 
 
 def invented(rng: Generator) -> Robot:
-    """A robot of 100 to 300 kg payload: sizes and compliances about those of such arms (assumed)."""
+    """A robot of 100 to 300 kg payload, with sizes and compliances typical of such arms (assumed)."""
 
     def about(*values: float) -> FloatArray:
         return np.array(values) * np.exp(rng.normal(0.0, 0.2, len(values)))
@@ -132,7 +132,7 @@ def invented(rng: Generator) -> Robot:
 
 
 def machine_text(robot: Robot, name: str) -> str:
-    """The machine file of the arm as it is thought to be."""
+    """Machine file of the arm as it is believed to be."""
 
     def row(heading: str, **keys: Any) -> str:
         written = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in keys.items()}
@@ -184,7 +184,7 @@ def frames(robot: Robot, joints: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def pulled(robot: Robot, joints: FloatArray, force: FloatArray) -> FloatArray:
-    """(n, 3) m that the tool moves under forces (n, 3) N at joint values (n, 6) rad."""
+    """(n, 3) m, motion of the tool under forces (n, 3) N at joint values (n, 6) rad."""
     axes, origins = frames(robot, joints)
     _, places, number = np.unique(joints, axis=0, return_index=True, return_inverse=True)
     compliance = np.array([_compliance(robot, axes[i], origins[i]) for i in places])[number.ravel()]
@@ -203,7 +203,7 @@ def pulled(robot: Robot, joints: FloatArray, force: FloatArray) -> FloatArray:
 
 
 def _compliance(robot: Robot, axes: FloatArray, origins: FloatArray) -> FloatArray:
-    """(3, 3) m/N of the tool: nodes are the foot, the far side of joints 1 to 6, the ends of both arms, the tool."""
+    """(3, 3) m/N at the tool; nodes: the foot, the far side of joints 1 to 6, the ends of both arms, the tool."""
     total = np.zeros((10 * NODE, 10 * NODE))
     add(total, [0], np.diag(1.0 / robot.mount))
     near = [0, 1, 7, 8, 4, 5]  # nodes that carry the joints
@@ -230,7 +230,7 @@ def _compliance(robot: Robot, axes: FloatArray, origins: FloatArray) -> FloatArr
 
 
 def robot_case(seed: int, hidden: str | None, noise: float) -> tuple[str, Table, Document]:
-    """Machine file, pulls in shop units and truth of an exercise; `hidden` as `draw_case` has it, names of `FAULTS`."""
+    """Machine file, pulls in shop units and truth of an exercise; `hidden` as for `draw_case`, or names of `FAULTS`."""
     streams = [np.random.default_rng([seed, 77, i]) for i in range(4)]
     robot = invented(streams[0])
     inside = [name for name, fault in FAULTS.items() if fault.names]
@@ -248,7 +248,7 @@ def robot_case(seed: int, hidden: str | None, noise: float) -> tuple[str, Table,
         fault = FAULTS[name]
         part, share = int(streams[1].choice(fault.parts)), float(np.exp(streams[1].uniform(*np.log(SHARES))))
         low, high = 1e-4, fault.largest
-        for _ in range(18):  # the size that moves the readings by that share, root mean square, or the largest
+        for _ in range(18):  # size at which the readings change by that share, rms; at most the largest size
             size = float(np.sqrt(low * high))
             true = replace(robot, **fault.change(robot, part, size))
             moved = np.linalg.norm(pulled(true, joints, force) - sound) / np.linalg.norm(sound)
@@ -258,7 +258,7 @@ def robot_case(seed: int, hidden: str | None, noise: float) -> tuple[str, Table,
         effects = [fault_keys | {"size": float(moved)}]
     moved_by = pulled(true, joints, force)
     sd = np.maximum(noise * np.linalg.norm(moved_by, axis=1), NOISE_FLOOR)
-    for effect in effects:  # whitened length of what it does to the readings: little where weight holds a gap closed
+    for effect in effects:  # whitened length of the change of readings: small where weight holds a gap closed
         effect["detectability"] = float(np.linalg.norm((moved_by - sound) / sd[:, None]))
     read = moved_by + sd[:, None] * streams[3].standard_normal(moved_by.shape)
     table: Table = {f"joint_{i + 1}_deg": np.round(deg_from_rad(joints[:, i]), 9) for i in range(6)}

@@ -1,4 +1,4 @@
-"""Sizes of hidden effects: how large one shows on a campaign, and the strength for a wanted size.
+"""Sizes of hidden effects: how visible an effect is in a campaign, and its strength for a wanted size.
 
 The size is the root mean square change of the readings' logarithm. It is drawn log-uniform from just detectable on that
 campaign (`DETECTABLE`) to 30 %, as far as the effect's bounds allow.
@@ -24,8 +24,8 @@ from toolpath_stiff.rig.unknowns import UNKNOWNS
 
 LARGEST = 0.30  # rms change of ln stiffness
 UNKNOWN_SIZES = (0.04, 0.15)  # rms change of ln stiffness that an unknown is drawn with, log-uniform
-FAULT_SIZES = (0.04, 0.20)  # that of a fault of elements, as far as its limit allows
-LARGEST_SINGLE = 1.0  # change of one reading: whoever reads nearly three times the others throws it away (assumed)
+FAULT_SIZES = (0.04, 0.20)  # the same for a fault of finite elements, within its limit
+LARGEST_SINGLE = 1.0  # change of one reading: one nearly three times the others would be thrown away (assumed)
 # Whitened length of an effect's signature, beside strut law and nuisances, that is found with 80 % power at 5 %
 # among some twenty candidates: z(1 - 0.0025/2) + z(0.8) = 3.02 + 0.84 (normal quantiles, Bonferroni).
 DETECTABLE = 3.9
@@ -33,7 +33,7 @@ FREE_LAW = 1.0  # prior sd of the logarithms of the two strut stiffnesses: free,
 
 
 class Scale:
-    """How large an effect shows on one campaign, and its strength for a wanted size; `start` is the sound machine."""
+    """Visibility of an effect in one campaign, and its strength for a wanted size; `start` is the sound machine."""
 
     def __init__(
         self, nominal: Nominal, rows: Rows, clamps: IntArray, nuisances: Nuisances, start: HiddenMachine
@@ -59,7 +59,7 @@ class Scale:
         return np.where(np.abs(change) <= LARGEST_SINGLE, change, math.inf)
 
     def draw(self, name: str, size: float | None, rng: Generator) -> tuple[Shape, dict[str, float]]:
-        """Shape, and their size and detectability."""
+        """Draw an effect's parameters; returns them with their size and detectability."""
         shape = draw_shape(name, rng, self.vertices, self.setups)
         fraction = rng.random()
         strength, change = self._reach(name, shape, 0.03)
@@ -75,12 +75,12 @@ class Scale:
             key: float(f"{value:.4g}") if isinstance(value, float) else value
             for key, value in at_strength(name, shape, strength).items()
         }
-        # The digits beyond are the processor's.
+        # Further digits depend on the processor.
         figures = {"size": _rms(change), "detectability": self._detectability(change)}
         return parameters, {key: float(f"{value:.6g}") for key, value in figures.items()}
 
     def _reach(self, name: str, shape: Shape, size: float, start: float = 0.02) -> tuple[float, FloatArray]:
-        """Strength in (0, 1] at which the rms change is `size` within 2 %, and that change; 1 if no strength does.
+        """Strength in (0, 1] at which the rms change is `size` within 2 %, and that change; 1 if none reaches it.
 
         The change grows about in proportion to the strength, so scaling the strength by what is missing converges.
         """

@@ -25,7 +25,7 @@ SECANT_TOLERANCE = 1e-11  # relative change of the tip's compliance between two 
 
 @dataclass(frozen=True)
 class Geometry:
-    """True places of n rows, base axes, m.
+    """True positions in n rows, base axes, m.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Geometry:
 
 
 class End(NamedTuple):
-    """A link between tool and work that carries the whole load, of n rows.
+    """A link between tool and work that carries the whole load, in n rows.
 
     A unit load along d puts d . lever on it (a force, or a torque where the lever is in m), and the tip moves along d
     by that times the compliance times d . lever.
@@ -66,7 +66,7 @@ class End(NamedTuple):
 
 
 class Motions(NamedTuple):
-    """What n loads move, m per N of the load; of n rows.
+    """Displacements under n loads, m per N of the load.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Motions(NamedTuple):
 
 @dataclass(frozen=True)
 class Links:
-    """How the links of n rows give way; SI. A compliance of zero is rigid.
+    """Compliances of the links in n rows; SI. A compliance of zero is rigid.
 
     Attributes
     ----------
@@ -121,18 +121,18 @@ class Links:
         return 6 + self.vertices.size + len(self.ends)
 
     def with_ends(self, *ends: tuple[FloatArray, FloatArray | float]) -> Self:
-        """Further links that carry the whole load: levers (n, 3) or (3,), compliances (n,) or alike in all rows."""
+        """Add links that carry the whole load: levers (n, 3) or (3,), compliances (n,) or one for all rows."""
         n = len(self.struts)
         more = (End("", np.broadcast_to(lever, (n, 3)), np.broadcast_to(give, (n,))) for lever, give in ends)
         return replace(self, ends=(*self.ends, *more))
 
     def with_joints(self, extra: Callable[[FloatArray], FloatArray] | FloatArray) -> Self:
-        """Further secant compliance (n, 6) along the struts, of their forces (n, 6) or whatever these are."""
+        """Add secant compliance (n, 6) along the struts: constant, or a function of the strut forces (n, 6)."""
         give = extra if callable(extra) else lambda forces: extra
         return replace(self, joints=lambda forces: self.joints(forces) + give(forces))
 
     def with_factors(self, factor: FloatArray) -> Self:
-        """Stiffnesses of the struts times (n, 6)."""
+        """Multiply the stiffnesses of the struts by factors (n, 6)."""
         root = np.sqrt(factor)
         return replace(self, struts=self.struts * root[:, :, None] * root[:, None, :])
 
@@ -140,7 +140,7 @@ class Links:
 def solved(
     place: Geometry, links: Links, direction: FloatArray, force: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The machine under loads `force` (n,) N along unit vectors `direction` (n, 3), per unit load.
+    """Solve the machine under loads `force` (n,) N along unit vectors `direction` (n, 3); results per unit load.
 
     Returns
     -------
@@ -166,8 +166,8 @@ def solved(
         held[:, first:] = give > 0.0
         springs = np.zeros((n, size))
         np.divide(1.0, give, out=springs[:, first:], where=give > 0.0)
-        springs[:, first:][give <= 0.0] = 1.0  # any number: the unknown is held
-        free = np.flatnonzero(held.any(axis=0))  # what is held in every row does not move
+        springs[:, first:][give <= 0.0] = 1.0  # any value will do: the unknown is held
+        free = np.flatnonzero(held.any(axis=0))  # an unknown held in every row does not move
         stiffness = fixed[:, free[:, None], free] * held[:, free, None] * held[:, None, free]
         stiffness[:, range(len(free)), range(len(free))] += springs[:, free]
         pull = (load * held)[:, free]
@@ -201,7 +201,7 @@ def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]
         relative[:, i, :, column] = -radial(place, int(vertex))
         relative[:, i, 2, column + 1] = -1.0
     stretch = np.einsum("nki,nkij->nkj", unit, relative)
-    stretch[:, range(6), range(dofs, dofs + 6)] = -1.0  # what the joints take is not left for the strut
+    stretch[:, range(6), range(dofs, dofs + 6)] = -1.0  # elongation taken up by the joints is not the strut's
     springs = np.zeros((n, size, size))
     if flexible:
         springs[:, :dofs, :dofs] = links.bars * _truss(nodes)
@@ -218,7 +218,7 @@ def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]
 def _end_rotations(
     unit: FloatArray, length: FloatArray, relative: FloatArray, platform_turn: FloatArray, moment: FloatArray
 ) -> FloatArray:
-    """(n, N, N) for springs `moment` (n, 6): squares of the struts' rotations against frame and platform, without spin.
+    """(n, N, N) stiffness of springs `moment` (n, 6) against the struts' rotations to frame and platform, without spin.
 
     A strut that stays straight turns by u x (displacement of its ends) / L; its spin about u meets no resistance.
     """
@@ -274,13 +274,13 @@ def radial(place: Geometry, vertex: int) -> FloatArray:
 
 
 def _give(links: Links, n: int) -> FloatArray:
-    """(n, .) compliances of those unknowns, in their order; the joints' are filled in during the iteration."""
+    """(n, .) compliances of the links' unknowns, in their order; those of joints are filled in during the iteration."""
     vertices = np.broadcast_to(links.vertices.ravel(), (n, links.vertices.size))
     return np.column_stack([np.zeros((n, 6)), vertices, *(end.compliance for end in links.ends)])
 
 
 def _load_vector(links: Links, direction: FloatArray, dofs: int) -> FloatArray:
-    """(n, N) what each unknown adds to the movement of tool against workpiece along `direction`.
+    """(n, N) contribution of each unknown to the motion of tool against workpiece along `direction`.
 
     The workpiece is pushed back: the load on it is -direction, so its give counts with the same sign.
     """

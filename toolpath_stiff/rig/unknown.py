@@ -1,4 +1,4 @@
-"""What an unknown is: physics of a link that no effect of the catalogue describes.
+"""Unknowns: physics of links that no effect of the catalogue describes.
 
 Each kind acts on the rig's own elements. What a description of it may name is settled from its physics, before any
 diagnosis sees it: `links`, the links of the load path whose give has this signature at the tool tip, and `variables`,
@@ -60,7 +60,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class CommandedRows:
-    """n rows as the machine meets them: commanded strut lengths (n, 6) m and true places."""
+    """n rows as the machine sees them: commanded strut lengths (n, 6) m and true positions."""
 
     nominal: Nominal
     rows: Rows
@@ -75,7 +75,7 @@ class CommandedRows:
 
     @property
     def stretched(self) -> FloatArray:
-        """(n, 6) how far out the struts are: 0 shortest, 1 longest."""
+        """(n, 6) extension of the struts: 0 shortest, 1 longest."""
         low, high = self.nominal.strut_range
         return np.asarray((self.lengths - low) / (high - low))
 
@@ -119,7 +119,7 @@ class Kind:
 def kind(
     kinds: dict[str, Kind], role: str, links: str, variables: str, limit: float, **more: Any
 ) -> Callable[[Physics], Physics]:
-    """Puts the function below it among the kinds, by its name; links, variables, columns stand between commas.
+    """Register the decorated function as a kind under its name; links, variables, columns are separated by commas.
 
     `role`: `act` or `read`.
     """
@@ -133,10 +133,10 @@ def kind(
 
 
 def opened(pull: FloatArray) -> FloatArray:
-    """0 where a seat is pressed, 1 where it is pulled by `pull` N, and in between over some newtons."""
+    """0 where a seat is pressed, 1 where it is pulled by `pull` N, with a smooth change over some newtons."""
     return np.asarray(0.5 * (1.0 + np.tanh(pull / SIGN_WIDTH)))
 
 
 def beyond(force: FloatArray, threshold: float) -> FloatArray:
-    """Secant compliance, over that of the open state, of a link that is rigid up to a force: (|f| - f0) / |f|."""
+    """Secant compliance, relative to the open state, of a link that is rigid up to a force f0: (|f| - f0) / |f|."""
     return np.asarray(np.maximum(0.0, 1.0 - threshold / np.maximum(np.abs(force), 1e-9)))

@@ -23,7 +23,7 @@ def _only(strut: int) -> FloatArray:
 
 
 def _coupled(links: Links, shares: FloatArray, compliance: float) -> Links:
-    """A spring that carries shares (n, 6) of the strut forces and lengthens each strut by its share: c a a^T."""
+    """Add a spring that carries shares (n, 6) of the strut forces and lengthens each strut by its share: c a a^T."""
     flexibility = np.linalg.inv(links.struts) + compliance * shares[:, :, None] * shares[:, None, :]
     return dataclasses.replace(links, struts=np.asarray(np.linalg.inv(flexibility), dtype=np.float64))
 

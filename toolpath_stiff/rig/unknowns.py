@@ -1,4 +1,4 @@
-"""What the rig can hide outside the catalogue: oddities, and unknowns, which are judged by what is said of them.
+"""Faults outside the catalogue that the rig can hide: oddities, and unknowns, judged by their description.
 
 Each is invented from its physics, with the shape that worn, damaged or badly set machines show; no source gives figures
 for them. The sizes that are drawn of unknowns change the stiffness by 4 to 15 % rms. Oddities are what a blind draw

@@ -1,1 +1,1 @@
-"""Stiffness of the tool tip: the plain reference, the exact production route, physical effects."""
+"""Stiffness of the tool tip: the exact route, the closed form, physical effects."""

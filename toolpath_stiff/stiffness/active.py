@@ -1,4 +1,4 @@
-"""An effect with its parameters, as files give them, at work: a user's own is held against the contract as it returns.
+"""An effect with parameter values, at work: the returns of a user's own effect are checked against the contract.
 
 Each fault is one `EffectFault` with file and line of the effect's code. The packaged effects are held against the
 contract by the tests and go through unchecked.
@@ -15,14 +15,14 @@ from toolpath_stiff.machine.model import EffectEntry, Hexapod, MachineTool
 from toolpath_stiff.stiffness.contract import SETUP, Effect, LoadPath, Parameter, Values, at_pose
 from toolpath_stiff.stiffness.effect_source import file_of, is_foreign, line_in, line_of
 
-# What each hook that adds to the compliance returns for n poses: shape beyond n.
+# Hook that adds to the compliance -> shape of its return for n poses, without the n.
 ADDING: dict[str, tuple[int, ...]] = {
     "strut_compliance": (6,),
     "load_compliance": (12, 12),
     "parallel_stiffness": (6, 6),
 }
 ASYMMETRY = 1e-9  # of the largest entry at the pose
-LARGEST = 1e18  # SI: a metre cube of diamond has 1e12 N/m; what is far beyond overflows in sums of squares
+LARGEST = 1e18  # SI: a metre cube of diamond has 1e12 N/m; far larger values overflow in sums of squares
 
 
 @dataclass(frozen=True)
@@ -34,17 +34,17 @@ class ActiveEffect:
 
     @property
     def waits_for(self) -> tuple[str, ...]:
-        """The conditions without which it adds nothing."""
+        """Conditions without which it adds nothing."""
         return self.effect.conditions(self.values)
 
     @property
     def setup(self) -> str:
-        """The set-up that it belongs to, "" if it names none."""
+        """Set-up to which it belongs; "" if it names none."""
         named = any(p.name == SETUP and p.kind == "text" for p in self.effect.parameters)
         return str(self.values[SETUP]) if named else ""
 
     def adds(self, hook: str, path: LoadPath) -> FloatArray | None:
-        """What one of `ADDING` adds at n poses; None adds nothing, and so does an effect that does not act there."""
+        """Contribution of a hook of `ADDING` at n poses; None if it adds nothing or does not act there."""
         if not self.effect.acts_on(path, self.values):
             return None
         added: FloatArray | None = self._called(hook, path)
@@ -52,7 +52,7 @@ class ActiveEffect:
             shape = path.element_zeros().shape[1:] if hook == "element_compliance" else ADDING[hook]
             self._check_shape(hook, added, (len(path), *shape))
             unsound = ~(np.abs(added) <= LARGEST)
-            if path.strut_forces is not None:  # nan at a singular pose, where nothing can be asked
+            if path.strut_forces is not None:  # nan at a singular pose, where the effect cannot be judged
                 unsound[~np.isfinite(path.strut_forces).all(axis=1)] = False
             self._refuse(hook, path, added, unsound, f"finite numbers within +-{LARGEST:g}")
             if added.ndim == 3:
@@ -73,14 +73,14 @@ class ActiveEffect:
         return changed
 
     def stands(self, machine: MachineTool, joints: FloatArray) -> tuple[MachineTool, FloatArray]:
-        """Machine and joint values (n, j) with which it truly stands, of those that the control believes."""
+        """Machine and joint values (n, j) at which it truly stands, from those that the control believes."""
         true, turned = self._called("stands", machine, joints)
         if is_foreign(self.effect):
             self._check_shape("stands", turned, joints.shape)
         return true, turned
 
     def reading(self, stiffness: FloatArray, path: LoadPath) -> FloatArray:
-        """What an instrument shows, (n,) N/m, for a true stiffness; the same where it does not act."""
+        """(n,) N/m that an instrument shows for a true stiffness; unchanged where it does not act."""
         if not self.effect.acts_on(path, self.values):
             return stiffness
         shown: FloatArray = self._called("reading", stiffness.copy(), path)
@@ -91,18 +91,18 @@ class ActiveEffect:
         return shown
 
     def _called(self, hook: str, *arguments: Any) -> Any:
-        """What a hook returns. Its own errors become faults; what it is shown is not to be written to."""
+        """Return value of a hook. Errors in the hook become faults; its arguments are write-protected."""
         method = getattr(self.effect, hook)
         if not is_foreign(self.effect):
             return method(*arguments, self.values)
         for path in (argument for argument in arguments if isinstance(argument, LoadPath)):
             for array in (*vars(path).values(), *vars(path.stance).values()):
                 if isinstance(array, np.ndarray):
-                    array.flags.writeable = False  # an effect that writes there would falsify the others
+                    array.flags.writeable = False  # an effect that writes to it would falsify the others
         try:
-            with np.errstate(all="ignore"):  # what it divides by zero shows in the result
+            with np.errstate(all="ignore"):  # a division by zero shows in the result
                 return method(*arguments, self.values)
-        except (Exception, SystemExit) as error:  # whatever a user's code does
+        except (Exception, SystemExit) as error:  # a user's code may raise anything
             what = f"{type(error).__name__}: {error}".rstrip(": ")
             raise self._fault(hook, f"ends in {what}", line=line_in(error, file_of(self.effect))) from None
 
@@ -127,7 +127,7 @@ def _kind(value: object) -> str:
 
 
 def read_parameters(effect: Effect, entry: EffectEntry, where: str) -> Values:
-    """SI values of an effect's parameters from a machine file's keys; choices as they are.
+    """SI values of an effect's parameters from a machine file's keys; choices stay as they are.
 
     Raises
     ------

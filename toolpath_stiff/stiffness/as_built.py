@@ -1,4 +1,4 @@
-"""Struts and joints as a machine file says that they were built: each a little off the drawing."""
+"""Struts and joints as built, according to the machine file: each slightly off the drawing."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from toolpath_stiff.stiffness.contract import Effect, LoadPath, Values
 
 
 class AsBuilt(Effect):
-    """`[as_built]` of a machine file at work: not in the catalogue, for it is not fitted as effects are."""
+    """`[as_built]` of a machine file as an effect: not in the catalogue, as it is not fitted the way effects are."""
 
     name = "as_built"
     title = "struts and joints as built"
@@ -20,16 +20,16 @@ class AsBuilt(Effect):
     parameters = ()
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
-        """What each strut's compliance is above the law's."""
+        """Excess of each strut's compliance over the law's."""
         return np.asarray(np.expm1(-p["struts"]) / path.machine.strut_law.stiffness(path.struts.lengths))
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
-        """With all joints moved."""
+        """The machine with all joints moved."""
         frame, platform = p["joints"].reshape(2, 6, 3)
         joints = {"frame_joints": machine.frame_joints + frame, "platform_joints": machine.platform_joints + platform}
         return machine.with_changes(**joints)
 
 
 def as_built(offsets: FloatArray) -> ActiveEffect:
-    """The effect of `Hexapod.as_built`, (42,)."""
+    """Effect of `Hexapod.as_built`, (42,)."""
     return ActiveEffect(AsBuilt(), {"struts": offsets[:6], "joints": offsets[6:]})

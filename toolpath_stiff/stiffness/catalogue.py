@@ -1,4 +1,4 @@
-"""Physical effects along the load path, one flat file each; `contract` says what an effect is.
+"""Physical effects along the load path, one flat file each; `contract` defines what an effect is.
 
 Which effects there are: the packaged ones and those of a user's files.
 """
@@ -24,18 +24,18 @@ from toolpath_stiff.stiffness.declarations import check_declarations
 from toolpath_stiff.stiffness.effect_source import line_in, line_of
 from toolpath_stiff.stiffness.term_file import effects_of_terms
 
-MOST_FILES = 64  # and versions of files that are kept loaded: an editor's every save is one
+MOST_FILES = 64  # files and versions kept loaded: every save in an editor is a version
 
 
 @cache
 def packaged_effects() -> dict[str, Effect]:
-    """Name -> effect of the packaged files, one an effect."""
+    """Name -> effect, for the packaged files, one effect each."""
     return _effects_below(effects)
 
 
 @cache
 def effects_of_elements() -> dict[str, Effect]:
-    """Name -> packaged effect that holds for machines of elements."""
+    """Name -> packaged effect that applies to machines of elements."""
     of_both = {name: effect for name, effect in packaged_effects().items() if effect.holds_for == "all"}
     return of_both | _effects_below(element_effects)
 
@@ -48,7 +48,7 @@ def _effects_below(package: ModuleType) -> dict[str, Effect]:
 
 
 def known_effects(files: Iterable[str | Path] = (), kind: str = Hexapod.kind) -> dict[str, Effect]:
-    """Name -> effect that holds for a kind of machine: packaged, and those of the files, sorted along the load path.
+    """Name -> effect that applies to a kind of machine, packaged or from the files, sorted along the load path.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def known_effects(files: Iterable[str | Path] = (), kind: str = Hexapod.kind) ->
 
 
 def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
-    """The effect of that name. Raises `InputError` with the nearest name if there is none."""
+    """Effect by name. Raises `InputError` with the nearest name if there is none."""
     files = list(files)
     known = known_effects(files, "elements") | known_effects(files)
     if name not in known:
@@ -80,7 +80,7 @@ def find_effect(name: str, files: Iterable[str | Path] = ()) -> Effect:
 
 
 def effects_from_file(file: str | Path) -> dict[str, Effect]:
-    """Name -> effect of a file: of every `Effect` subclass that a Python file defines, or of the terms of a TOML file.
+    """Name -> effect of a file: the `Effect` subclasses that a Python file defines, or the terms of a TOML file.
 
     Read once as long as it does not change.
 
@@ -99,19 +99,19 @@ def effects_from_file(file: str | Path) -> dict[str, Effect]:
 
 @lru_cache(maxsize=MOST_FILES)
 def _loaded(file: str, path: Path, changed: int, size: int) -> dict[str, Effect]:
-    """`path`, `changed` and `size` tell files and their versions apart."""
+    """Effects of a file; `path`, `changed` and `size` distinguish files and their versions."""
     if path.suffix == ".toml":
         return effects_of_terms(file)
     if path.suffix != ".py":
         raise EffectError("neither Python nor TOML", expected="a name that ends in .py or .toml", file=file)
     module = ModuleType(f"toolpath_stiff_user_effects_{path.stem}")
     module.__file__, sys.modules[module.__name__] = str(path), module
-    try:  # the text of the file: a compiled one beside it may come from anybody and say anything
+    try:  # compile the file's text: a compiled file beside it may be anybody's and differ
         exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
         effects_there = _effects_in(module, file)
     except InputError:
         raise
-    except (Exception, SystemExit) as error:  # whatever a user's file does
+    except (Exception, SystemExit) as error:  # a user's file may raise anything
         what, line = f"{type(error).__name__}: {error}".rstrip(": "), line_in(error, file)
         if isinstance(error, SyntaxError) and error.filename == str(path):
             what, line = f"{type(error).__name__}: {error.msg}", error.lineno
@@ -166,11 +166,11 @@ class EffectCatalogue(Result):
         return next(effect for effect in self.effects if effect.name == name)
 
     def to_dict(self) -> dict[str, object]:
-        """What each effect declares, in its own units."""
+        """Declarations of each effect, in its own units."""
         return {"effects": [self.view.describe_effect(effect) for effect in self.effects]}
 
     def to_frame(self) -> DataFrame:
-        """One row an effect: link of the load path, name, title, equation, source."""
+        """One row per effect: link of the load path, name, title, equation, source."""
         return frame_of(self.to_dict()["effects"])[["link", "name", "title", "equation", "source", "load_dependent"]]
 
     def _short(self) -> str:

@@ -1,4 +1,4 @@
-"""Strut forces in closed form (`elimination`), many poses at a time, numpy alone; for struts on a rigid platform.
+"""Strut forces in closed form (`elimination`) for struts on a rigid platform, many poses at a time, with numpy only.
 
 Nothing pivots, so the split is chosen once a machine (best determinants at its neutral pose), and every pose whose
 determinants are small is handed to a pivoted solve.
@@ -18,7 +18,7 @@ from toolpath_stiff.machine.kinematics import solve_struts_at
 from toolpath_stiff.machine.model import Hexapod, StrutLaw
 from toolpath_stiff.stiffness.elimination import Vector, cross, dot, forces, over_struts, strut
 
-BLOCK = 4096  # poses: fewer spend the time on calls, more fall out of the processor's cache
+BLOCK = 4096  # poses: with fewer, calls take the time; more do not fit the processor's cache
 # Determinants of unit directions lie within 0 and 1. Above this the elimination loses up to seven of sixteen digits:
 # at one pose in a hundred three or more, at most less than one (144,000 poses of random machines, many near singular).
 SMALL_DETERMINANT = 1e-3
@@ -26,7 +26,7 @@ SMALL_DETERMINANT = 1e-3
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """A machine prepared for the kernel: joints in the order of the split, strut law, scale.
+    """A machine prepared for the kernel: joints in the order of the split, strut law, size.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class ClosedForm:
 
 
 def prepare(machine: Hexapod, tool_length: float = np.nan) -> ClosedForm:
-    """The kernel's form of a machine with a tool of that length (m; nan: the reference tool), made once a machine."""
+    """Kernel form of a machine with a tool of a length (m; nan: the reference tool), made once for a machine."""
 
     def on_joints() -> ClosedForm:
         order, arm = machine.once("split", lambda: _split(machine))
@@ -60,7 +60,7 @@ def prepare(machine: Hexapod, tool_length: float = np.nan) -> ClosedForm:
 
 
 def _split(machine: Hexapod) -> tuple[list[int], float]:
-    """Struts, triplet A first, by the best determinants at the neutral pose; m, the size of the arms.
+    """Struts, triplet A first, with the best determinants at the neutral pose; size of the arms, m.
 
     The elimination divides by det U_A and by det S, which is det J / det U_A.
     """
@@ -69,12 +69,12 @@ def _split(machine: Hexapod) -> tuple[list[int], float]:
     triplets = list(combinations(range(6), 3))
     first = np.abs(np.linalg.det(struts.directions[0][np.array(triplets)]))
     second = np.abs(np.linalg.det(struts.jacobian[0])) / arm**3 / np.maximum(first, 1e-12)
-    best = triplets[int(np.round(np.minimum(first, second), 9).argmax())]  # of equal ones the first
+    best = triplets[int(np.round(np.minimum(first, second), 9).argmax())]  # the first of equal ones
     return [*best, *(i for i in range(6) if i not in best)], arm
 
 
 def well_conditioned(kernel: ClosedForm, first: FloatArray, second: FloatArray) -> BoolArray:
-    """Where neither of the determinants that the elimination divides by is small."""
+    """True where neither of the elimination's two determinants is small."""
     small = SMALL_DETERMINANT
     return np.asarray((np.abs(first) > small) & (np.abs(second) > small * kernel.arm**3))
 
@@ -86,7 +86,7 @@ def compliance_along_columns(
     rotation: FloatArray | None = None,
     strut_forces: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Compliance along one direction a pose, with what the limits ask for.
+    """Compliance along one direction a pose, with the quantities that limits depend on.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def compliance_along_columns(
                 along[rows] = over_struts(force, force, softness)
             if strut_forces is not None:
                 strut_forces[rows, kernel.order] = np.array(balanced[-1]).T
-            del balanced, in_order, stiffness, softness  # the next block takes their room in the cache
+            del balanced, in_order, stiffness, softness  # makes room in the cache for the next block
     good &= np.isfinite(compliance).all(axis=0)
     return compliance if direction.ndim == 3 else compliance[0], determinant, lengths, good
 
@@ -129,7 +129,7 @@ def compliance_along_columns(
 def _balanced(
     kernel: ClosedForm, position: FloatArray, loads: FloatArray, rotation: FloatArray | None, rows: slice
 ) -> tuple[list[Sequence[FloatArray]], FloatArray, FloatArray, BoolArray]:
-    """Forces in the struts that balance each load at some poses, and their lengths, both in the kernel's order.
+    """Strut forces that balance each load at some poses, and strut lengths, both in the kernel's order.
 
     Then |det J|, and where neither of the determinants that the elimination divides by is small.
     """

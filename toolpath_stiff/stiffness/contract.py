@@ -29,17 +29,17 @@ from toolpath_stiff.stiffness.measuring_loop import MeasuringLoop
 from toolpath_stiff.stiffness.sizes import about, sizes_in_words
 from toolpath_stiff.units import mm_from_m
 
-Values = Mapping[str, Any]  # name of a parameter -> SI value, or what is chosen: a number, a name
+Values = Mapping[str, Any]  # name of a parameter -> SI value, or its choice: a number, a name
 LINKS = ("tool", "platform", "joints", "struts", "frame", "table", "geometry", "instrument")
 HOOKS = ("strut_compliance", "load_compliance", "parallel_stiffness", "geometry", "reading", "element_compliance",
          "stands")  # fmt: skip
 
-# Columns of measurements that an effect may wait for -> attribute of `LoadPath`, which is None where nobody says.
+# Columns of measurements that an effect may wait for -> attribute of `LoadPath`, None where the value is unknown.
 CONDITIONS = {"setup": "setup", "temperature_C": "temperature", "time_min": "time", "direction": "direction"}
 SETUP = "setup"  # the condition, and the name of every parameter that names a set-up
 ELEMENT = "element"  # the name of every parameter that names an element of the machine
 EXPERIENCE = "engineering experience, no source"
-IDLE = 1e-3  # N in a strut: below, powers of the force would diverge, and the strut adds nothing that shows
+IDLE = 1e-3  # N in a strut: below it powers of the force would diverge, and the strut adds nothing visible
 
 
 @dataclass(frozen=True)
@@ -87,12 +87,12 @@ class Parameter:
 
     @property
     def discrete(self) -> bool:
-        """Whether it names what the effect acts on; fits then compare the choices."""
+        """True if it names what the effect acts on; fits then compare the choices."""
         return self.kind != "real"
 
     @property
     def expected(self) -> str:
-        """What a value must be, in words."""
+        """Allowed values, in words."""
         if self.kind == "text":
             return "a name in quotes"
         low, high = self.bounds
@@ -108,29 +108,29 @@ class Parameter:
 
 
 def setup_parameter(meaning: str) -> Parameter:
-    """The parameter that names the set-up to which an effect belongs."""
+    """Parameter that names the set-up to which an effect belongs."""
     source = "column setup of the measurements"
     return Parameter(SETUP, "", 1.0, (0, 0), (0, 0), source=source, meaning=meaning, kind="text")
 
 
 def element_parameter(meaning: str) -> Parameter:
-    """The parameter that names an element of the machine."""
+    """Parameter that names an element of the machine."""
     return Parameter(ELEMENT, "", 1.0, (0, 0), (0, 0), source="machine file", meaning=meaning, kind="text")
 
 
 def compliance(name: str, largest: float, typical: tuple[float, float], source: str, meaning: str) -> Parameter:
-    """The parameter of a part that gives way along a line, nm/N, from 0 to the largest."""
+    """Parameter of a part that gives way along a line, nm/N, from 0 to the largest."""
     return Parameter(name, "nm/N", 1e-9, (0.0, largest), typical, source=source, meaning=meaning)
 
 
 def rocking(name: str, source: str, meaning: str) -> Parameter:
-    """The parameter of a body that turns about horizontal axes under a moment, nrad/(N m)."""
+    """Parameter of a body that turns about horizontal axes under a moment, nrad/(N m)."""
     return Parameter(name, "nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0), source, meaning=meaning)
 
 
 @dataclass(frozen=True)
 class LoadPath(ArrayColumns):
-    """What an effect sees of n poses under load. SI, base axes.
+    """State of n poses under load, as an effect sees it. SI, base axes.
 
     Attributes
     ----------
@@ -175,11 +175,11 @@ class LoadPath(ArrayColumns):
         return len(self.position)
 
     def take(self, rows: IntArray | BoolArray | slice) -> Self:
-        """Some of the poses; repeated as an index says."""
+        """Some of the poses, repeated if the index repeats them."""
         return replace(super().take(rows), stance=self.stance.take(rows))
 
     def element(self, name: str) -> tuple[slice, Spring | LoadRows]:
-        """Columns of an element's loads among all, and these; of a machine of elements. Raises `EffectError`."""
+        """Columns of an element's loads, and these loads; of a machine of elements. Raises `EffectError`."""
         assert isinstance(self.stance, Stance)
         start = 0
         for element, load in zip(self.machine_tool.elements, self.stance.loads, strict=True):
@@ -191,7 +191,7 @@ class LoadPath(ArrayColumns):
         raise EffectError(f"machine {self.machine_tool.name} has no element {name!r}", expected=f"one of {names}")
 
     def element_zeros(self) -> FloatArray:
-        """(n, r) nothing added to any load of the elements."""
+        """(n, r) zeros: nothing added to any load of the elements."""
         assert isinstance(self.stance, Stance)
         return np.zeros((len(self), sum(load.compliance.shape[-1] for load in self.stance.loads)))
 
@@ -203,18 +203,18 @@ class LoadPath(ArrayColumns):
 
     @property
     def machine(self) -> Hexapod:
-        """The machine of six struts. Raises `InputError` of another kind."""
+        """The hexapod. Raises `InputError` for another kind of machine."""
         return as_hexapod(self.machine_tool, "an effect on struts")
 
     @property
     def struts(self) -> Struts:
-        """The struts of such a machine."""
+        """Struts of a hexapod."""
         assert isinstance(self.stance, Struts)
         return self.stance
 
 
 def at_pose(path: LoadPath, i: int) -> str:
-    """Pose i in words, as " at X0 Y0 Z800 mm" with the space before it."""
+    """Pose i in words, such as " at X0 Y0 Z800 mm", with a leading space."""
     x, y, z = (mm_from_m(float(v)) + 0.0 for v in path.position[i])
     return f" at X{x:g} Y{y:g} Z{z:g} mm"
 
@@ -232,7 +232,7 @@ def body_on_springs(path: LoadPath, shifts: tuple[float, float, float], rocking:
 
 
 def at_the_tip(path: LoadPath, compliances: FloatArray) -> FloatArray:
-    """(n, 12, 12) quadratic form of the tip force alone: compliances (n, 3, 3) or (3, 3) m/N, base axes."""
+    """(n, 12, 12) quadratic form in the tip force alone, from compliances (n, 3, 3) or (3, 3) m/N, base axes."""
     form = np.zeros((len(path), 12, 12))
     form[:, 6:9, 6:9] = compliances
     return form
@@ -240,7 +240,7 @@ def at_the_tip(path: LoadPath, compliances: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Conditions:
-    """Under what a program runs: what measurements say row by row, and a program does not say.
+    """Conditions of a program run: measurements state them row by row, a program does not.
 
     Attributes
     ----------
@@ -255,17 +255,17 @@ class Conditions:
 
     @property
     def known(self) -> tuple[str, ...]:
-        """Which of `CONDITIONS` somebody has given."""
+        """Those of `CONDITIONS` that are given."""
         return tuple(name for name, attribute in CONDITIONS.items() if getattr(self, attribute, None) is not None)
 
     def columns(self, n: int) -> dict[str, AnyArray]:
-        """The same for n poses, as `LoadPath` holds it."""
+        """The conditions as columns for n poses, as `LoadPath` holds them."""
         given = {"setup": self.setup, "temperature": self.temperature}
         return {name: np.full(n, value) for name, value in given.items() if value is not None}
 
 
 def _told(clause: str, values: Values) -> str:
-    """A clause with its values: numbers to two digits; of two words the first where the number is above zero.
+    """A clause with its values: numbers to two digits; of two words the first if the number is positive.
 
     Examples
     --------
@@ -415,7 +415,7 @@ class Effect:
         return machine
 
     def stands(self, machine: MachineTool, joints: FloatArray, p: Values) -> tuple[MachineTool, FloatArray]:
-        """The machine, and joint values (n, j) m or rad, with which it truly stands where its control believes these.
+        """The machine, and joint values (n, j) m or rad, at which it truly stands if its control believes these.
 
         Examples
         --------
@@ -426,7 +426,7 @@ class Effect:
         return machine, joints
 
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:
-        """What the instrument reads, (n,) N/m, for a true stiffness (n,) N/m.
+        """(n,) N/m that the instrument reads for a true stiffness (n,) N/m.
 
         Examples
         --------
@@ -440,7 +440,7 @@ class Effect:
         return stiffness
 
     def seen_by(self, loop: MeasuringLoop) -> float:
-        """Share of what it gives way that an indicator across part of the load path sees: all where its link is inside.
+        """Share of its give that an indicator across part of the load path sees: all, if its link is inside.
 
         Of a joint's two ends each is taken to give half.
 
@@ -456,7 +456,7 @@ class Effect:
         return 0.5 if loop.kind == "joint" and loop.where else 1.0
 
     def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:
-        """(n, 3) m, base axes: how far a vertex of the frame (1 to 3) moves under strut forces (n, 6) N.
+        """(n, 3) m, base axes: displacement of a frame vertex (1 to 3) under strut forces (n, 6) N.
 
         Of effects with `link = "frame"`: energy alone does not say which way a vertex moves. Without it an indicator
         between a vertex and the floor is taken to see nothing of the effect.
@@ -474,7 +474,7 @@ class Effect:
         return None
 
     def conditions(self, p: Values) -> tuple[str, ...]:
-        """Which of `CONDITIONS` it waits for with these values: those of `needs`, and those that a value names.
+        """Those of `CONDITIONS` that it waits for with these values: from `needs`, and from values that name one.
 
         None for a geometry: a machine has one, whatever the conditions.
 
@@ -494,11 +494,11 @@ class Effect:
         return tuple(dict.fromkeys(name for name in (*self.needs, *named) if name in CONDITIONS))
 
     def acts_on(self, path: LoadPath, p: Values) -> bool:
-        """Whether these poses come with every condition that it waits for."""
+        """True if these poses come with every condition that it waits for."""
         return all(getattr(path, CONDITIONS[name]) is not None for name in self.conditions(p))
 
     def finding(self, p: Values) -> str:
-        """What a fit has found, as an engineer says it: a clause with its size and unit, the cause first.
+        """Result of a fit in an engineer's words: a clause with its size and unit, the cause first.
 
         `p`: parameter name -> value in the units of files, choices as they are.
         """
@@ -513,7 +513,7 @@ class Effect:
 
     @property
     def hooks(self) -> list[str]:
-        """Which of `HOOKS` it implements.
+        """Those of `HOOKS` that it implements.
 
         Examples
         --------
@@ -525,5 +525,5 @@ class Effect:
 
     @property
     def is_instrument(self) -> bool:
-        """Whether it changes readings only."""
+        """True if it changes readings only."""
         return self.link == "instrument"

@@ -1,4 +1,4 @@
-"""Which route computes the tip compliance: the exact LAPACK route or the closed form.
+"""Choice of the route to the tip compliance: the exact LAPACK route or the closed form.
 
 For struts on a rigid platform both give the same to rounding. Physical effects take the exact route, and so do whole
 tensors and few poses. Poses at which the closed form is ill-conditioned are marked by it, and the caller asks the exact
@@ -27,12 +27,12 @@ Tools = FloatArray | float  # m, length of the tool; N, size of the load: of all
 
 
 def solver_of(machine: MachineTool) -> ModuleType:
-    """What gives the compliance of a kind of machine."""
+    """Module that computes the compliance of a kind of machine."""
     return exact if isinstance(machine, Hexapod) else element_sum
 
 
 def is_closed_form(model: StiffnessModel) -> bool:
-    """Whether struts on a rigid platform are all that acts, so that the closed form holds."""
+    """True if only struts on a rigid platform act, so that the closed form is valid."""
     acting = replace(model, effects=acting_effects(model))
     return (
         isinstance(model.machine, Hexapod)
@@ -50,7 +50,7 @@ def tip_compliance(
     load: FloatArray | None = None,
     in_work: bool = False,
 ) -> FloatArray:
-    """Compliance of the tool tip at n poses; load-dependent effects as under the load, left out where none is given.
+    """Compliance of the tool tip at n poses; load-dependent effects as under the load, left out without one.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def compliance_along(
 
 
 def rows_of_tools(tool_length: FloatArray) -> list[tuple[float, IntArray | slice]]:
-    """Each tool length, nan counts as one, and the rows that have it."""
+    """Each tool length (nan counts as one) and the rows that have it."""
     if len(tool_length) and (np.isnan(tool_length).all() or np.ptp(tool_length) == 0.0):
         return [(float(tool_length[0]), slice(None))]
     lengths, number = np.unique(tool_length, return_inverse=True)
@@ -143,7 +143,7 @@ def compliance_with_effects(
 def load_paths(
     model: StiffnessModel, position: FloatArray, rotation: FloatArray | None, tool_length: Tools, force: Tools
 ) -> Iterator[tuple[slice, LoadPath]]:
-    """Rows of some poses of a program, and what the effects see there, the model's conditions included."""
+    """Rows of some poses of a program, and the load path that the effects see there, with the model's conditions."""
     lengths, size = (np.broadcast_to(np.asarray(of, dtype=float), (len(position),)) for of in (tool_length, force))
     for start in range(0, len(position), BLOCK):
         rows = slice(start, start + BLOCK)

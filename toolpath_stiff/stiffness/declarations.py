@@ -1,4 +1,4 @@
-"""What an effect declares, held against the contract when it is loaded; each mistake with the line that makes it."""
+"""Declarations of an effect, checked against the contract when it is loaded; each mistake is given with its line."""
 
 import difflib
 import inspect
@@ -22,7 +22,7 @@ def _are_texts(value: object) -> bool:
     return isinstance(value, tuple | list) and all(isinstance(entry, str) for entry in value)
 
 
-# Attribute, whether a value will do, what is expected.
+# Attribute, test of its value, expected value.
 RULES: list[tuple[str, Callable[[Any], object], str]] = [
     *((attribute, is_text, "a text that is not empty") for attribute in TEXTS),
     ("name", NAME.fullmatch, "letters, digits and underscores, such as my_screw"),
@@ -34,7 +34,7 @@ RULES: list[tuple[str, Callable[[Any], object], str]] = [
 
 
 def check_declarations(effect: Effect, where: str) -> None:
-    """Refuse what is not a complete effect; `where` is its file.
+    """Refuse an incomplete effect; `where` is its file.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def check_declarations(effect: Effect, where: str) -> None:
 
 
 def _faults(effect: Any) -> Iterator[tuple[str, str, str]]:
-    """Attribute, mistake, what was expected; only the first is sure to be one."""
+    """Attribute, mistake, expected value; only the first one is certain to be a fault."""
     for attribute, holds, expected in RULES:
         if not hasattr(effect, attribute):
             yield "", f"`{attribute}` is missing", ""
@@ -75,7 +75,7 @@ def _faults(effect: Any) -> Iterator[tuple[str, str, str]]:
 
 
 def wrong_in(parameter: Parameter) -> tuple[str, str] | None:
-    """What is wrong, and what was expected."""
+    """Mistake in a parameter, and what was expected."""
     if not _are_texts((parameter.name, parameter.unit, parameter.source, parameter.meaning)):
         return "not of texts", "texts as name, unit, source and meaning"
     if not NAME.fullmatch(parameter.name):
@@ -101,7 +101,7 @@ def wrong_in(parameter: Parameter) -> tuple[str, str] | None:
 
 
 def _are_numbers(values: object, count: int) -> bool:
-    """So many numbers that a float holds: Python's whole numbers may be larger."""
+    """True for this count of numbers that a float can hold: Python's whole numbers may be larger."""
     if not isinstance(values, tuple | list) or len(values) != count or not all(map(is_number, values)):
         return False
     try:

@@ -18,13 +18,13 @@ from toolpath_stiff.stiffness.model import StiffnessModel
 
 
 def stance_of(path: LoadPath) -> Stance:
-    """How a machine of elements stands on a load path."""
+    """Stance of a machine of elements on a load path."""
     assert isinstance(path.stance, Stance)
     return path.stance
 
 
 def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
-    """(n, 3, 3) m/N, base axes: displacements of the tip under forces at it; nan where nothing holds the tip.
+    """(n, 3, 3) m/N, base axes: displacements of the tip under forces on it; nan where nothing holds the tip.
 
     Effects that depend on the load are left out.
     """
@@ -55,7 +55,7 @@ def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArra
 
 
 def added_by(effects: Iterable[ActiveEffect], path: LoadPath) -> tuple[FloatArray | None, FloatArray | None]:
-    """What effects add: (n, 6, 6) at the tip, (n, r) m/N and rad/(N m) in the elements' loads; None: nothing."""
+    """Contributions of effects: (n, 6, 6) at the tip, (n, r) m/N and rad/(N m) in the elements' loads; or None."""
     at_tip: FloatArray | None = None
     in_elements: FloatArray | None = None
     for active in effects:
@@ -94,7 +94,7 @@ def energies(stance: Stance, direction: FloatArray) -> list[FloatArray]:
 
 
 def _spring_energy(spring: Spring, tip: FloatArray, force: FloatArray) -> FloatArray:
-    """(n,) of a spring under forces (3, n) at the tip (3, n)."""
+    """(n,) m/N of a spring, twice its energy under forces (3, n) at the tip (3, n)."""
     axes = spring.axes
     if axes is not None and axes.ndim == 3:
         axes = np.moveaxis(axes, 0, -1)
@@ -111,7 +111,7 @@ def _spring_energy(spring: Spring, tip: FloatArray, force: FloatArray) -> FloatA
 
 
 def _quadratic(compliance: FloatArray, axes: FloatArray | None, vector: FloatArray) -> FloatArray | float:
-    """(n,) sum of c_k (a_k . v)^2 over three axes; what two or three axes have alike is counted by the length of v."""
+    """(n,) sum of c_k (a_k . v)^2 over three axes; axes with equal compliance are counted by the length of v."""
     if compliance.ndim == 2:
         alike, rest = 0.0, list(enumerate(compliance))
     else:

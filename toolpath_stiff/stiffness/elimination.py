@@ -1,4 +1,4 @@
-"""Strut forces by elimination: the arithmetic of the closed form, of many poses at a time.
+"""Strut forces by elimination: the arithmetic of the closed form, for many poses at a time.
 
 Equilibrium J^T f = w of the exact route, solved by 3 x 3 blocks instead of a pivoted 6 x 6: the struts are split into
 two triplets A and B, forces are eliminated first,
@@ -39,7 +39,7 @@ def dot(a: Vector, b: Vector) -> FloatArray:
 
 
 def strut(s: Vector, arm: Vector) -> tuple[Sequence[FloatArray], Sequence[FloatArray], FloatArray]:
-    """Direction, moment about the tip and length of the strut s, whose platform joint is at `arm` from the tip."""
+    """Direction, moment about the tip and length of strut s, whose platform joint is at `arm` from the tip."""
     length = np.sqrt(dot(s, s))
     over = 1.0 / length
     u = (s[0] * over, s[1] * over, s[2] * over)

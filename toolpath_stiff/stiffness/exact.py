@@ -37,16 +37,16 @@ from toolpath_stiff.stiffness.effect_source import file_of, is_foreign
 from toolpath_stiff.stiffness.model import StiffnessModel
 from toolpath_stiff.units import mm_from_m, n_per_um_from_n_per_m
 
-APART = 1e-6  # of the tip's compliance: how far a result may be from symmetric
+APART = 1e-6  # of the tip's compliance: largest asymmetry allowed
 # Condition of the struts' screws, arms in units of their size, beyond which a pose with an impossible compliance counts
-# as singular: rounding may have left nothing right but its largest eigenvalue.
+# as singular: rounding may have left only its largest eigenvalue right.
 NEARLY_SINGULAR = 1e7
-LEAST_STIFFNESS = 1e-6  # N/m; what a strut law gives below is no stiffness, and its inverse may be no number
-SHARES = (1.0, 0.5, 0.25, 0.1, 1.0)  # of a step: where whole ones cycle between the kinks, parts of them do not
+LEAST_STIFFNESS = 1e-6  # N/m; a strut law's value below it is no stiffness, and its inverse may overflow
+SHARES = (1.0, 0.5, 0.25, 0.1, 1.0)  # shares of a step: where whole steps cycle between kinks, partial ones do not
 WHOLE_STEPS, PART_STEPS = 25, 200
-SETTLED = 1e-8  # of the load: the tip's compliance is then certain to some 1e-8 of itself
-DIFFERENCE = 1e-9  # of the load, for the tangent: well below what settles, or the edge of a gap would be straddled
-LEAST_TANGENT = 1e-3  # of the secant: a strut whose stretch does not grow with its force would be infinitely stiff
+SETTLED = 1e-8  # of the load: the tip's compliance is then accurate to some 1e-8
+DIFFERENCE = 1e-9  # of the load, step of the tangent: well below `SETTLED`, so as not to straddle the edge of a gap
+LEAST_TANGENT = 1e-3  # of the secant: a strut whose stretch does not grow with force would be infinitely stiff
 
 
 def assemble_links(model: StiffnessModel, path: LoadPath) -> tuple[FloatArray, FloatArray | None]:
@@ -63,7 +63,7 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> tuple[FloatArray, F
     InputError
         The strut law was extrapolated to no stiffness or less, or the effects take more from a strut than it has.
     """
-    with np.errstate(invalid="ignore"):  # a law of absurd slope; refused with what it gives
+    with np.errstate(invalid="ignore"):  # a law of absurd slope is refused by its values
         stiffness = path.machine.strut_law.stiffness(path.struts.lengths)
     refuse_law_beyond_zero(path, stiffness)
     strut, form = 1.0 / stiffness, np.zeros((len(path), 12, 12))
@@ -85,10 +85,10 @@ def assemble_links(model: StiffnessModel, path: LoadPath) -> tuple[FloatArray, F
 
 
 def refuse_law_beyond_zero(path: LoadPath, stiffness: FloatArray) -> None:
-    """Raise `InputError` where the strut law gives (n, 6) struts no stiffness or less, or no number."""
+    """Raise `InputError` if the strut law gives (n, 6) struts zero, negative or non-numeric stiffness."""
     holds = (stiffness >= LEAST_STIFFNESS) & (stiffness < np.inf)
     lengths = path.struts.lengths
-    holds |= np.isnan(lengths)  # a pose that is no number, which stays nan
+    holds |= np.isnan(lengths)  # a pose of nan stays nan
     if holds.all():
         return
     worst = np.unravel_index(np.argmin(np.where(holds, np.inf, stiffness)), stiffness.shape)
@@ -132,20 +132,20 @@ def respond(
 
 
 def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve per pose with pivoting; nan where a matrix is singular instead of giving up on all of them."""
+    """Solve pose by pose with pivoting; nan where a matrix is singular, instead of failing for all."""
     try:
         return np.asarray(np.linalg.solve(matrix, right))
     except np.linalg.LinAlgError:
         solution = np.full(np.broadcast_shapes(matrix.shape[:-2], right.shape[:-2]) + right.shape[-2:], np.nan)
         for i, (left, side) in enumerate(zip(matrix, right, strict=True)):
-            # The same test as for a batch without singular poses: a pose's result does not hang on its neighbours.
+            # The same test as for a batch without singular poses: a pose's result must not depend on its neighbours.
             with suppress(np.linalg.LinAlgError):
                 solution[i] = np.linalg.solve(left, side)
         return solution
 
 
 def tip_compliance(model: StiffnessModel, path: LoadPath, direction: FloatArray | None = None) -> FloatArray:
-    """(n, 3, 3) m/N, displacements of the tip under forces at it.
+    """(n, 3, 3) m/N, displacements of the tip under forces on it.
 
     Load-dependent effects are in it where the direction (n, 3) of the load that acts is given, as under that load: it
     is the secant compliance there.
@@ -159,7 +159,7 @@ def tip_compliance(model: StiffnessModel, path: LoadPath, direction: FloatArray 
 def under_load(
     model: StiffnessModel, path: LoadPath, direction: FloatArray
 ) -> tuple[LoadPath, FloatArray, FloatArray, FloatArray]:
-    """The machine under a load of `path.force` along unit vectors (n, 3), load-dependent effects included.
+    """State of the machine under a load of `path.force` along unit vectors (n, 3), with load-dependent effects.
 
     Those see the strut forces of the loaded machine: the ones of equilibrium or, where a stiffness parallel to the
     struts shares the load, the ones that agree with the compliances that they cause (`_settled`).
@@ -210,9 +210,9 @@ def compliance_along(
 
 
 def _settle(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wrenches: FloatArray) -> None:
-    """Change the strut forces of the path, in place, to those that agree with the compliances that they cause."""
+    """Change the strut forces of the path, in place, to those consistent with the compliances that they cause."""
     assert loaded.strut_forces is not None
-    regular = np.flatnonzero(np.isfinite(loaded.strut_forces).all(axis=1))  # nan: a singular pose, which stays nan
+    regular = np.flatnonzero(np.isfinite(loaded.strut_forces).all(axis=1))  # nan marks a singular pose, which stays nan
     part = loaded.take(regular)
     rows, wrench = np.arange(len(part)), wrenches[regular] * part.force[:, None]
     for share in SHARES:
@@ -229,7 +229,7 @@ def _settle(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wrenc
 def _newton_steps(
     model: StiffnessModel, path: LoadPath, parallel: FloatArray, wrench: FloatArray, rows: IntArray, share: float
 ) -> IntArray:
-    """Newton's method for the strut forces of some poses, in place, by a share of each step; the rows left unsettled.
+    """Newton's method for strut forces of some poses, in place, by a share of each step; returns rows not settled.
 
     With e_i = t_i F_i + o_i, t the tangent and o_i = (s_i - t_i) F_i from the last forces, the system is linear. Where
     its forces stay e_i = s_i F_i holds, whatever the tangent was.
@@ -255,7 +255,7 @@ def _newton_steps(
         motion = np.asarray(np.linalg.solve(system, right[..., None])[..., 0])
         settled = _times(stiffened[..., :6], motion) - stiffened[..., 6]
         moved = np.abs(settled - before).max(axis=1) / load[rows]
-        # Between tension and compression of a strut lies its gap, where it is idle.
+        # Between tension and compression a strut has its gap, where it carries nothing.
         crossing = (settled * before < 0.0) & (moved > SETTLED)[:, None]
         forces[rows] = before + share * (np.where(crossing, 0.0, settled) - before)
         rows = rows[moved > SETTLED]
@@ -267,7 +267,7 @@ def _times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
 
 
 def possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> FloatArray:
-    """The symmetric part of the tip's compliance (n, k, k) m/N, if there can be such a one; nan at a singular pose.
+    """Symmetric part of a tip compliance (n, k, k) m/N, checked to be physically possible; nan at a singular pose.
 
     Raises
     ------
@@ -288,7 +288,7 @@ def possible(model: StiffnessModel, path: LoadPath, compliance: FloatArray) -> F
 
 def _is_singular(path: LoadPath) -> BoolArray:
     if isinstance(path.stance, Stance):
-        return np.ones(len(path), dtype=bool)  # of elements each of which gives way by itself
+        return np.ones(len(path), dtype=bool)  # a machine of elements, each with its own compliance
     screws = path.struts.jacobian.copy()
     with np.errstate(divide="ignore", invalid="ignore"):
         screws[:, :, 3:] /= np.linalg.norm(path.struts.arms, axis=-1).mean(axis=-1)[:, None, None]
@@ -299,10 +299,10 @@ def _is_singular(path: LoadPath) -> BoolArray:
 
 
 def is_compliance(tensor: FloatArray) -> BoolArray:
-    """(n,) whether tensors (n, k, k) are finite, symmetric and positive definite."""
+    """(n,) True where tensors (n, k, k) are finite, symmetric and positive definite."""
     scale = np.abs(tensor).max(axis=(1, 2))
     good = (scale > 0.0) & (scale < np.inf)
-    unit = tensor[good] / scale[good, None, None]  # sums of the largest numbers overflow
+    unit = tensor[good] / scale[good, None, None]  # scaled, as sums of the largest numbers overflow
     turned = np.swapaxes(unit, 1, 2)
     even = np.abs(unit - turned).max(axis=(1, 2)) <= APART
     good[good] = even & (np.linalg.eigvalsh(0.5 * (unit + turned))[:, 0] > 0.0)
@@ -310,7 +310,7 @@ def is_compliance(tensor: FloatArray) -> BoolArray:
 
 
 def _impossible(model: StiffnessModel, path: LoadPath, row: int, part: str) -> EffectError:
-    """An error that names the effects from outside the package, else all effects, else the machine."""
+    """Error that blames the effects from outside the package, otherwise all effects, otherwise the machine."""
     effects = [active.effect for active in model.effects]
     foreign = [effect for effect in effects if is_foreign(effect)]
     names = ", ".join(effect.name for effect in foreign or effects)

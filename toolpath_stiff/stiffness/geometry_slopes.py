@@ -1,4 +1,4 @@
-"""By how much struts that are not alike and joints off their places change the tip's stiffness.
+"""Change of tip stiffness by struts that are not alike and by displaced joints.
 
 With strut forces f, J^T f = w, and the motion y = J^-1 e of a platform on struts that stretch by e, a change of the
 geometry changes the compliance by -2 f^T dJ y: forces in equilibrium under the changed geometry do the virtual work

@@ -1,4 +1,4 @@
-"""What an indicator across part of the load path reads under a load at the tip: by virtual work.
+"""Readings of an indicator across part of the load path, under a load at the tip: by virtual work.
 
 A pair of equal and opposite unit forces at the indicator's two points is carried by what lies between them alone (the
 six struts are statically determinate, so that the pair loads nothing else). With the real loads u = [f; w] of strut
@@ -94,7 +94,7 @@ def _one_loop(model: StiffnessModel, path: LoadPath, direction: FloatArray, loop
 def _vertex_reading(
     model: StiffnessModel, path: LoadPath, forces: FloatArray, direction: FloatArray, loop: MeasuringLoop
 ) -> FloatArray:
-    """(n,) m/N of a vertex against the floor."""
+    """(n,) m/N, displacement of a vertex against the floor."""
     _, radial = frame_vertices(path.machine.frame_joints)[loop.number - 1]
     along = {"": direction, "radial": radial, "vertical": np.array([0.0, 0.0, 1.0])}[loop.where]
     reading = np.zeros(len(path))
@@ -107,7 +107,7 @@ def _vertex_reading(
 
 
 def law_products(forces: FloatArray, loops: Sequence[MeasuringLoop], which: IntArray) -> FloatArray:
-    """(n, 6) what each strut's own compliance counts in a reading: products of real and virtual strut forces.
+    """(n, 6) weight of each strut's own compliance in a reading: products of real and virtual strut forces.
 
     `forces` (n, 6) are those under the unit load.
     """

@@ -1,4 +1,4 @@
-"""What an indicator is set between: the words of the column `loop`, and which links of the load path lie inside.
+"""Measuring loops: the words of the column `loop`, and the links of the load path between an indicator's two points.
 
 An indicator sees what gives way between the two points that it touches, nothing else. The tip loop, tool against work,
 holds the whole load path; an indicator across one joint holds that joint alone.
@@ -18,7 +18,7 @@ INSIDE = {
     "strut": ("struts",),
     "alone": ("struts",),
 }
-# Kinds that read along the load, so that a reading is a stiffness; the others read along a strut or across a vertex.
+# Kinds that read along the load, so that a reading is a stiffness; others read along a strut or across a vertex.
 ALONG_THE_LOAD = ("tip", "spindle", "platform", "table")
 WORDS = (
     "tip, spindle, platform, table, strut 1 (to 6), strut 1 alone, joint 1, joint 1 platform, joint 1 frame, frame 1 "
@@ -28,7 +28,7 @@ WORDS = (
 
 @dataclass(frozen=True)
 class MeasuringLoop:
-    """Between which two points an indicator reads.
+    """The two points between which an indicator reads.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class MeasuringLoop:
 
     @property
     def along_load(self) -> bool:
-        """Whether it reads along the load."""
+        """True if it reads along the load."""
         return self.kind in ALONG_THE_LOAD or (self.kind == "frame" and not self.where)
 
 
@@ -79,5 +79,5 @@ _NAMED = {"": TIP, **{str(loop): loop for loop in _LOOPS}}
 
 
 def measuring_loop(text: str) -> MeasuringLoop | None:
-    """The loop that a cell of the column `loop` names, an empty one the tip's; None where it names none."""
+    """Loop that a cell of the column `loop` names (empty: the tip's); None if it names none."""
     return _NAMED.get(" ".join(text.lower().split()))

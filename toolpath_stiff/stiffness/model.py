@@ -1,4 +1,4 @@
-"""A stiffness model: a machine with the physical effects that it carries, and which of them act on a program.
+"""A stiffness model: a machine with its physical effects, and the effects that act on a program.
 
 Measurements bring set-up, time and temperature reading by reading. A program does not: what it runs under are the
 model's `Conditions`. An effect without a condition that it waits for adds nothing, which must not pass unnoticed:
@@ -31,8 +31,8 @@ from toolpath_stiff.stiffness.contract import ELEMENT, SETUP, Conditions, LoadPa
 from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.units import m_from_nm
 
-NO_SETUP = "none"  # what a user calls a set-up that none of the effects belongs to
-STEP = 0.01  # of a standard deviation, for differences: stiffness bends little over it, and rounding stays far below
+NO_SETUP = "none"  # a user's word for a set-up to which no effect belongs
+STEP = 0.01  # of a standard deviation, step of differences: stiffness is linear over it, and rounding far smaller
 WORDS = {
     "temperature_C": "the temperature, which nobody gives (--temperature)",
     "time_min": "the time since an indicator was zeroed, which no program has",
@@ -42,7 +42,7 @@ WORDS = {
 
 @dataclass(frozen=True)
 class StiffnessModel:
-    """What the stiffness is computed from.
+    """Everything from which the stiffness is computed.
 
     Attributes
     ----------
@@ -72,12 +72,12 @@ class StiffnessModel:
 
     @property
     def load_dependent(self) -> bool:
-        """Whether the stiffness depends on the size of the load (it is then the secant one)."""
+        """True if the stiffness depends on the size of the load (it is then the secant one)."""
         return any(active.effect.load_dependent for active in self.effects)
 
     @property
     def is_plain(self) -> bool:
-        """Whether struts and platform bars are all there is, so that the fast kernels apply."""
+        """True if there are only struts and platform bars, so that the fast kernels apply."""
         return all(type(active.effect) is PlatformFlexibility for active in self.effects)
 
 
@@ -87,7 +87,7 @@ def build_model(
     extra: Iterable[ActiveEffect] = (),
     conditions: Conditions | None = None,
 ) -> StiffnessModel:
-    """The model of a machine with the effects of its file and any extra ones.
+    """Model of a machine with the effects of its file and any extra ones.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def build_model(
 
 
 def _assembled(given: MachineTool, actives: Sequence[ActiveEffect], conditions: Conditions) -> StiffnessModel:
-    """Geometry effects applied one after the other, to the true machine and to what the control takes it for."""
+    """Model with geometry effects applied one by one, to the true machine and to that which the control assumes."""
     effects = tuple(active for active in actives if not active.effect.is_instrument)
     machine = control = given
     for active in effects if isinstance(given, Hexapod) else ():
@@ -164,7 +164,7 @@ def _assembled(given: MachineTool, actives: Sequence[ActiveEffect], conditions: 
 
 
 def with_parameter_moved(model: StiffnessModel, name: str, change: float) -> StiffnessModel:
-    """The model with one of the machine's fitted parameters changed.
+    """Model with one of the machine's fitted parameters changed.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def load_path(
     force: ArrayLike = defaults.FORCE,
     **seen: Any,
 ) -> LoadPath:
-    """What the effects see at n poses; see `LoadPath` for shapes and units.
+    """Load path at n poses, as the effects see it; see `LoadPath` for shapes and units.
 
     `rotation` None is a vertical spindle; `tool_length` nan the reference tool (m, scalar or (n,)). `seen` are
     `setup`, `time`, `temperature`, `direction` where they are known.
@@ -233,7 +233,7 @@ def load_path(
     tip = np.atleast_2d(np.asarray(position, dtype=float))
     n = len(tip)
     length = np.broadcast_to(np.asarray(tool_length, dtype=float), (n,))
-    if isinstance(model.control, Hexapod) and n:  # the struts get the lengths that it computes; it may not know all
+    if isinstance(model.control, Hexapod) and n:  # the struts get the lengths that the control computes
         hexapod = as_hexapod(model.machine, "a control")
         turn = np.broadcast_to(np.eye(3) if rotation is None else np.asarray(rotation, dtype=float), (n, 3, 3))
         lengths = solve_struts(model.control, tip, turn, length).lengths
@@ -252,7 +252,7 @@ def path_of_stance(
     force: ArrayLike = defaults.FORCE,
     **seen: Any,
 ) -> LoadPath:
-    """What the effects see of a machine of elements whose control believes this stance; arguments as of `load_path`."""
+    """Load path of a machine of elements whose control believes this stance; arguments as for `load_path`."""
     true, joints = model.machine, stance.joints
     for active in model.effects:
         true, joints = active.stands(true, joints)
@@ -283,7 +283,7 @@ def _path(
 
 
 def waiting_effects(model: StiffnessModel) -> dict[str, str]:
-    """Effects that add nothing to a program because nobody gives a condition -> what they need; never instruments."""
+    """Effects that add nothing to a program because a condition is not given -> what they need; never instruments."""
     waiting = {}
     for active in model.effects:
         options = f"(--setup {shlex.quote(active.setup or 'NAME')}, or --setup {NO_SETUP})"
@@ -295,7 +295,7 @@ def waiting_effects(model: StiffnessModel) -> dict[str, str]:
 
 
 def effects_elsewhere(model: StiffnessModel) -> dict[str, str]:
-    """Effects that belong to another set-up than the one that a program runs under -> which that is."""
+    """Effects that belong to another set-up than the program's -> that set-up."""
     setup, waiting = model.conditions.setup, waiting_effects(model)
     here = f"this is {setup!r}" if setup else "that is not there"
     return {
@@ -306,14 +306,14 @@ def effects_elsewhere(model: StiffnessModel) -> dict[str, str]:
 
 
 def idle_effects(model: StiffnessModel) -> dict[str, str]:
-    """All effects that add nothing to a program run under the model's conditions -> why, the end of a sentence."""
+    """All effects that add nothing to a program under the model's conditions -> the reason, the end of a sentence."""
     return waiting_effects(model) | effects_elsewhere(model)
 
 
 def parameter_slopes(
     model: StiffnessModel, quantity: Callable[[StiffnessModel], FloatArray], here: FloatArray
 ) -> dict[int, FloatArray]:
-    """Row in the machine file's uncertainty -> slope of a quantity, of each fitted parameter that acts.
+    """Row in the machine file's uncertainty -> slope of a quantity, for each fitted parameter that acts.
 
     A slope is the change from `here` for a standard deviation of the parameter, away from a bound that is near.
     """
@@ -334,18 +334,18 @@ def parameter_slopes(
 
 
 def acting_effects(model: StiffnessModel) -> tuple[ActiveEffect, ...]:
-    """The other effects: those that headers list."""
+    """Effects that act on a program: those listed in headings."""
     idle = idle_effects(model)
     return tuple(active for active in model.effects if active.effect.name not in idle)
 
 
 def acting_names(model: StiffnessModel) -> list[str]:
-    """Their names."""
+    """Names of the effects that act."""
     return [active.effect.name for active in acting_effects(model)]
 
 
 def condition_warnings(model: StiffnessModel) -> list[str]:
-    """What of the model does not act on a program, for want of a condition or as an instrument; plain sentences."""
+    """Sentences on what in the model does not act on a program, lacking a condition or being an instrument."""
     warnings = list(model.unchecked)
     if model.instruments:
         names = ", ".join(active.effect.name for active in model.instruments)
@@ -360,7 +360,7 @@ def condition_warnings(model: StiffnessModel) -> list[str]:
 
 
 def conditions_stated(model: StiffnessModel) -> list[str]:
-    """What the results assume of set-up and temperature, and which effects stand aside for it."""
+    """Sentences on the set-up and temperature that the results assume, and on effects that do not act then."""
     setup, temperature = model.conditions.setup, model.conditions.temperature
     return [
         *([] if setup is None else [f"set-up: {setup or NO_SETUP}"]),
@@ -370,7 +370,7 @@ def conditions_stated(model: StiffnessModel) -> list[str]:
 
 
 def effects_stated(model: StiffnessModel) -> Document:
-    """The entries of a result's JSON: what acts, what does not and why, under which set-up and temperature."""
+    """Entries of a result's JSON: effects that act, effects that do not and why, set-up and temperature."""
     return {
         "effects": acting_names(model),
         "effects_idle": [{"effect": name, "reason": reason} for name, reason in idle_effects(model).items()],
@@ -380,14 +380,14 @@ def effects_stated(model: StiffnessModel) -> Document:
 
 
 def machine_words(document: Document) -> str:
-    """The machine of a result, what acts on it, the set-up: "nist with setup_compliance, set-up riser"."""
+    """Machine of a result, its active effects, the set-up: "nist with setup_compliance, set-up riser"."""
     effects = document.get("effects") or []
     parts = [f"{document.get('machine') or '-'}" + (f" with {', '.join(map(str, effects))}" if effects else "")]
     return ", ".join(parts + ([f"set-up {document['setup']}"] if document.get("setup") else []))
 
 
 def idle_on_readings(model: StiffnessModel, missing: Collection[str], setups: Collection[str]) -> dict[str, str]:
-    """Effects and instruments of the model that add nothing to readings -> a sentence that says why.
+    """Effects and instruments of the model that add nothing to readings -> a sentence on the reason.
 
     `missing`: columns that the readings lack; `setups`: names that occur in them.
     """
@@ -402,7 +402,7 @@ def idle_on_readings(model: StiffnessModel, missing: Collection[str], setups: Co
 
 
 def check_setup(setup: str, said_by: str, *models: StiffnessModel) -> None:
-    """Refuse a set-up that no machine file lists and no effect names; any will do if none is known.
+    """Refuse a set-up that no machine file lists and no effect names; any is accepted if none is known.
 
     Raises `InputError`, which begins with `said_by`.
     """

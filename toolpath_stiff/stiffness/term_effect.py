@@ -1,4 +1,4 @@
-"""Effects made of terms, each with a size of its own: what the portrait computes with and what an effect file holds.
+"""Effects made of terms, each with its own size: for the portrait's computations and for effect files.
 
 What terms do per unit of their sizes: loads of links, compliances of struts, errors of readings.
 """
@@ -27,8 +27,8 @@ from toolpath_stiff.stiffness.terms import (
     variable_values,
 )
 
-LEAST_STRUT = 0.8  # share of its own compliance that a strut may lose at most, so that it keeps some
-MOST_COUPLED = 0.9  # of the mean of both compliances: beyond 1 the pair has none left
+LEAST_STRUT = 0.8  # largest share of its own compliance that a strut may lose
+MOST_COUPLED = 0.9  # of the mean of both compliances: at 1 the pair would have none left
 LEAST_READ = 0.05  # of the deflection: less is never read
 NEEDS = {
     "load": "force_N",
@@ -38,7 +38,7 @@ NEEDS = {
     "setup": "setup",
 }
 CATALOGUE_LINKS = {"one strut": "struts"}
-# Terms of the geometry and of readings are effects of their own beside those of parts that give way or resist: action
+# Terms of geometry and of readings form effects separate from those of parts that give way or resist: action
 # -> what is added to the name; that -> hooks.
 ENDINGS = {"joint offset": "_geometry", "reading factor": "_reading", "reading shift": "_reading"}
 HOOKS_OF = {
@@ -49,12 +49,12 @@ HOOKS_OF = {
 
 
 def size_parameter(action: str, size: str, meaning: str) -> Parameter:
-    """The parameter that a term's size is, with bounds and usual sizes of its action."""
+    """Parameter for a term's size, with bounds and usual sizes of its action."""
     return replace(SIZES[action], name=size, meaning=meaning)
 
 
 class TermEffect(Effect):
-    """Terms of one ending that act together, by the name of the size of each.
+    """Terms with the same ending that act together, by the name of each one's size.
 
     Attributes
     ----------
@@ -86,11 +86,11 @@ class TermEffect(Effect):
 
     @property
     def hooks(self) -> list[str]:
-        """Those of its ending."""
+        """Hooks of its ending."""
         return list(HOOKS_OF[self.ending])
 
     def load_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
-        """Quadratic form of strut forces and tip wrench; a pair coupled by all that it has would have no stiffness."""
+        """Quadratic form in strut forces and tip wrench; full coupling would leave a pair without stiffness."""
         forms = []
         for term, size in self._sizes(path, p, "give", "rocking", "tilting", "vertex"):
             rows = carriers(term, path)
@@ -104,7 +104,7 @@ class TermEffect(Effect):
         return np.sum(forms, axis=0) if forms else None
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
-        """In series with each strut."""
+        """Compliance in series with each strut."""
         added = []
         for term, size in self._sizes(path, p, *IN_SERIES):
             law = path.machine.strut_law.stiffness(path.struts.lengths)
@@ -128,7 +128,7 @@ class TermEffect(Effect):
         return np.asarray(np.sum([turning, *springs], axis=0))
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
-        """With joints off their places."""
+        """The machine with joints displaced."""
         for size, term in self.terms.items():
             if term.action == "joint offset" and term.where is not None:
                 name = f"{term.column}_joints"
@@ -146,7 +146,7 @@ class TermEffect(Effect):
         return stiffness
 
     def _sizes(self, path: LoadPath, p: Values, *actions: str) -> Iterator[tuple[Term, float]]:
-        """Terms of these actions that the poses say enough for, each with its size."""
+        """Terms of these actions, each with its size, for which the poses state enough."""
         for size, term in self.terms.items():
             if term.action in actions and all(SEEN[name](path, "") is not None for name in term.variables):
                 yield term, p[size]
@@ -165,7 +165,7 @@ def shaped_at(term: Term, path: LoadPath) -> FloatArray:
 
 
 def carriers(term: Term, path: LoadPath) -> FloatArray:
-    """(n, k, 12) h of the link's generalised forces h . [f; w] under strut forces f and the tip's wrench w.
+    """(n, k, 12) vectors h: the link's generalised forces are h . [f; w] under strut forces f and the tip's wrench w.
 
     The compliance along a load is the sum of their squares times that of the link.
     """
@@ -178,7 +178,7 @@ def carriers(term: Term, path: LoadPath) -> FloatArray:
 
 
 def _axes(term: Term, path: LoadPath) -> FloatArray:
-    """(n, k, 3) a: the link's generalised forces are a . F of the tip's force F."""
+    """(n, k, 3) vectors a: the link's generalised forces are a . F under the tip force F."""
     n, direction = len(path), term.direction
     if term.link in ("tool", "platform"):
         columns = {"axial": [2], "radial": [0, 1], "all": [0, 1, 2]}.get(direction) or [AXES[direction]]
@@ -201,14 +201,14 @@ def _axes(term: Term, path: LoadPath) -> FloatArray:
 
 
 def _vertex_carriers(term: Term, path: LoadPath) -> FloatArray:
-    """(n, k, 12) of the vertices of frame or platform: the force of two struts along the vertex's own axes."""
+    """(n, k, 12) vectors for vertices of frame or platform: the force of two struts along the vertex's own axes."""
     joints = path.machine.frame_joints if term.link == "frame" else path.machine.platform_joints
     carried = []
     for number, (pair, outward) in enumerate(frame_vertices(joints), start=1):
         if term.where not in (None, number):
             continue
         row = np.zeros((len(path), 12))
-        if term.direction == "along the struts":  # what both carry together
+        if term.direction == "along the struts":  # the force that both carry together
             row[:, pair] = 1.0
         else:
             across, upright = np.array([-outward[1], outward[0], 0.0]), np.array([0.0, 0.0, 1.0])
@@ -220,7 +220,7 @@ def _vertex_carriers(term: Term, path: LoadPath) -> FloatArray:
 
 
 def along_pins(term: Term, path: LoadPath) -> FloatArray:
-    """(n, 6) share of each strut's force that is along the pin of its joint."""
+    """(n, 6) share of each strut's force along the pin of its joint."""
     joints = path.machine.frame_joints if term.action == "frame pin" else path.machine.platform_joints
     x, y = joints[:, :2].T / np.linalg.norm(joints[:, :2], axis=1)
     pins = np.stack([x, y, 0.0 * x] if term.direction == "radial" else [-y, x, 0.0 * x], axis=1)
@@ -229,7 +229,7 @@ def along_pins(term: Term, path: LoadPath) -> FloatArray:
 
 
 def strut_share(term: Term, path: LoadPath) -> FloatArray:
-    """(n, 6) of each strut per unit of a size: compliance of what is in series with it, stiffness of `turning`."""
+    """(n, 6) per unit of a size, for each strut: compliance in series with it, or stiffness for `turning`."""
     shape = shaped_at(term, path)
     each = np.array(np.broadcast_to(shape[:, None] if shape.ndim == 1 else shape, (len(path), 6)), dtype=float)
     if term.where is not None:
@@ -240,31 +240,31 @@ def strut_share(term: Term, path: LoadPath) -> FloatArray:
 
 
 def spring_rows(term: Term, path: LoadPath) -> FloatArray:
-    """(n, k, 6) by how much the middle of the platform joints moves along a `spring` for a twist of the tip."""
+    """(n, k, 6) motion of the middle of the platform joints along a `spring` for a twist of the tip."""
     axes = np.eye(3)[{"all": [0, 1, 2], "horizontal": [0, 1]}.get(term.direction) or [AXES[term.direction]]]
     lever = np.cross(path.struts.arms.mean(axis=1)[:, None], axes)
     return np.concatenate([np.broadcast_to(axes, lever.shape), lever], axis=2)
 
 
 def spring_stiffness(term: Term, path: LoadPath, stiffness: FloatArray) -> FloatArray:
-    """(n, 6, 6) about the tip of springs of stiffness (n,) N/m."""
+    """(n, 6, 6) stiffness about the tip of springs of stiffness (n,) N/m."""
     rows = spring_rows(term, path)
     return np.asarray(stiffness[:, None, None] * (np.swapaxes(rows, 1, 2) @ rows))
 
 
 def coupled(term: Term) -> tuple[int, int]:
-    """Indices from 0 of the struts of a `coupling`."""
+    """Indices (from 0) of the struts of a `coupling`."""
     return int(term.constants["first"]) - 1, int(term.constants["second"]) - 1
 
 
 def pair_stiffness(term: Term, path: LoadPath) -> FloatArray:
-    """(n,) N/m, the geometric mean of the struts of a `coupling`."""
+    """(n,) N/m, geometric mean of the stiffnesses of the struts of a `coupling`."""
     pair = path.machine.strut_law.stiffness(path.struts.lengths[:, coupled(term)])
     return np.asarray(np.sqrt(pair.prod(axis=1)))
 
 
 def reading_share(term: Term, path: LoadPath) -> FloatArray:
-    """(n,) by how much a `reading` is off per unit of the term's size: a share, or a displacement in m."""
+    """(n,) error of a `reading` per unit of the term's size: a share, or a displacement in m."""
     shape = shaped_at(term, path)
     if term.direction in AXES:
         assert path.direction is not None

@@ -1,4 +1,4 @@
-"""Effect files without code: terms as `[[effect]] name = "term"` entries of a TOML file, which a draft writes.
+"""Effect files without code: terms as `[[effect]] name = "term"` entries of a TOML file, as a draft writes them.
 
 The terms of a file are one effect; those of the geometry and those of readings have one of their own.
 """
@@ -30,7 +30,7 @@ from toolpath_stiff.stiffness.terms import (
 from toolpath_stiff.toml_reader import TomlReader, is_text
 from toolpath_stiff.units import RAD_PER_DEG
 
-# Variable -> unit of its constants in files and its SI value; the rest, and those named below, are plain numbers.
+# Variable -> unit of its constants in files and its SI value; others, and those named below, are plain numbers.
 CONSTANT_UNITS = {
     **dict.fromkeys((*PLACE, "strut length", "tool length"), ("mm", 1e-3)),
     **dict.fromkeys(("strut force", "load"), ("N", 1.0)),
@@ -47,7 +47,7 @@ COLUMNS = {"tilt": ("", *AXES, *SWINGS), "joint offset": ("frame", "platform")}
 
 
 def constant_key(name: str, variable: str) -> tuple[str, float]:
-    """What a constant is called in files, with its unit, and the SI value of that."""
+    """Key of a constant in files, with its unit, and the SI value of that unit."""
     unit, si = CONSTANT_UNITS.get(variable, ("", 1.0))
     return (f"{name}_{unit}", si) if unit and name not in PLAIN else (name, 1.0)
 
@@ -79,7 +79,7 @@ def _shape_entry(term: Term) -> Document:
 
 
 def _range_keys(parameter: Parameter) -> tuple[str, str]:
-    """What bounds and usual sizes are called, with their unit."""
+    """Keys of bounds and usual sizes, with their unit."""
     unit = parameter.key.removeprefix(parameter.name)
     return f"bounds{unit}", f"typical{unit}"
 
@@ -112,7 +112,7 @@ def effects_of_terms(file: str) -> dict[str, Effect]:
 
 
 def _entry(toml: TomlReader, where: str, row: Document) -> tuple[Term, Parameter]:
-    """One entry, checked."""
+    """One entry of a file, checked."""
     _choice(toml, where, row, "name", ("term",))
     link = _choice(toml, where, row, "link", LINKS)
     action = _choice(toml, where, row, "action", [action for action, place in ALONG if place == link])
@@ -132,7 +132,7 @@ def _choice(toml: TomlReader, where: str, row: Document, key: str, choices: Sequ
 
 
 def _parameter(toml: TomlReader, where: str, row: Document, action: str) -> Parameter:
-    """The size, with what it may be."""
+    """Parameter for the size, with its range."""
     size, meaning = (_text(toml, f"{where}.{key}", row.get(key)) for key in ("size", "meaning"))
     usual = size_parameter(action, size, meaning)
     pairs = (row.get(key, pair) for key, pair in zip(_range_keys(usual), (usual.bounds, usual.typical), strict=True))
@@ -144,7 +144,7 @@ def _parameter(toml: TomlReader, where: str, row: Document, action: str) -> Para
 
 
 def _shape(toml: TomlReader, where: str, row: Document, action: str, of: str) -> tuple[str, str, Constants, str]:
-    """Variable, shape, constants and column of an action; "" for a second variable, which is one `of` the first's."""
+    """Variable, shape, constants and column of an action; "" for a second variable, which must suit action `of`."""
     by_strut = of in (*IN_SERIES, "turning")
     seen = [name for name in SEEN if by_strut or name not in (*OF_FORCES, "strut length")]
     variable = _choice(toml, where, row, "varies_with", seen)
@@ -169,7 +169,7 @@ def _shape(toml: TomlReader, where: str, row: Document, action: str, of: str) ->
 
 
 def _place(toml: TomlReader, where: str, row: Document, action: str) -> int | None:
-    """Number of the strut or of the vertex; None: all of them."""
+    """Number of the strut or vertex; None: all of them."""
     number = row.get("where")
     needed = action == "joint offset" or row["link"] == "one strut"
     most = 3 if action == "vertex" else 6 if needed or row["link"] in ("joints", "struts") else 0

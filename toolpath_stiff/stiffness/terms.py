@@ -1,4 +1,4 @@
-"""Terms: one link of the load path that gives way, along some directions, as one variable says.
+"""Terms: one link of the load path that gives way, in some directions, as a function of one variable.
 
 A term has a size and constants that are read off readings; `term_effect` makes effects of terms. Its compliance is
 
@@ -45,7 +45,7 @@ Constants = tuple[tuple[str, float], ...]
 #   reading factor  the deflection is read too large by a share
 #   reading shift   the deflection is read too large by a displacement; m
 NM_PER_N = Parameter("size", "nm/N", 1e-9, (0.0, 500.0), (1.0, 20.0), ASSUMED)
-SIZES: dict[Action, Parameter] = {  # what a machine that still mills can have
+SIZES: dict[Action, Parameter] = {  # sizes possible on a machine that can still mill
     **dict.fromkeys(("give", "vertex", "strut", "frame pin", "platform pin"), NM_PER_N),
     "rocking": Parameter("size", "nrad/N/m", 1e-9, (0.0, 500.0), (0.5, 10.0), ASSUMED),
     "tilting": Parameter("size", "nrad/N/m", 1e-9, (0.0, 5000.0), (1.0, 300.0), ASSUMED),
@@ -73,7 +73,7 @@ EQUATIONS: dict[Action, str] = {  # {} is the size, s its share, h a load
     "reading shift": "F / k_read = F / k + {} s",
 }
 PINS = ("frame pin", "platform pin")
-IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the compliance of each strut by itself
+IN_SERIES = ("strut", "strut factor", *PINS)  # actions that add to the compliance of single struts
 PARALLEL = ("turning", "spring")  # actions that share the load with the struts; not linear in their size
 PAIR = ("first", "second")  # constants of a coupling
 # (action, link) -> directions along which it may act there.
@@ -105,7 +105,7 @@ def _tilt(path: LoadPath, column: str) -> FloatArray:
     return np.asarray(np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2]))
 
 
-# Variable -> its values at n poses, SI: (n,), or (n, 6) of each strut; of the strut forces under the load.
+# Variable -> its values at n poses, SI: (n,), or (n, 6) for each strut; strut forces are those under the load.
 SEEN: dict[str, Callable[[LoadPath, str], FloatArray | None]] = {
     "constant": lambda path, column: np.ones(len(path)),
     "x": lambda path, column: path.position[:, 0],
@@ -123,7 +123,7 @@ SEEN: dict[str, Callable[[LoadPath, str], FloatArray | None]] = {
     "temperature": lambda path, column: path.temperature,
     "direction": lambda path, column: np.ones(len(path)),
 }
-VARIABLES = (*SEEN, "order")  # of the readings, which no effect sees
+VARIABLES = (*SEEN, "order")  # "order" of the readings, which no effect sees
 PLACE = ("x", "y", "z", "radius")
 OF_FORCES = ("strut force", "force sign")
 
@@ -133,7 +133,7 @@ def _growing(v: FloatArray, power: FloatArray, reference: FloatArray) -> FloatAr
 
 
 # Shape and names of its constants -> share s of the variable v in words, and as a function. Coulomb friction holds up
-# to a force `beyond`: (v - beyond) / v gives; play that a force `within` uses up gives no more: min(v, within) / v.
+# to a force `beyond`: share (v - beyond) / v; play is used up at a force `within`: share min(v, within) / v.
 FORMULAS: dict[tuple[str, tuple[str, ...]], tuple[str, Callable[..., FloatArray]]] = {
     ("offset", ()): ("v", lambda v: v),
     ("slope", ("start", "end")): ("(v - start) / (end - start)", lambda v, start, end: (v - start) / (end - start)),
@@ -147,7 +147,7 @@ FORMULAS: dict[tuple[str, tuple[str, ...]], tuple[str, Callable[..., FloatArray]
     ),
     ("threshold", ("from", "end")): (
         "max(0, (v - from) / (end - from))",
-        lambda v, end, **edges: np.maximum((v - edges["from"]) / (end - edges["from"]), 0.0),  # a word of Python's
+        lambda v, end, **edges: np.maximum((v - edges["from"]) / (end - edges["from"]), 0.0),  # a Python keyword
     ),
     ("threshold", ("beyond",)): (
         "max(0, 1 - beyond / v)", lambda v, beyond: np.maximum(1.0 - beyond / np.maximum(v, IDLE), 0.0)
@@ -215,27 +215,27 @@ class Term:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """What the size may be, in `unit`."""
+        """Range of the size, in `unit`."""
         return SIZES[self.action].bounds
 
     @property
     def signed(self) -> bool:
-        """Whether the size may go to both sides."""
+        """True if the size may be negative."""
         return self.bounds[0] < 0.0
 
     @property
     def unseen(self) -> tuple[str, ...]:
-        """Variables that no effect sees: the order of readings and further columns."""
+        """Variables that no effect sees: order of readings and further columns."""
         return tuple(name for name in self.variables if name not in SEEN)
 
     @property
     def acts(self) -> bool:
-        """Whether an effect can see its variables."""
+        """True if an effect can see its variables."""
         return not self.unseen
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """One or two."""
+        """The variable, or both variables."""
         return (self.variable,) if self.times is None else (self.variable, self.times.variable)
 
     @property
@@ -245,29 +245,29 @@ class Term:
 
     @property
     def key(self) -> str:
-        """A name that no other term has: its words, and its constants to six digits."""
+        """Unique name: the term's words, and its constants to six digits."""
         numbers = [f"{name}={value:.6g}" for name, value in self.at]
         named = [self.link, str(self.where or ""), self.action, self.direction, self.variable, self.column, self.shape]
         words = " ".join(part for part in (*named, *numbers) if part)
         return words if self.times is None else f"{words} times {self.times.key.removeprefix(f'{self.link} ')}"
 
     def with_second(self, variable: str, shape: str, at: Constants = (), column: str = "") -> Term:
-        """The same times the share of a second variable, which is not below 0."""
+        """Term multiplied by the share of a second variable, which is not negative."""
         return replace(self, times=replace(self, variable=variable, shape=shape, at=at, column=column, times=None))
 
     def sized(self, size: float) -> Term:
-        """The same with a size (SI)."""
+        """Term with a size (SI)."""
         return replace(self, size=float(size))
 
 
 def variable_values(variable: str, path: LoadPath, column: str = "") -> FloatArray:
-    """Values of a variable at n poses, SI: (n,), or (n, 6) for those of each strut; 0 where nobody gives them."""
+    """Values of a variable at n poses, SI: (n,), or (n, 6) for each strut; 0 where not given."""
     values = SEEN[variable](path, column)
     return np.zeros(len(path)) if values is None else values
 
 
 def shape_values(shape: str, values: FloatArray, constants: Mapping[str, float], signed: bool) -> FloatArray:
-    """s(v) at values of any shape; `at` as of `Term.at`. Not below 0, but for slopes of what may change to both sides.
+    """s(v) of any shape at given values; `constants` as in `Term.at`. Not negative, except slopes if `signed`.
 
     `at` holds numbers, or arrays that broadcast with the values.
     """
@@ -277,7 +277,7 @@ def shape_values(shape: str, values: FloatArray, constants: Mapping[str, float],
 
 
 def shaped(term: Term, values: Callable[[str, str], FloatArray]) -> FloatArray:
-    """s(v) of a term, times t(w) where it has a second variable: (n,), or (n, 6) where it is each strut's own.
+    """s(v) of a term, times t(w) for a second variable: (n,), or (n, 6) if each strut has its own.
 
     `values` gives those of a variable and column. What varies from strut to strut belongs to a single strut where the
     term has one.
@@ -293,13 +293,13 @@ def shaped(term: Term, values: Callable[[str, str], FloatArray]) -> FloatArray:
 
 
 def formula(term: Term, size: str) -> str:
-    """What a term adds, its size and its constants by name."""
+    """Formula of a term's contribution, with its size and its constants by name."""
     along = f" along {term.direction}" if term.link == "instrument" and term.direction in AXES else ""
     return f"{EQUATIONS[term.action].format(size)}{along}, s = {_share_formula(term, term.signed)}"
 
 
 def _share_formula(term: Term, signed: bool) -> str:
-    """The share s as a formula of the variable's name."""
+    """Formula of the share s, in the variable's name."""
     if term.variable in ("constant", "direction"):
         share = "1"
     elif term.variable == "setup":

@@ -1,4 +1,4 @@
-"""An effect tried against the contract on a machine: what `tps effects check` says of it."""
+"""Trial of an effect against the contract on a machine: the results of `tps effects check`."""
 
 import pickle
 import re
@@ -35,7 +35,7 @@ SETUPS = ("riser", "table")
 ALLOW = "--allow-unchecked-effects"
 SAME = 1e-9  # relative: of results that must agree
 
-# SI value of the units that parameters have.
+# SI values of parameters' units.
 PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
 UNITS = {prefix + unit: factor for prefix, factor in PREFIXES.items() for unit in ("m", "N", "rad", "s")}
 UNITS |= {"": 1.0, "m": 1.0, "N": 1.0, "rad": 1.0, "s": 1.0, "K": 1.0, "C": 1.0, "deg": RAD_PER_DEG}
@@ -44,7 +44,7 @@ UNITS |= {"%": 1e-2, "percent": 1e-2, "1": 1.0, "min": 60.0, "h": 3600.0}
 
 @dataclass(frozen=True)
 class TrialOutcome:
-    """One check: its name, whether it passed (None: for information), what was found."""
+    """One check: its name, its result (None: for information), what was found."""
 
     name: str
     passed: bool | None
@@ -52,14 +52,14 @@ class TrialOutcome:
 
 
 def own_effects(model: StiffnessModel, effect_files: Iterable[str | Path]) -> list[Effect]:
-    """Effects from outside the package that act in a model, or compete as of a file; each once."""
+    """Effects from outside the package that act in a model or compete from a file; each once."""
     acting = [active.effect for active in (*model.effects, *model.instruments) if is_foreign(active.effect)]
     in_files = (effect for file in effect_files for effect in effects_from_file(file).values())
     return list(dict.fromkeys([*acting, *in_files]))
 
 
 def refuse_failing(effects: Iterable[Effect], machine: MachineTool, machine_name: str) -> None:
-    """Raise `InputError` for the first effect from outside the package that fails on a machine, which it names."""
+    """Raise `InputError` for the first effect from outside the package that fails on the named machine."""
     for effect, reason in _failing(effects, machine):
         check = command_line("effects", "check", file_of(effect), *options(machine=machine_name))
         hint = f"`{check}` says more; with {ALLOW} (allow_unchecked_effects=True) it is used all the same"
@@ -67,12 +67,12 @@ def refuse_failing(effects: Iterable[Effect], machine: MachineTool, machine_name
 
 
 def failures(effects: Iterable[Effect], machine: MachineTool) -> list[str]:
-    """What results say of effects that were used although they fail."""
+    """Sentences in results on effects that were used although they fail."""
     return [f"UNCHECKED effect {effect.name} ({ALLOW}): it {reason}" for effect, reason in _failing(effects, machine)]
 
 
 def _failing(effects: Iterable[Effect], machine: MachineTool) -> Iterator[tuple[Effect, str]]:
-    """Effects in which `effects check` finds something wrong: the end of a sentence."""
+    """Effects that fail `effects check`, each with the end of a sentence."""
     plain = pickle.dumps(machine.with_changes(effects=(), instruments=()))
     return ((effect, reason) for effect in effects if (reason := _failure(effect, plain)))
 
@@ -107,7 +107,7 @@ def try_effect(effect: Effect, machine: MachineTool, seed: int = 0) -> list[Tria
 
 
 def _behaviour(effect: Effect, machine: MachineTool, seed: int) -> Iterator[TrialOutcome]:
-    """What it does at some poses with one set of parameters after the other."""
+    """Checks of the effect's results at some poses, for one set of parameters after the other."""
     plain, poses = build_model(machine), _poses(machine, seed)
     elements = () if isinstance(machine, Hexapod) else machine.elements
     names = [element.name for element in elements if turns(element) == (effect.link == "joints")]
@@ -117,7 +117,7 @@ def _behaviour(effect: Effect, machine: MachineTool, seed: int) -> Iterator[Tria
     for words, values in _parameter_sets(effect, names):
         model = build_model(machine, extra=[ActiveEffect(effect, values)])
         path = _path(model, poses)
-        solver_of(machine).tip_compliance(model, path)  # refused if there can be no such one
+        solver_of(machine).tip_compliance(model, path)  # raises if the compliance is impossible
         after[words] = _shown(model, path)
     alone = np.concatenate([_shown(model, path.take(slice(i, i + 1))) for i in range(len(path))])
     yield TrialOutcome("shapes", True, f"shapes, finite, symmetric, positive definite: {len(poses)} poses")
@@ -128,13 +128,13 @@ def _behaviour(effect: Effect, machine: MachineTool, seed: int) -> Iterator[Tria
     if np.abs(changes).max() > 100.0 * SAME:
         span = f"{changes.min():+.3g} to {changes.max():+.3g} % (median {np.median(changes):+.3g} %)"
         yield TrialOutcome("size", None, f"at its upper typical value the stiffness changes by {span}")
-    else:  # one drawn from readings may act at a set-up, a load, a corner that is not among these poses
+    else:  # one drawn from readings may act only at a set-up, load or corner not among these poses
         passed = None if effect.described_from else False
         yield TrialOutcome("size", passed, "at its upper typical value it changes nothing at these poses")
     mixed = float(np.abs(alone / after["typical, high"] - 1.0).max())
     mistake = f"alone and together differ by up to {100.0 * mixed:.3g} %: the poses mix"
     yield TrialOutcome("poses", mixed <= SAME, "each alone gives what all together give" if mixed <= SAME else mistake)
-    # What gives way can only soften the tip, what stands beside the struts only stiffen it; others may do both.
+    # Compliances can only soften the tip, parallel stiffnesses only stiffen it; other hooks may do both.
     softening = set(effect.hooks) <= {"strut_compliance", "load_compliance", "element_compliance"}
     side = 1.0 if softening else -1.0 if effect.hooks == ["parallel_stiffness"] else 0.0
     both_ways = any(p.kind == "real" and p.bounds[0] < p.neutral < p.bounds[1] for p in effect.parameters)
@@ -159,7 +159,7 @@ def _poses(machine: MachineTool, seed: int) -> FloatArray:
 
 
 def _parameter_sets(effect: Effect, elements: Sequence[str]) -> Iterator[tuple[str, Values]]:
-    """Words -> SI values."""
+    """Words -> SI values of the parameters."""
     for words, index in (("neutral", None), ("typical, low", 0), ("typical, high", 1)):
         values: dict[str, str | float] = {}
         for p in effect.parameters:
@@ -173,7 +173,7 @@ def _parameter_sets(effect: Effect, elements: Sequence[str]) -> Iterator[tuple[s
 
 
 def _path(model: StiffnessModel, poses: FloatArray) -> LoadPath:
-    """Everything that an effect may ask for: half of the poses on the riser, an hour of time, 5 K."""
+    """Load path with everything that an effect may ask for: half of the poses on the riser, an hour of time, 5 K."""
     n = len(poses)
     ramp, turns = np.linspace(0.0, 1.0, n), rotation_matrices(poses[:, 3:])
     seen = {"setup": np.resize(SETUPS, n), "time": 3600.0 * ramp, "temperature": 20.0 + 5.0 * ramp}
@@ -190,7 +190,7 @@ def _shown(model: StiffnessModel, path: LoadPath) -> FloatArray:
 
 
 def _unit(parameter: Parameter) -> TrialOutcome:
-    """Whether `si` is what the unit says."""
+    """Check that `si` agrees with the unit."""
     meant, name = unit_in_si(parameter.unit), f"unit of {parameter.name}"
     if meant is None:
         return TrialOutcome(name, None, f"{parameter.unit!r} is not known here; si = {parameter.si:g} is not checked")
@@ -206,7 +206,7 @@ def unit_in_si(unit: str) -> float | None:
 
 
 def all_passed(outcomes: Iterable[TrialOutcome]) -> bool:
-    """Whether no check failed."""
+    """True if no check failed."""
     return all(outcome.passed is not False for outcome in outcomes)
 
 
@@ -236,17 +236,17 @@ class EffectCheck(Result):
 
     @property
     def passed(self) -> bool:
-        """Whether every effect keeps the contract."""
+        """True if every effect keeps the contract."""
         return all(map(all_passed, self.trials.values()))
 
     def to_dict(self) -> dict[str, Any]:
-        """Each check of each effect."""
+        """All checks of all effects."""
         trials = self.trials.items()
         rows = [{"effect": name, "passed": all_passed(made), "checks": to_dict(made)} for name, made in trials]
         return {"file": self.file, "machine": self.machine, "passed": self.passed, "effects": rows}
 
     def to_frame(self) -> DataFrame:
-        """One row a check."""
+        """One row per check."""
         trials = self.trials.items()
         return frame_of([{"effect": name, **check} for name, made in trials for check in to_dict(made)])
 

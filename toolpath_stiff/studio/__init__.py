@@ -1,1 +1,1 @@
-"""The studio: a case in the browser, opened and served until it is ended. No physics, no statistics here."""
+"""The studio: a case in the browser, opened and served until it is closed. No physics, no statistics here."""

@@ -1,4 +1,4 @@
-"""What a page may ask a session to do; files that are dropped on it."""
+"""Actions that a page may request of a session, and files dropped on it."""
 
 import re
 import tempfile
@@ -26,7 +26,7 @@ LONGEST_NAME = 200  # bytes: what a file system takes, and what is put before it
 
 
 def do(session: Session, question: Document) -> Document:
-    """Do what a page asks. Raises `InputError` for what cannot be done."""
+    """Carry out the action that a page requests. Raises `InputError` if it is impossible."""
     name = str(question.get("do"))
     if name not in ACTIONS:
         raise InputError(f"nothing called {name!r} can be done")
@@ -44,7 +44,7 @@ def do(session: Session, question: Document) -> Document:
 
 
 def _by_hand(session: Session, on: Mapping[str, Document]) -> Document:
-    # Which readings are wild is found out when the slider is let go.
+    # Outliers are looked for only when the slider is released.
     errors = session.case.preview.at(on, strut_law=bool(on), near=session.case.state.on or None)
     rounded = {"deviation_percent": 3, "modelled_N_per_mm": 0}
     return {**errors, **{name: [round(value, n) for value in errors[name]] for name, n in rounded.items()}}
@@ -66,7 +66,7 @@ def _fit(session: Session) -> None:
 
 
 def _word(effect: tps.Effect, keys: Document) -> str:
-    """An effect as --add takes it: with what it acts on."""
+    """An effect as --add takes it, with the elements that it acts on."""
     discrete = [parameter for parameter in effect.parameters if parameter.discrete]
     chosen = [f"{part.name}={keys[part.key]}" for part in discrete if keys.get(part.key) not in ("", None)]
     return f"{effect.name}:{','.join(chosen)}" if chosen else effect.name
@@ -88,7 +88,7 @@ def _measure(session: Session) -> None:
 
 @contextmanager
 def _sent(session: Session, name: str, content: bytes) -> Iterator[Path]:
-    """What a page has sent, as a file; errors do not name its folder."""
+    """Content sent by a page, as a temporary file; errors do not mention its folder."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / name
         file.write_bytes(content)
@@ -99,7 +99,7 @@ def _sent(session: Session, name: str, content: bytes) -> Iterator[Path]:
 
 
 def take_file(session: Session, name: str, content: bytes, run: bool) -> Document:
-    """A file that was dropped: measurements, a machine, effects, the setup of a cut, else a program."""
+    """Take in a dropped file: measurements, a machine, effects, the setup of a cut, otherwise a program."""
     plain = Path(name.replace("\\", "/")).name or "file"
     if "\0" in plain or len(plain.encode()) > LONGEST_NAME:
         raise InputError(f"a file called {plain[:40]!r}", expected=f"{LONGEST_NAME} bytes at most, none of them zero")
@@ -131,7 +131,7 @@ def _unnumbered(name: str) -> str:
 
 
 def _kind(suffix: str, content: bytes) -> str:
-    """What a file is that was dropped; tables of tools and controller files are known by their headings and keys."""
+    """Kind of a dropped file; tool tables and controller files are recognised by their headings and keys."""
     heading = content[:4096].decode("utf-8-sig", "replace").partition("\n")[0]
     if suffix == ".csv" and {"tool", "length_mm"} <= {cell.strip() for cell in heading.split(",")}:
         return "tools"

@@ -47,7 +47,7 @@ def document(session: Session) -> Document:
 
 
 def result(session: Session, kind: str) -> Document | None:
-    """A result as its command writes it, where it is kept, and what was made with it."""
+    """A result as its command writes it, with the folder that keeps it and the files made from it."""
     latest = session.found(kind)
     if latest is None:
         return None
@@ -55,13 +55,13 @@ def result(session: Session, kind: str) -> Document | None:
 
 
 def machine(session: Session) -> Document:
-    """What the drawing of the machine needs, and the boundary of its reach with the tool as it stands at rest."""
+    """Data for the drawing of the machine, and the boundary of its reach with the tool as it is at rest."""
     on, state = session.machine, session.case.state
     model, key, analysis = on.model.machine, (state.machine, state.effects), session.found("analyze")
     tables = [*([session.readings()] if state.data else []), *([analysis.path] if analysis else [])]
 
     def poses() -> FloatArray:
-        """At the origin, at each reading, along the path: where a machine that is no hexapod is drawn."""
+        """Poses at the origin, at each reading and along the path, for drawing a machine that is not a hexapod."""
         rows = [np.array([table[name] for name in POSE]).T for table in tables]
         return np.array([pose_in_si(row) for row in np.concatenate([[on.origin_mm_deg], *rows]).tolist()])
 
@@ -77,7 +77,7 @@ def machine(session: Session) -> Document:
 
 
 def readings(session: Session) -> Document:
-    """All readings; deviation and model are None for those that are set aside."""
+    """All readings; deviation and model are None for those set aside."""
     columns, aside, now = session.readings(), session.case.state.aside, session.errors()
     out = [f"{file}:{line}" in aside for file, line in zip(columns["file"], columns["line"], strict=True)]
     deviation, modelled = iter(now["deviation_percent"]), iter(now["modelled_N_per_mm"])
@@ -90,7 +90,7 @@ def readings(session: Session) -> Document:
 
 
 def gauge(session: Session) -> Document:
-    """Mean errors in per cent: as the file stands, refitted, now, at left-out points; the noise floor."""
+    """Mean errors in per cent: as filed, refitted, now, at left-out points; and the noise floor."""
     state, preview = session.case.state, session.case.preview
     as_given, refitted = session.once(
         "base", state.judged, lambda: [preview.at(strut_law=law)["mean_abs_error_percent"] for law in (False, True)]
@@ -106,25 +106,25 @@ def gauge(session: Session) -> Document:
             left_out = diagnosed["baseline"]["as_given"]["held_out_error_percent"]
         elif len(on) == 1 and on[0] in rows:
             left_out = diagnosed["candidates"][rows.index(on[0])]["held_out_error_percent"]
-    if fitted:  # what it wrote, form of the machine included
+    if fitted:  # the figures of the fit itself, made with its own form of the machine
         last, floor = fitted["steps"][-1], fitted["noise_floor_percent"]
         error, left_out = last["mean_abs_error_percent"], last["held_out_error_percent"]
     return {"as_given": as_given, "refitted": refitted, "now": error, "left_out": left_out, "floor": floor}
 
 
 def _sizes(candidate: Document) -> Document:
-    """Key -> value, of what a candidate acts on and of its sizes."""
+    """Key -> value of a candidate's elements and sizes."""
     return {**candidate["choice"], **{key: size["value"] for key, size in candidate["parameters"].items()}}
 
 
 def verdict(session: Session) -> Document | None:
-    """What the diagnosis says; None while there is none for these readings."""
+    """Verdict of the diagnosis; None while there is none for these readings."""
     diagnosis = session.document("diagnose")
     return diagnosis and {"sentence": diagnosis["text"].split(". ")[0].rstrip("."), **diagnosis}
 
 
 def effects(session: Session) -> list[Document]:
-    """The catalogue with what a diagnosis says of each, the likeliest first."""
+    """The catalogue with the diagnosis's finding on each effect, the most likely first."""
     candidates = (session.document("diagnose") or {"candidates": []})["candidates"]
     judged = {row["effect"]: row for row in reversed(candidates)}  # of several elements the likeliest
     order = [row["effect"] for row in candidates]
@@ -146,7 +146,7 @@ def effects(session: Session) -> list[Document]:
 
 
 def _slider(parameter: tps.Parameter, candidate: Document, session: Session, of_joints: bool) -> Document:
-    """A parameter: its key, what it is, the ends of its slider, where it begins; elements are `of_joints` or others."""
+    """A parameter's slider: key, description, ends, start; elements are `of_joints` or others."""
     key, neutral, typical = parameter.key, parameter.neutral, parameter.typical
     value = _sizes(candidate).get(key) if candidate else None
     row = {"key": key, "name": parameter.name.replace("_", " "), "unit": parameter.unit}
@@ -169,7 +169,7 @@ def _slider(parameter: tps.Parameter, candidate: Document, session: Session, of_
 
 
 def _setups(session: Session) -> list[str]:
-    """Names of set-ups in the readings, in their order."""
+    """Names of the set-ups in the readings, in order."""
 
     def make() -> list[str]:
         columns = reading_columns(session.case.data.on(session.machine))
@@ -179,7 +179,7 @@ def _setups(session: Session) -> list[str]:
 
 
 def program(session: Session) -> Document:
-    """The program's text and, once it is analyzed, its path."""
+    """Text of the program and, once it has been analyzed, its path."""
     state, analysis = session.case.state, session.found("analyze")
     lines = session.once("lines", session.program_key, lambda: list(session.case.program.lines))
     path, shifted = analysis.path if analysis else None, session.found("compensate")
@@ -201,7 +201,7 @@ def program(session: Session) -> Document:
 
 
 def origin(session: Session) -> list[float]:
-    """Where program zero sits."""
+    """Position of program zero, mm and degrees."""
     state = session.case.state
     if state.origin:
         return [*state.origin, 0.0, 0.0, 0.0][:6]
@@ -210,7 +210,7 @@ def origin(session: Session) -> list[float]:
 
 
 def placement(session: Session) -> Document:
-    """The figures where the program sits and where it sat; the front of the last search and the set-up sheet."""
+    """Figures where the program sits now and where it sat before; front of the last search; set-up sheet."""
     now, before, place = None, None, origin(session)
     with suppress(TpsError):
         key, trial = session.key("place"), session.trial()

@@ -1,4 +1,4 @@
-"""The process that those for long work are forked from: it loads the libraries once, beside the studio's own start."""
+"""A process with the libraries preloaded, beside the studio's own start, from which workers are forked."""
 
 import multiprocessing
 from multiprocessing import forkserver
@@ -8,7 +8,7 @@ MODULES = ("studio.work", "correction.update", "diagnosis.diagnose", "analysis.r
 
 
 def prepared() -> BaseContext:
-    """Processes that begin with the libraries loaded, from now on, where the system can do that; else from scratch."""
+    """Context for new processes: forked with the libraries loaded if the system allows it, otherwise from scratch."""
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")

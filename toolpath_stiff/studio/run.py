@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise: int | None) -> Case:
-    """The case of a folder, or a new one. Raises `InputError` where machine or exercise are of a case that is there."""
+    """Case in a folder, existing or new. Raises `InputError` if an existing one is given machine or exercise."""
     prepared()  # beside what is loaded here
     from toolpath_stiff.case.case import Case
     from toolpath_stiff.case.state import CASE_FILE
@@ -36,7 +36,7 @@ def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise
 
 
 def serve(case: Case, port: int = 0, *, browser: bool = True) -> int:
-    """Serve until Ctrl-C or a request to end; returns 0. Raises `InputError` where the port is taken."""
+    """Serve until Ctrl-C or a request to end; returns 0. Raises `InputError` if the port is taken."""
     from toolpath_stiff.studio.server import Studio
     from toolpath_stiff.studio.session import Session
 

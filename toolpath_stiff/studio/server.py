@@ -60,11 +60,11 @@ class Studio(ThreadingHTTPServer):
 
     @property
     def address(self) -> str:
-        """What a browser opens."""
+        """Address that the browser opens."""
         return f"http://127.0.0.1:{self.server_port}/?token={self.token}"
 
     def close(self) -> None:
-        """Stop serving and end what runs beside the page."""
+        """Stop serving and end the work under way."""
         self.closing.set()
         self.session.close()
         self.shutdown()
@@ -72,7 +72,7 @@ class Studio(ThreadingHTTPServer):
 
 
 class Handler(BaseHTTPRequestHandler):
-    """One connection."""
+    """One HTTP connection."""
 
     server: Studio
     protocol_version = "HTTP/1.1"
@@ -81,10 +81,10 @@ class Handler(BaseHTTPRequestHandler):
     disable_nagle_algorithm = True  # head and body go out at once: a hand at a slider would wait 40 ms for each answer
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing on the terminal: the page says what is wrong."""
+        """Log nothing on the terminal: the page reports errors."""
 
     def do_GET(self) -> None:
-        """The page, the state, the events, results; by POST what is to be done, and files."""
+        """Serve the page, the state, the events and results; POST carries actions and files."""
         try:
             if self._refused():
                 self.close_connection = True
@@ -166,7 +166,7 @@ class Handler(BaseHTTPRequestHandler):
         return self._send(HTTPStatus.NOT_FOUND, "there is no such page", "text/plain")
 
     def _events(self) -> None:
-        """The session's version after every change, until the tab is closed."""
+        """Send the session's version after every change, until the tab is closed."""
         self.send_response(HTTPStatus.OK)
         self.send_header("Content-Type", "text/event-stream")
         self.send_header("Cache-Control", "no-store")
@@ -185,7 +185,7 @@ class Handler(BaseHTTPRequestHandler):
         folder = self.server.session.case.folder.resolve()
         file = (folder / name.replace("\0", "")).resolve()
         room = file.relative_to(folder).parts[0] if file.is_relative_to(folder) and file != folder else "exercise"
-        # Programs have any suffix; among the results there is nothing that the tool has not written.
+        # Programs may have any suffix; everything among the results was written by the tool.
         known = PLAIN.get(file.suffix, "text/plain" if room == "results" else "")
         if not known or "exercise" in room or not is_file(file):
             return self._send(HTTPStatus.NOT_FOUND, "there is no such file in the case", "text/plain")

@@ -1,4 +1,4 @@
-"""What all tabs of a studio share: the case, what was found, the work under way."""
+"""State shared by all tabs of a studio: the case, the results so far, the work under way."""
 
 import json
 import threading
@@ -17,13 +17,13 @@ from toolpath_stiff.studio.work import Job, Reply
 
 READING = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "dx", "dy", "dz", "stiffness_N_per_mm", "force_N")
 OF_PATH = ("analyze", "compensate")
-OF_READINGS = ("diagnose", "update", "plan")  # results that a studio takes up again
+OF_READINGS = ("diagnose", "update", "plan")  # results that a reopened studio reloads
 
 Made = TypeVar("Made")
 
 
 def fitted_sizes(update: Document) -> Mapping[str, Document]:
-    """Effect -> key -> value of the last model of an update's document."""
+    """Effect -> key -> value of the last model in an update's document."""
     return {
         name: {key: size["value"] if isinstance(size, dict) else size for key, size in sizes.items()}
         for name, sizes in update["steps"][-1]["parameters"].items()
@@ -65,16 +65,16 @@ class Session:
             return document
         return None
 
-    # What tabs are told.
+    # News for the tabs.
 
     def wait(self, seen: tuple[int, int], seconds: float) -> tuple[int, int]:
-        """The version and the beat of the work, as soon as one of them is another."""
+        """Version of the state and beat of the work, as soon as either differs from `seen`."""
         with self._changed:
             self._changed.wait_for(lambda: (self._version, self._beat) != seen, seconds)
             return self._version, self._beat
 
     def news(self) -> Document:
-        """What tabs are told at once: the version of the state, the work under way, the last message."""
+        """Immediate news for the tabs: version of the state, work under way, last message."""
         job, shown = self._running, None
         if job:
             text, done, total = job.progress
@@ -82,28 +82,28 @@ class Session:
         return {"version": self._version, "job": shown, "message": self.message}
 
     def tell(self, state: bool = True) -> None:
-        """Wake all tabs; `state`: it is another than before."""
+        """Wake all tabs; `state` says that the state has changed."""
         with self._changed:
             self._version += state
             self._beat += 1
             self._changed.notify_all()
 
-    # What holds, each worked out once.
+    # The present state, each part worked out once.
 
     @property
     def path_key(self) -> tuple[object, ...]:
-        """What the analysis of the program hangs on."""
+        """Everything that the analysis of the program depends on."""
         state = self.case.state
-        fitted = bool(state.on) and self.is_fitted  # a fit knows how well it knows: its machine has a band
+        fitted = bool(state.on) and self.is_fitted  # a fit knows its own uncertainty, so its machine has a band
         return (self.key("place"), fitted, state.origin, state.require, state.cut)
 
     @property
     def program_key(self) -> tuple[str, str]:
-        """The program and how it is read."""
+        """The program and its reading settings."""
         return (self.case.state.program, str(self.case.state.reading))
 
     def once(self, name: str, key: object, make: Callable[[], Made]) -> Made:
-        """What `make` gives, worked out once for a key."""
+        """Result of `make`, computed once for a key."""
         if name not in self._kept or self._kept[name][0] != key:
             self._kept[name] = (key, make())
         made: Made = self._kept[name][1]
@@ -116,24 +116,24 @@ class Session:
         return self.once("machine", (state.machine, state.effects), lambda: self.case.machine)
 
     def errors(self) -> Document:
-        """The error of every reading in use as the switches stand."""
+        """Error of every reading in use, with the effects as switched."""
         on = self.case.state.on
         return self.once("errors", (self.case.state.judged, on), lambda: self.case.preview.at(on, strut_law=bool(on)))
 
     def catalogue(self) -> tps.EffectCatalogue:
-        """The effects that can be switched on."""
+        """Effects that can be switched on."""
         files, kind = self.case.effect_files, self.machine.model.machine.kind
         return self.once("catalogue", (files, kind), lambda: tps.effects(files, kind=kind))
 
     def trial(self) -> tps.PlacementTrial:
-        """The program that can be put anywhere."""
+        """The program, ready to be evaluated at any placement."""
         case = self.case
         return self.once(
             "trial", self.key("place"), lambda: tps.try_placement(case.program, case.machine_with(case.state.on))
         )
 
     def readings(self) -> Mapping[str, list[Any]]:
-        """All readings of the case, those set aside too, as columns."""
+        """All readings of the case as columns, including those set aside."""
         state = self.case.state
 
         def make() -> Mapping[str, list[Any]]:
@@ -147,27 +147,27 @@ class Session:
     # What was found.
 
     def found(self, kind: str) -> Reply | None:
-        """What was found last, if it still holds."""
+        """Last result of a kind, if it still holds."""
         return self._found.get((kind, self.key(kind)))
 
     def document(self, kind: str) -> Document | None:
-        """The document of what was found last, if it still holds."""
+        """Document of the last result of a kind, if it still holds."""
         latest = self.found(kind)
         return latest.document if latest else None
 
     def failed(self, kind: str) -> str:
-        """Why the last attempt for this state failed; "" where it did not."""
+        """Reason why the last attempt for this state failed; "" if it did not."""
         key, text = self._failed.get(kind, (None, ""))
         return text if key == self.key(kind) else ""
 
     @property
     def is_fitted(self) -> bool:
-        """True where the switches stand as the last fit has them."""
+        """True if the switches stand as the last fit set them."""
         fit = self.document("update")
         return fit is not None and self.case.state.on == fitted_sizes(fit)
 
     def revealed(self) -> Document | None:
-        """What the opened seal of the present exercise has shown."""
+        """Content of the opened seal of the present exercise."""
         exercise = self.case.state.exercise
         steps = [step for step in self.case.history if step.kind == "reveal" and step.state.exercise == exercise]
         return self._document_of(steps[-1]) if steps else None
@@ -175,7 +175,7 @@ class Session:
     # The work.
 
     def key(self, kind: str) -> object:
-        """What the state holds of that on which this kind of result hangs."""
+        """The part of the state that a kind of result depends on."""
         state = self.case.state
         if kind in ("place", "set_up"):
             on = state.judged if state.on else (state.machine, state.effects)
@@ -183,12 +183,12 @@ class Session:
         return self.path_key if kind in OF_PATH else state.judged
 
     def queue(self, kind: str, **given: Any) -> None:
-        """Ask for a result before all that waits."""
+        """Request a result, ahead of everything that waits."""
         self._failed.pop(kind, None)
         self._jobs.insert(0, (kind, given))
 
     def follow_up(self) -> None:
-        """Stop what has lost its reason; ask for what the state wants; start the next."""
+        """Stop work that is out of date, request what the state needs, start the next job."""
         state, running = self.case.state, self._running
         if running and running.key != self.key(running.kind):
             running.stop()
@@ -224,7 +224,7 @@ class Session:
         self.tell()
 
     def _take(self, job: Job, answer: Reply) -> None:
-        """An answer into the history; what was fitted or drafted acts from now on."""
+        """Enter a finished job's result into the history; a fit or a drafted effect takes effect from now on."""
         self._found[job.kind, job.key] = answer
         case, state = self.case, self.case.state
         known = [(step.kind, step.command) for step in case.history if step.state == state]
@@ -240,7 +240,7 @@ class Session:
                 case.add_effects(case.folder / answer.file)
 
     def cancel(self) -> None:
-        """End the work under way, and forget what waits."""
+        """End the work under way, and drop what waits."""
         self._jobs = []
         if self._running:
             self._failed[self._running.kind] = (self._running.key, "stopped")

@@ -1,4 +1,4 @@
-"""Long work beside the page: one process at a time, which reports how far it is and can be stopped at any moment."""
+"""Long work beside the page: one process at a time, which reports its progress and can be stopped at any moment."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from toolpath_stiff.report.curves import extremes_by_column
 from toolpath_stiff.studio.preloading import prepared
 from toolpath_stiff.units import mm_from_m, um_from_m
 
-COARSE_SAMPLES = 6000  # of a path in the page; the statistics are those of all samples
+COARSE_SAMPLES = 6000  # of a path drawn in the page; statistics use all samples
 REPORTS_EVERY = 0.2  # s
 DRAWN = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "s_mm", "t_s", "margin")
 
 
 class Job:
-    """A task in a process of its own.
+    """A task in its own process.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Job:
         theirs.close()
 
     def follow(self, reported: Callable[[], None], done: Callable[[Job, Reply | None, str], None]) -> None:
-        """In a thread: `reported` after every report, `done` with the answer, or None and what went wrong."""
+        """Watch in a thread: call `reported` on each report, `done` with the answer, or with None and the error."""
 
         def listen() -> None:
             answer, error = None, "stopped"
@@ -66,12 +66,12 @@ class Job:
         threading.Thread(target=listen, daemon=True).start()
 
     def stop(self) -> None:
-        """End it at once; nothing of it is kept."""
+        """End the job at once; nothing of it is kept."""
         self._process.kill()
 
 
 def work(folder: Path, kind: str, result: str, given: Document, first: str, pipe: Connection) -> None:
-    """The process: one task, reports, one answer."""
+    """Main function of the process: one task, its progress reports, one answer."""
     last = 0.0
 
     def tell(text: str, done: int, total: int) -> None:
@@ -90,7 +90,7 @@ def work(folder: Path, kind: str, result: str, given: Document, first: str, pipe
 
 @dataclass(frozen=True)
 class Reply:
-    """What the page needs of a result.
+    """The part of a result that the page needs.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Reply:
 def answer(
     case: Case, kind: str, result: str, given: Document, first: str, tell: Callable[[str, int, int], None]
 ) -> Reply:
-    """What the page needs of a result that is kept in the case; `first`: the machine to hold an analysis against."""
+    """The page's part of a result kept in the case; `first`: the machine with which to compare an analysis."""
     case.plots = kind == "compare"  # the only one whose page is opened from the studio
     tell(kind, 0, 0)
     kept, command = find(case, kind, result, tell, **given)
@@ -140,7 +140,7 @@ def answer(
 
 
 def _columns(analysis: tps.Analysis, before: tps.Analysis) -> Document:
-    """What the page draws of a path: at most so many samples, the lowest and the highest of every stretch."""
+    """A path's columns for drawing: at most so many samples, the lowest and the highest of every stretch."""
     frame, given = analysis.to_frame(), before.to_frame()["stiffness_N_per_mm"].to_numpy()
     stiffness, band = frame["stiffness_N_per_mm"].to_numpy(), analysis.deviation_N_per_mm
     rows = _thinned(stiffness, np.flatnonzero(np.diff(frame["line"], prepend=-1, append=-1)[:-1]))
@@ -159,7 +159,7 @@ def _columns(analysis: tps.Analysis, before: tps.Analysis) -> Document:
 
 
 def _cut_columns(analysis: tps.Analysis, rows: Any) -> Document:
-    """Error of the surface (um), that of the largest size at each sample, and width of cut (mm); nothing without."""
+    """Surface error (um), the largest at each sample, and width of cut (mm); empty without a cut."""
     cut = analysis.cut
     if cut is None:
         return {}
@@ -170,7 +170,7 @@ def _cut_columns(analysis: tps.Analysis, rows: Any) -> Document:
 
 
 def _thinned(values: Any, starts: Any) -> Any:
-    """Rows of a drawing: all, or the lowest and highest of each of many stretches, and starts of lines."""
+    """Rows to draw: all, or the lowest and highest of each of many stretches, plus the starts of lines."""
     if len(values) <= COARSE_SAMPLES:
         return np.arange(len(values))
     some = starts[:: max(1, len(starts) // (COARSE_SAMPLES // 3))]
@@ -179,5 +179,5 @@ def _thinned(values: Any, starts: Any) -> Any:
 
 
 def _plain(values: Any, digits: int) -> list[float | None]:
-    """Rounded numbers as JSON has them."""
+    """Rounded numbers in the form that JSON takes."""
     return [float(value) if np.isfinite(value) else None for value in np.round(values, digits)]

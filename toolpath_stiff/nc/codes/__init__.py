@@ -1,1 +1,1 @@
-"""The codes: what a code is, in which modal group it stands, and when in its block it acts."""
+"""Codes: what a code is, its modal group, and its place in the order of execution."""

@@ -1,4 +1,4 @@
-"""The path of the tool centre under cutter compensation (`compensation`), as it is recorded. mm.
+"""Recorded path of the tool centre under cutter compensation (`compensation`). mm.
 
 The program keeps its own coordinates: `Frames.position` is the programmed point. What is recorded is the path of the
 tool centre; the ends of the last moves are set back in the recorder when the next corner is concave.
@@ -17,7 +17,7 @@ SAME_PLACE = 1e-9  # mm; a step of less in the plane is none
 
 
 def offset_move(state: State, cutter: RadiusCompensation, move: Move, control: list[float]) -> bool:
-    """Record what a programmed move makes of the tool centre's path. Returns whether any move was added.
+    """Record the tool centre's path for a programmed move. Returns True if any move was added.
 
     `move`: as programmed, from where the tool centre stands; `control`: its programmed end in control coordinates.
     Raises `ArcError`.
@@ -48,7 +48,7 @@ def offset_move(state: State, cutter: RadiusCompensation, move: Move, control: l
 def _go_round_corner(
     state: State, cutter: RadiusCompensation, move: Move, step: CenterMove, start: complex, there: list[float]
 ) -> None:
-    """End the moves before the corner, and go round it if it is convex; rotary axes turn on the way round.
+    """End the moves before the corner, and go round it if convex; rotary axes turn on the way round.
 
     Straight moves round it are at the feed of the block; rotary axes have turned at the first one's end.
     """
@@ -71,7 +71,7 @@ def _go_round_corner(
 
 
 def _add(state: State, cutter: RadiusCompensation, move: Move, end: list[float], arc: OffsetArc | None) -> Move | None:
-    """Record a move of the tool centre to a point in program coordinates; None if it goes nowhere."""
+    """Record a move of the tool centre to a point in program coordinates; None if it has no length."""
     assert cutter.position is not None
     frames, here = state.frames, cutter.position
     move.start = to_setup_of_program(frames, here)
@@ -82,7 +82,7 @@ def _add(state: State, cutter: RadiusCompensation, move: Move, end: list[float],
 
 
 def settle(state: State, cutter: RadiusCompensation, to: complex) -> None:
-    """Move the end of the pending moves; raises `ArcError` where the tool would have to go back."""
+    """Move the end of the pending moves; raises `ArcError` if the tool would have to go back."""
     assert cutter.position is not None
     for pending in cutter.pending:
         geometry.refuse_arc_if(_gouges(cutter, pending, to), compensation.GOUGE, compensation.SMALLER)
@@ -96,13 +96,13 @@ def settle(state: State, cutter: RadiusCompensation, to: complex) -> None:
 
 
 def _row(state: State, move: Move) -> int:
-    """Place of a move among the recent ones, of which it is one of the last."""
+    """Index of a move among the recent ones, near their end."""
     recent = state.recorder.recent
     return next(row for row in range(len(recent) - 1, -1, -1) if recent[row] is move)
 
 
 def _gouges(cutter: RadiusCompensation, move: Pending, to: complex) -> bool:
-    """Whether a move that ends at `to` would go back, or round the wrong way."""
+    """True if a move that ends at `to` would go back, or the wrong way round."""
     anchor, arc = cutter.anchor, move.arc
     if arc is None:
         return (move.direction.conjugate() * (to - anchor)).real < 0.0
@@ -112,7 +112,7 @@ def _gouges(cutter: RadiusCompensation, move: Pending, to: complex) -> bool:
 
 
 def arc_about(state: State, here: list[float], center: complex, sweep: float) -> Arc:
-    """The arc about a point of the plane in force, from a point in program coordinates."""
+    """Arc about a point of the plane in force, from a point in program coordinates."""
     frames, middle, (first, second, _) = state.frames, list(here), geometry.PLANES[state.plane]
     middle[first], middle[second] = center.real, center.imag
     x, y, z = to_setup_of_program(frames, middle)[:3]
@@ -120,7 +120,7 @@ def arc_about(state: State, here: list[float], center: complex, sweep: float) ->
 
 
 def _rewrite(state: State, cutter: RadiusCompensation, pending: Pending) -> None:
-    """The recorded move of one whose end has changed."""
+    """Update the recorded move of a pending one whose end has changed."""
     move, arc, recent = pending.move, pending.arc, state.recorder.recent
     if move is None:
         return

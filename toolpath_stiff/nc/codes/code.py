@@ -1,4 +1,4 @@
-"""A code: its name, its modal group (`state`), what it does, and the manual that it follows.
+"""A code: its name, its modal group (`state`), its function, and the manual that it follows.
 
 Each module here has a group of codes, each a function and a row; `registry` joins the rows to one table.
 """
@@ -55,18 +55,18 @@ class Code:
 
     @property
     def when(self) -> Group:
-        """Its step of the order of execution."""
+        """Step of the order of execution at which it acts."""
         return self.step or self.group
 
     @property
     def rank(self) -> int:
-        """Its place in the order of execution."""
+        """Position in the order of execution."""
         return STEPS[self.when]
 
 
 @dataclass(frozen=True)
 class Refused:
-    """A code that changes the path, or what a force does to it, in a way that is not supported: what it is, a hint."""
+    """An unsupported code that changes the path, or the effect of a force on it: its meaning, and a hint."""
 
     name: str
     what: str
@@ -82,7 +82,7 @@ def family(
     controls: tuple[str, ...] = EVERYWHERE,
     listed: str = "",
 ) -> tuple[Code, ...]:
-    """Codes of one function, by their names and meanings.
+    """Codes with one function, by their names and meanings.
 
     Examples
     --------
@@ -96,7 +96,7 @@ Rows = tuple[tuple[Group, str, tuple[tuple[str, Act, str], ...]], ...]  # group,
 
 
 def table(rows: Rows, controls: tuple[str, ...], between: str | None = None) -> dict[str, Code]:
-    """Codes of a language by their names, which stand between blanks, or other separators."""
+    """Codes of a language by name; names are separated by blanks, or by `between`."""
     return {
         name: Code(name, group, act, meaning, source, controls)
         for group, source, members in rows
@@ -106,12 +106,12 @@ def table(rows: Rows, controls: tuple[str, ...], between: str | None = None) -> 
 
 
 def refused(rows: Iterable[tuple[str, str, str, str]], between: str | None = None) -> dict[str, Refused]:
-    """Refused codes by their names: names between blanks, or other separators, what they are, a hint, the source."""
+    """Refused codes by name: names separated by blanks or by `between`, their meaning, a hint, the source."""
     return {name: Refused(name, what, hint, at) for names, what, hint, at in rows for name in names.split(between)}
 
 
 def code_name(letter: str, value: float) -> str:
-    """`G` and 59.3 to "G59.3", `G` and 1.0 to "G1".
+    """Name of a code: `G` and 59.3 give "G59.3", `G` and 1.0 give "G1".
 
     Examples
     --------
@@ -132,4 +132,4 @@ def m_codes(section: str) -> str:
 
 
 def holds_anyway(state: State, block: CurrentBlock, code: str) -> None:
-    """What the code asks for does not affect a path, or holds anyway."""
+    """Do nothing: the code does not affect a path, or its state holds anyway."""

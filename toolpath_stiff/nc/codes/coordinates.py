@@ -1,4 +1,4 @@
-"""Where program zero is, and how the program's axes lie: work offsets, G10, shifts (G52, G92), rotation (G68).
+"""Position of program zero and orientation of the program's axes: work offsets, G10, shifts (G52, G92), rotation (G68).
 
 Rotation follows Fanuc's milling controls (operator's manuals of the series 16 and 15i, "Coordinate system rotation").
 Where these manuals leave the point to parameters or forbid the block, it is refused. mm and degrees.
@@ -35,7 +35,7 @@ def additional_offset(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _take_additional(state: State, block: CurrentBlock, word: Word, code: str, number: int | None) -> None:
-    """An additional offset, by the code and the number that the controller file has it under."""
+    """Put an additional offset in force, by its code and its number in the controller file."""
     if number is None or number > ADDITIONAL_OFFSETS[code]:
         raise block.fail(word, "needs the number of its offset", f"P1 to P{ADDITIONAL_OFFSETS[code]}")
     if number not in state.frames.offsets.additional:
@@ -45,7 +45,7 @@ def _take_additional(state: State, block: CurrentBlock, word: Word, code: str, n
 
 
 def take_offset(state: State, block: CurrentBlock, word: Word, index: int) -> None:
-    """The work offset of an index from here on."""
+    """Put the work offset with an index in force."""
     frames = state.frames
     if index != frames.active:
         refuse_while_rotated(state, block, word, "takes another work offset")
@@ -56,13 +56,13 @@ def take_offset(state: State, block: CurrentBlock, word: Word, index: int) -> No
 
 
 def _zero_moved(state: State) -> None:
-    """Note that the zero of turned coordinates moved: LinuxCNC's rs274 forgets it at the next M6."""
+    """Note that the zero of rotated coordinates has moved: LinuxCNC's rs274 forgets it at the next M6."""
     if state.frames.offsets.at(state.frames.active).rotation:
         state.rotation_changed = True
 
 
 def set_offsets(state: State, block: CurrentBlock, code: str) -> None:
-    """G10: L2 and L20 set work offsets, L1 a tool of the table; on Fanuc's and Haas' controls as they have it."""
+    """G10: L2 and L20 set work offsets, L1 a tool of the table; on Fanuc's and Haas' controls by their own rules."""
     fanuc = state.dialect.increments
     largest: dict[float, int] = {1: 10**9, 2: len(WORK_OFFSETS), 20: len(WORK_OFFSETS)}
     if fanuc:
@@ -83,7 +83,7 @@ def set_offsets(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _set_offset(state: State, block: CurrentBlock, code: str, number: int, from_here: bool) -> None:
-    """L2, L20: the numbers of an offset, or of the present point in it."""
+    """L2, L20: set the numbers of an offset, or make it give the present point these numbers."""
     frames = state.frames
     additional = frames.active >= len(WORK_OFFSETS)
     block.refuse_if(number == 0 and additional, code, "P0 while an additional offset is in force", "P1 to P9")

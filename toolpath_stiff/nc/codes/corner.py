@@ -20,7 +20,7 @@ SAME_MM = 1e-9
 
 
 def corner(state: State, block: CurrentBlock, code: str) -> None:
-    """`,C` and `,R`: the corner to the next block is cut off or rounded."""
+    """`,C` and `,R`: cut off or round the corner to the next block."""
     word, size, recent = block.values[code], block.take(code) or 0.0, state.recorder.recent
     block.refuse_if(state.dialect.name == "linuxcnc", word, "is not a word of the dialect linuxcnc", "fanuc or haas")
     block.refuse_if(size <= 0.0, word, "is the size of a corner", "more than 0")
@@ -31,7 +31,7 @@ def corner(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
-    """Shorten the move before this one, and add the corner between them; the tool then stands at its end."""
+    """Shorten the move before this one and add the corner between them, where the tool then stands."""
     pending, frames, before = state.corner, state.frames, state.recorder.recent[-1]
     assert pending is not None
     others = [group for group in block.groups if group not in ("motion", "distance") and not group.startswith("M ")]
@@ -52,7 +52,7 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     before_corner, corner_point, after_corner = (complex(point[first], point[second]) for point in points)
     lines = ((before_corner, corner_point, None, 0), (corner_point, after_corner, None, 0))
     cut = cut_off(*lines, size, rounded)
-    if cut is None:  # the path goes straight on
+    if cut is None:  # no corner: the path goes straight on
         return
 
     def in_setup(place: complex) -> list[float]:

@@ -10,7 +10,7 @@ from toolpath_stiff.nc.state import CurrentBlock, State
 
 LEFT, RIGHT = 1, -1
 SIDES = {"G41": LEFT, "G41.1": LEFT, "G42": RIGHT, "G42.1": RIGHT}
-# What may stand in a block while compensation is on: all that LinuxCNC allows there and that leaves its path defined.
+# Codes allowed in a block while compensation is on: those that LinuxCNC allows and that leave the path defined.
 GROUPS = {
     "motion", "cutter compensation", "distance", "arc distance", "feed mode", "spindle mode", "lathe diameter",
     "M spindle", "M coolant", "M subprogram",
@@ -19,7 +19,7 @@ MOTIONS = ("G0", "G1", "G2", "G3")
 
 
 def switch_on(state: State, block: CurrentBlock, code: str) -> None:
-    """G41, G42 D: the tool is left or right of the contour, by the diameter in the tool table; D of G41.1 is it."""
+    """G41, G42 D: the tool is left or right of the contour, by its diameter in the tool table; G41.1: by D itself."""
     word, frames = block.codes[code], state.frames
     straight = state.dialect.increments  # Fanuc, Haas
     _check_codes(state, block, ("plane", "units", "M tool change"))
@@ -40,7 +40,7 @@ def switch_on(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _diameter(state: State, block: CurrentBlock, code: str) -> float:
-    """Diameter that G41, G42 name: D is a tool's number, in G41.1 and G42.1 the diameter."""
+    """Diameter for G41, G42: D is a tool's number, in G41.1 and G42.1 the diameter itself."""
     word = block.codes[code]
     if code.endswith(".1"):
         diameter = block.take("D")
@@ -49,7 +49,7 @@ def _diameter(state: State, block: CurrentBlock, code: str) -> float:
         return diameter * state.length_scale
     number = block.whole("D", word, 0)
     block.refuse_if(not number and state.renamed, word, "of the tool in the spindle after M61", f"D{state.tool}")
-    tool = number or state.tool  # D0: of the tool in the spindle
+    tool = number or state.tool  # D0 means the tool in the spindle
     entry = (state.tools or {}).get(tool)
     if entry is None or math.isnan(entry.diameter):
         hint = "give it in a tool table (--tools FILE), or G41.1 D"
@@ -71,7 +71,7 @@ def switch_off(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def check_block(state: State, block: CurrentBlock) -> None:
-    """Refuse what changes coordinates or the tool while compensation is on."""
+    """Refuse codes that change coordinates or the tool while compensation is on."""
     if state.cutter is not None:
         _check_codes(state, block, ())
 

@@ -19,7 +19,7 @@ CYCLES = ("G73", "G74", "G76", "G81", "G82", "G83", "G84", "G85", "G86", "G89")
 TAPS = ("G74", "G84")
 PECKS, DWELLS = ("G73", "G83"), ("G82", "G89")
 MOST_REPEATS = 10_000
-RENEWED = ("level", "unit")  # what one cycle leaves to another one of its run
+RENEWED = ("level", "unit")  # state that one cycle passes on to the next in its run
 
 
 def return_level(state: State, block: CurrentBlock, code: str) -> None:
@@ -28,14 +28,14 @@ def return_level(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def begin_cycle(state: State, code: str) -> None:
-    """Another cycle than the one in force forgets its words; within a run the level and the unit stay."""
+    """Forget the words of the cycle in force when another begins; within a run the level and the unit stay."""
     if code != state.motion:
         kept = RENEWED if state.motion in CYCLES else ()
         state.sticky = {name: state.sticky[name] for name in kept if name in state.sticky}
 
 
 def cycle(state: State, block: CurrentBlock, code: str) -> None:
-    """One block of a canned cycle: its holes, expanded."""
+    """Execute one block of a canned cycle: its holes, expanded."""
     given = "motion" in block.groups
     if not given and not any(block.has(letter) for letter in AXES):
         return
@@ -52,7 +52,7 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     retract, bottom = _heights(state, block, code, initial)
     if not repeats:  # L0, or Fanuc's K0: the words are kept for the blocks that follow, and nothing moves
         return
-    # As measured on LinuxCNC: a run that began below R goes to R first; otherwise a tool at or below R goes to the
+    # As observed on LinuxCNC: a run that began below R goes to R first; otherwise a tool at or below R goes to the
     # level above the holes on its way to the next one.
     if initial < retract:
         _along_normal(state, block, normal, retract, RAPID)
@@ -88,14 +88,14 @@ def _repeats(state: State, block: CurrentBlock) -> int:
     if letter is None:
         return 1
     block.take(letter)
-    word = block.as_written(letter)  # a count, whatever a bare K length is
+    word = block.as_written(letter)  # a count, whatever a K without a point means as a length
     wrong = word.value != int(word.value) or not 0 <= word.value <= MOST_REPEATS
     block.refuse_if(wrong, word, "is not a number of repeats", "a whole number from 0")
     return int(word.value)
 
 
 def _keep_heights(state: State, block: CurrentBlock, code: str, normal: int) -> None:
-    """G90 or G91 since Z and R were given: Fanuc's hole stays where it is, LinuxCNC reads the numbers again."""
+    """Handle G90 or G91 after Z and R were given: Fanuc's hole stays where it is, LinuxCNC reads the numbers again."""
     absolute, retract, bottom = state.heights
     if absolute == state.absolute or not {"R", "Z", "level"} <= state.sticky.keys():
         return
@@ -112,7 +112,7 @@ def _keep_heights(state: State, block: CurrentBlock, code: str, normal: int) -> 
 
 
 def _cycle_words(state: State, block: CurrentBlock, code: str, normal: int, given: bool) -> dict[int, float]:
-    """Take the block's words; R, Q, P and the bottom stay in force, the place of the hole is returned."""
+    """Take the block's words: R, Q, P and the bottom stay in force, the position of the hole is returned."""
     for letter in "RQ":
         value = block.take(letter)
         if value is not None:
@@ -134,7 +134,7 @@ def _cycle_words(state: State, block: CurrentBlock, code: str, normal: int, give
 
 
 def _words_of_one_control(state: State, block: CurrentBlock, code: str) -> None:
-    """I, J, K of Haas' pecks; what taps and fine boring have besides, which changes no cut."""
+    """Take words of single controls: I, J, K of Haas' pecks; words of taps and fine boring that change no cut."""
     haas = state.dialect.name == "haas"
     if code in PECKS and haas:
         _shallower_pecks(state, block)
@@ -148,7 +148,7 @@ def _words_of_one_control(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _shallower_pecks(state: State, block: CurrentBlock) -> None:
-    """I: the first peck; J: how much less each further one is; K: the least (Haas' manual, G83)."""
+    """I: the first peck; J: the decrease of each further one; K: the smallest (Haas' manual, G83)."""
     given = [letter for letter in "IJK" if block.has(letter)]
     if not given:
         if "Q" in block.values:

@@ -1,4 +1,4 @@
-"""Feed, speed and time: F and S, G93 G94 G95, G96 G97, the feed of a move; G4 and words of time. mm/min, s inside."""
+"""Feed, speed and time: F and S, G93 G94 G95, G96 G97, the feed of a move; G4 and time words. mm/min, s inside."""
 
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes
 from toolpath_stiff.nc.controller import GENERIC, MILLISECONDS, SECONDS
@@ -10,13 +10,13 @@ from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH
 
 LONG_PAUSE = 100.0  # s; a longer one may count milliseconds
-SLOWEST = 1e-6  # mm/min, or 1/min: slower is a slip, and its time beyond all numbers
+SLOWEST = 1e-6  # mm/min, or 1/min: slower is a mistake, and its time would overflow
 
 
 def feed_mode(state: State, block: CurrentBlock, code: str) -> None:
     """G93: F is one over the minutes of the move; G94: per minute; G95: per revolution."""
     if code != state.feed_mode:
-        state.feed = None  # the old number means something else now
+        state.feed = None  # the old number has another meaning now
     state.feed_mode = code
     if code == "G95":
         state.turning.setdefault("feed per revolution (G95)", block.line)
@@ -36,7 +36,7 @@ def feed_word(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def bare_feed_is_open(state: State) -> bool:
-    """Whether a control's parameters say what F without a decimal point counts."""
+    """True if a control's parameters decide what F without a decimal point counts."""
     if state.feed_mode == "G93":
         return False
     per_revolution = state.dialect.increments and state.feed_mode == "G95"
@@ -52,7 +52,7 @@ def speed_word(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def surface_speed(state: State, block: CurrentBlock, code: str) -> None:
-    """G96: D is its greatest spindle speed, which does not enter; G97: S is revolutions again, not known before it."""
+    """G96: D, the greatest spindle speed, is not used; G97: S is revolutions again, unknown until the next S."""
     if code == "G97":
         state.speed = state.speed if "S" in block.values or not state.surface_speed else 0.0
         state.surface_speed = False
@@ -68,15 +68,15 @@ def turn_spindle(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: list[float], arc: Arc | None) -> float:
-    """Feed of a move in mm/min, or deg/min for one of the rotary axes alone."""
+    """Feed of a move in mm/min, or deg/min if only rotary axes move."""
     if state.feed is None:
         word = next((word for word in block.block.words if word.letter == "G"), block.block.words[0])
         block.refuse_if(state.feed_mode == "G93", word, "is a feed move without F under G93", "F above 0")
         hint = ", or --feed MM_PER_MIN for such moves" if state.feed_mode == "G94" else ""
         raise block.fail(word, "is a feed move before any feed", f"F above 0{hint}")
     if state.feed_mode == "G93":
-        feed, state.feed = state.feed, None  # every move needs its own
-        # Of the rotary axes alone, the degrees of the one that turns most.
+        feed, state.feed = state.feed, None  # every move needs its own F
+        # For rotary axes alone, the degrees of the axis that turns most.
         return feed * (
             length_of_move(start, end, arc) or max(abs(e - s) for s, e in zip(start[3:], end[3:], strict=True))
         )
@@ -88,19 +88,19 @@ def feed_of_move(state: State, block: CurrentBlock, start: list[float], end: lis
 
 
 def rotary_feed(state: State, feed: Numbers) -> Numbers:
-    """G94's feed of the rotary axes alone, deg/min: degrees are degrees in inch programs too."""
+    """G94's feed if only rotary axes move, deg/min: degrees stay degrees in inch programs."""
     return feed / (MM_PER_INCH if state.inch else 1.0)
 
 
 def dwells_by(state: State, block: CurrentBlock) -> str:
-    """The word that holds the time of a block's G4: P; in generic programs those of `TIMES`; "" for no such word."""
+    """Word with the time of a block's G4: P; in generic programs those of `TIMES`; "" if there is none."""
     if "G4" not in block.codes:
         return ""
     letters = {"linuxcnc": "P", "generic": "PXSKF"}.get(state.dialect.name, "XP")
     return next((letter for letter in letters if letter in block.values), "")
 
 
-# Who means a time by a letter beside G4, and the seconds of 1 (Fanuc, Dwell (G04); Marlin, G004; Fagor, 8055,
+# Letters that mean a time beside G4, by control, and the seconds of 1 (Fanuc, Dwell (G04); Marlin, G004; Fagor, 8055,
 # programming manual, G04: hundredths of a second; Siemens, Fundamentals, Dwell time).
 TIMES = {"X": ("Fanuc", 1.0), "S": ("Marlin", 1.0), "K": ("Fagor", 0.01), "F": ("Siemens", 1.0)}
 
@@ -128,7 +128,7 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def time_word(state: State, block: CurrentBlock, letter: str) -> float | None:
-    """A time word in s; what its number counts is the dialect's."""
+    """A time word in s; its unit depends on the dialect."""
     value = block.take(letter)
     if value is None or state.dialect.dwell == SECONDS:
         return value

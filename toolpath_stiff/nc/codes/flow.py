@@ -1,4 +1,4 @@
-"""Which block runs next: subprogram calls (M97, M98, G65), M99, stops and the end; `program_run` carries them out."""
+"""Program flow: subprogram calls (M97, M98, G65), M99, stops and the end; `program_run` carries them out."""
 
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, holds_anyway, m_codes
 from toolpath_stiff.nc.state import Call, CurrentBlock, Flow, State
@@ -19,7 +19,7 @@ def call(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def macro_call(state: State, block: CurrentBlock, code: str) -> None:
-    """G65, G66, G67: `parametric` carries them out; what comes here is of a control that has none."""
+    """G65, G66, G67: refused here, on a control without macro calls; elsewhere `parametric` carries them out."""
     raise block.fail(code, "is a macro call of Fanuc's and Haas' controls", hint="name the control with --dialect")
 
 

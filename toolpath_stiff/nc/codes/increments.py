@@ -29,7 +29,7 @@ def read_numbers(state: State, block: CurrentBlock) -> None:
     """Give the block's words their values in program units, by the dialect's decimal-point rule."""
     if not state.dialect.increments:
         return
-    # Q may be a number of something else: G5.1 Q1, M61 Q5.
+    # Q may be a count or a number: G5.1 Q1, M61 Q5.
     counts = "Q" if "look-ahead" in block.groups or "M61" in block.codes else ""
     words = [word for letter, word in block.values.items() if letter not in counts]
     inch = block.groups.get("units", "G20" if state.inch else "G21") == "G20"
@@ -51,12 +51,12 @@ def increment(angle: bool, inch: bool) -> float:
 
 
 def assume_increments(state: State) -> None:
-    """Say that numbers without a point were counted in increments."""
+    """Note that numbers without a point were counted in increments."""
     state.assume(INCREMENTS.format(state.dialect.name))
 
 
 def increments_hint(state: State) -> str:
-    """What to do about an arc that fits nowhere, once numbers without a point were counted in increments."""
+    """Hint for an arc that does not fit, if numbers without a point were counted in increments."""
     if INCREMENTS.format(state.dialect.name) not in state.assumptions:
         return ""
     step, unit = ("0.0001", "inch") if state.inch else ("0.001", "mm")
@@ -65,11 +65,11 @@ def increments_hint(state: State) -> str:
 
 
 _LENGTH_WORDS = re.compile(r"[XYZIJR]\s*[-+]?(?:\d+\.?\d*|\.\d+)(?![\d.]|\s*E)", re.IGNORECASE)
-_LOOKED_AT = 10_000  # lines: a program writes its numbers as it does at its beginning
+_LOOKED_AT = 10_000  # lines: a program keeps to the number format of its beginning
 
 
 def point_warning(state: State, lines: Sequence[str]) -> list[Remark]:
-    """That lengths without a decimal point may be meant otherwise than they were read, by how others are written.
+    """Warning that lengths without a decimal point may be misread, judged by how other lengths are written.
 
     Where whole numbers are increments, posts end those in mm with their point. So X10 beside X5. is one, whatever it
     was read as; X10 beside X5.5, and nothing like X5., is none.

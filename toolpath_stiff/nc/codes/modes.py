@@ -16,7 +16,7 @@ def units(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def no_units(state: State, block: CurrentBlock, code: str) -> None:
-    """G70, G71 that are not G20 and G21 by dialect or controller file: without a cycle's words beside them they are."""
+    """G70, G71 that are not G20 and G21 by dialect or controller file: taken as units unless with a cycle's words."""
     what = "is inch or metric units on some controls, a cycle on others"
     hint = 'write G20 or G21, or give a controller file with inch_metric = "G70 G71"'
     block.refuse_if(block.values.keys() - {*"FS"}, code, what, hint=hint)

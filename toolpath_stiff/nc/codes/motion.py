@@ -44,7 +44,7 @@ def record(
     machine: Collection[int] = (),
     arc: Arc | None = None,
 ) -> None:
-    """Move to a point in control coordinates; `work`, `machine`: axes that were given in each."""
+    """Record a move to a point in control coordinates; `work`, `machine`: axes given in work or machine coordinates."""
     frames = state.frames
     state.length_changed = state.rotation_changed = False
     if state.height_lost:
@@ -54,10 +54,10 @@ def record(
         frames.from_machine[axis] = False
     for axis in machine:
         frames.from_machine[axis] = True
-    # An axis that was not asked to move keeps its number to the last digit, whatever the frames' sums say.
+    # An axis that was not told to move keeps its number to the last digit, whatever rounding the frames add.
     end = standing(start, frames.to_setup(control))
     feed = math.nan if motion == RAPID else feed_of_move(state, block, start, end, arc)
-    if state.beside is not None:  # the tool centre still stands where compensation left it
+    if state.beside is not None:  # the tool centre is still where compensation left it
         start, state.beside = [s + b for s, b in zip(start, state.beside, strict=True)], None
     flags = (was, frames.bound)
     move = Move(block.line, motion, start, end, feed, state.tool, state.tool_length, state.spindle, flags, arc)
@@ -73,14 +73,14 @@ def record(
 
 
 def find_height(state: State, block: CurrentBlock, motion: int, named: bool) -> None:
-    """A move where the present height is lost: a cut is refused, a Z finds it again."""
+    """Handle a move while the present height is unknown: a cut is refused, a Z makes it known again."""
     if motion != RAPID:
         know_height(state, block, None)
     state.height_lost = not named
 
 
 def know_height(state: State, block: CurrentBlock, word: Word | None) -> None:
-    """Refuse what depends on the present height, if that is lost."""
+    """Refuse words that depend on the present height if that is unknown."""
     if state.height_lost:
         reason = "the tool length changed between the last move and M6, and LinuxCNC's interpreter forgets that"
         raise block.fail(
@@ -89,7 +89,7 @@ def know_height(state: State, block: CurrentBlock, word: Word | None) -> None:
 
 
 def know_position(state: State, block: CurrentBlock, word: Word, axes: Collection[int]) -> None:
-    """Refuse a code that takes the present numbers of axes that LinuxCNC's interpreter may have otherwise."""
+    """Refuse a code that uses present coordinates of axes that LinuxCNC's interpreter may have differently."""
     if 2 in axes:
         know_height(state, block, word)
     if XY & set(axes):
@@ -161,7 +161,7 @@ def _center(
 
 
 def motion_off(state: State, block: CurrentBlock, code: str) -> None:
-    """G80: no motion mode; axis words have none to move in. On Fanuc's and Haas' controls G0 or G1 hold on."""
+    """G80: no motion mode, so axis words are not allowed. On Fanuc's and Haas' controls G0 or G1 stay in force."""
     state.motion = state.group_01 if state.group_01 in ("G0", "G1") else None
 
 
@@ -182,7 +182,7 @@ def machine_move(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def homes_standing(block: CurrentBlock, letter: str) -> bool:
-    """Whether U, V or W is 0 beside G28 or G30: X, Y or Z goes home from where it stands."""
+    """True if U, V or W is 0 beside G28 or G30: X, Y or Z goes home from its present position."""
     return block.groups.get("non-modal") in ("G28", "G30") and block.values[letter].value == 0.0
 
 
@@ -201,7 +201,7 @@ def go_home(state: State, block: CurrentBlock, code: str) -> None:
     if not any(home):
         state.assume(f"the reference point of {code}, not given by any offsets file, is machine 0, 0, 0")
     going = at_rest | words.keys() or set(range(6))
-    # Axis by axis in program coordinates, as LinuxCNC does: with a rotation in force it is not the same.
+    # Axis by axis in program coordinates, as LinuxCNC does, which makes a difference with a rotation in force.
     there = frames.to_program(frames.control_of_machine(list(home)))
     here = frames.to_program(frames.position)
     point = [there[axis] if axis in going else here[axis] for axis in range(6)]
@@ -216,7 +216,7 @@ def set_home(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _leave_program_coordinates(state: State, block: CurrentBlock, word: Word, axes: Collection[int]) -> None:
-    """A move of `axes` (none: all) by machine coordinates: harmless under G68 only off the rotated plane."""
+    """Prepare a move of `axes` (none: all) by machine coordinates: under G68 only off the rotated plane."""
     block.refuse_if(state.frames.tip_held, word, "while tool centre point control is on (G43.4)", "G49 before it")
     both = not axes or set(axes) >= XY
     if not both:

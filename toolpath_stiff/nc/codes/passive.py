@@ -1,4 +1,4 @@
-"""Codes that leave the path alone: how a control plans ahead, spindle, coolant, overrides, zones, what is switched off.
+"""Codes that leave the path alone: look-ahead, spindle, coolant, overrides, zones, and modes switched off.
 
 What Fanuc's and Haas' programs begin with ("safe start") is here: it switches off what is refused where it is on.
 """
@@ -19,7 +19,7 @@ SPLINES = ("G5", "G5.1")
 
 
 def m_parameters(state: State, block: CurrentBlock) -> None:
-    """M codes may carry P, Q, E, R, S words, M66 an L too; unless the block moves, these are theirs."""
+    """Take P, Q, E, R, S words beside M codes (M66: L too) as the M code's, unless the block moves."""
     moves = "motion" in block.groups or "non-modal" in block.groups or any(block.has(letter) for letter in AXES)
     if not moves:
         waits = any(word.letter == "M" and word.value == WAIT_FOR_INPUT for word in block.block.words)
@@ -39,7 +39,7 @@ def take_words(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def scaling_off(state: State, block: CurrentBlock, code: str) -> None:
-    """G50 alone; with S or axis words it is a lathe's."""
+    """G50 alone: scaling off; with S or axis words it is a lathe's code."""
     letter = next((letter for letter in "SXYZUVW" if letter in block.values), None)
     block.refuse_if(letter, code, f"with {letter} is a lathe's code, and a lathe's X is a diameter", hint=LATHE_HINT)
 

@@ -1,4 +1,4 @@
-"""Points: what the axis words and polar words of a block mean, and what a turned program makes uncertain. mm, degrees.
+"""Points: meaning of a block's axis words and polar words, and uncertainty after rotations. mm, degrees.
 
 Polar words: Fanuc's operator's manuals of the series 16 and 15i, "Polar coordinate command" (G16).
 """
@@ -16,7 +16,7 @@ TURNED = "G10, or another work offset and M6, turned the coordinates: LinuxCNC's
 
 
 def axis_words(state: State, block: CurrentBlock) -> dict[int, float]:
-    """Axis index -> value of the block's axis words in mm and degrees; they then count as used."""
+    """Axis index -> value of the block's axis words in mm and degrees; marks them as used."""
     return {
         axis: value * (state.length_scale if letter in LINEAR else 1.0)
         for axis, letter in enumerate(AXES)
@@ -25,7 +25,7 @@ def axis_words(state: State, block: CurrentBlock) -> dict[int, float]:
 
 
 def point_words(state: State, block: CurrentBlock) -> dict[int, float]:
-    """As `axis_words`, of a block that moves in program coordinates: under G16 the second one is an angle."""
+    """`axis_words` of a block that moves in program coordinates: under G16 the second one is an angle."""
     if state.polar is None:
         words = axis_words(state, block)
         if state.unsettled:
@@ -37,14 +37,14 @@ def point_words(state: State, block: CurrentBlock) -> dict[int, float]:
 
 
 def cartesian(state: State, here: list[float], words: dict[int, float]) -> list[float]:
-    """The point that words name in the distance mode in force, coming from `here`."""
+    """Point that words name in the distance mode in force, starting from `here`."""
     if state.absolute:
         return [words.get(axis, coordinate) for axis, coordinate in enumerate(here)]
     return [coordinate + words.get(axis, 0.0) for axis, coordinate in enumerate(here)]
 
 
 def destination(state: State, block: CurrentBlock, here: list[float], words: dict[int, float]) -> list[float]:
-    """Program coordinates of the point that words from `point_words` name, coming from `here`."""
+    """Program coordinates of the point that words from `point_words` name, starting from `here`."""
     point = cartesian(state, here, words)
     first, second, _ = PLANES[state.plane]
     if state.polar is not None and (first in words or second in words):
@@ -53,7 +53,7 @@ def destination(state: State, block: CurrentBlock, here: list[float], words: dic
 
 
 def control_point(state: State, block: CurrentBlock, here: list[float], words: dict[int, float]) -> list[float]:
-    """Control coordinates of that point.
+    """Control coordinates of the point that words name.
 
     Where nothing turns, axis by axis: one that is not named keeps its number to the last digit, and a step is added to
     that number.
@@ -75,7 +75,7 @@ def target(state: State, block: CurrentBlock) -> tuple[list[float], dict[int, fl
 
 
 def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle: float | None) -> tuple[float, float]:
-    """The point of G16's words, of which the last ones hold on."""
+    """Point of G16's words, the last ones of which stay in force."""
     polar, letter = state.polar, AXES[PLANES[state.plane][0 if radius is not None else 1]]
     assert polar is not None
     if radius is not None:
@@ -91,23 +91,23 @@ def _polar_point(state: State, block: CurrentBlock, radius: float | None, angle:
 
 
 def forget_polar(state: State) -> None:
-    """The tool or the zero moved by other than polar words: the next ones must name both."""
+    """Forget polar words when the tool or the zero moved otherwise: the next ones must give both."""
     if state.polar is not None:
         state.polar = [math.nan, math.nan]
 
 
 def refuse_while_rotated(state: State, block: CurrentBlock, word: Word | str, what: str) -> None:
-    """Refuse what Fanuc's controls forbid between G68 and G69."""
+    """Refuse words that Fanuc's controls forbid between G68 and G69."""
     block.refuse_if(state.frames.rotation is not None, word, f"{what} while a rotation is on (G68)", "G69 before it")
 
 
 def know_place(state: State, block: CurrentBlock, word: Word) -> None:
-    """Refuse what depends on the present X and Y, after a G10 that turned the offset in force."""
+    """Refuse words that depend on the present X and Y after a G10 has rotated the offset in force."""
     block.refuse_if(state.unsettled == "G10", word, f"depends on the present X and Y. {TURNED}", "both before it")
 
 
 def _settle(state: State, block: CurrentBlock, words: dict[int, float]) -> None:
-    """Refuse what a control may read as another point: X and Y had other numbers before the rotation changed."""
+    """Refuse words that a control may read as another point: X and Y had other numbers before the rotation changed."""
     named = XY & words.keys()
     if state.absolute and named == XY:
         state.unsettled = None

@@ -1,4 +1,4 @@
-"""The table of codes, and what the user is told of each. A new code is a row beside its function, in one of the files.
+"""The table of codes, with the user's text on each. A new code is a row beside its function in one of the files.
 
 What is refused in every dialect stands here, with what it is, what to do instead, and the manual that has it.
 
@@ -62,7 +62,7 @@ REFUSED = refused((
 
 
 def code_meaning(name: str) -> str:
-    """What a code is taken for, in a few words.
+    """Meaning of a code to the reader, in a few words.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""M70 to M73: modes saved and restored, as LinuxCNC has them ("M-Codes", "M70 - M73"); motion mode and tool stay."""
+"""M70 to M73: save and restore modes, as LinuxCNC does ("M-Codes", "M70 - M73"); motion mode and tool stay."""
 
 from copy import copy
 

@@ -27,17 +27,17 @@ def change_tool(state: State, block: CurrentBlock, code: str) -> None:
     state.tool, state.renamed = number, code == "M61"
     if code == "M6":
         state.turn = 0  # LinuxCNC, M-Codes, M6: "the spindle will be stopped"
-    # What LinuxCNC's rs274 forgets at a tool change.
+    # State that LinuxCNC's rs274 forgets at a tool change.
     state.height_lost = state.height_lost or state.length_changed
     if state.rotation_changed:
         state.unsettled = "G10"
-    if state.beside is not None:  # it then counts from where the tool centre stands
+    if state.beside is not None:  # it then counts from the tool centre's place
         state.frames.position = [p + b for p, b in zip(state.frames.position, state.beside, strict=True)]
         state.beside = None
 
 
 def list_numbers(state: State, block: CurrentBlock) -> None:
-    """D and H beside a tool change or a tool length: numbers of offsets that nothing of the block uses."""
+    """D and H beside a tool change or tool length: list offset numbers that nothing in the block uses."""
     changes = "M tool change" in block.groups or "T" in block.values
     if block.has("D") and (changes or "tool length" in block.groups):
         block.take("D")
@@ -73,7 +73,7 @@ def tool_length(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def hold_tip(state: State, block: CurrentBlock, code: str, hold: bool) -> None:
-    """Switch tool centre point control: the machine stands still, the numbers of the present point change."""
+    """Switch tool centre point control: the machine does not move, the numbers of the present point change."""
     frames = state.frames
     if frames.posted is None or (not frames.posted.tcp and frames.tip_held == hold):
         return
@@ -83,7 +83,7 @@ def hold_tip(state: State, block: CurrentBlock, code: str, hold: bool) -> None:
     if not any(frames.position[3 + axis.column] for axis in frames.posted.axes):
         return
     if frames.posted.tcp or (frames.bound and frames.source != "program"):
-        frames.from_machine[:3] = [True] * 3  # not known until X, Y and Z are named
+        frames.from_machine[:3] = [True] * 3  # unknown until X, Y and Z are given
         return
     length = tool_of(state.tools, state.tool).length if math.isnan(state.tool_length) else state.tool_length
     position = switched(frames, length, hold)
@@ -92,7 +92,7 @@ def hold_tip(state: State, block: CurrentBlock, code: str, hold: bool) -> None:
 
 
 def _length_in_table(state: State, block: CurrentBlock, code: str) -> float:
-    """Length of the tool that G43 names by H, or of the one in the spindle."""
+    """Length of the tool given by G43's H, or of the one in the spindle."""
     number = block.whole("H", block.codes[code], 0)
     if number == 0 and state.dialect.increments:
         return math.nan

@@ -1,1 +1,1 @@
-"""Cutter-location files: the points, tool axes and feeds that CAM systems hand to post processors, in APT's words."""
+"""Cutter-location files: points, tool axes and feeds that CAM systems pass to post-processors, in APT's words."""

@@ -1,4 +1,4 @@
-"""Circles of a cutter-location file in mm: which way round, how far, and whether start, end and radius agree.
+"""Circles of a cutter-location file in mm: direction, sweep, and whether start, end and radius agree.
 
 - `CIRCLE/x,y,z,i,j,k,r`: by the right hand about i, j, k (PTC, "CL Output for Circular Interpolation").
 - `CIRCLE/x,y,z,i,j,k`: by the right hand too (files of a post for CAMplete, whose arcs enter smoothly so).
@@ -65,7 +65,7 @@ def minus(a: Vector, b: Vector) -> Vector:
 
 
 def _in_plane(circle: Circle, start: Vector) -> tuple[Vector, Vector]:
-    """Axes of the circle's plane, the first towards the start as far as that lies in the plane."""
+    """Axes of the circle's plane, the first towards the start, projected onto the plane."""
     out = minus(start, circle.center)
     out = along(out, circle.axis, -dot(out, circle.axis))
     length = math.sqrt(dot(out, out))
@@ -75,7 +75,7 @@ def _in_plane(circle: Circle, start: Vector) -> tuple[Vector, Vector]:
 
 
 def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
-    """The arc from start to end. Raises `ArcError` where they do not lie on the circle within its tolerance."""
+    """Arc from start to end. Raises `ArcError` if they do not lie on the circle within its tolerance."""
     first, second = _in_plane(circle, start)
     from_center, to_end = minus(start, circle.center), minus(end, circle.center)
     radius, there = dot(from_center, first), complex(dot(to_end, first), dot(to_end, second))
@@ -86,7 +86,7 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
             f"an arc whose end lies {abs(last - radius):.4f} mm off its circle (radius {radius:.4f} mm at the start"
         )
         raise ArcError(f"{problem}, {last:.4f} mm at the end)", expected)
-    if abs(circle.radius - radius) > allowed:  # never, if the file gives no radius
+    if abs(circle.radius - radius) > allowed:  # never true if the file gives no radius
         problem = f"whose centre lies {radius:.4f} mm from the tool's position"
         raise ArcError(f"a circle of radius {circle.radius:.4f} mm {problem}", expected)
     center = along(circle.center, circle.axis, dot(from_center, circle.axis))
@@ -107,7 +107,7 @@ def _sweep(circle: Circle, here: float, there: complex) -> float:
 
 
 def turned_as(center: Vector, axis: Vector, start: Vector, direction: Vector) -> Vector:
-    """The axis with the sign that makes a motion from the start begin in a direction. Raises `ArcError`."""
+    """Axis with the sign for which a motion from the start begins in a direction. Raises `ArcError`."""
     tangent = cross(axis, minus(start, center))
     size = math.sqrt(dot(tangent, tangent) * dot(direction, direction))
     if size < SAME_POINT or abs(dot(tangent, direction)) < 0.5 * size:
@@ -116,7 +116,7 @@ def turned_as(center: Vector, axis: Vector, start: Vector, direction: Vector) ->
 
 
 def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which: int) -> Vector:
-    """The point where a motion along the circle meets a line for the first or second time. Raises `ArcError`.
+    """Point where a motion along the circle meets a line for the first or second time. Raises `ArcError`.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which
     radius = dot(minus(start, circle.center), first)
     places = meetings((p, q, None, 0), (complex(radius), complex(radius), 0j, 1))
     refuse_arc_if(not places, "a line that does not meet its circle", "one that does")
-    # The start itself, if the line goes through it, is met after a whole turn.
+    # If the line goes through the start, that is met after a whole turn.
     order = sorted(places, key=lambda place: cmath.phase(place) % math.tau or math.tau)
     order.sort(key=lambda place: abs(place - radius) < near)
     place = order[which - 1]

@@ -1,4 +1,4 @@
-"""CYCLE/ of a cutter-location file: the holes that the next points drill.
+"""CYCLE/ of a cutter-location file: holes drilled at the points that follow.
 
 A cycle comes in pairs of a word and its value. Read is what systems agree on: `DEPTH` or `FEDTO` counts from the GOTO
 point into the hole along the tool axis, `CLEAR` from it outwards (PTC, "CL Output for Holemaking Cycles"; Autodesk's
@@ -29,7 +29,7 @@ BORES = "CYCLE/BORE and REAM feed out of the hole as they fed in"
 
 
 def cycle(state: CutterLocationState, statement: MajorStatement) -> None:
-    """The cycle that the next points drill; CYCLE/OFF ends it."""
+    """Set the cycle for the points that follow; CYCLE/OFF ends it."""
     state.no_circle("CYCLE/")
     state.hole, arguments = None, list(statement.arguments)
     kind = arguments.pop(0).upper() if arguments else ""
@@ -74,7 +74,7 @@ def cycle(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def _name_in_cycle(state: CutterLocationState, key: str) -> str:
-    """The quantity that a word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
+    """Quantity that the word of a pair gives: DEPTH, CLEAR, STEP, RETURN, DWELL, or "feed"."""
     name = ALIASES.get(key.upper(), key.upper())
     by_order = "a cycle of numbers without words: their order depends on the CAM system"
     state.refuse_if(is_number(name), by_order, "pairs, as DEPTH,5", EXPAND)
@@ -85,7 +85,7 @@ def _name_in_cycle(state: CutterLocationState, key: str) -> str:
 
 
 def _check_cycle(state: CutterLocationState, code: str, values: dict[str, float]) -> None:
-    """Refuse a hole that cannot be, or of which systems mean different things; lengths in the file's unit."""
+    """Refuse an impossible hole, or one that systems read differently; lengths in the file's unit."""
     shown, pecks = state.statement.shown, code in ("G73", "G83")
     depth, clear, step, dwell = (values.get(name, 0.0) for name in ("DEPTH", "CLEAR", "STEP", "DWELL"))
     back = values.get("RETURN", clear)

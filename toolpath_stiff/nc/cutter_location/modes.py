@@ -1,4 +1,4 @@
-"""Words of a cutter-location file that say what holds from here on: units, feed, spindle, frames, tools; and pauses."""
+"""Modal words of a cutter-location file: units, feed, spindle, frames, tools; and pauses."""
 
 import math
 
@@ -31,7 +31,7 @@ FRAMES = {"MSYS": _FRAME, "MCS": _FRAME, "CSYS": _FRAME, "ZERO": _ZERO}
 
 
 def units(state: CutterLocationState, statement: MajorStatement) -> None:
-    """The length unit; before the first points, which are mm without it."""
+    """Set the length unit; inches after the first points are refused, as those were taken as mm."""
     scale = LENGTH_UNITS.get(",".join(statement.words))
     if scale is None:
         raise state.fail(statement.shown, "UNITS/MM or UNITS/INCHES")
@@ -64,7 +64,7 @@ def fedrat(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def spindl(state: CutterLocationState, statement: MajorStatement) -> None:
-    """Revolutions per minute, and whether the spindle turns; surface speeds are listed."""
+    """Set the revolutions per minute, and whether the spindle turns; surface speeds are only listed."""
     words = statement.words
     if "OFF" in words or "STOP" in words:
         state.speed = 0.0
@@ -94,7 +94,7 @@ def delay(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def multax(state: CutterLocationState, statement: MajorStatement) -> None:
-    """Points carry a tool axis; after MULTAX/OFF a tilted tool must be given again."""
+    """Points carry a tool axis; after MULTAX/OFF the axis of a tilted tool must be given again."""
     words = statement.words
     state.refuse_if(words not in ([], ["ON"], ["OFF"]), statement.shown, "MULTAX, MULTAX/ON or MULTAX/OFF")
     state.multax = words != ["OFF"]
@@ -103,19 +103,19 @@ def multax(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def tlaxis(state: CutterLocationState, statement: MajorStatement) -> None:
-    """The tool axis of points that give none."""
+    """Set the tool axis of points that give none."""
     state.next_axis = unit_axis(state.numbers(statement, 3))
 
 
 def frame_word(state: CutterLocationState, statement: MajorStatement) -> None:
-    """A second, different one is refused."""
+    """Take a coordinate system; a second, different one is refused."""
     numbers = (state.number(argument) for argument in statement.arguments if is_number(argument))
     one_frame(state, statement.word, tuple(numbers), statement.shown)
     state.note(FRAMES[statement.word])
 
 
 def one_frame(state: CutterLocationState, kind: str, numbers: tuple[float, ...], shown: str) -> None:
-    """Points of one coordinate system only; `kind` says who names it, the numbers where it lies."""
+    """Allow points of one coordinate system only; `kind` says which word names it, the numbers where it lies."""
     before = state.frames.get(kind, numbers)
     same = len(before) == len(numbers) and all(abs(a - b) < 1e-6 for a, b in zip(before, numbers, strict=True))
     if not same and state.point is not None:
@@ -125,7 +125,7 @@ def one_frame(state: CutterLocationState, kind: str, numbers: tuple[float, ...],
 
 
 def cutcom(state: CutterLocationState, statement: MajorStatement) -> None:
-    """Compensation by the control: the points of such a file are the tool's, and the compensation wear."""
+    """Compensation by the control: the points of such a file are the tool's, the compensation is for wear."""
     words, (what, *_) = statement.words, (*statement.words, "")
     state.refuse_if(what not in ("OFF", "ON", "LEFT", "RIGHT"), statement.shown, "CUTCOM/LEFT, RIGHT, ON or OFF")
     harmless = what == "OFF" or "LENGTH" in words
@@ -135,14 +135,14 @@ def cutcom(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def mode(state: CutterLocationState, statement: MajorStatement) -> None:
-    """Milling; turning is doubted: its points are read all the same."""
+    """Set milling; turning is doubted, but its points are read."""
     state.refuse_if(statement.words not in (["MILL"], ["TURN"]), statement.shown, "MODE/MILL or MODE/TURN")
     turns = statement.words == ["TURN"]
     state.note(TURNING if turns else "milling", doubtful=turns)
 
 
 def loadtl(state: CutterLocationState, statement: MajorStatement) -> None:
-    """Another tool: its number (after TOOL in NX' LOAD/), and perhaps LENGTH and the length."""
+    """Change the tool: its number (after TOOL in NX' LOAD/), and perhaps LENGTH and the length."""
     words, given = statement.words, statement.arguments
     if statement.word == "LOAD":
         state.refuse_if(words[:1] != ["TOOL"] or len(words) < 2, statement.shown, "LOAD/TOOL, and the tool's number")
@@ -155,13 +155,13 @@ def loadtl(state: CutterLocationState, statement: MajorStatement) -> None:
     if "LENGTH" in words[:-1] and (stated := state.number(words[words.index("LENGTH") + 1]) * state.scale) > 0.0:
         state.assume("the LENGTH of LOADTL is the tool's length from spindle nose to tip; --tools takes precedence")
         length = stated if math.isnan(length) else length
-    if len(state.recorder) > state.moves_before_cutter:  # a CUTTER between the last move and this is its own
+    if len(state.recorder) > state.moves_before_cutter:  # a CUTTER since the last move belongs to this tool
         state.diameter = math.nan
     state.tool, state.tool_length = int(number), length
 
 
 def cutter(state: CutterLocationState, statement: MajorStatement) -> None:
-    """The diameter: the first number, in all of APT's forms of CUTTER/; of TLDATA/ after the kind of tool."""
+    """Set the diameter: the first number, in all of APT's forms of CUTTER/; in TLDATA/ after the kind of tool."""
     given = statement.arguments[:1] if statement.word == "CUTTER" else statement.arguments
     first = next((argument for argument in given if is_number(argument)), None)
     if first is not None:
@@ -171,7 +171,7 @@ def cutter(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def heading(state: CutterLocationState, statement: MajorStatement) -> None:
-    """The name of an operation; after TOOL PATH/ perhaps of its tool."""
+    """Take the name of an operation; after TOOL PATH/ perhaps also its tool."""
     if statement.arguments:
         state.marks.append((statement.line, statement.arguments[0]))
     if statement.word == "TOOL PATH":
@@ -186,6 +186,6 @@ def heading(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def fini(state: CutterLocationState, statement: MajorStatement) -> None:
-    """The end: what follows is not read."""
+    """End the file: what follows is not read."""
     state.no_circle("FINI")
     state.ended = True

@@ -14,7 +14,7 @@ from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Remark
 HOME = "home is the control's: the way there is not part of the path"
 CIRCLE_AXIS = "a circle's axis"
 ROUNDING = 1e-3  # rad, of the arcs that make a whole turn
-# What TLON,GOFWD/ goes along and up to: a line, or the plane through two points (CATIA).
+# Elements that TLON,GOFWD/ follows and ends at: a line, or the plane through two points (CATIA).
 _POINT = r"\(\s*POINT\s*/([^()]*)\)"
 CIRCLE = re.compile(r"\(\s*(?:CIRCLE|CYLNDR)\s*/([^()]*)\)", re.IGNORECASE)
 END = re.compile(r"\(\s*LINE\s*/([^()]*)\)", re.IGNORECASE)
@@ -22,7 +22,7 @@ PLANE = re.compile(rf"\(\s*PLANE\s*/\s*PERPTO\s*,.*{_POINT}\s*,\s*{_POINT}\s*\)"
 
 
 def goto(state: CutterLocationState, statement: MajorStatement) -> None:
-    """A point; on a circle several points, too."""
+    """Go to a point; on a circle also through several points."""
     numbers = [state.number(argument) for argument in statement.arguments]
     if len(numbers) in (3, 6):
         to_point(state, numbers)
@@ -34,14 +34,14 @@ def goto(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def more_points(state: CutterLocationState, statement: MajorStatement) -> None:
-    """A line of numbers alone after GOTO: the next point (Creo writes arcs so)."""
+    """Take a line of numbers alone after GOTO as the next point (Creo writes arcs so)."""
     state.refuse_if(state.last_word != "GOTO", f"{statement.text[:30]!r} is not a statement", "a word, /, arguments")
     state.circle = state.followed
     to_point(state, state.numbers(statement, 3, 6))
 
 
 def to_point(state: CutterLocationState, numbers: list[float]) -> None:
-    """A point, with its tool axis or the one in force: the end of a move or an arc, or a hole."""
+    """Go to a point with its own tool axis or the one in force: the end of a move or an arc, or a hole."""
     axis = _axis_of(state, numbers)
     target = state.scaled(numbers[:3])
     if state.circle is not None:
@@ -54,7 +54,7 @@ def to_point(state: CutterLocationState, numbers: list[float]) -> None:
 
 
 def _axis_of(state: CutterLocationState, numbers: list[float]) -> Vector:
-    """The tool axis that comes with a point, or that in force."""
+    """Tool axis given with a point, or the one in force."""
     if len(numbers) == 6:
         axis = unit_axis(numbers[3:])
         tilted = state.multax is False and axis != VERTICAL
@@ -72,7 +72,7 @@ def _go(state: CutterLocationState, target: Vector, axis: Vector) -> None:
 
 
 def godlta(state: CutterLocationState, statement: MajorStatement) -> None:
-    """A point by its distance from the last one."""
+    """Go to a point by its distance from the last one."""
     if state.point is None:
         raise state.fail("GODLTA/ before any point", "FROM/ or GOTO/ before it")
     numbers = state.numbers(statement, 3, 6)
@@ -83,7 +83,7 @@ def godlta(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def from_(state: CutterLocationState, statement: MajorStatement) -> None:
-    """The point at which the tool stands."""
+    """Set the point at which the tool stands."""
     numbers = state.numbers(statement, 3, 6)
     axis = _axis_of(state, numbers)
     if len(state.recorder):
@@ -94,7 +94,7 @@ def from_(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def gohome(state: CutterLocationState, statement: MajorStatement) -> None:
-    """NX gives the point of home; without one it is the control's."""
+    """Go home: NX gives the point; without one it is the control's."""
     if statement.arguments:
         to_point(state, state.numbers(statement, 3, 6))
         return
@@ -104,7 +104,7 @@ def gohome(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def rapid(state: CutterLocationState, statement: MajorStatement) -> None:
-    """The next motion, and no other, is rapid."""
+    """Make the next motion, and no other, rapid."""
     state.refuse_if(statement.arguments, statement.shown, "RAPID alone")
     state.no_circle("RAPID")
     state.refuse_if(state.hole, "RAPID within a drilling cycle: is the next point a hole?", "CYCLE/OFF before it")
@@ -112,12 +112,12 @@ def rapid(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def circle(state: CutterLocationState, statement: MajorStatement) -> None:
-    """A circle in the forms of PTC, NX and APT."""
+    """Take a circle in the forms of PTC, NX and APT."""
     _await_circle(state, [state.number(argument) for argument in statement.arguments])
 
 
 def movarc(state: CutterLocationState, statement: MajorStatement) -> None:
-    """A circle by the right hand, and the angle that is cut."""
+    """Take a circle by the right hand, and the angle that is cut."""
     state.refuse_if(
         statement.words[7:8] != ["ANGLE"] or statement.words[9:], statement.shown, "MOVARC/x,y,z,i,j,k,r,ANGLE,a"
     )
@@ -128,13 +128,13 @@ def movarc(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def indirv(state: CutterLocationState, statement: MajorStatement) -> None:
-    """The direction at the start, which says which way round."""
+    """Take the direction at the start, which decides the sense of rotation."""
     x, y, z = state.numbers(statement, 3)
     state.direction = (x, y, z)
 
 
 def _await_circle(state: CutterLocationState, numbers: list[float], sweep: float | None = None) -> Circle:
-    """The circle that the next point ends, turned as INDIRV says."""
+    """Set the circle that the next point ends, turned as INDIRV says."""
     state.refuse_if(state.rapid, f"an arc after the RAPID of line {state.rapid}", "a rapid to a point")
     state.refuse_if(state.hole, "an arc within a drilling cycle", "CYCLE/OFF before it")
     state.no_circle("a circle")
@@ -153,7 +153,7 @@ def _await_circle(state: CutterLocationState, numbers: list[float], sweep: float
     radius = numbers[3] if len(numbers) == 4 else (*numbers[6:7], math.nan)[0]
     state.circle = Circle(center, axis, radius * state.scale, state.statement.line, sweep)
     state.swept = 0.0
-    # A straight move goes on into an arc smoothly, as it nearly always does, or would turn back.
+    # A straight move enters the arc smoothly, as it nearly always does, or would turn back.
     tangent = circles.cross(axis, circles.minus(state.point, center))
     angle = angle_of(tangent, state.heading) if state.heading is not None else math.nan
     state.smooth += angle < circles.SMOOTH_DEG
@@ -163,7 +163,7 @@ def _await_circle(state: CutterLocationState, numbers: list[float], sweep: float
 
 
 def _arc_through(state: CutterLocationState, targets: list[Vector], axis: Vector) -> None:
-    """Follow the circle that waits through points; the last one ends the arc."""
+    """Follow the waiting circle through points; the last one ends the arc."""
     circle = state.circle
     assert circle is not None
     state.circle, state.followed = None, circle
@@ -179,7 +179,7 @@ def _arc_through(state: CutterLocationState, targets: list[Vector], axis: Vector
 
 
 def tlon(state: CutterLocationState, statement: MajorStatement) -> None:
-    """CATIA's and Creo's arcs in APT's own words."""
+    """Arcs of CATIA and Creo in APT's own words."""
     state.refuse_if(state.direction is None, "TLON,GOFWD/ without its direction", "INDIRV/ before it")
     texts, words, which = list(statement.arguments), statement.words, 1
     if len(words) == 5 and words[2] in ("1", "2") and words[3] == "INTOF":
@@ -201,6 +201,6 @@ def tlon(state: CutterLocationState, statement: MajorStatement) -> None:
 
 
 def _numbers(geometry: re.Match[str] | None) -> list[float]:
-    """The numbers of a geometry in parentheses, whatever it has in its groups; none of what is no such geometry."""
+    """Numbers of a geometry in parentheses; empty if there is no such geometry."""
     texts = [part.strip() for group in geometry.groups() for part in group.split(",")] if geometry else []
     return [number(text) for text in texts] if all(map(is_number, texts)) else []

@@ -1,4 +1,4 @@
-"""Cutter-location files: the points, tool axes and feeds that CAM systems hand to post processors, in APT's words.
+"""Reader of cutter-location files: the points, tool axes and feeds of a CAM system's output, in APT words.
 
 `statements` splits lines; `vocabulary` is the table of words, whose functions are in `modes`, `motion` and `cycles`;
 each takes the `state` and a statement. `state` also makes moves of what `circles` and `tool_axes` compute.
@@ -31,7 +31,7 @@ PACKED_AT = 50_000  # moves
 
 
 def not_for(request: Request) -> list[Remark]:
-    """A warning about what was asked for and means nothing to a cutter-location file."""
+    """Warning about requested options that mean nothing to a cutter-location file."""
     controller = request.controller
     given = {
         "a dialect": controller.dialect.name != "generic",
@@ -43,7 +43,7 @@ def not_for(request: Request) -> list[Remark]:
 
 
 class CutterLocationRun(ProgramRun):
-    r"""A run of a cutter-location file; parameters as of `ProgramRun`. Lengths of the tool table win over the file's.
+    r"""Run of a cutter-location file; parameters as of `ProgramRun`. The tool table's lengths win over the file's.
 
     Examples
     --------
@@ -62,7 +62,7 @@ class CutterLocationRun(ProgramRun):
         self.state = CutterLocationState(request.name, tools=copy.deepcopy(controller.tools), feed=controller.feed)
 
     def program(self, ending: list[Remark]) -> ReadProgram:
-        """What the run has made of the file."""
+        """Program made by the run."""
         request, state = self.request, self.state
         return request.program(
             state,
@@ -91,7 +91,7 @@ class CutterLocationRun(ProgramRun):
                 else:
                     self._execute_statement(statement, point)
             except InputError as error:
-                if state.last_word == "END" and not any_statement(lines[here:]):  # notes of a CAM system behind it
+                if state.last_word == "END" and not any_statement(lines[here:]):  # only notes of a CAM system follow
                     state.warnings.append(Remark("what follows END is no statement, and not read", here + 1))
                     break
                 if self.tally is None:
@@ -104,7 +104,7 @@ class CutterLocationRun(ProgramRun):
         return []
 
     def _execute_statement(self, statement: MajorStatement, point: list[float] | None) -> None:
-        """Execute a statement, whose numbers are known if it is a plain GOTO; geometry's errors get its place."""
+        """Execute a statement, with its numbers if it is a plain GOTO; errors of geometry get its place."""
         state, word = self.state, statement.word
         state.statement = statement
         if word and self.tally is not None:
@@ -120,7 +120,7 @@ class CutterLocationRun(ProgramRun):
 
 
 def _take_comment(state: CutterLocationState, lines: tuple[str, ...], index: int) -> None:
-    """Take what CAM systems tell in comments: CATIA's operations, CATIA's and Creo's coordinate systems."""
+    """Take information that CAM systems put in comments: CATIA's operations, CATIA's and Creo's coordinate systems."""
     operation, frame = OPERATION.match(lines[index]), frame_in_comment(lines, index)
     state.on_contour = state.on_contour or "OUTPUT_ON_PROFILE" in lines[index]
     if operation:

@@ -1,4 +1,4 @@
-"""The state of a cutter-location file being read, and the moves of the tool tip that its words record.
+"""State of a cutter-location file being read, and the moves of the tool tip that its words record.
 
 Moves go straight, along circles and into holes, with the tool axis turning meanwhile; they begin where the tool stands
 and belong to the line of the statement being executed. They raise `AxisError` and `ArcError`, which know no line, and
@@ -29,7 +29,7 @@ NOT_MOVED = (False, False)
 
 @dataclass
 class CutterLocationState(Record):
-    """The modes in force and all that was made so far; every word is a function of this and its statement."""
+    """Modes in force and everything made so far; every word is a function of this and its statement."""
 
     statement: MajorStatement = field(default_factory=lambda: MajorStatement(1, 1, ""))  # being executed
     last_word: str = ""  # of the statement before
@@ -42,14 +42,14 @@ class CutterLocationState(Record):
     turn: float = 1.0  # -1: counter-clockwise; nan: a speed of the surface
     revolutions: float = 0.0  # that SPINDL/ON goes back to
     on_contour: bool = False  # Creo's OUTPUT_ON_PROFILE: points of the contour beside CUTCOM
-    frames: dict[str, tuple[float, ...]] = field(default_factory=dict)  # who names a coordinate system: its numbers
+    frames: dict[str, tuple[float, ...]] = field(default_factory=dict)  # naming word -> its numbers
 
     # The tool.
     diameter: float = math.nan
     tool_name: str = ""
     moves_before_cutter: int = 0
 
-    # Where the tool stands.
+    # Position of the tool.
     point: Vector | None = None
     axis: Vector = VERTICAL
     angles: tuple[float, float] = (0.0, 0.0)
@@ -58,33 +58,33 @@ class CutterLocationState(Record):
     # What the next motion is.
     rapid: int = 0  # line of the RAPID that waits for its motion
     multax: bool | None = None
-    next_axis: Vector | None = VERTICAL  # of a point that gives none; None: MULTAX/OFF leaves open how the tool stands
+    next_axis: Vector | None = VERTICAL  # axis of points that give none; None: left open by MULTAX/OFF
     direction: Vector | None = None  # of INDIRV
     circle: Circle | None = None  # waits for its GOTO
     followed: Circle | None = None  # whose arc the last GOTO made
     swept: float = 0.0  # rad, along that circle
-    hole: Drilling | None = None  # that each point drills: heights from the point in mm
+    hole: Drilling | None = None  # drilled at each point: heights from the point in mm
     hole_feed: float = 0.0  # mm/min or mm per revolution
     hole_per_revolution: bool = False
-    hole_from: Vector | None = None  # where the tool stood before the cycle, to whose height each hole goes back
+    hole_from: Vector | None = None  # tool position before the cycle, to whose height each hole returns
 
-    # What the file holds.
+    # Content of the file.
     marks: list[tuple[int, str]] = field(default_factory=list)  # line and name of each operation
     doubted: dict[str, Remark] = field(default_factory=dict)  # words not acted upon that deserve a warning
     smooth: int = 0  # arcs that a straight move enters smoothly
     turning_back: list[int] = field(default_factory=list)  # lines of those into which it would turn back
 
     def fail(self, problem: str, expected: str = "", hint: str = "") -> ProgramError:
-        """The error for the statement being executed."""
+        """Error for the statement being executed."""
         return Place(self.name, self.statement.line, self.statement.column).fail(problem, expected, hint)
 
     def refuse_if(self, refused: object, problem: str, expected: str = "", hint: str = "") -> None:
-        """Raise the error for the statement being executed, if it is to be refused."""
+        """Raise the error for the statement being executed if `refused`."""
         if refused:
             raise self.fail(problem, expected, hint)
 
     def note(self, reason: str, doubtful: bool = False) -> None:
-        """Note that the word being executed is not acted upon; `doubtful`: which is a warning."""
+        """Note that the word being executed is not acted upon; `doubtful` makes it a warning."""
         line, column, word = self.statement.line, self.statement.column, self.statement.word
         if all(noted.word != word for noted in self.unsupported):
             self.unsupported.append(Unsupported(line, column, word, reason))
@@ -99,14 +99,14 @@ class CutterLocationState(Record):
         return value
 
     def numbers(self, statement: MajorStatement, *counts: int) -> list[float]:
-        """All arguments as numbers; there must be one of `counts` of them."""
+        """All arguments as numbers; their count must be among `counts`."""
         numbers = [self.number(argument) for argument in statement.arguments]
         expected = f"{' or '.join(map(str, counts))} numbers"
         self.refuse_if(len(numbers) not in counts, f"{statement.word}/ with {len(numbers)} numbers", expected)
         return numbers
 
     def scaled(self, numbers: list[float]) -> Vector:
-        """The point of three numbers of the file, in mm."""
+        """Point of three numbers of the file, in mm."""
         scale = self.scale
         x, y, z = numbers[0] * scale, numbers[1] * scale, numbers[2] * scale
         if max(abs(x), abs(y), abs(z)) > LARGEST_MM:
@@ -119,7 +119,7 @@ class CutterLocationState(Record):
             raise self.fail(f"{what} while the circle of line {self.circle.line} waits for its GOTO", "GOTO/")
 
     def feed_per_minute(self, feed: float, per_revolution: bool) -> float:
-        """mm/min of a feed that may be per revolution."""
+        """Feed in mm/min, from one that may be per revolution."""
         if not per_revolution:
             return feed
         no_speed = not self.speed > 0.0
@@ -128,7 +128,7 @@ class CutterLocationState(Record):
 
 
 def stand(state: CutterLocationState, point: Vector, axis: Vector) -> None:
-    """The tool stands somewhere; how it got there is not part of the path."""
+    """Put the tool at a point; its way there is not part of the path."""
     state.point, state.axis, state.heading = point, axis, None
     state.angles = angles_near(axis, state.angles)
     if axis != VERTICAL:
@@ -136,7 +136,7 @@ def stand(state: CutterLocationState, point: Vector, axis: Vector) -> None:
 
 
 def move(state: CutterLocationState, motion: int, target: Vector, axis: Vector, arc: Arc | None = None) -> None:
-    """A move of the tip to a point, straight or along an arc, where the tool has an axis.
+    """Record a move of the tip to a point, straight or along an arc, at the end of which the tool has `axis`.
 
     Where the axis turns, in as many parts as keep it near its great circle.
     """
@@ -153,7 +153,7 @@ def move(state: CutterLocationState, motion: int, target: Vector, axis: Vector, 
     if motion != RAPID:
         if state.feed is None:
             raise state.fail("a cut before any feed", "FEDRAT/ with a feed above 0, or --feed MM_PER_MIN for such cuts")
-        # Of a tip that stands still the same number of degrees per minute.
+        # If the tip stands still, the same number as degrees per minute.
         feed = state.feed_per_minute(state.feed, state.per_revolution)
         if still and arc is None:
             state.assume(TURN_FEED)
@@ -178,7 +178,7 @@ def move(state: CutterLocationState, motion: int, target: Vector, axis: Vector, 
 
 
 def drill(state: CutterLocationState, target: Vector, axis: Vector, hole: Drilling) -> None:
-    """The hole of the cycle in force at a point, along the tool axis."""
+    """Record the hole of the cycle in force at a point, along the tool axis."""
     leans = state.point is not None and axis != state.axis
     expected = "a GOTO/ before the cycle that turns the tool"
     state.refuse_if(leans, "a hole with another tool axis than the move before", expected)
@@ -191,7 +191,7 @@ def drill(state: CutterLocationState, target: Vector, axis: Vector, hole: Drilli
     assert state.point is not None
     height = dot(minus(state.point, target), state.axis)
     level = max(height, hole.clear, hole.retract)
-    # Up to the level of the holes first, where the tool is below it; then across, then down.
+    # If the tool is below the level of the holes, up to it first; then across, then down.
     stops = [
         (along(state.point, axis, -height), level, RAPID, 0.0),
         (target, level, RAPID, 0.0),

@@ -1,4 +1,4 @@
-"""Lines of a cutter-location file to statements: a major word, a slash, arguments between commas.
+"""Lines of a cutter-location file as statements: a major word, a slash, arguments between commas.
 
 `$` at the end of a line continues a statement on the next one; `$$` begins a comment (APT; ISO 4343).
 """
@@ -21,7 +21,7 @@ _NEW_STATEMENT = re.compile(
     r"\s*(?:(?:GOTO|FROM|FEDRAT|GODLTA|CYCLE|LOADTL|SPINDL|CUTTER|UNITS?|TLAXIS|INDIRV)\s*/|TLON\s*,|(?:RAPID|FINI)\s*$)",
     re.IGNORECASE,
 )
-# Without an exponent of D, which `float` does not read.
+# Without an exponent D, which `float` does not read.
 _FIRST = rf"\s*({_NUMBER.replace('Dd', '')})"
 _NEXT = rf"\s*,{_FIRST}"
 _POINT = re.compile(rf"\s*GOTO\s*/{_FIRST}{_NEXT * 2}(?:{_NEXT * 3})?\s*$", re.IGNORECASE)
@@ -51,23 +51,23 @@ class MajorStatement:
 
 
 def plain_point(line: str) -> list[float] | None:
-    """The 3 or 6 numbers of a GOTO that stands on one line, which most lines are; None for any other line."""
+    """The 3 or 6 numbers of a GOTO on one line, as most lines are; None for any other line."""
     point = _POINT.match(line)
     return [float(number) for number in point.groups() if number is not None] if point else None
 
 
 def is_number(text: str) -> bool:
-    """True for a text that is a number."""
+    """True if a text is a number."""
     return NUMBERS.fullmatch(text) is not None
 
 
 def number(text: str) -> float:
-    """The value of a number, whose exponent may begin with D."""
+    """Value of a number, whose exponent may begin with D."""
     return float(text.upper().replace("D", "E"))
 
 
 def read_statement(lines: tuple[str, ...], index: int, name: str) -> tuple[MajorStatement | None, int]:
-    """The statement that begins with line `index` (from 0), None if there is none, and the line after it.
+    """Statement that begins at line `index` (from 0), None if there is none, and the next line.
 
     Raises `InputError` with line and column.
     """
@@ -96,7 +96,7 @@ def read_statement(lines: tuple[str, ...], index: int, name: str) -> tuple[Major
 
 
 def _after_comment(lines: tuple[str, ...], index: int) -> int:
-    """The line after a comment; `$$-> CSYS / ..., $` goes on over lines of numbers (Creo)."""
+    """Line after a comment; `$$-> CSYS / ..., $` continues over lines of numbers (Creo)."""
     goes_on = lines[index].lstrip().startswith("$$->")
     index += 1
     while (
@@ -110,7 +110,7 @@ def _after_comment(lines: tuple[str, ...], index: int) -> int:
 
 
 def frame_in_comment(lines: tuple[str, ...], index: int) -> tuple[str, tuple[float, ...]] | None:
-    """The coordinate system that a comment names: a word for whose it is, and its matrix of 3 rows of 4.
+    """Coordinate system that a comment names: a word for its origin, and its matrix of 3 rows of 4.
 
     CATIA writes `$$*CATIA0`, a name and three rows, all of them comments; Creo `$$-> CSYS /` and twelve numbers.
     """
@@ -126,7 +126,7 @@ def frame_in_comment(lines: tuple[str, ...], index: int) -> tuple[str, tuple[flo
 
 
 def _parse(text: str, place: Place) -> MajorStatement | None:
-    """The statement of a text, at the place of its first character."""
+    """Statement of a text, given the place of its first character."""
     line, column = place.line, place.column or 1
     if not text:
         return None
@@ -146,7 +146,7 @@ def _parse(text: str, place: Place) -> MajorStatement | None:
 
 
 def _arguments(text: str) -> tuple[str, ...]:
-    """The texts between the commas outside parentheses."""
+    """Texts between the commas outside parentheses."""
     arguments, depth = [""], 0
     for character in text:
         depth += (character == "(") - (character == ")")

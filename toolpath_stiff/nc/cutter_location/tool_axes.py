@@ -21,7 +21,7 @@ TURNED_OVER = 179.0  # deg: beyond, two axes do not say in which plane the tool 
 
 
 def unit_axis(numbers: Sequence[float], what: str = "a tool axis") -> Vector:
-    """An axis of length 1. Raises `ArcError` if the given one is further off than `AXIS_TOLERANCE`."""
+    """Axis of length 1. Raises `ArcError` if the given one is further off than `AXIS_TOLERANCE`."""
     i, j, k = numbers
     length = math.sqrt(i * i + j * j + k * k)
     if abs(length - 1.0) > AXIS_TOLERANCE:
@@ -30,7 +30,7 @@ def unit_axis(numbers: Sequence[float], what: str = "a tool axis") -> Vector:
 
 
 def angles_near(axis: Vector, near: tuple[float, float]) -> tuple[float, float]:
-    """Roll and pitch of a unit tool axis, the pitch within half a turn of the one before."""
+    """Roll and pitch of a unit tool axis, the pitch within half a turn of the previous one."""
     i, j, k = axis
     roll, pitch = roll_pitch_of_axis(i, j, k)
     if i * i + k * k < 1e-18:  # along Y any pitch gives this axis
@@ -40,7 +40,7 @@ def angles_near(axis: Vector, near: tuple[float, float]) -> tuple[float, float]:
 
 
 def angle_of(first: Vector, second: Vector) -> float:
-    """Degrees between two vectors of any length, nan where one has none."""
+    """Angle in degrees between two vectors of any length; nan if one has no length."""
     x, y, z = cross(first, second)
     if min(dot(first, first), dot(second, second)) < 1e-18:
         return math.nan
@@ -48,10 +48,10 @@ def angle_of(first: Vector, second: Vector) -> float:
 
 
 def division(first: Vector, second: Vector) -> int:
-    """Number of equal parts into which a turn of the tool axis is divided. Raises `ArcError` where it turns over."""
+    """Number of equal parts for a turn of the tool axis. Raises `ArcError` if it turns over."""
     chord = math.dist(first, second)
     if chord < 0.008 and abs(first[1]) < 0.9 and abs(second[1]) < 0.9:
-        return 1  # half a degree and less, of a tool well away from Y: what most moves turn by
+        return 1  # most moves: half a degree or less, with the tool well away from Y
     angle = angle_of(first, second)
     if angle > TURNED_OVER:
         raise ArcError(f"a tool axis that turns over by {angle:.1f} degrees within one move", "points in between")
@@ -64,7 +64,7 @@ def division(first: Vector, second: Vector) -> int:
 
 
 def _steepest_roll(first: Vector, second: Vector, angle: float) -> float:
-    """Greatest roll in degrees on the way: sin(roll) is -j, and j = j0 cos t + g sin t along the great circle."""
+    """Greatest roll on the way, degrees: sin(roll) is -j, and j = j0 cos t + g sin t along the great circle."""
     sine = max(abs(first[1]), abs(second[1]))
     if angle > 1e-9:
         growth = (second[1] - first[1] * math.cos(angle)) / math.sin(angle)
@@ -74,7 +74,7 @@ def _steepest_roll(first: Vector, second: Vector, angle: float) -> float:
 
 
 def on_great_circle(first: Vector, second: Vector, share: float) -> Vector:
-    """The unit vector at a share of the way from one to another."""
+    """Unit vector at a share of the way from one to another along the great circle."""
     angle = math.radians(angle_of(first, second))
     if angle < 1e-9:
         return second

@@ -1,4 +1,4 @@
-"""The table of words of cutter-location files: word to function, meaning, who writes it, source; and how it is used.
+"""Table of words of cutter-location files: word to function, meaning, writers, source; and how it is used.
 
 Functions of words that act are in `modes` and `motion`; those of words that are listed, doubted or refused are here.
 """
@@ -12,19 +12,19 @@ from toolpath_stiff.nc.cutter_location.modes import FRAMES, HEADING, TOOL
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
 
-# What becomes of a word.
+# Treatment of a word.
 READ, LISTED, DOUBTFUL, REFUSED = "read", "listed", "listed, with a warning", "refused"
 # Who writes it.
 ALL, CREO, NX, CATIA, AUTODESK, CAMPLETE = "all", "Creo", "NX", "CATIA", "Autodesk", "Autodesk for CAMplete"
 SOLIDWORKS = "SolidWorks CAM"
 CATIA_CREO, CREO_NX, MOST = f"{CATIA}, {CREO}", f"{CREO}, {NX}, {AUTODESK}", f"{CATIA}, {CREO}, {AUTODESK}"
-# Where it is described.
+# Sources.
 ISO, APT = "ISO 4343", "ISO 4342, the APT language"
 PTC, SIEMENS = 'PTC, "Supported CL Data Commands"', 'Siemens NX, "CLSF Manager"'
 DASSAULT, POSTS = "Dassault, CATIA's help on APT import", "Autodesk's APT posts"
 SAMPLES = "published files of SolidWorks CAM"
 VERICUT, MANUALS = 'Vericut, "Supported APT-CLS NC Program Records"', "manuals of post processors"
-# An unknown word that begins like one of a motion or a feed, or that carries a point, is not passed over.
+# An unknown word that looks like a motion or a feed, or that carries a point, is not skipped.
 LIKE_MOTION = ("GO", "RAP", "FED", "CIR", "ARC", "MOV", "HEL", "CYC", "TLA", "TLO", "TLL", "TLR", "UNI", "MUL", "FRO")
 LIKE_G_CODE = re.compile(r"[A-Z]-?[\d.]+")
 GEOMETRY = "points, tool axes and feeds alone"
@@ -62,7 +62,7 @@ class MajorWord:
 
 
 def listed(meaning: str, written_by: str, source: str, names: str, kind: str = LISTED) -> list[MajorWord]:
-    """Words that change nothing of the path, or (DOUBTFUL) what the machine makes of them."""
+    """Words that do not change the path or (DOUBTFUL) change how the machine follows it."""
 
     def act(state: CutterLocationState, statement: MajorStatement) -> None:
         state.note(meaning, doubtful=kind == DOUBTFUL)
@@ -84,7 +84,7 @@ def refused(meaning: str, source: str, names: str, unless: str = "") -> list[Maj
 
 
 def changes_nothing(statement: MajorStatement) -> bool:
-    """True for OFF, and where all numbers are 0: a shift or a turn by nothing."""
+    """True for OFF, and if all numbers are 0: a shift or turn by nothing."""
     numbers = [number(word) for word in statement.words if is_number(word)]
     return statement.words == ["OFF"] or (bool(numbers) and not any(numbers))
 
@@ -179,13 +179,13 @@ WORDS = {word.name: word for word in TABLE}
 
 
 def look_up(name: str) -> MajorWord | None:
-    """The entry of a word; a refused one is refused with whatever follows its comma, as in `TLRGT,GORGT`."""
+    """Entry of a word; a refused one is refused with anything after its comma, as in `TLRGT,GORGT`."""
     head = WORDS.get(name.partition(",")[0])
     return WORDS.get(name) or (head if head is not None and head.kind == REFUSED else None)
 
 
 def meaning_of(name: str) -> str:
-    """The meaning of a word, for a list of the words used."""
+    """Meaning of a word, for a list of the words used."""
     word = look_up(name)
     meaning = word.meaning if word is not None else UNKNOWN
     return f"{meaning}, not supported" if word is not None and word.kind == REFUSED else meaning

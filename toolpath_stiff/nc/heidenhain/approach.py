@@ -11,12 +11,12 @@ from functools import partial
 
 from toolpath_stiff.nc.codes.cutter import switch_off
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import SIDES, begin_compensation, go, take_side
+from toolpath_stiff.nc.heidenhain.contour import SIDES, Circle, begin_compensation, go, take_side
 from toolpath_stiff.nc.heidenhain.points import feed, in_plane, named, plane_of_pole, polar, present
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
-NO_ARC_MM = 1e-3  # an arc of LCT that is shorter is none: the line goes on smoothly
+NO_ARC_MM = 1e-3  # an arc of LCT shorter than this is left out: the line continues smoothly
 OF_CENTER = "lines and arcs of APPR and DEP (LEN, R) are those of the tool's centre"
 
 
@@ -34,7 +34,7 @@ def approach(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _point(state: State, block: CurrentBlock, code: str) -> dict[int, float]:
-    """Axis -> coordinate, of the polar forms by PR and PA."""
+    """Axis -> coordinate, also from the polar forms by PR and PA."""
     if " P" not in code:
         return named(state, block)
     with plane_of_pole(state, block) as pole:
@@ -50,7 +50,7 @@ def begin_contour(
     rate: float | None,
     heading: complex,
 ) -> None:
-    """Carry out an APPR, now that the direction of the first contour element is known; feeds before and in it."""
+    """Carry out an APPR, once the direction of the first contour element is known; feeds before and in it."""
     state.plain.approach, (first, second, normal), after = None, PLANES[state.plane], state.feed
     contour, start, to_arc = complex(there[first], there[second]), in_plane(state, present(state)), code.endswith("LCT")
     rapid = state.plain.fast and not to_arc
@@ -61,14 +61,14 @@ def begin_contour(
         begin_compensation(state, block, side)
     cutter, state.cutter = state.cutter, None
     apex = contour if cutter is None else contour + cutter.side * 1j * heading * cutter.radius
-    place, center, turn = _way(state, block, code, apex, -heading, -SIDES.get(side, 1), start)
+    place, about = _way(state, block, code, apex, -heading, -SIDES.get(side, 1), start)
     _go(state, block, place, rapid=rapid)
     if normal in there:
         go(state, block, {normal: there[normal]}, rapid=rapid)
     state.feed = rate
-    if center is None or abs(apex - place) > NO_ARC_MM:
-        _go(state, block, apex, center, -turn)
-    if cutter is not None:  # the tool stands beside the contour's first point, from where that goes on
+    if about is None or abs(apex - place) > NO_ARC_MM:
+        _go(state, block, apex, about and (about[0], -about[1], 1))
+    if cutter is not None:  # the tool stands beside the contour's first point, where the contour continues
         cutter.position = state.frames.to_program(state.frames.position)
         cutter.anchor = apex
         state.frames.position = state.frames.to_control(cutter.moved(cutter.position, contour))
@@ -80,29 +80,29 @@ def begin_contour(
 
 def _way(
     state: State, block: CurrentBlock, code: str, apex: complex, away: complex, side: int, other: complex
-) -> tuple[complex, complex | None, int]:
-    """Where the line or arc ends that leaves a point in a direction, the arc's centre and its turn.
+) -> tuple[complex, Circle | None]:
+    """End of the line or arc that leaves a point in a direction, and its circle.
 
     An approach is such a way back: `side` is then the other one than the contour's. `other`: where LCT begins or ends.
     """
     across, kind = side * 1j * away, code.split()[1].removeprefix("P")
     if kind in ("LT", "LN"):
-        return apex + size_of(state, block, "LEN") * (away if kind == "LT" else across), None, 0
+        return apex + size_of(state, block, "LEN") * (away if kind == "LT" else across), None
     state.assume(OF_CENTER)
     radius, swept = size_of(state, block, "R"), size_of(state, block, "CCA", 1.0) if kind == "CT" else 0.0
     turn = side if radius > 0.0 else -side
     center = apex + radius * across
     if kind == "CT":
-        return center + (apex - center) * cmath.exp(1j * turn * math.radians(swept)), center, turn
+        return center + (apex - center) * cmath.exp(1j * turn * math.radians(swept)), (center, turn, 1)
     apart = other - center
     problem = "whose arc holds the point from which, or to which, it goes"
     block.refuse_if(abs(apart) <= radius, None, problem, "another R")
     direction = apart / complex(radius, turn * math.sqrt(abs(apart) ** 2 - radius**2))
-    return center + radius * direction / abs(direction), center, turn
+    return center + radius * direction / abs(direction), (center, turn, 1)
 
 
 def size_of(state: State, block: CurrentBlock, letter: str, scale: float | None = None) -> float:
-    """A length (an angle with `scale` 1) that APPR and DEP need: above 0, R of CT but not 0."""
+    """Length (with `scale` 1 an angle) that APPR and DEP need: above 0; R of CT may be negative, but not 0."""
     value = block.take(letter) or 0.0
     signed = letter == "R" and block.block.words[0].text.endswith((" CT", " PCT"))
     wrong = value == 0.0 or (value < 0.0 and not signed) or (letter == "CCA" and value > 360.0)
@@ -111,7 +111,7 @@ def size_of(state: State, block: CurrentBlock, letter: str, scale: float | None 
 
 
 def depart(state: State, block: CurrentBlock, code: str) -> None:
-    """DEP: leaves the contour and ends the compensation there; the tool then stands at its end without one."""
+    """DEP: leave the contour and end the compensation there; the tool then stands at its end without one."""
     plain, (first, second, normal) = state.plain, PLANES[state.plane]
     if plain.heading is None:
         raise block.fail(None, "without a contour element in the plane before it", "L, C, CR or CT before it")
@@ -125,24 +125,22 @@ def depart(state: State, block: CurrentBlock, code: str) -> None:
         raise block.fail(None, "with or without its end point", "X and Y with LCT alone")
     stop(state, block)
     apex, end = in_plane(state, present(state)), complex(there.get(first, 0.0), there.get(second, 0.0))
-    place, center, turn = _way(state, block, code, apex, heading, cutter.side if cutter else 1, end)
-    if center is None or abs(place - apex) > NO_ARC_MM:
-        _go(state, block, place, center, turn)
+    place, about = _way(state, block, code, apex, heading, cutter.side if cutter else 1, end)
+    if about is None or abs(place - apex) > NO_ARC_MM:
+        _go(state, block, place, about)
     if to_point:
         _go(state, block, end)
     if depth is not None:
         go(state, block, {normal: depth})
 
 
-def _go(
-    state: State, block: CurrentBlock, place: complex, center: complex | None = None, turn: int = 0, rapid: bool = False
-) -> None:
+def _go(state: State, block: CurrentBlock, place: complex, about: Circle | None = None, rapid: bool = False) -> None:
     first, second, _ = PLANES[state.plane]
-    go(state, block, {first: place.real, second: place.imag}, center, turn, rapid=rapid)
+    go(state, block, {first: place.real, second: place.imag}, about, rapid)
 
 
 def stop(state: State, block: CurrentBlock) -> None:
-    """Compensation off where the tool centre stands, which is the programmed point from here on."""
+    """End the compensation where the tool centre stands, which becomes the programmed point."""
     switch_off(state, block, "R0")
     if state.beside is not None:
         state.frames.position = [p + b for p, b in zip(state.frames.position, state.beside, strict=True)]

@@ -38,6 +38,7 @@ PATHS, POLAR = f"{MANUAL}, Path contours: Cartesian coordinates", f"{MANUAL}, Pa
 COMPENSATED = (
     "RL, RR (G41, G42) begin and end perpendicular to the first and the last contour element and round outside corners"
 )
+Circle = tuple[complex, int, int]  # about a centre, +1 counter-clockwise or -1, turns begun
 SIDES = {"RL": LEFT, "RR": RIGHT}
 UNKNOWN_POINT = "goes to a point of the machine that the program does not give: left out of the path"
 
@@ -61,7 +62,7 @@ def take_side(block: CurrentBlock) -> str | None:
 def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> None:
     """R0, RL, RR of a straight statement: the tool on the contour, left of it, right of it."""
     side, cutter = take_side(block), state.cutter
-    if state.plain.approach is not None:  # which says the side
+    if state.plain.approach is not None:  # which decides the side
         block.refuse_if(side == "R0", side, "behind an APPR", "no R0")
         return
     if side is None or (side == "R0" and cutter is None) or (cutter and SIDES.get(side) == cutter.side):
@@ -96,16 +97,10 @@ def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
 
 
 def go(
-    state: State,
-    block: CurrentBlock,
-    there: dict[int, float],
-    center: complex | None = None,
-    turn: int = 0,
-    turns: int = 1,
-    rapid: bool = False,
+    state: State, block: CurrentBlock, there: dict[int, float], about: Circle | None = None, rapid: bool = False
 ) -> None:
-    """A contour element from the present point; `turn`: an arc, +1 counter-clockwise. Waits if a corner follows."""
-    plain, (first, second, _) = state.plain, PLANES[state.plane]
+    """A contour element from the present point, straight or `about` a centre. Waits if a corner follows."""
+    plain, (first, second, _), (center, turn, turns) = state.plain, PLANES[state.plane], about or (None, 0, 1)
     start = present(state)
     begin, end = in_plane(state, start), complex(there.get(first, start[first]), there.get(second, start[second]))
     if plain.approach is not None:
@@ -124,17 +119,11 @@ def go(
         block.refuse_if(rapid or turns > 1 or there.keys() - {first, second}, None, *_NO_CORNER)
         plain.held = (block, (begin, end, center, turn), state.feed)
     else:
-        move(state, block, there, center, turn, turns, rapid)
+        move(state, block, there, about, rapid)
 
 
 def move(
-    state: State,
-    block: CurrentBlock,
-    there: dict[int, float],
-    center: complex | None = None,
-    turn: int = 0,
-    turns: int = 1,
-    rapid: bool = False,
+    state: State, block: CurrentBlock, there: dict[int, float], about: Circle | None = None, rapid: bool = False
 ) -> None:
     """Record a straight move or an arc from where the tool stands, as G0 to G3 do."""
     frames = state.frames
@@ -142,9 +131,10 @@ def move(
     control = frames.to_control([there.get(axis, value) for axis, value in enumerate(here)])
     if not frames.rotated:  # an axis that is not named keeps its number to the last digit
         control = [control[axis] if axis in there else value for axis, value in enumerate(frames.position)]
-    if center is None:
+    if about is None:
         record(state, block, RAPID if rapid else FEED, control, there)
         return
+    center, turn, turns = about
     block.refuse_if(state.beside, None, "is an arc right after R0", "a straight statement (L) between")
     first, second, _ = PLANES[state.plane]
     end = there.get(first, here[first]), there.get(second, here[second])
@@ -202,7 +192,7 @@ def line(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _to_machine(state: State, block: CurrentBlock, code: str, there: dict[int, float], rapid: bool) -> None:
-    """M91: machine coordinates; those that are not known, and the points of M92, are left out of the path."""
+    """M91: machine coordinates; unknown ones, and the points of M92, are left out of the path."""
     plain, unit = state.plain, state.length_scale
     block.take("R0")
     lost = {axis for axis, value in there.items() if code == "M92" or math.isnan(value)}
@@ -241,22 +231,20 @@ def circle(state: State, block: CurrentBlock, code: str) -> None:
         turns = max(1, math.ceil(abs(step.value) / 360.0 - 1e-9))
     with plane_of_pole(state, block) as center:
         there = polar(state, block, center) if code == "CP" else named(state, block)
-        _round(state, block, there, center, turn, turns)
+        _round(state, block, there, (center, turn, turns))
 
 
-def _round(
-    state: State, block: CurrentBlock, there: dict[int, float], center: complex, turn: int, turns: int = 1
-) -> None:
+def _round(state: State, block: CurrentBlock, there: dict[int, float], about: Circle) -> None:
     rapid = feed(state, block)
     block.refuse_if(rapid, "FMAX", "on an arc", "F with a number")
     side = take_side(block)
     same = side is None or SIDES.get(side, 0) == (state.cutter.side if state.cutter else 0)
     block.refuse_if(not same or state.beside, side, "changes on an arc", "a straight statement (L) for it")
-    go(state, block, there, center, turn, turns)
+    go(state, block, there, about)
 
 
 def direction(block: CurrentBlock, step: float = 0.0) -> int:
-    """+1 or -1 of DR+ and DR-; without it of an angle's step."""
+    """+1 or -1 by DR+ and DR-; without them by the sign of an angle's step."""
     plus, minus = block.take("DR+"), block.take("DR-")
     block.refuse_if(plus is None and minus is None and not step, None, "without its direction", "DR+ or DR-")
     return 1 if plus is not None or (minus is None and step > 0.0) else -1
@@ -270,11 +258,11 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
     start, end = in_plane(state, present(state)), end_of(state, there)
     places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
     center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
-    _round(state, block, there, center, turn)
+    _round(state, block, there, (center, turn, 1))
 
 
 def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
-    """CT, CTP: an arc to a point that goes on smoothly from the contour element before."""
+    """CT, CTP: an arc to a point that continues smoothly from the previous contour element."""
     heading = state.plain.heading
     if heading is None:
         raise block.fail(None, "without a contour element in the plane before it", "L, C, CR or CT before it")
@@ -292,15 +280,15 @@ def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
         return
     block.refuse_if(math.pi - abs(cmath.phase(chord)) < STRAIGHT_ON, None, "straight back", "another point")
     radius = abs(chord) ** 2 / (2.0 * chord.imag)  # to the left where positive
-    _round(state, block, there, start + radius * 1j * ahead, 1 if radius > 0.0 else -1)
+    _round(state, block, there, (start + radius * 1j * ahead, 1 if radius > 0.0 else -1, 1))
 
 
 def corner(state: State, block: CurrentBlock, code: str) -> None:
-    """CHF, RND: the corner between the contour elements before and behind it is cut off, or rounded."""
+    """CHF, RND: cut off or round the corner between the contour elements before and after."""
     block.refuse_if(state.plain.held is None, None, "without a contour element before it", "L, C, CR or CT before it")
     size = block.take("#") if code == "CHF" and block.has("#") else block.take("R")
     rate = block.take("F")
-    if rate is not None:  # holds for the corner alone
+    if rate is not None:  # holds only for the corner
         block.values["F alone"] = Word("F", rate * inch_tenths(state), 1, "F")
     block.refuse_if(not size or size < 0.0, None, "without its size", "RND R5, CHF 2")
     block.values["size"] = Word("R", (size or 0.0) * state.length_scale, 1, "R")
@@ -308,7 +296,7 @@ def corner(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict[int, float], rapid: bool) -> None:
-    """Carry out the element that waited, shortened, and its corner; the tool then stands where the next one begins."""
+    """Carry out the waiting element, shortened, and its corner; the tool then stands where the next element begins."""
     (block, held, rate), corner_block, modal = state.plain.held or (None, None, None), state.plain.corner, state.feed
     state.plain.held = state.plain.corner = None
     if block is None or held is None or corner_block is None:  # in a check, after the corner's own error
@@ -323,11 +311,16 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     corner_block.refuse_if(not rounded and not lines, None, "beside an arc", "CHF between two lines")
     with corner_block.placing():
         cut = cut_off(held, element, size, rounded)
-    begin, end, center, turn = cut or (held[1], held[1], None, 0)
+    rounding = cut or (held[1], held[1], None, 0)
     state.feed = rate
-    move(state, block, {first: begin.real, second: begin.imag}, held[2], held[3])
+    _along(state, block, held, rounding[0])
     alone = corner_block.values.get("F alone")
     state.feed = alone.value if alone else rate
     if cut is not None:
-        move(state, corner_block, {first: end.real, second: end.imag}, center, turn)
+        _along(state, corner_block, cut, cut[1])
     state.feed = modal
+
+
+def _along(state: State, block: CurrentBlock, element: Element, end: complex) -> None:
+    (first, second, _), (_, _, center, turn) = PLANES[state.plane], element
+    move(state, block, {first: end.real, second: end.imag}, None if center is None else (center, turn, 1))

@@ -21,7 +21,8 @@ TIP_TURNS = (
     "PLANE, cycle 19 and CYCLE800 turn the tool about its tip where it stands: how the machine's axes turn is not known"
 )
 HOW_AXES_TURN = (
-    "STAY", "MOVE", "TURN", "F", "FMAX", "SEQ+", "SEQ-", "SYM", "DIST", "ABST", "MB", "MBMAX", "TABLEROT", "COORDROT",
+    "STAY", "MOVE", "TURN", "F", "FMAX", "SEQ+", "SEQ-", "SYM+", "SYM-", "DIST", "ABST", "MB", "MBMAX", "TABLEROT",
+    "COORDROT",
 )  # fmt: skip
 SPATIAL = "the angles of cycle 19 are spatial angles, not positions of the machine's axes"
 
@@ -32,7 +33,7 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 
 def put(state: State, block: CurrentBlock, inner: Matrix) -> None:
-    """Put a turn, mirror image and scale, the tilting and the shifts into force; the tool stands still meanwhile."""
+    """Put a rotation, mirror image and scale, the tilting and the shifts in force; the tool does not move."""
     plain, frames = state.plain, state.frames
     outside_contour(state, block, "changes coordinates", state.beside is not None or plain.side)
     whole, shift = inner, plain.shift
@@ -44,7 +45,7 @@ def put(state: State, block: CurrentBlock, inner: Matrix) -> None:
 
 
 def apply(state: State, block: CurrentBlock) -> None:
-    """Put what is in force into the frames."""
+    """Put the transformations in force into the frames."""
     plain = state.plain
     inner = [[plain.scale * v for v in row] for row in UNIT]
     if plain.angle:
@@ -59,13 +60,13 @@ def apply(state: State, block: CurrentBlock) -> None:
 
 
 def shift(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCL DEF 7.1 and on: the datum, absolute or by a step; in a tilted plane along its axes."""
+    """CYCL DEF 7.1 and on, TRANS DATUM: the datum, absolute or by a step; in a tilted plane along its axes."""
     plain = state.plain
     values, outer = list(plain.shift), list(plain.outer)
     if block.has("TABLE"):
         datum(state, block, code)
     for axis, letter in enumerate(AXES[:3]):
-        value, step = block.take(letter), block.take(f"I{letter}")
+        value, step = 0.0 if code == "TRANS DATUM RESET" else block.take(letter), block.take(f"I{letter}")
         if value is not None:
             values[axis], outer[axis] = value * state.length_scale, outer[axis] if value else 0.0
         if step is not None:
@@ -137,7 +138,7 @@ def tilt(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def turn_tool(state: State, block: CurrentBlock) -> None:
-    """Turn the tool upright on the tilted plane; where its tip then is, is not known."""
+    """Turn the tool upright on the tilted plane, after which the position of its tip is unknown."""
     plain = state.plain
     axis = [row[2] for row in plain.tilt] if plain.tilt is not None else [0.0, 0.0, 1.0]
     state.assume(TIP_TURNS)
@@ -148,7 +149,7 @@ def turn_tool(state: State, block: CurrentBlock) -> None:
 def datum(state: State, block: CurrentBlock, code: str) -> None:
     """CYCL DEF 247 and 7.1 #: the datum of a table; the program's first is its zero."""
     number, plain = block.take("TABLE" if block.has("TABLE") else "Q339"), state.plain
-    other = plain.preset not in (None, number) or (plain.preset is None and len(state.recorder) > 0)
+    other = plain.preset not in (None, number) or (plain.preset is None and state.recorder.cuts)
     problem = "another datum than before: where it is stands in a table of the control"
     block.refuse_if(
         other or any(plain.shift) or plain.tilt is not None, None, problem, "one datum, and cycle 7 for others"

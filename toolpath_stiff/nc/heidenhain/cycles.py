@@ -29,7 +29,7 @@ NEEDED = {
     221: ("Q225", "Q226", "Q237", "Q238", "Q242", "Q243", "Q224"),
 }  # fmt: skip
 PECKS, TAPS = (200, 203, 205), (207, 209)
-# Cycles of older controls, whose parameters are statements: the one of today, and what their parts are.
+# Cycles of older controls, with parameters in statements -> the present cycle, and the meaning of the parts.
 OLDER = {
     "1": (205, ("Q200", "Q201", "Q202", "Q211", "Q206")), "2": (206, ("Q200", "Q201", "Q211", "Q206")),
     "17": (207, ("Q200", "Q201", "Q239")),
@@ -38,13 +38,13 @@ KNOWN = {"Q200", "Q201", "Q202", "Q203", "Q204", "Q205", "Q206", "Q208", "Q210",
          "Q256", "Q257", "Q258", "Q259", "Q253", "Q336", "Q343", "Q344", "Q351", "Q379", "Q395", "Q403", "Q301", "Q365",
          "Q357", "Q359", "Q350", "Q426", "Q427", "Q428", "Q429", "Q430", "Q435", "Q401"}  # fmt: skip
 FEEDS, MAX, AUTO = ("Q206", "Q208", "Q253"), -1.0, -2.0
-LEAST_AHEAD_MM, MOST_AHEAD_MM = 0.6, 7.0  # where rapids of the older pecking end above the last depth
+LEAST_AHEAD_MM, MOST_AHEAD_MM = 0.6, 7.0  # end of the older pecking's rapids above the last depth
 MOST_POINTS = 1000
 HAVE_NO_SHIFT = "the shift off the wall before the tool leaves the hole"
 
 
 def define(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCL DEF 200 and on: keeps the cycle for its calls; 220 and 221 call the one before at their points."""
+    """CYCL DEF 200 and on: keep the cycle for its calls; 220 and 221 call the previous one at their points."""
     number = int(code.removeprefix("CYCL DEF "))
     values = {letter: block.take(letter) or 0.0 for letter in list(block.free)}
     missing = next((name for name in NEEDED[number] if name not in values), None)
@@ -61,7 +61,7 @@ def define(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def define_older(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCL DEF 1, 2 and 17: a parameter a statement; holes begin where the tool stands, the set-up clearance above."""
+    """CYCL DEF 1, 2 and 17: one parameter a statement; holes begin at the tool's height, the set-up clearance above."""
     cycle, part = code.removeprefix("CYCL DEF ").split(".")
     number, names = OLDER[cycle]
     value, values = block.take("#"), dict(state.plain.cycle[1]) if state.plain.cycle else {"Q203": 0.0}
@@ -97,7 +97,7 @@ def _check(block: CurrentBlock, number: int, values: Values) -> None:
 
 
 def call(state: State, block: CurrentBlock, change: Values | None = None) -> None:
-    """The cycle defined last, at the present point (CYCL CALL, M99, M89); `change`: other parameters of this call."""
+    """Run the last cycle defined, at the present point (CYCL CALL, M99, M89); `change`: parameters for this call."""
     plain, normal = state.plain, PLANES[state.plane][2]
     if plain.cycle is None:
         raise block.fail(None, "calls a cycle, and none is defined", "CYCL DEF before it")
@@ -111,7 +111,7 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
         missing = next((name for name in NEEDED[number] if name not in values), None)
         block.refuse_if(missing, None, "calls a cycle that is not whole", "all its statements (CYCL DEF 1.0 to 1.5)")
         _check(block, number, values)
-    if not values["Q201"]:  # a depth of 0: the cycle is not carried out
+    if not values["Q201"]:  # with a depth of 0 the cycle is not carried out
         return
     check_known(state, block, {normal: 0.0}, rapid=True)
     block.refuse_if(plain.unknown, None, "calls a cycle where X or Y is not known", "X and Y before it")
@@ -123,7 +123,7 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
 
 
 def plunge(state: State, block: CurrentBlock, path: Iterable[Stroke]) -> None:
-    """Carry out strokes at the present point, in mm and mm/min; a feed of 0 is none that was given."""
+    """Carry out strokes at the present point, in mm and mm/min; a feed of 0 means that none was given."""
     frames, normal, modal = state.frames, PLANES[state.plane][2], state.feed
     for height, rate, wait in path:
         place = frames.to_program(frames.position)
@@ -162,7 +162,7 @@ def strokes(number: int, values: Values, speed: float) -> Iterator[Stroke]:
 
 
 def _pecks(number: int, values: Values, down: float, out: float | None) -> Iterator[Stroke]:
-    """Strokes of the pecks above the bottom, and of what is between them; 205: the stops before the last depth differ.
+    """Strokes of the pecks above the bottom, and between them; 205 has different stops before the last depth.
 
     209 breaks the chip at each depth by its pitch, or clears it where it has no Q256.
     """
@@ -226,7 +226,7 @@ def _points(block: CurrentBlock, number: int, values: Values) -> Iterator[tuple[
 
 
 def call_statement(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCL CALL: at the present point; CYCL CALL POS: at a point, whose height comes on top of the surface's."""
+    """CYCL CALL: at the present point; CYCL CALL POS: at a point, its height added to the surface's."""
     change, plain = None, state.plain
     if code == "CYCL CALL POS" and plain.cycle is not None:
         normal, there, unit = PLANES[state.plane][2], named(state, block), state.length_scale

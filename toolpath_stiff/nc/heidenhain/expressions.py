@@ -1,4 +1,4 @@
-"""Q parameters: formulas (`Q5 = 3 * (SIN Q1 - 2)`) and the functions FN 0 to FN 13, worked out by one grammar.
+"""Q parameters: formulas (`Q5 = 3 * (SIN Q1 - 2)`) and the functions FN 0 to FN 13, evaluated by one grammar.
 
 HEIDENHAIN, user's manual of the iTNC 530, "Programming: Q parameters" ("Basic arithmetic", "Trigonometric functions",
 "Entering formulas directly"). Functions bind tightest, then ^, * and / (DIV), + and -; LEN is the root of the sum of
@@ -29,12 +29,12 @@ LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (SIEMENS, Fundamentals, "Bl
 
 
 def whole(value: float) -> float:
-    """Without what stands behind the point."""
+    """Value without its fraction."""
     return float(math.trunc(value))
 
 
 def trimmed(degrees: float) -> float:
-    """Without the noise beyond the digits of a control: SIN 180 is 0."""
+    """Value without noise beyond the digits of a control: SIN 180 is 0."""
     return float(f"{degrees:.12g}") if abs(degrees) > 1e-14 else 0.0
 
 
@@ -51,7 +51,7 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
 
 
 def assigned(head: str, rest: str, place: Place) -> tuple[str, str, Place]:
-    """Name, formula and its place, of an assignment: `Q5 = ...`, with the name as its head, or `FN 1: Q5 = ...`."""
+    """Name, formula and its place in an assignment: `Q5 = ...`, with the name as its head, or `FN 1: Q5 = ...`."""
     formula = _ASSIGNED.match(rest)
     if formula is None or not (formula[1] or head[0] == "Q"):
         raise place.fail(f"{head}{rest[:40]} is no assignment", "Q5 = +10")
@@ -61,7 +61,7 @@ def assigned(head: str, rest: str, place: Place) -> tuple[str, str, Place]:
 def condition(
     head: str, rest: str, parameter: Callable[[str], float], place: Place
 ) -> tuple[bool, str | None, str | None]:
-    """Whether the condition of FN 9 to FN 12 holds, and the label to which it then goes: a number, or a name."""
+    """True if the condition of FN 9 to FN 12 holds, and the label to jump to then: a number, or a name."""
     jump = _JUMP.match(rest)
     if jump is None or jump[2] != CONDITIONS[head]:
         raise place.fail(f"{head}:{rest[:40]} is no condition", f"IF +Q1 {CONDITIONS[head]} +5 GOTO LBL 2")
@@ -74,23 +74,15 @@ def condition(
 
 @dataclass
 class Formula(Scanner):
-    """A block in upper case without its comment; blanks between its parts are passed over. `lookup`: variables."""
+    """A block in upper case without its comment; blanks between its parts are skipped. `lookup`: variables."""
 
     lookup: Lookup = field(kw_only=True)
 
     literal: ClassVar = re.compile(NUMBER)
     operator: ClassVar = re.compile(r"DIV|LEN|ANG|[-+*/^]")
     name: ClassVar = re.compile(rf"{PARAMETER.pattern}|[A-Z]+")
-    ranks: ClassVar[Mapping[str, int]] = {
-        "+": 1,
-        "-": 1,
-        "*": 2,
-        "/": 2,
-        "DIV": 2,
-        "^": 3,
-        "LEN": 1,
-        "ANG": 1,
-    }  # how tightly an operator binds
+    # How tightly an operator binds.
+    ranks: ClassVar[Mapping[str, int]] = {"+": 1, "-": 1, "LEN": 1, "ANG": 1, "*": 2, "/": 2, "DIV": 2, "^": 3}
     operations: ClassVar[Mapping[str, Callable[[float, float], float]]] = {
         **ARITHMETIC, "DIV": truediv, "^": math.pow, "LEN": math.hypot,
         "ANG": lambda a, b: trimmed(math.degrees(math.atan2(a, b)) % 360.0),
@@ -102,17 +94,17 @@ class Formula(Scanner):
         self.refuse_if(long, problem, f"at most {LONGEST_BLOCK}, {MOST_BRACKETS} of them")
 
     def part(self, pattern: re.Pattern[str]) -> str:
-        """What matches next behind blanks, then read."""
+        """Next text that matches, after blanks; it is then read."""
         self.take(BLANK)
         return self.take(pattern)
 
     def sign(self, text: str) -> bool:
-        """Whether that comes next behind blanks; it is then read."""
+        """True if `text` comes next, after blanks; it is then read."""
         self.take(BLANK)
         return self.next(text)
 
     def result(self, tightest: int = 0) -> Value:
-        """Values and operators that bind tighter than `tightest`."""
+        """Value of operands and operators that bind tighter than `tightest`."""
         left = self.operand()
         while True:
             begin, column = self.position, self.column
@@ -123,12 +115,12 @@ class Formula(Scanner):
             left = self.operated(operator, left, self.result(self.ranks[operator]), column)
 
     def real(self) -> float:
-        """A number. Raises `InputError` where it is none."""
+        """A number. Raises `InputError` if the value is none."""
         column = self.column
         return float(self.number(self.result(), column))
 
     def operand(self) -> Value:
-        """A value with its sign: a number, an expression in brackets, what a name stands for."""
+        """A value with its sign: a number, an expression in brackets, or a named value."""
         self.take(BLANK)
         column = self.column
         self.next("+")
@@ -149,26 +141,26 @@ class Formula(Scanner):
         return self.named(name, column)
 
     def named(self, name: str, column: int) -> Value:
-        """The value of a name, with what belongs to it: of a function, of a Q parameter."""
+        """Value of a name with what belongs to it: of a function, of a Q parameter."""
         if name in FUNCTIONS:
             return self.finite(name, column, FUNCTIONS[name], self.operand())
         self.refuse_if(name != "PI" and not PARAMETER.fullmatch(name), f"{name} in a formula", KNOWN, column=column)
         return math.pi if name == "PI" else self.lookup(name, column)
 
     def operated(self, operator: str, left: Value, right: Value, column: int) -> Value:
-        """The value of an operator."""
+        """Result of an operator."""
         values = self.number(left, column), self.number(right, column)
         return self.finite(operator, column, self.operations[operator], *values)
 
     def number(self, value: Value, column: int) -> float:
-        """The number that a value is."""
+        """Numeric value."""
         if isinstance(value, str):
             raise self.fail(f"{value!r} is no number", "a number", column=column)
         return value
 
 
 def work_out(text: str, parameter: Callable[[str], float], place: Place) -> float:
-    """The value of an expression; `parameter` gives that of a Q parameter. Raises `InputError`.
+    """Value of an expression; `parameter` gives the values of Q parameters. Raises `InputError`.
 
     Examples
     --------

@@ -16,9 +16,9 @@ from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
-# M functions that are those of the one table of codes.
+# M functions that are those of the common table of codes.
 SHARED = ("M0", "M1", "M2", "M3", "M4", "M5", "M7", "M8", "M9", "M13", "M14", "M19", "M30")
-# Others that leave the programmed path alone, and those that do not: by what they do.
+# Other M functions that leave the programmed path alone, and those that do not, with what they do.
 PASSIVE = {
     name: what
     for what, names in {
@@ -45,7 +45,7 @@ OF_M = ("F", "LA", "T", "E", "P")  # parameters of M103, M120, M112, M124
 
 
 def miscellaneous(state: State, block: CurrentBlock) -> None:
-    """The M functions of a statement that act at its beginning, or leave the path alone."""
+    """Carry out the M functions of a statement that act at its beginning, or leave the path alone."""
     for letter in [letter for letter in block.values if letter[0] == "M" and letter[1:].isdigit()]:
         word = block.values[letter]
         if letter in ("M89", "M91", "M92", "M99", "M140"):
@@ -106,7 +106,7 @@ def vectors(state: State, block: CurrentBlock, code: str) -> None:
     target = unit_axis([component or 0.0 for component in axis])
     start, here = _axis(state), present(state)
     parts = division(start, target)
-    held, state.plain.held_tip = state.plain.held_tip, False  # the vectors say what M128 holds
+    held, state.plain.held_tip = state.plain.held_tip, False  # the vectors themselves state what M128 would hold
     for part in range(1, parts + 1):
         share = part / parts
         at_part = {i: here[i] + share * (there[i] - here[i]) for i in there} if part < parts else dict(there)
@@ -117,7 +117,7 @@ def vectors(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _axis(state: State) -> Vector:
-    """The tool's axis, of roll and pitch."""
+    """Axis of the tool, from roll and pitch."""
     roll, pitch = (math.radians(v) for v in state.frames.position[3:5])
     return (math.sin(pitch) * math.cos(roll), -math.sin(roll), math.cos(pitch) * math.cos(roll))
 
@@ -135,18 +135,18 @@ def units(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def nothing(state: State, block: CurrentBlock, code: str) -> None:
-    """A heading or a label, or what `run` carries out."""
+    """Do nothing: a heading or a label, or a statement that `run` carries out."""
     block.free.clear()
 
 
 def listed(state: State, block: CurrentBlock, code: str) -> None:
-    """A statement that leaves the path alone; its words go with it."""
+    """List a statement that leaves the path alone, with its words."""
     block.free.clear()
     state.note(block.line, block.block.words[0], "leaves the path as it is")
 
 
 def left_out(state: State, block: CurrentBlock, code: str) -> None:
-    """A cycle that makes no cut and whose moves are the control's: after probing the tool's place is not known."""
+    """Leave out a cycle without cuts, whose moves are the control's: after probing, the tool's position is unknown."""
     probes, shown = code.startswith("TCH"), block.block.words[0].text
     block.free.clear()
     what = "probing; where it sets the datum, that is program zero" if probes else "a cycle of the machine builder's"

@@ -14,12 +14,12 @@ INCH = re.compile(r"\s*(?:N?\d+\s+)?BEGIN\s+PGM\b.*\bINCH\s*(?:;.*)?$", re.IGNOR
 
 
 def in_inches(lines: Sequence[str]) -> bool:
-    """Whether a program's BEGIN PGM says so."""
+    """True if a program's BEGIN PGM states inches."""
     return any(INCH.match(line) for line in lines[:100])
 
 
 def corner_follows(lines: Sequence[str], row: int) -> bool:
-    """Whether the next statement from a line on (from 0) is a corner (RND, CHF)."""
+    """True if the next statement from a line on (from 0) is a corner (RND, CHF)."""
     while row < len(lines) and not CORNER.match(lines[row]):
         if not EMPTY.fullmatch(lines[row]):
             return False
@@ -28,7 +28,7 @@ def corner_follows(lines: Sequence[str], row: int) -> bool:
 
 
 def as_g_code(lines: Sequence[str]) -> list[str]:
-    """Plain statements as G code; for all others, and the last one of a run, "?", which no run of plain lines takes.
+    """Plain statements as G code; "?", which plain lines do not include, for all others and for the last of a run.
 
     Examples
     --------

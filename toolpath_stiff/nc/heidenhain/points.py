@@ -20,7 +20,7 @@ ON_CIRCLE_MM = 0.016  # how far an end may lie off its circle (user's manual, "C
 
 
 def present(state: State) -> list[float]:
-    """The programmed point in program axes: of an element that waits the end, of an APPR the contour point."""
+    """Programmed point in program axes: the end of a waiting element, the contour point of an APPR."""
     plain, here = state.plain, state.frames.to_program(state.frames.position)
     if plain.held is not None:
         first, second, _ = PLANES[state.plane]
@@ -31,7 +31,7 @@ def present(state: State) -> list[float]:
 
 
 def outside_contour(state: State, block: CurrentBlock, what: str, also: object = False) -> None:
-    """Refuse what cannot be in a contour: with compensation, before the element behind a corner, or behind APPR."""
+    """Refuse a statement not allowed in a contour: with compensation, between a corner and its element, after APPR."""
     plain = state.plain
     waits = state.cutter is not None or plain.held is not None or plain.approach is not None or also
     problem = f"{what} inside a contour with compensation or a corner"
@@ -39,18 +39,18 @@ def outside_contour(state: State, block: CurrentBlock, what: str, also: object =
 
 
 def in_plane(state: State, point: list[float]) -> complex:
-    """A point's two coordinates of the plane."""
+    """The two in-plane coordinates of a point."""
     first, second, _ = PLANES[state.plane]
     return complex(point[first], point[second])
 
 
 def end_of(state: State, there: dict[int, float]) -> complex:
-    """Where a move ends in the plane, whose words give some coordinates; the others are the present ones."""
+    """End of a move in the plane; coordinates that its words do not give are the present ones."""
     return in_plane(state, [there.get(axis, value) for axis, value in enumerate(present(state))])
 
 
 def named(state: State, block: CurrentBlock) -> dict[int, float]:
-    """Axis -> coordinate of the axis words, steps added to the present point; they then count as used."""
+    """Axis -> coordinate of the axis words, steps added to the present point; marks the words as used."""
     words = block.free & WORDS_OF_AXES.keys()
     relative = state.plain.shorter or any(letter[0] == "I" for letter in words)
     here, there = present(state) if relative else [], dict[int, float]()
@@ -69,7 +69,7 @@ def named(state: State, block: CurrentBlock) -> dict[int, float]:
 
 @contextmanager
 def plane_of_pole(state: State, block: CurrentBlock) -> Iterator[complex]:
-    """The pole in its plane, which is in force meanwhile: CC X Z in G17 gives a circle of ZX."""
+    """The pole in its own plane, which is in force meanwhile: CC X Z in G17 gives a circle in ZX."""
     if state.plain.pole is None:
         problem = "without a circle centre or pole, or after a change of the coordinates"
         raise block.fail(None, problem, "CC before it")
@@ -100,18 +100,20 @@ def polar(state: State, block: CurrentBlock, pole: complex) -> dict[int, float]:
 
 
 def feed(state: State, block: CurrentBlock) -> bool:
-    """Take F; whether it is FMAX, which holds for its statement alone."""
+    """Take F; returns True for FMAX, which holds for its statement only."""
     value, rapid = block.take("F"), "FMAX" in block.values
     block.take("FMAX")
     if value is not None:
         state.feed = value * inch_tenths(state)
         block.refuse_if(not state.feed >= SLOWEST, "F", "is no feed that moves", "F above 0")
     if block.take("FAUTO") is not None:
-        block.refuse_if(state.plain.tool_feed is None, "FAUTO", "without F in TOOL CALL", "F with a number")
+        block.refuse_if(
+            state.plain.tool_feed is None, "FAUTO", "without F in TOOL CALL", "F with a number, or --feed MM_PER_MIN"
+        )
         state.feed = state.plain.tool_feed
     return rapid
 
 
 def inch_tenths(state: State) -> float:
-    """mm/min of F 1: in inch programs a tenth of an inch a minute (user's manual, "Feed rate F")."""
+    """Feed of F 1 in mm/min: in inch programs a tenth of an inch a minute (user's manual, "Feed rate F")."""
     return MM_PER_INCH / 10.0 if state.inch else 1.0

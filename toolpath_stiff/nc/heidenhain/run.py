@@ -1,4 +1,4 @@
-"""Runs a program in Heidenhain's plain language: its statements one after another, labels, repeats, calls and jumps.
+"""Run of a program in Heidenhain's plain language: statements in order, labels, repeats, calls and jumps.
 
 HEIDENHAIN, user's manual of the iTNC 530, "Programming: subprograms and program section repeats", "Q parameters". Plain
 straight statements, most of a CAM system's program, are written as G0 and G1 and executed many at a time.
@@ -32,24 +32,25 @@ CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?
 CONTOUR = frozenset(("RND", "CHF", "L", "LP", "C", "CP", "CR", "CT", "CTP", "LN"))
 FORMULAS = ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
 OF_CONTROL = ("FN18", "FN28")
-TO_MACHINE = ("M91", "M92")  # beside which FMAX may lead to a point that is not known
-TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control works out for a tilted plane
+TO_MACHINE = ("M91", "M92")  # with these FMAX may lead to an unknown point
+TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control computes for a tilted plane
 
 
 class HeidenhainRun(ProgramRun):
-    """A run of a program in the plain language; parameters as of `ProgramRun`.
+    """Run of a program in the plain language; parameters as for `ProgramRun`.
 
     Programs that CALL PGM names are looked for in the folder of the controller.
     """
 
     def __init__(self, request: Request, tally: Tally | None = None) -> None:
         super().__init__(request, tally, fast=False)
+        self.state.plain.tool_feed = request.controller.feed
         self._plain = self._lexer = PlainRun(self.state, as_g_code(self.lines), self.name)
         self._statements: dict[int, PlainStatement] = {}
         self._has_labels = any("LBL" in line.upper() for line in self.lines)  # without any no statement runs again
-        self._labels: dict[int, dict[str, list[int]]] = {}  # by the first line of their program
+        self._labels: dict[int, dict[str, list[int]]] = {}  # by the first line of the program
         self._repeats: dict[tuple[int, int], int] = {}
-        self._locals: list[dict[str, float]] = [{}]  # QL, by the programs that run
+        self._locals: list[dict[str, float]] = [{}]  # QL, one dictionary for each running program
         self._to_machine = False  # the statement is a rapid in machine coordinates
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
@@ -69,7 +70,7 @@ class HeidenhainRun(ProgramRun):
         return self._statements[row]
 
     def _steered(self, row: int) -> int:
-        """Carry out the statement in a line; where the run goes on."""
+        """Carry out the statement at a line; returns the line where the run goes on."""
         self._count_block(row)
         statement = self._statement(row)
         if not statement.head or (statement.optional and 1 in self.switches):
@@ -127,7 +128,7 @@ class HeidenhainRun(ProgramRun):
         self._to_machine = "FMAX" in letters and not letters.isdisjoint(TO_MACHINE)
         for place, text in statement.computed.items():
             word = words[place]
-            # Of axes that the control turns to a plane 0, which counts in an untilted one alone.
+            # Axes that the control turns to a plane are 0, which is valid only in an untilted plane.
             turns = word.letter in ("A", "B", "C") and text.lstrip("+-") in TILTING
             with suppress(InputError) if statement.head.startswith("BLK") else nullcontext():  # a blank not known yet
                 word = word._replace(value=math.nan)
@@ -141,7 +142,7 @@ class HeidenhainRun(ProgramRun):
         return block
 
     def _value(self, row: int, text: str, column: int) -> float:
-        """The number of a word: as written, or of a Q parameter."""
+        """Number of a word, as written or from a Q parameter."""
         if "Q" not in text:
             try:
                 return float(text)
@@ -162,16 +163,16 @@ class HeidenhainRun(ProgramRun):
         return known
 
     def _scope(self, name: str) -> dict[str, float]:
-        """Where a parameter is kept; nan: the control has given it a value that is not known."""
+        """Dictionary that holds a parameter; nan: set by the control to an unknown value."""
         return self._locals[-1] if name.startswith("QL") else self.state.plain.parameters
 
     def _work_out(self, formula: str, place: Place) -> float:
-        """The value of a formula; nan where one of its parameters has a value that is not known."""
+        """Value of a formula; nan if one of its parameters is unknown."""
         unknown = any(math.isnan(self._scope(name).get(name, 0.0)) for name in PARAMETER.findall(formula))
         return math.nan if unknown else work_out(formula, self._parameter, place)
 
     def _flow(self, row: int, statement: PlainStatement, block: CurrentBlock) -> int | None:
-        """Where the run goes on after a statement, whose parameters and jumps are carried out; None: nowhere."""
+        """Line where the run goes on after a statement, with parameters and jumps carried out; None at the end."""
         head, rest, after = statement.head, statement.rest, statement.after
         place = self._place(row)._replace(column=len(code_text(self.lines[row])) - len(rest) + 1)
         if head.startswith("CYCL DEF 2"):
@@ -192,7 +193,7 @@ class HeidenhainRun(ProgramRun):
             if reads is not None:
                 index = self._work_out(reads[4] or "0", place)
                 self._scope(reads[1])[reads[1]] = system_value(self.state, reads[2], reads[3], index)
-        elif head[0] == "Q" or head in FORMULAS:
+        elif (head[0] == "Q" and head[1] != "S") or head in FORMULAS:
             name, formula, place = assigned(head, rest, place)
             self._scope(name)[name] = self._work_out(formula, place)
         elif head == "CALL LBL":
@@ -211,13 +212,13 @@ class HeidenhainRun(ProgramRun):
         return after
 
     def _jump_back(self, row: int, to: int) -> int:
-        """Go to a label on a condition."""
+        """Jump to a label on a condition."""
         if to <= row:
             self._check_loop(row, to, (self.state.plain.parameters, self._locals, self._repeats))
         return self._jump(row, to)
 
     def _label(self, row: int, number: str | None, name: str | None) -> int:
-        """The line of a label in the program that runs. Raises `InputError` unless there is one."""
+        """Line of a label in the running program. Raises `InputError` if there is none."""
         first, stop = next((file[:2] for file in self._files if file[0] <= row < file[1]), (0, self._main_lines))
         if first not in self._labels:
             self._labels[first] = labels(self.lines, first, stop)
@@ -250,7 +251,7 @@ class HeidenhainRun(ProgramRun):
         return self._jump(row, label)
 
     def _program(self, row: int, statement: PlainStatement) -> int:
-        """The first line of a program that is called, whose file is read unless it is there."""
+        """First line of a called program, whose file is read if it is not loaded."""
         name = PurePath(statement.rest.strip().strip('"').replace("\\", "/")).name
         stem = name.removesuffix(".H")
         first = next((first for first, _, file in self._files if PurePath(file).stem.upper() == stem), None)
@@ -265,7 +266,7 @@ class HeidenhainRun(ProgramRun):
         return first
 
     def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
-        """A warning about what follows END PGM; an error where a corner or an approach still waits."""
+        """Warning on text after END PGM; raises an error if a corner or an approach is still pending."""
         plain = self.state.plain
         if plain.held is not None or plain.approach is not None:
             raise self._fail(self._at, "the program ends before the element behind a corner or an APPR", "the element")

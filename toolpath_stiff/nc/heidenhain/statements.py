@@ -1,4 +1,4 @@
-"""Lines of the plain language to statements: a head, and words with their columns.
+"""Lines of the plain language as statements: a head, and words with their columns.
 
 A statement is a line, `~` at its end continues it; `;` begins a comment, `*` a heading, `/` a statement that may be
 left out. Cycles from 200 on have their parameters in lines that follow (HEIDENHAIN, user's manuals of the iTNC 530 and
@@ -22,16 +22,17 @@ _COMMENT = re.compile(r'"[^"]*"|;.*')
 _HEAD = re.compile(
     r"(?:BEGIN|END)\s+PGM|BLK\s+FORM(?:\s+(?:0[.,][12]|[A-Z]+))?|TOOL\s+(?:CALL|DEF)|CYCL\s+DEF\s*\d+(?:\s*[.,]\d+)?"
     r"|CYCL\s+CALL(?:\s+P[OA][ST]\b)?|CALL\s+(?:LBL|PGM)|FN\s*\d+\s*:|FUNCTION\s+(?:RESET\s+)?[A-Z]+|PLANE\s+[A-Z]+"
-    r"|(?:APPR|DEP)\s+[A-Z]+|TCH\s+PROBE(?:\s+\d+)?|(?:SEL|PATTERN|INIT)\s+[A-Z]+|Q[LRS]?\d+(?=\s*=)|[A-Z]+"
+    r"|(?:APPR|DEP)\s+[A-Z]+|TCH\s+PROBE(?:\s+\d+)?|(?:SEL|PATTERN|INIT)\s+[A-Z]+|Q[LRS]?\d+(?=\s*=)|DECLARE\s+STRING"
+    r"|TRANS\s+DATUM(?:\s+(?:AXIS|RESET))?|[A-Z]+"
 )
 _WORD = re.compile(
-    r"(R0(?![\d.,])|R[LR]|DR[+-](?!\s*[\d.,Q])|F\s*MAX|F\s*AUTO|MB\s*MAX|SEQ[+-]|STAY|TURN|MOVE|SYM|(?:TABLE|COORD)\s+ROT"
+    r"(R0(?![\d.,])|R[LR]|DR[+-](?!\s*[\d.,Q])|F\s*MAX|F\s*AUTO|MB\s*MAX|S(?:EQ|YM)[+-]|STAY|TURN|MOVE|(?:TABLE|COORD)\s+ROT"
     r"|AXIS\s+(?:POS|SPAT)|PATHCTRL\s+(?:AXIS|VECTOR)|F\s+(?:TCP|CONT)|REFPNT\s+[A-Z-]+)"
     rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
     rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
     r"|([XYZABCUVW])(?![A-Z])"
     rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"|[FRM](?![A-Z\d])"
-    r"|\([^)]*\)?|(\S)",  # a remark, as simulators have it; what is no word
+    r"|\([^)]*\)?|(\S)"  # a remark, as simulators write it; anything else that is no word
 )
 _LABEL = re.compile(r'\s*/?\s*(?:N?\d+\s+)?/?\s*LBL\s*(?:0*(\d+)|"([^"]*)")\s*$')
 PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
@@ -39,9 +40,9 @@ _INCH = re.compile(r"\b(INCH)()\s*$")
 _NUMBER_BEHIND = re.compile(rf"()({VALUE})\s*$")  # a name in the control's language
 _OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|17)\.[1-5])")
 _VALUES = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
-# Heads whose rest has another form, or does not matter.
+# Heads whose rest has another form, or is irrelevant.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|TCH|FN|Q|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
+    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|TCH|FN|Q|DECLARE|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
     r"|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 
@@ -65,13 +66,13 @@ class PlainStatement:
 
 
 def code_text(line: str) -> str:
-    """A line without its comment and the mark of continuation, in upper case; columns stay."""
+    """Line without its comment and continuation mark, in upper case; columns are kept."""
     text = _COMMENT.sub(lambda part: part[0] if part[0].startswith('"') else "", line) if ";" in line else line
     return text.rstrip().rstrip("~").rstrip().upper()
 
 
 def labels(lines: Sequence[str], first: int, stop: int) -> dict[str, list[int]]:
-    """Label -> the lines where it stands between two lines (from 0), LBL 0 apart."""
+    """Label -> lines between two lines (from 0) where it occurs, except LBL 0."""
     places = dict[str, list[int]]()
     for row in range(first, stop):
         label = _LABEL.match(code_text(lines[row])) if "LBL" in lines[row].upper() else None
@@ -82,7 +83,7 @@ def labels(lines: Sequence[str], first: int, stop: int) -> dict[str, list[int]]:
 
 @lru_cache(256)
 def _form(head: str) -> tuple[str, re.Pattern[str] | None, bool]:
-    """A head as messages have it, what is looked for behind it alone, and whether words follow it."""
+    """Head as in messages, the only pattern looked for after it, and True if words follow it."""
     shown = " ".join(head.split()).replace(",", ".").replace("FN ", "FN").rstrip(": ")
     if shown.startswith("CYCL DEF"):
         shown = "CYCL DEF " + shown.removeprefix("CYCL DEF").replace(" ", "")
@@ -91,7 +92,7 @@ def _form(head: str) -> tuple[str, re.Pattern[str] | None, bool]:
 
 
 def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
-    """The statement that begins in a line (from 0), with what continues it. Raises `InputError`."""
+    """Statement that begins at a line (from 0), with its continuation. Raises `InputError`."""
     text, after, place = code_text(lines[row]), row + 1, Place(name, row + 1)
     begin = _BEGIN.match(text)
     assert begin is not None
@@ -108,10 +109,10 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
     if special is not None and (number := special.search(text, end)):
         _add(words, computed, number[1] or "#", number[2].replace(",", "."), number.start() + 1, number[0].strip())
     if has_words:
-        first = PARAMETER.search(text, end) if cycle else None  # what stands before it is the cycle's name
+        first = PARAMETER.search(text, end) if cycle else None  # the text before it is the cycle's name
         _words(words, computed, text, first.start() if first else len(text) if cycle else end, place, shown)
     while after < len(lines) and (lines[after - 1].rstrip().endswith("~") or (cycle and PARAMETER.match(lines[after]))):
-        if has_words and (cycle or ";" not in lines[after - 1]):  # else a remark goes on
+        if has_words and (cycle or ";" not in lines[after - 1]):  # otherwise a remark continues
             _words(words, computed, code_text(lines[after]), 0, Place(name, after + 1), shown)
         after += 1
     return PlainStatement(
@@ -136,12 +137,12 @@ def _words(words: list[Word], computed: dict[int, str], text: str, position: int
             raise place.fail(f"a number of {len(written)} characters", "", "", column)
         if key == "M":
             key = f"M{written.lstrip('+0') or '0'}"
-        if match.lastindex:  # else F, R or M alone, which changes nothing
+        if match.lastindex:  # otherwise F, R or M alone, which changes nothing
             _add(words, computed, key, written, column, quoted if quoted is not None else match[0])
 
 
 def _add(words: list[Word], computed: dict[int, str], key: str, written: str, column: int, text: str) -> None:
-    """Add a word; its value is worked out when it runs where it is no number."""
+    """Add a word; if its value is no number it is evaluated when the word runs."""
     number = _VALUES.get(written)
     if number is None and "Q" not in written and written != "PREDEF":
         number = float(written or 0.0)

@@ -1,4 +1,4 @@
-"""Data of the control that programs read (FN 18: SYSREAD), as far as the program and its tool table say them.
+"""Data of the control that programs read (FN 18: SYSREAD), as far as program and tool table give them.
 
 HEIDENHAIN, user's manuals of the iTNC 530 and the TNC 640, "FN 18: SYSREAD", "System data". Lengths are mm in inch
 programs too. Where the tool stands (ID 240, 270) is not among them: programs read it after a move by hand.
@@ -33,7 +33,7 @@ def _shift(state: State, index: int) -> float:
     return state.plain.shift[index - 1] if known else math.nan
 
 
-# Group (ID) and number (NR) -> the value of an index (IDX; 0: none), nan where it is not known.
+# Group (ID) and number (NR) -> function of the index (IDX; 0: none), nan for unknown values.
 SYSTEM_DATA: dict[tuple[int, int], Callable[[State, int], float]] = {
     (20, 1): _tool, (60, 1): _tool,
     (20, 3): lambda state, index: float(("G19", "G18", "G17").index(state.plane)),
@@ -48,7 +48,7 @@ SYSTEM_DATA: dict[tuple[int, int], Callable[[State, int], float]] = {
 
 
 def system_value(state: State, group: str, number: str, index: float) -> float:
-    """What FN 18 reads; nan where that is not known.
+    """Value that FN 18 reads; nan if unknown.
 
     Examples
     --------

@@ -12,7 +12,7 @@ from toolpath_stiff.nc.tables import ToolEntry, tool_of
 from toolpath_stiff.nc.words import AXES
 
 TOOL_PLANES = {"X!": "G19", "Y!": "G18", "Z!": "G17"}
-FIRST_NAMED = 10_001  # the number of the first tool that the program calls by its name
+FIRST_NAMED = 10_001  # number given to the first tool called by name
 
 
 def tool_call(state: State, block: CurrentBlock, code: str) -> None:
@@ -45,7 +45,7 @@ def tool_call(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def tool_number(state: State, block: CurrentBlock) -> int | None:
-    """The tool that a statement names: by its number, or by its name in the tool table (or as it comes)."""
+    """Number of the tool in a statement: as given, or by its name in the tool table (or in order of appearance)."""
     name, value = block.values.get('"'), block.take("#")
     if block.take('"') is None or name is None:
         block.refuse_if(value is not None and (value != int(value) or value < 0), "#", "is no tool", "a whole number")
@@ -61,6 +61,8 @@ def tool_number(state: State, block: CurrentBlock) -> int | None:
 def tool_definition(state: State, block: CurrentBlock, code: str) -> None:
     """TOOL DEF: length and radius of a tool; without them it is the next one of the magazine."""
     number, length, radius = tool_number(state, block), block.take("L"), block.take("R")
+    if block.take("F") is not None:
+        state.note(block.line, block.values["F"], "a feed with a tool, as simulators have it: TOOL CALL has it")
     if number is None or (length is None and radius is None):
         return
     state.tools = {} if state.tools is None else state.tools

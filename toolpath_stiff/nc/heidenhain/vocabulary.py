@@ -1,4 +1,4 @@
-"""The table of statements of the plain language: head, function, meaning, source; what is refused, and why.
+"""Table of statements of the plain language: head, function, meaning, source; and refused statements with reasons.
 
 The functions are in `contour`, `approach`, `coordinates`, `cycles`, `functions`; `run` carries out the flow (LBL, CALL,
 FN). M functions that mean what they mean in G code are the one table's (`codes.registry`).
@@ -20,6 +20,11 @@ _APPROACH, _TOOLS = f"{MANUAL}, Contour approach and departure", f"{MANUAL}, Too
 _PLANE, _FLOW = f"{MANUAL}, The PLANE function", f"{MANUAL}, Subprograms and program section repeats"
 _Q, _BASICS = f"{MANUAL}, Programming: Q parameters", f"{MANUAL}, Fundamentals of programming"
 _SPECIAL = f"{_CYCLES}, Special cycles"
+
+
+def _parts(cycle: int, first: int, last: int) -> str:
+    """Statements of which a cycle of older controls consists."""
+    return "|".join(f"CYCL DEF {cycle}.{part}" for part in range(first, last + 1))
 
 
 _SILENT, _LISTED = functions.nothing, functions.listed
@@ -53,7 +58,7 @@ _ROWS: Rows = (
         ("TOOL DEF", tools.tool_definition, "length and radius of a tool, or the next tool"),
     )),
     ("dynamic offset", _TRANSFORM, (
-        ("CYCL DEF 7.1|CYCL DEF 7.2|CYCL DEF 7.3|CYCL DEF 7.4|CYCL DEF 7.5|CYCL DEF 7.6", coordinates.shift, "shift"),
+        (f"{_parts(7, 1, 6)}|TRANS DATUM AXIS|TRANS DATUM RESET", coordinates.shift, "shift"),
         ("CYCL DEF 8.1", coordinates.mirror, "mirror image"),
         ("CYCL DEF 10.1", coordinates.rotation, "rotation"),
         ("CYCL DEF 11.1", coordinates.scale, "scale"),
@@ -77,26 +82,26 @@ _ROWS: Rows = (
         ("CYCL DEF 205", cycles.define, "deep drilling"),
         ("CYCL DEF 240", cycles.define, "centring"),
         ("CYCL DEF 241", cycles.define, "single-lip drilling"),
-        ("|".join(f"CYCL DEF 1.{part}" for part in range(6)), cycles.define_older, "pecking, of older controls"),
+        (_parts(1, 0, 5), cycles.define_older, "pecking, of older controls"),
         ("CYCL CALL|CYCL CALL POS", cycles.call_statement, "carries out the cycle"),
     )),
     ("motion", _TAPPING, (
         ("CYCL DEF 206|CYCL DEF 207|CYCL DEF 209", cycles.define, "tapping"),
-        ("|".join(f"CYCL DEF 2.{part}" for part in range(5)), cycles.define_older, "tapping, of older controls"),
-        ("|".join(f"CYCL DEF 17.{part}" for part in range(4)), cycles.define_older, "tapping, of older controls"),
+        (f"{_parts(2, 0, 4)}|{_parts(17, 0, 3)}", cycles.define_older, "tapping, of older controls"),
     )),
     ("motion", _PATTERNS, (("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),)),
     ("motion", _SPECIAL, (("CYCL DEF 300", functions.left_out, "300 to 399: the machine builder's, left out"),)),
     ("motion", f"{_CYCLES}, Touch probe cycles", (("TCH PROBE", functions.left_out, "probing, left out"),)),
     ("dwell", _SPECIAL, (("CYCL DEF 9.1", functions.dwell, "dwell"),)),
     ("path control", _SPECIAL, (
-        ("CYCL DEF 9.0|CYCL DEF 13.0|CYCL DEF 13.1|CYCL DEF 32.0|CYCL DEF 32.1|CYCL DEF 32.2|CYCL DEF 32.3", _LISTED,
+        (f"CYCL DEF 9.0|{_parts(13, 0, 1)}|{_parts(32, 0, 3)}", _LISTED,
          "dwell, spindle angle, tolerance: changes no path"),
     )),
     ("M subprogram", _FLOW, (("LBL", _SILENT, "label"), ("CALL LBL|CALL PGM", _SILENT, "call"))),
     ("M stop", _BASICS, (("STOP|M", holds_anyway, "M functions alone"), ("END PGM", _SILENT, "end"))),
     ("non-modal", _Q, (
         ("Q|FN0|FN1|FN2|FN3|FN4|FN5|FN6|FN7|FN8|FN13", _SILENT, "Q parameter"),
+        ("QS|DECLARE STRING", _LISTED, "a text: not known where a tool, a label or a program is called by it"),
         ("FN9|FN10|FN11|FN12", _SILENT, "jump on a condition"),
         ("FN14", _SILENT, "error: the program stops"),
         ("FN18", _LISTED, "data of the control: tool, datum shift, rotation, scale; others are not known"),
@@ -105,7 +110,8 @@ _ROWS: Rows = (
     )),
     ("non-modal", _BASICS, (
         ("BLK FORM 0.1|BLK FORM 0.2", tools.blank, "corner of the blank"),
-        ("BLK FORM CYLINDER|BLK FORM ROTATION|BLK FORM FILE|FUNCTION MODE|SEL TABLE|FUNCTION FEED|FUNCTION SPINDLE",
+        ("BLK FORM CYLINDER|BLK FORM ROTATION|BLK FORM FILE|FUNCTION MODE|SEL TABLE|FUNCTION FEED|FUNCTION SPINDLE"
+         "|FUNCTION DCM|FUNCTION AFC|FUNCTION COUNT",
          _LISTED, "changes no path"),
     )),
 )  # fmt: skip
@@ -129,18 +135,19 @@ _REFUSED = (
 REFUSED = refused(_REFUSED, ", ")
 
 
-_BUILDERS = re.compile(r"CYCL DEF 3\d\d")
+_BUILDERS, _PARAMETER = re.compile(r"CYCL DEF 3\d\d"), re.compile(r"(Q[LRS]?)\d")
 
 
 @lru_cache(256)
 def look_up(head: str) -> Code | None:
-    """The row of a statement's head; of Q parameters that of "Q", of the machine builder's cycles that of 300."""
+    """Row of a statement's head; Q parameters have the row "Q", the machine builder's cycles that of 300."""
     head = "TCH PROBE" if head.startswith("TCH PROBE") else "CYCL DEF 300" if _BUILDERS.fullmatch(head) else head
-    return STATEMENTS.get("Q" if (head[0] == "Q" and head[1:2].isdigit()) or head[:2] in ("QL", "QR") else head)
+    parameter = _PARAMETER.match(head)
+    return STATEMENTS.get(parameter[1].rstrip("LR") if parameter else head)
 
 
 def refusal_of(head: str) -> tuple[str, str]:
-    """What a statement without a row is, and what to do instead."""
+    """Description of a statement without a row, and what to do instead."""
     for name in (head, " ".join(head.split()[:2]), head.split(maxsplit=1)[0]):
         if name in REFUSED:
             return f"is {REFUSED[name].what}, which is not supported", REFUSED[name].hint
@@ -150,7 +157,7 @@ def refusal_of(head: str) -> tuple[str, str]:
 
 
 def meaning_of(name: str) -> str:
-    """What a statement or an M function is taken for.
+    """Meaning of a statement or M function to the reader.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The canonical commands that `rs274` prints, to moves.
+"""Moves from the canonical commands that `rs274` prints.
 
 Motions are given in program coordinates of the controlled point, in the active length unit; the frame is printed when
 it changes. As measured (2.9): world = Rz(rotation) (program + g92) + g5x, spindle nose = world + tool length, and the
@@ -40,7 +40,7 @@ Vector = list[float]
 
 @dataclass
 class Follower(Record):
-    """Follows the canonical commands; `recorder` holds the moves in control coordinates less the `reference`.
+    """Interpreter of the canonical commands; `recorder` holds the moves in control coordinates less the `reference`.
 
     Here `feed` is mm/min or mm/rev, degrees/min where only rotary axes move.
 
@@ -63,28 +63,28 @@ class Follower(Record):
     synchronised: float = 0.0
     turn: int = 0  # of the spindle: 1 clockwise, -1 the other way
     surface_speed: bool = False
-    line: int = 0  # that moves; 0: one before the program
+    line: int = 0  # line that moves; 0: before the program
     reading: int = 0
     cycle: bool = False
     frame_changed: bool = False
     turned_by: int = 0
-    raised: float = 0.0  # mm that changes of length since the last move added to Z's number
-    lost: float = 0.0  # the same, where a tool change has made rs274 forget them
+    raised: float = 0.0  # mm added to Z by changes of tool length since the last move
+    lost: float = 0.0  # the same, forgotten by rs274 at a tool change
     moves_of_line: int = 0
     incremental: bool = False
-    given: dict[str, float] = field(default_factory=dict)  # X, Y, Z as plain blocks say, to the program's last digit
-    steps: dict[str, float] = field(default_factory=dict)  # of this line, from what was given before it
+    given: dict[str, float] = field(default_factory=dict)  # X, Y, Z of plain blocks, to the program's last digit
+    steps: dict[str, float] = field(default_factory=dict)  # steps of this line from the point given before
 
     def __post_init__(self) -> None:
         self.frames = Frames(Offsets(), None, ZERO, posted=self.posted)  # whatever offset is in force is its G54
         self.fine = any(program_words.FINE_WORD.search(line.words) for line in self.lines)
-        self.passed = [0]  # how many of the first lines no run that comes straight on leaves out
+        self.passed = [0]  # number of first lines that a run without jumps passes
         for line in self.lines:
             shows = line.words.strip("%") and not line.optional and not program_words.LEAVES.match(line.words)
             self.passed.append(self.passed[-1] + bool(shows))
 
     def follow(self, text: str) -> None:
-        """Take every command. Raises `InputError` for what gives no path: probing, splines, tools of unknown length."""
+        """Take every command. Raises `InputError` for what has no path: probing, splines, tools of unknown length."""
         for match in CALL.finditer(text):
             number, name, inner = match.groups()
             action = getattr(self, f"_on_{name.lower()}", None)
@@ -97,7 +97,7 @@ class Follower(Record):
             self.turn = TURNS.get(name, self.turn)
 
     def fail(self, problem: str, expected: str = "", hint: str = "", line: int | None = None) -> InputError:
-        """An error of a line of the program, unless one is given of that being read."""
+        """Error at a line of the program, by default at the line being read."""
         line = self.reading if line is None else line
         return ProgramError(problem, expected=expected, hint=hint, file=self.name, line=line or None)
 
@@ -121,7 +121,7 @@ class Follower(Record):
             self._check_diameter()
 
     def _note_jump(self, line: int) -> None:
-        """A loop, a condition or a call, from whose line the run left, or after whose line it goes on."""
+        """Note a loop, condition or call: the line that the run left, or the line after which it goes on."""
         if line > self.line and self.passed[line - 1] == self.passed[self.line]:
             return
         left, after = self.line + 1, line - 1
@@ -167,7 +167,7 @@ class Follower(Record):
         self.frame_changed = True
 
     def _tool_named(self, letter: str) -> int:
-        """The tool of an H or D word; of 0 or none that in the spindle."""
+        """Tool of an H or D word; for 0 or none, the one in the spindle."""
         named = re.search(rf"{letter}0*(\d+)(?![\d.])", self._words(self.reading))
         return int(named[1] if named else 0) or self.tool
 
@@ -187,7 +187,7 @@ class Follower(Record):
         self.frame_changed = True
 
     def _check_diameter(self) -> None:
-        """rs274 takes 0 for a diameter that its table does not give, and would compensate by zero."""
+        """Refuse a tool without a diameter in the table: rs274 takes 0, and would compensate by zero."""
         words = self._words(self.reading)
         if "G41.1" in words or "G42.1" in words:
             return
@@ -227,7 +227,7 @@ class Follower(Record):
         self.synchronised = 0.0
 
     def _feed_of(self, start: Vector, end: Vector, arc: bool) -> float:
-        """mm/min, or deg/min of a move of the rotary axes alone."""
+        """Feed in mm/min, or deg/min if only rotary axes move."""
         feed = self.feed or 0.0
         if self.synchronised or self.per_revolution:
             if self.speed == 0.0:
@@ -245,7 +245,7 @@ class Follower(Record):
         self._move(CYCLE if self.cycle else FEED, self._point(inner))
 
     def _on_rigid_tap(self, inner: str) -> None:
-        """Down and, the spindle reversed, back."""
+        """Record a rigid tap: down and, with the spindle reversed, back."""
         here = self.frames.to_program(self.frames.position)
         self._move(CYCLE, [*self._point(inner)[:3], *here[3:]])
         self._move(CYCLE, here)
@@ -261,13 +261,13 @@ class Follower(Record):
         self._move(ARC, end, (c1 * scale, c2 * scale, turns))
 
     def _move(self, motion: int, target: Vector, arc: tuple[float, float, float] | None = None) -> None:
-        """One move to a point in program coordinates; an arc with its centre in the plane and its turns."""
+        """Record a move to a point in program coordinates; an arc with its centre in the plane and its turns."""
         end = self.frames.to_control(target)
         if self.lost and self.line:
             self._find_height(end)
         self.raised = 0.0
         start, self.frames.position = self.frames.position, end
-        if self.line == 0:  # one of the moves that the copy puts before the program
+        if self.line == 0:  # a move that the copy puts before the program
             self.frame_changed = False
             return
         if self.first_motion is None:
@@ -310,7 +310,7 @@ class Follower(Record):
         return Arc((x, y, z), frames.turn_direction(geometry.normal_of(self.plane)), sweep)
 
     def _end_in_words(self, here: Vector, apart: float, axes: tuple[int, int]) -> Vector:
-        """The end of an arc that rs274 prints like its start: a full circle, or one shorter than its digits."""
+        """End of an arc that rs274 prints equal to its start: a full circle, or an arc shorter than its digits."""
         named, end = self.lines[self.line - 1].named, list(here)
         for axis in axes:
             if (name := AXES[axis]) in named:
@@ -324,7 +324,7 @@ class Follower(Record):
         return here
 
     def _find_height(self, end: Vector) -> None:
-        """Until a move names Z, rs274 prints the number that Z had before the length changed."""
+        """Handle a change of tool length: until a move names Z, rs274 prints the number Z had before."""
         words = self._words(self.line)
         named = "Z" in self.lines[self.line - 1].named
         if self.cycle or (named and self.incremental) or (program_words.HOME_MOVE.search(words) and not named):

@@ -1,4 +1,4 @@
-"""Programs that `rs274` is never given.
+"""The fence: programs that are never given to `rs274`.
 
 LinuxCNC executes Python in comments (`;py,...`, `(py,...)`, `(pyrun,...)`), user M codes (M100 to M199) as executables,
 and subprograms of other files. A program with these is refused here, before anything is started; user M codes that
@@ -20,7 +20,7 @@ from toolpath_stiff.nc.place import Place
 # `py,`, `pyrun`, `pyreload`, and `py` alone or before anything but a letter or digit, whatever blanks are in between;
 # a comment within a comment counts, though LinuxCNC does not look there.
 PYTHON = re.compile(r"[(;][\s(;]*p\s*y(?:\s*(?:[^\w\s]|$|r\s*u\s*n|r\s*e\s*l\s*o\s*a\s*d)|\s)", re.IGNORECASE)
-# Of all functions, operators and O words only MOD has an M in it.
+# Only MOD, of all functions, operators and O words, contains an M.
 M_WORD = re.compile(r"M(?!OD)([+-]?[0-9.]+)?", re.ASCII)
 SUBPROGRAM = re.compile(r"O(<[^<>]*>|\d+)(SUB|CALL)?")
 ENDS = re.compile(r"(?:END)?SUB")
@@ -33,7 +33,7 @@ PARAMETER = re.compile(r"[PQ][+-]?(?:\d+\.?\d*|\.\d+|#+\d*)", re.ASCII)
 
 
 def without_user_codes(line: Line) -> Line:
-    """A line without its user M codes and their P and Q; beside a G code, whose these may be, such a line stays."""
+    """Line without its user M codes and their P and Q; unchanged beside a G code, to which these may belong."""
     codes, parameters = [*USER_CODE.finditer(line.plain)], [*PARAMETER.finditer(line.plain)]
     if not codes or line.words.startswith("O") or (parameters and "G" in line.plain):
         return line
@@ -44,7 +44,7 @@ def without_user_codes(line: Line) -> Line:
 
 
 def called_files(lines: list[Line], folder: str | None) -> tuple[list[Line], dict[int, int]]:
-    """The subs of a folder's files (`name.ngc`) that a program calls, numbered on from it, and who calls each line."""
+    """Subs of a folder's files (`name.ngc`) that a program calls, numbered on from it, and the calling line of each."""
     subs, callers = list[Line](), dict[int, int]()
     defined = {_key(match[1]) for line in lines if (match := SUBPROGRAM.match(line.words)) and match[2] == "SUB"}
     queue = deque(lines if folder is not None else ())
@@ -105,12 +105,12 @@ def _check_m_codes(line: Line, name: str) -> None:
 
 
 def _take_subprogram(line: Line, name: str, calls: list[tuple[str, int]], defined: set[str]) -> None:
-    """The subprogram that a line calls or defines: O words may call only what the program itself has.
+    """Take the subprogram that a line calls or defines: O words may only call those in the program itself.
 
     LinuxCNC would go and look for a file.
     """
     place, subprogram = Place(name, line.number), SUBPROGRAM.match(line.words)
-    if subprogram and "/" in subprogram[1]:  # it would be looked for there, if what defines it here is left out
+    if subprogram and "/" in subprogram[1]:  # LinuxCNC would look for it elsewhere if its definition here were skipped
         raise _refused("a subprogram whose name is a path", place)
     if subprogram and subprogram[2] == "CALL":
         calls.append((_key(subprogram[1]), line.number))

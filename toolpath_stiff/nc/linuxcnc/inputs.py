@@ -1,4 +1,4 @@
-"""Files that `rs274` is given: a copy of the program, a tool table, a parameter file.
+"""Input files of `rs274`: a copy of the program, a tool table, a parameter file.
 
 Comments are how LinuxCNC is told to run Python, to open files and to print messages; none reaches it but `(abort,...)`,
 which ends a program. Lines keep their places, so that a line number in one of its messages is that of the file.
@@ -31,9 +31,9 @@ LINE_NUMBER = re.compile(r"N[0-9]+(\.[0-9]+)?")
 # that no check has seen.
 BARE_NUMBER = tuple("0123456789.")
 NAMED = re.compile(r"<[^<>]*>")
-EXPRESSION = re.compile(r"\[[^\[\]]*(?:\]|$)")  # one without another in it
+EXPRESSION = re.compile(r"\[[^\[\]]*(?:\]|$)")  # an expression without another in it
 AXIS_WORD = re.compile(r"([XYZABC])(?=[-+.\d#\[]|$|[A-Z])")
-# A block that moves in program coordinates, in the unit in force, and says where by numbers alone.
+# A block that moves in program coordinates, in the unit in force, to a point given by numbers only.
 PLAIN_BLOCK = re.compile(
     r"(?:G(?:0*[0-3]|1[789]|9[014])(?![\d.])|M0*[3-9](?!\d)|[XYZABCIJKRFSPT][+-]?(?:\d++\.?\d*+|\.\d++))*+", re.ASCII
 )
@@ -50,11 +50,11 @@ class Line:
     words: str
     columns: Sequence[int] = ()
     optional: bool = False
-    user_codes: tuple[str, ...] = ()  # that were taken out of its words
+    user_codes: tuple[str, ...] = ()  # taken out of its words
 
     @cached_property
     def plain(self) -> str:
-        """The words, names in angle brackets and bracketed expressions struck out."""
+        """Words with names in angle brackets and bracketed expressions removed."""
         words = NAMED.sub(_struck_out, self.words)
         while "[" in words:
             words = EXPRESSION.sub(_struck_out, words)
@@ -62,12 +62,12 @@ class Line:
 
     @property
     def named(self) -> list[str]:
-        """The axes that it names, by numbers or by expressions."""
+        """Axes given by numbers or expressions."""
         return AXIS_WORD.findall(self.plain)
 
     @cached_property
     def coordinates(self) -> dict[str, float] | None:
-        """X, Y and Z of a plain block, to the digits of the program; None of any other."""
+        """X, Y and Z of a plain block, to the digits of the program; None for any other."""
         plain = PLAIN_BLOCK.fullmatch(self.words)
         return {letter: float(number) for letter, number in COORDINATE.findall(self.words)} if plain else None
 
@@ -77,7 +77,7 @@ def _struck_out(match: re.Match[str]) -> str:
 
 
 def split(lines: Iterable[str], name: str) -> list[Line]:
-    """The words of every line. Raises `InputError` for a comment that is not closed, or foreign letters."""
+    """Words of every line. Raises `InputError` for an unclosed comment, or foreign letters."""
     return [_line(text, Place(name, number)) for number, text in enumerate(lines, 1)]
 
 
@@ -93,7 +93,7 @@ def _line(text: str, place: Place) -> Line:
 
 
 def numbered(lines: Iterable[Line], name: str, *, block_delete: bool, prefix: Sequence[str] = ()) -> str:
-    """The text for `rs274`: after the `prefix`, one line for each of the program's.
+    """Text for `rs274`: the `prefix`, then one line for each of the program's.
 
     Text before a tape mark that follows words, and after it, is treated as by the built-in reader: the second `%`, or
     one that follows words, ends the program. `M2` is added: LinuxCNC requires an end.
@@ -116,7 +116,7 @@ def numbered_line(line: Line, words: str, place: Place) -> str:
     """A line of the copy, with its number."""
     if words.startswith(BARE_NUMBER):
         raise place.fail(f"a block that begins with a number: {words[:20]!r}", "a letter before each number")
-    comment = "" if words[:1] in ("", "O") else f"({line.number})"  # after an O word some forms take no comment
+    comment = "" if words[:1] in ("", "O") else f"({line.number})"  # some forms allow no comment after an O word
     if ABORTS.search(line.text):
         comment = "(abort,stopped by the program)"
     text = f"N{line.number}{words}{comment}" if words or comment else ""
@@ -128,7 +128,7 @@ def numbered_line(line: Line, words: str, place: Place) -> str:
 
 # LinuxCNC's manual, "Parameters": the persistent ones must all be there, in order.
 G92_ENABLED, G92_FIRST, ACTIVE_SYSTEM = 5210, 5211, 5220
-MOST_TOOLS = 900  # of the 1000 pockets that LinuxCNC has
+MOST_TOOLS = 900  # out of LinuxCNC's 1000 pockets
 UNKNOWN_LENGTH_MM = -1e5  # stands for a length that the table does not give; a move with it is refused
 TOOL_WORDS = re.compile(r"[THD]0*(\d+)(?![\d.])")
 COMPUTED_TOOL = re.compile(r"[THD](?:[#\[]|[A-Z]{2})")
@@ -149,13 +149,13 @@ def parameter_file(offsets: Offsets, shift: Sequence[float], active: int) -> str
 
 
 def first_offset(text: str) -> list[float]:
-    """G54 of a parameter file that rs274 wrote: six axes in mm and degrees."""
+    """G54 in a parameter file written by rs274: six axes in mm and degrees."""
     values = {int(number): float(value) for number, value in re.findall(r"^(\d+)\s+(\S+)", text, re.MULTILINE)}
     return [values.get(FIRST_OFFSET + place, 0.0) * (MM_PER_INCH if place < 3 else 1.0) for place in range(6)]
 
 
 def tool_numbers(tools: dict[int, ToolEntry] | None, lines: Iterable[Line]) -> list[int]:
-    """The tools known and those that the program names, in the order of `tool_file`: rs274 prints places in it."""
+    """Tools known and tools that the program names, in the order of `tool_file`: rs274 prints places in it."""
     numbers = set(tools or {})
     for line in lines:
         numbers |= {int(digits) for digits in TOOL_WORDS.findall(line.plain)}

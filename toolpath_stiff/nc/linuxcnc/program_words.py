@@ -1,4 +1,4 @@
-"""What the words of a program say, where `rs274` prints too little; the commands that give no path."""
+"""Words of a program, where `rs274` prints too little; and commands that give no path."""
 
 import re
 

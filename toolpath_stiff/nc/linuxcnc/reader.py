@@ -51,7 +51,7 @@ def read(request: Request) -> ReadProgram:
 
 
 def fenced(source: Sequence[str], name: str, folder: str | None = None) -> tuple[list[Line], dict[int, int]]:
-    """The lines of a program, then those of the files that it calls, with the line of the call of each.
+    """Lines of a program, then lines of the files that it calls, with the line of the call of each.
 
     Raises `InputError` for a program that the interpreter is not started on.
     """
@@ -62,7 +62,7 @@ def fenced(source: Sequence[str], name: str, folder: str | None = None) -> tuple
 
 
 class _Session:
-    """A program being read, as often as it takes to know its zero."""
+    """A program being read, with as many runs as it takes to know its zero."""
 
     def __init__(self, request: Request, lines: list[Line], callers: dict[int, int]) -> None:
         self.request, self.lines, self.callers = request, lines, callers
@@ -114,7 +114,7 @@ class _Session:
         return any(codes.search(line.plain) for line in self.lines)
 
     def _shift(self, origin: ShopPose | None, default_origin: ShopPose) -> Sequence[float]:
-        """The shift of all work offsets for machine coordinates to be those of the machine; mm.
+        """Shift of all work offsets, mm, that makes machine coordinates those of the machine.
 
         It matters to G53, G28 and G30 alone. G10 writes offsets that are machine coordinates already: then none.
         """
@@ -139,8 +139,8 @@ class _Session:
     def _run(self, shift: Sequence[float], until: int | None = None) -> Run:
         """Run the program, or its part before the line `until` is first executed."""
         name = self.request.name
-        # rs274 begins at 0 of the machine and, where the offset in force is turned, with wrong numbers: so another one
-        # is in force until it has begun.
+        # rs274 begins at machine zero and, if the offset in force is rotated, with wrong numbers: so another offset
+        # is in force until it has started.
         active = next((index for index, offset in enumerate(self.offsets.table) if not offset.rotation), None)
         if active is None:
             raise ProgramError("every work offset is turned", expected="one of G54 to G59.3 that is not", file=name)
@@ -170,7 +170,7 @@ class _Session:
         return follower
 
     def _first_g54(self, run: Run, first_motion: int, shift: Sequence[float]) -> tuple[list[float], bool]:
-        """G54's axes (mm) at the first motion, and whether they were set at all."""
+        """G54's axes (mm) at the first motion, and True if they were set at all."""
         g54 = self.offsets.table[0]
         before = [a + s for a, s in zip(g54.axes, (*shift, 0.0, 0.0, 0.0), strict=True)]
 

@@ -25,7 +25,7 @@ PROGRAM, CANON, PARAMETERS, TOOLS, ERRORS = "program.ngc", "canon.txt", "rs274.v
 LONGEST_MESSAGE = 4000
 # Limits of a run: processor time, memory, and size of any file it writes.
 SECONDS, MEMORY_BYTES, FILE_BYTES = 60, 1 << 30, 1 << 28
-# rs274 repeats the line that it was reading, with the copy's N word; of its output the last line names it too.
+# rs274 repeats the line being read, with the copy's N word; the last line of its output names it too.
 LAST_LINE = re.compile(r"^(?: *\d+ )?N(\d+)", re.MULTILINE)
 
 
@@ -40,7 +40,7 @@ class Run:
 
 
 def find_rs274(path: str | None = None, unconfined: bool = False) -> str:
-    """The interpreter's path. Raises `InputError` with how to get it, or what is to confine it."""
+    """Path of the interpreter. Raises `InputError` with how to install it, or the program that is to confine it."""
     program = shutil.which(path or "rs274")
     if program is None or sys.platform != "linux":
         what = f"{path!r} is not a program that can be run" if path else "LinuxCNC's interpreter rs274 is not installed"
@@ -71,7 +71,7 @@ def run_rs274(program: str, parameters: str, tools: str, *, rs274: str) -> Run:
 
 
 def _execute(command: list[str], folder: Path) -> int:
-    """Exit code, or less the signal that ended it; a process that sleeps uses no processor time: the clock ends it."""
+    """Exit code, or minus the signal that ended it. Wall time is limited too: a sleeping process uses no CPU time."""
     environment = {"HOME": str(folder), "PATH": "/usr/bin:/bin", "LC_ALL": "C", "TMPDIR": str(folder)}
     with (folder / ERRORS).open("wb") as errors:
         try:
@@ -87,7 +87,7 @@ def _execute(command: list[str], folder: Path) -> int:
 
 
 def _exceeded(code: int, written: int) -> str:
-    """The limit that an exit code stands for, "" for none; a shell's or bubblewrap's 128 + n is signal n."""
+    """Limit that an exit code stands for, "" for none; for a shell or bubblewrap 128 + n is signal n."""
     number = -code if code < 0 else code - 128
     if written >= FILE_BYTES:  # Python within rs274 ignores the signal
         limit = f"{FILE_BYTES / 1e6:.0f} MB of output"
@@ -103,7 +103,7 @@ def _exceeded(code: int, written: int) -> str:
 
 @cache
 def _bubblewrap() -> tuple[str, ...] | None:
-    """Its command line so far; None where it is missing or may not make name spaces (many containers)."""
+    """Beginning of bubblewrap's command line; None if it is missing or may not make namespaces (many containers)."""
     path = shutil.which("bwrap")
     if path is None:
         return None
@@ -121,11 +121,11 @@ def _text(path: Path) -> str:
 
 
 def _refusal_and_line(message: str) -> tuple[str, int | None]:
-    """The message of rs274 without its chatter, and the line at its end."""
+    """Message of rs274 without its chatter, and the line named at its end."""
     lines = [line.strip() for line in message.splitlines()]
     lines = [line for line in lines if line and line != "executing" and not line.startswith("link (updating")]
     number = LAST_LINE.match(lines[-1]) if len(lines) > 1 else None
     text = " ".join(lines[:-1] if number else lines) or "it stopped without a message"
-    if "File ended" in text:  # it did not see the M2 that the copy ends with
+    if "File ended" in text:  # it did not reach the M2 at the end of the copy
         text = "the end of an O word is missing"
     return f"LinuxCNC's interpreter refuses: {text}", int(number[1]) if number else None

@@ -1,1 +1,1 @@
-"""Programs with variables, expressions, loops and macro calls: values are worked out, then blocks run as any others."""
+"""Programs with variables, expressions, loops and macro calls: values are computed, then blocks run like any others."""

@@ -1,4 +1,4 @@
-"""Expressions of parametric programs: text to functions of the variables.
+"""Expressions of parametric programs: text as functions of the variables.
 
 Two families of controls have variables (`#`). RS274/NGC is LinuxCNC's (manual, "O Codes" and "G-Code Overview",
 "Expressions", "Binary Operators", "Functions"). Macro B is Fanuc's (operator's manuals, "Custom macro", "Arithmetic
@@ -32,7 +32,7 @@ SHORT = {"RND": "ROUND", "SQR": "SQRT"}  # Fanuc's short forms
 OPERATOR = re.compile(r"\*\*|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE|[*/+-]")
 COMPARISONS = ("EQ", "NE", "GT", "GE", "LT", "LE")
 LOGIC: dict[str, Callable[[int, int], int]] = {"AND": and_, "OR": or_, "XOR": xor}
-# How tightly an operator binds. All are left-associative, `**` too (LinuxCNC: 2**3**2 is 64).
+# Precedence of operators. All are left-associative, even `**` (LinuxCNC: 2**3**2 is 64).
 _SHARED = {"*": 4, "/": 4, "MOD": 4, "+": 3, "-": 3, **dict.fromkeys(COMPARISONS, 2)}
 BINDS = {
     NGC: {"**": 5, **_SHARED, **dict.fromkeys(LOGIC, 1)},
@@ -47,7 +47,7 @@ NO_TANGENT_DEGREES = 1e-9
 
 @dataclass
 class Scanner:
-    """A block without blanks and comments, in upper case, and how far it is read.
+    """A block without blanks and comments, in upper case, and the position read so far.
 
     Attributes
     ----------
@@ -72,26 +72,26 @@ class Scanner:
 
     @property
     def done(self) -> bool:
-        """Whether all of it is read."""
+        """True if all of it is read."""
         return self.position >= len(self.text)
 
     @property
     def column(self) -> int:
-        """The column of the next character."""
+        """Column of the next character."""
         return self.columns[min(self.position, len(self.columns) - 1)]
 
     def begins(self, *texts: str) -> bool:
-        """Whether one of these comes next."""
+        """True if one of these texts comes next."""
         return self.text.startswith(texts, self.position)
 
     def next(self, text: str) -> bool:
-        """Whether that comes next; it is then read."""
+        """True if the text comes next; it is then read."""
         begins = self.begins(text)
         self.position += len(text) * begins
         return begins
 
     def take(self, pattern: re.Pattern[str]) -> str:
-        """What matches next, then read; "" if nothing does."""
+        """Next text that matches, which is then read; "" if none does."""
         token = pattern.match(self.text, self.position)
         if token is None:
             return ""
@@ -99,13 +99,13 @@ class Scanner:
         return token[0]
 
     def fail(self, problem: str, expected: str = "", hint: str = "", column: int | None = None) -> InputError:
-        """An error at a column, unless given that of the next character."""
+        """Error at a column, by default that of the next character."""
         return self.place.fail(problem, expected, hint, column or self.column)
 
     def refuse_if(
         self, refused: object, problem: str, expected: str = "", hint: str = "", column: int | None = None
     ) -> None:
-        """Raise the error, if there is to be one."""
+        """Raise the error if `refused`."""
         if refused:
             raise self.fail(problem, expected, hint, column)
 
@@ -117,7 +117,7 @@ class Scanner:
         return self.fail("the block ends here" if self.done else f"{self.rest()} is not {what}", expected)
 
     def finite(self, name: str, column: int, work: Callable[..., float], *values: object) -> float:
-        """What a function or an operator makes of values: a finite real number, or an error at `column`."""
+        """Result of a function or operator: a finite real number, or an error at `column`."""
         try:
             result = float(work(*values))
             if not math.isfinite(result):
@@ -130,7 +130,7 @@ class Scanner:
         return lambda variables: self.finite(name, column, work, variables)
 
     def _open(self) -> int:
-        """The column of the bracket that comes next, then read."""
+        """Column of the opening bracket, which is read."""
         column = self.column
         if not self.next("["):
             raise self._missing("a bracket", "[")
@@ -140,7 +140,7 @@ class Scanner:
         self.refuse_if(not self.next("]"), "a bracket that is not closed", "]", column=column)
 
     def value(self) -> Value:
-        """The value after a letter or an operator: a number, a variable, a function, an expression in brackets."""
+        """Value after a letter or an operator: a number, a variable, a function, an expression in brackets."""
         negative = self.take(SIGNS).count("-") % 2
         value = self._unsigned()
         return (lambda variables: -number(value(variables))) if negative else value
@@ -167,12 +167,12 @@ class Scanner:
         return value
 
     def variable(self) -> Value:
-        """The variable after a `#`."""
+        """Variable after a `#`."""
         place, which = self.place._replace(column=self.column), self.which()
         return lambda variables: variables.get(which(variables), place)
 
     def which(self) -> Callable[[Variables], Which]:
-        """Which variable a `#` means: a number, the number that another one holds, an expression, a name."""
+        """Variable that a `#` means: by a number, by the number in another one, by an expression, by a name."""
         column = self.column
         name = self.take(NAME)[1:-1]
         problem = f"#<{name}> is a named variable, which Macro B does not have"
@@ -190,7 +190,7 @@ class Scanner:
         return numbered
 
     def expression(self, tightest: int = 0) -> Value:
-        """Values and operators that bind tighter than `tightest`."""
+        """Value of operands and operators that bind tighter than `tightest`."""
         left = self.value()
         while True:
             begin, column = self.position, self.column
@@ -223,7 +223,7 @@ class Scanner:
         return self._worked_out(name, column, lambda variables: evaluate(name, number(argument(variables)), family))
 
     def _of_two(self, name: str, column: int) -> Value:
-        """ATAN[y]/[x]; Macro B's ATAN[y,x] and POW[base,exponent] too."""
+        """ATAN[y]/[x]; in Macro B also ATAN[y,x] and POW[base,exponent]."""
         start = self._open()
         first = self.expression()
         if self.family != NGC and self.next(","):
@@ -248,12 +248,12 @@ class Scanner:
 
 
 def number(value: float | None) -> float:
-    """A value as operators take it: an empty variable counts as 0."""
+    """Value as operators take it: an empty variable counts as 0."""
     return 0.0 if value is None else value
 
 
 def operate(operator: str, left: float | None, right: float | None, family: str) -> float:
-    """The value of an operator.
+    """Result of an operator.
 
     EQ and NE allow for 0.0001 in NGC; to Macro B empty is not 0 ("Custom macro", "Handling of an empty variable").
     Logic is of truth values in NGC, of bits in Macro B; MOD is never negative in NGC.
@@ -277,7 +277,7 @@ def operate(operator: str, left: float | None, right: float | None, family: str)
 
 
 def evaluate(name: str, value: float, family: str) -> float:
-    """The value of a function: FIX and FUP go down and up in NGC, towards and from zero in Macro B.
+    """Result of a function: FIX and FUP go down and up in NGC, towards and away from zero in Macro B.
 
     Angles are in degrees, to 14 digits: LinuxCNC works them out in long double, where ASIN[0.5] is 30, exactly; MOD and
     FIX make something else of 30.000000000000004.
@@ -288,7 +288,7 @@ def evaluate(name: str, value: float, family: str) -> float:
         up = (name == "FUP") != (family == MACRO_B and value < 0.0)
         return float(math.ceil(value) if up else math.floor(value))
     if name == "TAN" and abs(abs(math.fmod(value, 180.0)) - 90.0) < NO_TANGENT_DEGREES:
-        raise ValueError("the angle is 90 degrees")  # digits that no control shares decide
+        raise ValueError("the angle is 90 degrees")  # the result would depend on digits that differ between controls
     if name in OF_ANGLES:
         return float(f"{OF_ANGLES[name](math.radians(value)):.14g}")
     if name in TO_ANGLES:

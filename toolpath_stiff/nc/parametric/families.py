@@ -1,4 +1,4 @@
-"""The family of a parametric program: RS274/NGC or Macro B, by its dialect or by its signs."""
+"""Family of a parametric program: RS274/NGC or Macro B, by its dialect or by its signs."""
 
 import re
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ NGC_WORDS = (
     "SUB", "ENDSUB", "CALL", "RETURN", "IF", "ELSEIF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "DO", "REPEAT",
     "ENDREPEAT", "BREAK", "CONTINUE",
 )  # fmt: skip
-# What only one family has, in a line without comments and blanks, in upper case.
+# Signs of one family only, in a line without comments and blanks, in upper case.
 _BEGIN = r"^(?:/\d?)?(?:N\d+)?"
 _NGC_SIGN = re.compile(
     rf"{_BEGIN}O(?:<|\[|#|\d+(?:{'|'.join(NGC_WORDS)}))|#<|\*\*|EXISTS\["  # o<x> sub, #<name>
@@ -23,7 +23,7 @@ _SUSPECT = re.compile(r"[#\[oOiIwWdD]|[gG]\s*0*6")
 
 
 def line_with_variables(lines: tuple[str, ...]) -> int:
-    """The first line, from 1, that holds a variable, an expression, or control of the flow; 0: none does.
+    """First line, from 1, with a variable, an expression, or flow control; 0 if there is none.
 
     Examples
     --------
@@ -41,7 +41,7 @@ def _bare(lines: tuple[str, ...]) -> Iterator[tuple[int, str]]:
 
 
 def family_of(lines: tuple[str, ...], dialect: Dialect, name: str) -> str:
-    """The family of a program: the dialect's or, for `generic`, that of which the program shows signs.
+    """Family of a program: the dialect's or, for `generic`, the one whose signs the program shows.
 
     Raises
     ------

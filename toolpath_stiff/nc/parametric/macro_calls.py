@@ -1,4 +1,4 @@
-"""The words of a macro call (G65, G66) to the local variables of what it calls.
+"""Words of a macro call (G65, G66) as local variables of the called program.
 
 Fanuc's operator's manuals, "Custom macro" ("Macro call", "Argument specification" I and II).
 """
@@ -15,14 +15,14 @@ ARGUMENTS = {
 }  # fmt: skip
 SECOND_KIND = {"A": 1, "B": 2, "C": 3}  # then I, J, K up to ten times, from #4
 LAST_LOCAL = 33
-WHOLE_ARGUMENTS = frozenset("DHMST")  # numbers of tools, offsets and speeds: no decimal point belongs to them
+WHOLE_ARGUMENTS = frozenset("DHMST")  # numbers of tools, offsets and speeds, which have no decimal point
 MACRO_CALLS = ("G65", "G66", "G67")
 LARGEST_NUMBER = 99_999_999  # of a program, or of repeats
 Fault = Callable[[Word, str, str], InputError]  # makes the error of a word: what is wrong with it, what was expected
 
 
 def call_of(code: Word, words: Iterable[Word], modal: bool, increments: bool, fault: Fault) -> Call:
-    """The call that G65 or G66 and the words after it make; `increments`: numbers without a point count those."""
+    """Call made by G65 or G66 and the words after it; `increments`: numbers without a point count increments."""
     given = {word.letter: word for word in words if word.letter in "PL"}
     if "P" not in given:
         raise fault(code, "without P", "P with the number of the macro")
@@ -37,7 +37,7 @@ def _count(word: Word, fault: Fault) -> int:
 
 
 def arguments_of(words: Iterable[Word], increments: bool, fault: Fault) -> dict[int, float | None]:
-    """The local variables that the words of a macro call give."""
+    """Local variables that the words of a macro call set."""
     words = [word for word in words if word.letter not in "PL"]
     second = any(sum(word.letter == letter for word in words) > 1 for letter in "IJK")
     arguments: dict[int, float | None] = {}

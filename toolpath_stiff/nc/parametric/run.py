@@ -1,4 +1,4 @@
-"""Runs a parametric program: works out the values of its blocks, and goes where O words, GOTO, WHILE and calls lead.
+"""Run of a parametric program: values of its blocks, and the way through O words, GOTO, WHILE and calls.
 
 LinuxCNC's manual, "O Codes"; Fanuc's operator's manuals, "Custom macro" ("Macro call", "Branch and repetition"). Each
 block's words act as those of any program (`interpreter.execute`). Subprograms of other files are read from one folder
@@ -33,7 +33,7 @@ SUFFIXES = (".ngc", ".nc", ".NGC", ".NC", "")
 
 
 class ParametricRun(ProgramRun):
-    """A run of a program with variables, and with what steers it; parameters as of `ProgramRun`.
+    """Run of a program with variables and flow control; parameters as for `ProgramRun`.
 
     Files of subprograms are looked for in the folder of the controller: `name.ngc` for `o<name> call`, `O1234.nc` or
     `1234.nc` for M98 and G65 P1234.
@@ -46,8 +46,8 @@ class ParametricRun(ProgramRun):
         self._statements: dict[int, Statement] = {}
         self._structure_known: Structure | None = None
         self._modal: Call | None = None
-        self._began = False  # a variable was set, or the flow steered
-        self._repeats: dict[tuple[int, int], int] = {}  # left of a loop, by the calls that run and its line
+        self._began = False  # True once a variable was set, or the flow steered
+        self._repeats: dict[tuple[int, int], int] = {}  # repeats left of a loop, by depth of calls and its line
         self._marks: dict[str, int] = {}  # lines of BREAK and CONTINUE that LinuxCNC's interpreter has not forgotten
 
     def _statement(self, row: int) -> Statement:
@@ -60,7 +60,7 @@ class ParametricRun(ProgramRun):
         return self._tried(self._read, row, Block(row + 1, ()))
 
     def _read(self, row: int) -> Block:
-        """The block with its values; its variables are set."""
+        """Block with its values; its variables are set."""
         statement = self._statement(row)
         block = worked_out(statement, self.variables, self._place(row))
         self._assign(statement.assignments)
@@ -78,12 +78,12 @@ class ParametricRun(ProgramRun):
     def _execute(self, block: Block) -> Then:
         codes = [code_name("G", word.value) if word.letter == "G" else "" for word in block.words]
         place = next((index for index, code in enumerate(codes) if code in MACRO_CALLS), None)
-        if place is None or self.family == NGC:  # LinuxCNC has none: refused where the codes are sorted
+        if place is None or self.family == NGC:  # LinuxCNC has none: refused when the codes are sorted
             return self._act(block)
         return self._macro_call(block, codes[place], place)
 
     def _act(self, block: Block) -> Then:
-        """Carry out a block; after a move the call of G66 follows."""
+        """Carry out a block; after a move comes the call of G66."""
         moves = len(self.state.recorder)
         flow = execute(self.state, block) if block.words else Flow.NEXT
         if self._modal is None or flow is not Flow.NEXT or len(self.state.recorder) == moves:
@@ -91,7 +91,7 @@ class ParametricRun(ProgramRun):
         return flow if any(level.modal for level in self._levels) else self._modal
 
     def _macro_call(self, block: Block, code: str, place: int) -> Then:
-        """Carry out G65, G66 or G67 at a place in a block, and what stands before it."""
+        """Carry out G65, G66 or G67 at a place in a block, and the words before it."""
         before, word, after = block.words[:place], block.words[place], block.words[place + 1 :]
         if before:
             execute(self.state, replace(block, words=before))
@@ -127,19 +127,19 @@ class ParametricRun(ProgramRun):
         return call.number, call.repeats or 1
 
     def _load_program(self, names: tuple[str, ...]) -> None:
-        """Read a subprogram's file from the folder, if it is there."""
+        """Read a subprogram's file from the folder, if it exists."""
         if self._load(name + suffix for name in names for suffix in SUFFIXES) is not None:
             self._structure_known = None
 
     def _steered(self, row: int) -> int | None:
-        """Where the run goes on, of a block that steers it or is left out; None for a block that acts."""
+        """Line where the run goes on after a block that steers or is skipped; None for a block that acts."""
         if self._ends_before(row):
             return len(self.lines)
         self._count_block(row)
         statement = self._statement(row)
         block, steering = statement.block, statement.steering
         self.variables.line = block.line
-        if block.percent and self._began:  # as after a word, the tape mark is the last one
+        if block.percent and self._began:  # as after a word, this tape mark is the last
             return len(self.lines)
         self._began |= bool(statement.assignments or steering)
         if block.optional and block.switch in self.switches:
@@ -150,24 +150,24 @@ class ParametricRun(ProgramRun):
             raise self._structure.faults[row]
         act, depth = self._step(steering.kind), len(self._levels)
         to = act(self, row, steering) if act else None
-        if to is not None and to <= row and len(self._levels) == depth:  # else a call, or its end
+        if to is not None and to <= row and len(self._levels) == depth:  # otherwise a call, or its end
             variables = self.variables
             self._check_loop(row, to, (variables.levels, variables.common, self._repeats, self._levels))
         return row + 1 if to is None else self._jump(row, to)
 
     def _ends_before(self, row: int) -> bool:
-        """Whether a line is the first of a file: the one before it has ended there."""
+        """True if a line is the first of a file, so that the file before it has ended."""
         return any(row == first for first, *_ in self._files)
 
     def _step(self, kind: str) -> Step | None:
-        """What carries out a kind of block that steers."""
+        """Function that carries out a kind of steering block."""
         return STEPS.get(kind)
 
     def _jump(self, row: int, to: int) -> int:
         return super()._jump(row, to) if to != row + 1 and max(row, to) < self._main_lines else to
 
     def _return(self, row: int, flow: Flow | Word) -> int | None:
-        """M99; with P it goes on at that block of the caller, wherever that is."""
+        """M99; with P the run continues at that block of the caller, wherever it is."""
         if not isinstance(flow, Word) or not self._levels:
             return super()._return(row, flow)
         self._levels[-1].again = 0
@@ -184,7 +184,7 @@ class ParametricRun(ProgramRun):
         raise AssertionError("every if has its endif")
 
     def _else(self, row: int, steering: Steering) -> int | None:
-        """Reached from the branch before: the rest is passed over."""
+        """Skip the other branches, when reached from the branch before."""
         return self._structure.end[self._structure.start[row]] + 1
 
     def _while(self, row: int, steering: Steering) -> int | None:
@@ -211,7 +211,7 @@ class ParametricRun(ProgramRun):
         return self._again(row)
 
     def _again(self, start: int) -> int:
-        """Where a repeat goes on, from its beginning and from its end."""
+        """Line where a repeat goes on, both at its beginning and at its end."""
         left = self._repeats.get((len(self._levels), start), 0)
         self._repeats[len(self._levels), start] = left - 1
         if left > 0:
@@ -239,7 +239,7 @@ class ParametricRun(ProgramRun):
         return steering.kind if steering is not None else ""
 
     def _refuse_after(self, leave: str, row: int, what: str) -> None:
-        """Refuse what LinuxCNC's interpreter does otherwise after a `break` or `continue`, whose mark it keeps.
+        """Refuse what LinuxCNC's interpreter does differently after a `break` or `continue`, whose mark it keeps.
 
         interp_o_word.cc: only the end of a do forgets a break, only that of a while or a repeat a continue, whatever
         loop they were for.
@@ -284,7 +284,7 @@ class ParametricRun(ProgramRun):
         return [candidate for candidate in super()._numbered(row, number) if self._program_of(candidate) == program]
 
     def _go_on(self, row: int, number: float, column: int) -> int:
-        """The block with an N number in the program that runs. Raises `InputError` for a jump into a loop."""
+        """Block with an N number in the running program. Raises `InputError` for a jump into a loop."""
         to = self._block_numbered(row, "the run goes on at", number, column)
         for start, end in self._structure.end.items():
             if start < to < end and not start < row < end:
@@ -293,7 +293,7 @@ class ParametricRun(ProgramRun):
         return to
 
     def _program_of(self, row: int) -> int:
-        """The line at which the program (from O number to O number) begins that holds a line."""
+        """First line of the program (from O number to O number) that contains a line."""
         begins = sorted({0, *self._heads().values(), *(first for first, *_ in self._files)})
         return begins[bisect_right(begins, row) - 1]
 
@@ -302,7 +302,7 @@ class ParametricRun(ProgramRun):
         if self._structure_known is None:
             steerings = []
             for row in range(len(self.lines)):
-                with suppress(InputError):  # what cannot be read is an error where it runs, if it does
+                with suppress(InputError):  # an unreadable line is an error when it runs, if it does
                     steering = self._statement(row).steering
                     if steering is not None:
                         steerings.append((row, steering))

@@ -1,4 +1,4 @@
-"""The blocks of parametric programs: their words, assignments and control of the flow.
+"""Blocks of parametric programs: words, assignments and flow control.
 
 RS274/NGC: LinuxCNC's manual, "O Codes". Macro B: Fanuc's operator's manuals, "Custom macro" ("Branch and repetition").
 A block is read once, to a `Statement`; running it works out its values.
@@ -31,7 +31,7 @@ _N_WORD = re.compile(r"N\d+(?:\.\d+)?", re.ASCII)
 _LOOP = re.compile(r"(?:DO|END)\d+", re.ASCII)
 LONGEST_BLOCK = 255  # characters without comments and blanks: what LinuxCNC reads
 MOST_VALUES = 30  # of a call
-WHOLE_WORDS = frozenset("GMTL")  # codes and numbers, which a value must be
+WHOLE_WORDS = frozenset("GMTL")  # codes and numbers, whose values must be whole
 
 # `#which = value`: works both out; what that gives sets the variable. In a block all are worked out before any is set.
 Assignment = Callable[[Variables], Callable[[], None]]
@@ -39,7 +39,7 @@ Assignment = Callable[[Variables], Callable[[], None]]
 
 @dataclass(frozen=True)
 class Steering:
-    """What a block does to the flow.
+    """Effect of a block on the flow.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Steering:
 
 @dataclass(frozen=True)
 class Statement:
-    """A block that was read.
+    """A block after reading.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ def read_statement(text: str, place: Place, family: str, dialect: Dialect) -> St
         if value is not None:
             computed[len(words)] = value
         words.append(word)
-    # The numbers that codes and tools may have, as in any other program.
+    # Numbers that codes and tools may have, as in any program.
     through_pygcode([word for index, word in enumerate(words) if index not in computed], place)
     block = Block(place.line, tuple(words), optional=start > 0, switch=switch)
     return Statement(block, computed, tuple(assignments), steering)
@@ -184,7 +184,7 @@ def _o_word(scanner: Scanner) -> Steering:
 
 
 def _word(scanner: Scanner, text: str) -> tuple[Word, Value | None]:
-    """A word, and its value if that is computed."""
+    """A word, and its value if computed."""
     column, letter = scanner.column, scanner.text[scanner.position]
     scanner.refuse_if(letter not in LETTERS, f"{scanner.rest()} is not a word", "a letter and a value, or #1=...")
     plain, value = WORD.match(scanner.text, scanner.position), None
@@ -208,13 +208,13 @@ def _assignment(scanner: Scanner) -> Assignment:
     if not scanner.next("="):
         raise place.fail(f"a variable without its letter or `=`: {scanner.rest()}", "X#1, or #1=...")
     scanner.refuse_if(scanner.done, "an assignment without a value", "#1=...")
-    # A whole expression in Macro B; in NGC one value, so that an operator after it is an error.
+    # A whole expression in Macro B; in NGC a single value, so that an operator after it is an error.
     value = scanner.value() if scanner.family == NGC else scanner.expression()
     return lambda variables: partial(variables.set, which(variables), value(variables), place)
 
 
 def worked_out(statement: Statement, variables: Variables, place: Place) -> Block:
-    """The block with the values of its words; one with an empty variable is as if it were not there (Macro B)."""
+    """Block with the values of its words; a word with an empty variable counts as absent (Macro B)."""
     words = []
     for index, word in enumerate(statement.block.words):
         if index not in statement.computed:
@@ -227,7 +227,7 @@ def worked_out(statement: Statement, variables: Variables, place: Place) -> Bloc
 
 
 def _whole(word: Word, value: float, place: Place) -> float:
-    """The code or number that a value stands for, as LinuxCNC's interpreter rounds it."""
+    """Code or number that a value stands for, rounded as LinuxCNC's interpreter does."""
     whole = round(value, 1 if word.letter in "GM" else 0)
     if abs(whole - value) > EQUAL or whole < 0.0:
         expected = f"a code such as {word.letter}1" if word.letter in "GM" else "a whole number from 0"
@@ -236,7 +236,7 @@ def _whole(word: Word, value: float, place: Place) -> float:
 
 
 def _computed_word(word: Word, value: float) -> Word:
-    """A computed word with its value, which stands beside its text too, always with a decimal point.
+    """Computed word with its value, which is in its text too, always with a decimal point.
 
     So a computed number never counts increments.
     """

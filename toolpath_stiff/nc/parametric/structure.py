@@ -1,4 +1,4 @@
-"""What belongs together in a parametric program: O words of RS274/NGC, DO and END of Macro B.
+"""Structure of a parametric program: matching O words of RS274/NGC, DO and END of Macro B.
 
 LinuxCNC's manual, "O Codes"; Fanuc's operator's manuals, "Custom macro" ("Branch and repetition").
 """
@@ -11,7 +11,7 @@ from toolpath_stiff.nc.parametric.statements import Steering
 
 MACRO_LOOPS = ("LOOP", "WHILE LOOP")
 OPENS = ("SUB", "IF", "WHILE", "DO", "REPEAT", "FOR", "DO UNTIL", *MACRO_LOOPS)  # FOR and DO UNTIL: Siemens
-# What goes on with, or closes, one of these of the same label.
+# Words that continue or close one of these with the same label.
 BELONGS = {
     "ELSEIF": ("IF",), "ELSE": ("IF",), "ENDIF": ("IF",), "ENDSUB": ("SUB",), "ENDWHILE": ("WHILE",), "WHILE": ("DO",),
     "ENDREPEAT": ("REPEAT",), "END": MACRO_LOOPS, "ENDFOR": ("FOR",), "ENDLOOP": ("LOOP",), "UNTIL": ("DO UNTIL",),
@@ -21,7 +21,7 @@ LEAVES = {"BREAK": ("WHILE", "DO"), "CONTINUE": ("WHILE", "DO")}  # LinuxCNC ref
 
 @dataclass
 class Structure:
-    """Where the words that steer belong to each other; lines from 0.
+    """Matching of the words that steer; lines from 0.
 
     Attributes
     ----------
@@ -47,12 +47,12 @@ class Structure:
 def structure_of(
     steerings: Iterable[tuple[int, Steering]], files: Collection[int], fail: Callable[..., InputError]
 ) -> Structure:
-    """How blocks that steer, with their lines, belong to each other.
+    """Structure of the blocks that steer, given with their lines.
 
     `files` are the first lines of files, which have labels of their own; `fail` makes the error of a line.
     """
     structure, opened = Structure(), list[tuple[int, Steering]]()
-    labels: list[set[str]] = [set()]  # of the file, and of the sub that is open
+    labels: list[set[str]] = [set()]  # labels of the file, and of the open sub
     for row, steering in steerings:
         kind, label = steering.kind, steering.label
         if row in files:

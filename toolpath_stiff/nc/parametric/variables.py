@@ -1,4 +1,4 @@
-"""Variables of parametric programs: local, common and named ones, and what the control keeps in numbered ones.
+"""Variables of parametric programs: local, common and named ones, and numbered ones of the control.
 
 RS274/NGC: LinuxCNC's manual, "Parameters" ("Numbered Parameters", "Subroutine Parameters", "Named Parameters",
 "Predefined Named Parameters"). Macro B: Fanuc's operator's manuals, "Custom macro" ("Variables", "System variables");
@@ -18,10 +18,10 @@ from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import FIRST_OFFSET, OFFSET_STRIDE, tool_of
 from toolpath_stiff.nc.words import AXES, Block, Word
 
-# What a program may set: NGC's numbered parameters below those of the control; Macro B's locals and commons.
+# Variables that a program may set: NGC's numbered parameters below the control's; Macro B's locals and commons.
 LOCALS = {NGC: 30, MACRO_B: 33, EITHER: 30}
 NGC_LAST = 5000
-DEBUG_SWITCH = 5599  # whether (DEBUG,...) comments print
+DEBUG_SWITCH = 5599  # if set, (DEBUG,...) comments print
 COMMON = (range(100, 200), range(500, 1000))  # Fanuc's series 16 to 31i, Haas; the second survive power-off
 NGC_POSITION, NGC_TOOL, NGC_OFFSET = 5420, 5400, 5220
 MACRO_POSITIONS = (5001, 5041)  # block end; present position, with the tool length: the same without one
@@ -59,7 +59,7 @@ class Variables:
     line: int = 0
 
     def get(self, which: Which, place: Place) -> float | None:
-        """The value of a variable; None: empty. Raises `InputError` for one that is not known."""
+        """The value of a variable; None: empty. Raises `InputError` for a variable of unknown value."""
         scope = self._scope(which)
         if scope is not None and which in scope:
             return scope[which]
@@ -72,11 +72,11 @@ class Variables:
         raise place.fail(problem, "it in the same subprogram before; not #<_task>, which a preview has otherwise")
 
     def exists(self, name: str) -> bool:
-        """Whether a named variable has a value."""
+        """True if a named variable has a value."""
         return name in PREDEFINED or name in (self._scope(name) or ())
 
     def _scope(self, which: Which) -> Values | None:
-        """Where a variable is kept that a program may set; None for one of the control's."""
+        """The dictionary that holds a variable which a program may set; None for a variable of the control."""
         if isinstance(which, str):
             return self.common if which.startswith("_") else self.levels[-1]
         if 1 <= which <= LOCALS[self.family]:
@@ -88,13 +88,13 @@ class Variables:
             if number > LOCALS[NGC]:
                 self.state.assume(f"#{number} is read before it is set: 0, as in an empty parameter file")
             return 0.0
-        if number and (self.family == EITHER or number in COMMON[1]):  # a control keeps those from earlier programs
+        if number and (self.family == EITHER or number in COMMON[1]):  # these may keep values from earlier programs
             reason = "0 on LinuxCNC and empty on Fanuc's and Haas' controls, which keep those from #500 on"
             raise place.fail(f"#{number} is read before it is set: {reason}", f"#{number}=... before, or --dialect")
         return None
 
     def _system(self, number: int, place: Place) -> float:
-        """The value of a variable in which the control keeps something."""
+        """The value of a system variable, one that the control itself sets."""
         if self.family == EITHER:
             problem = f"#{number} has another meaning on LinuxCNC than on Fanuc's and Haas' controls"
             raise place.fail(problem, hint="name it with --dialect")
@@ -105,7 +105,7 @@ class Variables:
         return value
 
     def _settable(self, number: int) -> bool:
-        """Whether a program may set a numbered variable beyond the local ones."""
+        """True if a program may set this numbered variable, which is above the local ones."""
         macro = any(number in numbers for numbers in COMMON)
         ngc = LOCALS[NGC] < number <= NGC_LAST or number == DEBUG_SWITCH
         if self.family == EITHER:
@@ -139,7 +139,7 @@ class Variables:
         raise ValueError("controls differ in angles below 0: name the control with --dialect")
 
     def position(self, axis: int, shown: str, place: Place) -> float:
-        """The present point in program coordinates and units; refused where controls may have another one."""
+        """The present point in program coordinates and units; refused where controls may differ in it."""
         state, frames = self.state, self.state.frames
         word = Word("#", 0.0, place.column or 1, shown)
         block = CurrentBlock(place.name, Block(place.line, (word,)))
@@ -177,7 +177,7 @@ class Variables:
         return self._modal(number) if number in MODAL else None
 
     def _modal(self, number: int) -> float | None:
-        """#4001 to #4120: what was in force before this block, by Fanuc's groups of G codes; then by letters."""
+        """#4001 to #4120: the modal state before this block, by Fanuc's groups of G codes, then by letters."""
         state = self.state
         cycle = state.motion is not None and state.motion not in ("G0", "G1", "G2", "G3")
         group_values: dict[int, float | None] = {

@@ -1,4 +1,4 @@
-"""A block in Siemens' language: its words sorted, its codes in their order, then its move, then its cycles."""
+"""A block in Siemens' language: words sorted, then codes in their order, then the move, then the cycles."""
 
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.run_records import Tally
@@ -10,11 +10,11 @@ from toolpath_stiff.nc.words import Block
 
 SINGLE = ("motion", "distance", "plane", "cutter compensation", "work offset", "units", "feed mode")
 BETWEEN = frozenset((*SINGLE[:2], "F", "S", "look-ahead", "M coolant", "M stop"))  # the moves of a corner
-OTHER_NUMBERS = {"G4", "G25", "G26"}  # beside which F and S are none
+OTHER_NUMBERS = {"G4", "G25", "G26"}  # beside these, F and S are no feed and no speed
 
 
 def sort_words(state: State, block: Block, tally: Tally | None) -> CurrentBlock:
-    """The words of a block by what they are; in a check they are counted. Raises `InputError` at a word."""
+    """The words of a block by kind; in a check they are counted. Raises `InputError` at a word."""
     current = CurrentBlock(state.name, block)
     numbers = {code_name("G", word.value) for word in block.words if word.letter == "G"}
     acting = {"#": "T", '"': "T", "D": "D"} | ({} if numbers & OTHER_NUMBERS else {"F": "F", "S": "S"})
@@ -42,7 +42,7 @@ def sort_words(state: State, block: Block, tally: Tally | None) -> CurrentBlock:
 
 
 def carry_out(state: State, block: CurrentBlock) -> None:
-    """The codes of a block in their order, its move, the cycle of MCALL, then its own cycle."""
+    """Carry out the codes of a block in their order, its move, the cycle of MCALL, then its own cycle."""
     plain, frames = state.plain, state.frames
     codes = sorted((TABLE[name] for name in block.codes), key=lambda code: code.rank)
     waits = plain.held is not None and any(code.group not in BETWEEN for code in codes)
@@ -60,5 +60,10 @@ def carry_out(state: State, block: CurrentBlock) -> None:
         if code.rank > STEPS["motion"]:
             code.act(state, block, code.name)
     for letter in sorted(block.free):
-        block.refuse_if(letter not in WORDS, letter, "is not used by any code of its block", hint="remove it")
+        block.refuse_if(
+            letter not in WORDS,
+            letter,
+            "is not used by any code of its block",
+            hint="remove it, or give a call its own block",
+        )
         state.note(block.line, block.values[letter], "how the control moves: the path is taken as programmed")

@@ -31,7 +31,7 @@ def apply(state: State, block: CurrentBlock) -> None:
 
 
 def frame(state: State, block: CurrentBlock, code: str) -> None:
-    """TRANS, ROT, SCALE, MIRROR: the programmable frame anew; with A before it: added to it, in its axes."""
+    """TRANS, ROT, SCALE, MIRROR: a new programmable frame; with A before it: added to the present one, in its axes."""
     plain, kind, scale = state.plain, code.removeprefix("A"), state.length_scale
     if kind == code:
         plain.shift, plain.inner = [0.0] * 3, [list(row) for row in UNIT]
@@ -57,7 +57,7 @@ def frame(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def offset(state: State, block: CurrentBlock, code: str) -> None:
-    """G54 to G57, and G505 to G599, the fifth settable offset and on; G500: none."""
+    """G54 to G57, and G505 to G599 for the fifth and further settable offsets; G500: none."""
     plain, frames = state.plain, state.frames
     outside_contour(state, block, code)
     if code == "G500":
@@ -74,11 +74,11 @@ def offset(state: State, block: CurrentBlock, code: str) -> None:
         frames.active = len(WORK_OFFSETS) + number - 1
     else:
         settable.work_offset(state, block, code)
-    frames.g92 = list(frames.g92)  # the present point has other numbers
+    frames.g92 = list(frames.g92)  # the coordinates of the present point change
 
 
 def swivel(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCLE800: the plane turned by angles about its axes, and the tool upright on it; without angles no longer."""
+    """CYCLE800: tilt the plane by angles about its axes, tool perpendicular to it; without angles: reset."""
     plain = state.plain
     block.take("FR"), block.take("TC"), block.take("FRI"), block.take("DMODE")
     kind, mode = int(block.take("ST") or 0), int(block.take("MODE") or 0)
@@ -92,6 +92,8 @@ def swivel(state: State, block: CurrentBlock, code: str) -> None:
         about = [angle if axis == number else 0.0 for number in range(3)]
         turned = product(turned, rotation_matrix((about[0], about[1], about[2])))
     added = kind % 10 == 1 and plain.tilt is not None
+    framed = any(plain.shift) or plain.inner != UNIT
+    block.refuse_if(added and framed, "ST", "adds to a plane under a frame (TRANS, ROT)", "TRANS before it")
     before, outer = (plain.tilt or UNIT, plain.outer) if added else (UNIT, [0.0] * 3)
     for matrix, point in ((before, points[0]), (product(before, turned), points[1])):
         outer = [o + row[0] for o, row in zip(outer, product(matrix, [[v] for v in point]), strict=True)]
@@ -108,13 +110,13 @@ def swivel(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def transformation(state: State, block: CurrentBlock, code: str) -> None:
-    """TRAORI: X, Y, Z are the tip's while the tool turns; TRAFOOF: no longer."""
+    """TRAORI: X, Y, Z are the tip's while the tool turns; TRAFOOF: off."""
     tools.hold_tip(state, block, code, code == "TRAORI")
     state.plain.transformed = code == "TRAORI"
 
 
 def pole(state: State, block: CurrentBlock, code: str) -> None:
-    """G110, G111, G112: the pole, from the present point, from zero, from the last pole."""
+    """G110, G111, G112: the pole, relative to the present point, to zero, to the last pole."""
     first, second, _ = PLANES[state.plane]
     here, last = present(state), state.plain.pole[1] if state.plain.pole else 0j
     base = {"G110": complex(here[first], here[second]), "G111": 0j, "G112": last}[code]

@@ -45,12 +45,12 @@ SHIFT = "the shift off the wall before the tool leaves the hole"
 
 
 def modal(state: State, block: CurrentBlock, code: str) -> None:
-    """MCALL: the cycle beside it after each block that moves; alone: none any more."""
+    """MCALL: the cycle beside it runs after each block that moves; MCALL alone: cancel."""
     state.plain.modal, state.plain.cycle = False, None
 
 
 def cycle(state: State, block: CurrentBlock, code: str) -> None:
-    """A drilling cycle, here or (behind MCALL) wherever a block moves to."""
+    """A drilling cycle, run here or, after MCALL, wherever a block moves to."""
     scale = state.length_scale
     values = {name: block.take(name) or 0.0 for name in SIGNATURES[code].split() if block.has(name)}
     values = {name: value * (scale if name in LENGTHS else 1.0) for name, value in values.items()}
@@ -89,17 +89,17 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def drill(state: State, block: CurrentBlock, values: Values) -> None:
-    """A cycle at the present point."""
+    """Drill at the present point by a cycle's values."""
     plain = state.plain
     outside_contour(state, block, "a cycle", plain.side)
     check_known(state, block, {PLANES[state.plane][2]: 0.0}, rapid=True)
     block.refuse_if(plain.unknown, None, "a cycle where X or Y is not known", "X and Y before it")
-    turns = state.speed if state.feed_mode == "G95" and state.speed else 1.0  # feeds of taps are then a turn's
+    turns = state.speed if state.feed_mode == "G95" and state.speed else 1.0  # feeds of taps are then per revolution
     plunge(state, block, strokes(values, state.feed, state.speed, turns))
 
 
 def strokes(values: Values, feed: float | None, speed: float, turns: float = 1.0) -> Iterator[Stroke]:
-    """Heights of a hole one after another, each with its feed (0: there is none) and the dwell there.
+    """The heights of a hole in order, each with its feed (0: none) and its dwell.
 
     `turns`: 1/min that feeds are counted by, 1 where they are mm/min.
 
@@ -130,7 +130,7 @@ def strokes(values: Values, feed: float | None, speed: float, turns: float = 1.0
 
 
 def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
-    """CYCLE83: strokes that get shorter by DAM, of DAM at least, the last two alike; between them out, or 1 mm back."""
+    """CYCLE83: pecks that get shorter by DAM, down to DAM, the last two alike; retract out, or by 1 mm, in between."""
     depth, bottom, less = values["FIRST"], values["DP"], values.get("DAM", 0.0)
     stroke, rate = values["RFP"] - depth, feed * (values.get("FRF") or 1.0)
     ahead = values.get("DIS1") or min(max(AHEAD_MM, AHEAD_SHARE * (values["RFP"] - bottom)), MOST_AHEAD_MM)
@@ -150,7 +150,7 @@ def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
 
 
 def pattern(state: State, block: CurrentBlock, code: str) -> None:
-    """HOLES1: holes on a line, from its nearer end; HOLES2: on a circle; CYCLE802: at points. With MCALL's cycle."""
+    """HOLES1: holes on a line, from the nearer end; HOLES2: on a circle; CYCLE802: at points. Runs MCALL's cycle."""
     plain, (first, second, _) = state.plain, PLANES[state.plane]
     given = {name for name in SIGNATURES[code].split() if block.has(name)}
     values = {name: (block.take(name) or 0.0) * (state.length_scale if name in LENGTHS else 1.0) for name in given}
@@ -181,7 +181,7 @@ def pattern(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def repeated(state: State, block: CurrentBlock) -> None:
-    """The cycle of MCALL behind a block that moved."""
+    """Run the cycle of MCALL after a block that moved."""
     if state.plain.modal and state.plain.cycle is not None:
         word = block.block.words[0] if block.block.words else Word("", 0.0, 1, "MCALL")
         drill(state, CurrentBlock(block.name, type(block.block)(block.line, (word,))), state.plain.cycle[1])

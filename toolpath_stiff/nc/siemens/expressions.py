@@ -1,4 +1,4 @@
-"""Expressions of Siemens' language, worked out where they stand.
+"""Expressions of Siemens' language, evaluated where they stand.
 
 SIEMENS, SINUMERIK 840D sl, Programming Manual Job Planning, "Flexible NC programming" ("Arithmetic operations",
 "Comparison and logic operations", "Priority of the operations"): NOT binds tightest, then * / DIV MOD, + -, AND,
@@ -33,7 +33,7 @@ CONSTANTS: dict[str, Value] = {"TRUE": True, "FALSE": False, "$PI": math.pi}
 
 @dataclass
 class SiemensScanner(Formula):
-    """A block in Siemens' language."""
+    """Scanner of a block in Siemens' language."""
 
     literal: ClassVar = re.compile(r"(?:\d++\.?\d*|\.\d+)(?:EX[+-]?\d+)?", re.ASCII)
     operator: ClassVar = re.compile(r"<<|<>|<=|>=|==|[-+*/<>]|(?:DIV|MOD|AND|XOR|OR)\b")
@@ -45,7 +45,7 @@ class SiemensScanner(Formula):
     operations: ClassVar = {**ARITHMETIC, "DIV": lambda a, b: whole(a / b), "MOD": math.fmod}
 
     def named(self, name: str, column: int) -> Value:
-        """A text, NOT, a function, a constant, or a variable."""
+        """The value of a text, NOT, a function, a constant, or a variable."""
         if name == '"':
             self.position -= 1
             return self.take(STRING)[1:-1]
@@ -58,7 +58,7 @@ class SiemensScanner(Formula):
         return CONSTANTS[name] if name in CONSTANTS else self.lookup(name + self.index(), column)
 
     def index(self) -> str:
-        """The index behind the name of an array, as names have it: "[2]", "[1,3]"; "" where there is none."""
+        """The index of an array's element as variables' names hold it: "[2]", "[1,3]"; "" if there is none."""
         column, parts = self.column, list[str]()
         if not self.next("["):
             return ""
@@ -72,7 +72,7 @@ class SiemensScanner(Formula):
         return f"[{','.join(parts)}]"
 
     def arguments(self, named: Container[int] = ()) -> list[Value | None]:
-        """The values in the brackets that come next, separated by commas; None for one that is left out.
+        """The values in the brackets that follow, separated by commas; None for an omitted one.
 
         Of those at the places `named` the name of the variable.
         """
@@ -88,7 +88,7 @@ class SiemensScanner(Formula):
         return values
 
     def operated(self, operator: str, left: Value, right: Value, column: int) -> Value:
-        """The value of an operator."""
+        """The result of an operator."""
         if operator == "<<":
             return "".join(value if isinstance(value, str) else f"{value:g}" for value in (left, right))
         if operator in LOGIC:

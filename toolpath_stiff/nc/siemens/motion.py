@@ -33,7 +33,7 @@ CHORDS = "a spline is taken as straight lines through its points"
 
 
 def rename(block: CurrentBlock, old: str, new: str, value: float | None = None) -> None:
-    """Give a word that is free another letter, and perhaps another number."""
+    """Give an unused word another letter and, if given, another value."""
     block.refuse_if(new in block.values, old, f"and {new} name the same in one block", "one of them")
     word = block.values.pop(old)
     block.values[new] = word if value is None else word._replace(value=value)
@@ -41,13 +41,13 @@ def rename(block: CurrentBlock, old: str, new: str, value: float | None = None) 
 
 
 def mark(block: CurrentBlock, letter: str, shown: str = "", value: float = 0.0) -> None:
-    """Give a block a word that it is not written with."""
+    """Add to a block a word that is not written in it."""
     block.values[letter] = Word(letter, value, block.block.words[0].column, shown or letter)
     block.free.add(letter)
 
 
 def moves(state: State, block: CurrentBlock) -> bool:
-    """Whether a block moves: it names a point, a tool's axis, or an arc's centre beside G2 or G3."""
+    """True if a block moves: it names a point, a tool axis, or an arc's centre beside G2 or G3."""
     arcs = state.motion in ("G2", "G3") and "motion" in block.groups
     return bool(block.free & (POINTS | {*VECTOR} | (CENTERS if arcs else frozenset())))
 
@@ -73,7 +73,7 @@ def move(state: State, block: CurrentBlock) -> None:
 
 
 def _name_steps(state: State, block: CurrentBlock) -> None:
-    """Name coordinates as Heidenhain's are named: X, and IX for a step."""
+    """Rename coordinates to Heidenhain's names: X, and IX for an increment."""
     plain, here = state.plain, present(state)
     for axis, letter in enumerate(AXES):
         if f"@{letter}" in block.free:
@@ -101,7 +101,7 @@ def _name_steps(state: State, block: CurrentBlock) -> None:
 
 
 def straight(state: State, block: CurrentBlock, code: str) -> None:
-    """G0, G1: straight to a point, with the tool's axis where A3, B3, C3 give one; splines as their chords."""
+    """G0, G1: straight to a point, with the tool axis if A3, B3, C3 give one; splines as their chords."""
     plain, (first, second, _) = state.plain, PLANES[state.plane]
     if code in ("ASPLINE", "CSPLINE"):
         state.assume(CHORDS)
@@ -118,7 +118,7 @@ def straight(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def _lean(state: State, block: CurrentBlock) -> None:
-    """A move with the tool's axis as a vector of the workpiece, turned with the frames in force."""
+    """Move with the tool axis as a vector in workpiece coordinates, rotated by the frames in force."""
     plain, vector = state.plain, [block.take(letter) or 0.0 for letter in VECTOR]
     length = math.hypot(*vector)
     block.refuse_if(not plain.transformed, "A3", "is the tool's axis without TRAORI", "TRAORI before it")
@@ -166,17 +166,17 @@ def arc(state: State, block: CurrentBlock, code: str) -> None:
         there, given = there | {first: end.real, second: end.imag}, True
     block.refuse_if(not given, None, "an arc without a centre", "I, J, K, CR= or AR=")
     plain.fast = False
-    contour.go(state, block, there, middle, turn, turns)
+    contour.go(state, block, there, (middle, turn, turns))
 
 
 def tangent(state: State, block: CurrentBlock, code: str) -> None:
-    """CT: an arc that goes on smoothly from the element before."""
+    """CT: an arc tangent to the element before."""
     _no_side(state, block)
     contour.tangent_circle(state, block, "CTP" if block.free & POLAR else "CT")
 
 
 def through(state: State, block: CurrentBlock, code: str) -> None:
-    """CIP: an arc in space through the point of I1, J1, K1."""
+    """CIP: an arc in space through the intermediate point I1, J1, K1."""
     plain, frames, scale, start = state.plain, state.frames, state.length_scale, present(state)
     other = state.cutter or plain.held or plain.to_corner or plain.side
     block.refuse_if(other, None, "CIP beside a corner, or with G41 or G42", "G2, G3")
@@ -209,7 +209,7 @@ def _no_side(state: State, block: CurrentBlock) -> None:
 
 
 def _machine(state: State, block: CurrentBlock, code: str, mode: str) -> None:
-    """SUPA, G53, G153, and G500 where other offsets are in use: coordinates of the machine, of the tool's tip."""
+    """SUPA, G53, G153, and G500 where other offsets are in use: machine coordinates of the tool's tip."""
     plain, frames, moved = state.plain, state.frames, {axis for axis, letter in enumerate(AXES) if block.has(letter)}
     outside_contour(state, block, code, plain.to_corner or plain.side)
     cut = mode != "G0" and (code == "G500" or mode != "G1")

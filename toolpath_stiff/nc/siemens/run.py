@@ -1,4 +1,4 @@
-"""Runs a program in Siemens' language: as parametric programs run, with Siemens' words, labels, loops and calls.
+"""Run of a program in Siemens' language: a parametric run with Siemens' words, labels, loops and calls.
 
 SIEMENS, SINUMERIK 840D sl, Programming Manual Job Planning, "Flexible NC programming", "Program section repetition",
 "Subprogram technique". Plain blocks of G0 to G3 are executed many at a time, as those of G code.
@@ -28,7 +28,7 @@ from toolpath_stiff.nc.words import AXES, Block, Word
 
 HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
 PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
-PLAIN = re.compile(r"\s*(?:N\d+\s*)?((?:(?:[GXYZABCIJKFS]|CR=)[-+]?[\d.]+\s*)*)(?:;.*)?", re.ASCII | re.IGNORECASE)
+PLAIN = re.compile(r"\s*(?:N\d+\s*)?((?:(?:G|[XYZABCIJKFS]=?|CR=)[-+]?[\d.]+\s*)*)(?:;.*)?", re.ASCII | re.IGNORECASE)
 OFFSET = re.compile(r"\bG(?:5[4-7]|5(?:0[5-9]|[1-9]\d))(?!\d)")
 CHANGE = re.compile(r"(?<![A-Z])M0*6(?!\d)")
 OF_LATHES = re.compile(r"\bG(?:18|96)(?!\d)|\bLIMS\b|\bDIAM(?:ON|90)\b")
@@ -36,6 +36,8 @@ ALONG_Y = re.compile(r"(?<![A-Z_$])Y\s*[-+=\d.]")
 IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
+REMARK = re.compile(r"^\s*(?:N\d+\s*)?\([^()]*\)$", re.ASCII)  # a comment as the ISO dialect and some posts write it
+ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
@@ -43,8 +45,8 @@ RUNS = "the program runs from its beginning, not searched, tested or simulated (
 
 
 def _array(name: str) -> str:
-    """The name of the array that an element belongs to; of another variable none that there is."""
-    return name.partition("[")[0] + "[]" if "[" in name else ""
+    """The array to which an element belongs; for any other variable a name that no array has."""
+    return name.partition("[")[0] + "[]" if ELEMENT.search(name) else ""
 
 
 class SiemensRun(ParametricRun):
@@ -63,7 +65,7 @@ class SiemensRun(ParametricRun):
         plain, text = self.state.plain, "\n".join(map(code_text, self.lines))
         self._of_lathe = None if ALONG_Y.search(text) else OF_LATHES.search(text)
         plain.offsets_named, plain.changes_by_t = OFFSET.search(text) is not None, CHANGE.search(text) is None
-        self.state.motion = "G1"  # as a control starts
+        self.state.motion = "G1"  # a control's state at power-on
 
     def _lex(self) -> None:
         """Find programs and labels; plain blocks are left to the reader of plain lines."""
@@ -72,7 +74,7 @@ class SiemensRun(ParametricRun):
         self._begins: list[re.Match[str]] = []
         texts, opened = list[str](), -1
         for row, line in enumerate(self.lines):
-            code, plain = code_text(line), PLAIN.fullmatch(line)
+            code, plain = REMARK.sub("", code_text(line)), PLAIN.fullmatch(line)
             begin, program = HEAD.match(code), PROGRAM.match(code)
             assert begin is not None
             self._begins.append(begin)
@@ -83,9 +85,11 @@ class SiemensRun(ParametricRun):
                 opened = row
             elif code.strip():
                 opened = -1
-            if re.search(r"\bCT\b", code) and texts:  # its direction is that of the block before
+            if re.search(r"\bCT\b", code) and texts:  # it takes its direction from the block before
                 texts[-1] = "?"
-            texts.append(plain[1].upper().replace("CR=", "R") if plain is not None and begin[3] is None else "?")
+            texts.append(
+                plain[1].upper().replace("CR=", "R").replace("=", "") if plain is not None and begin[3] is None else "?"
+            )
         self._ends = {row for row in self._subs.values() if any(code_text(text).strip() for text in self.lines[:row])}
         self._plain = self._lexer = PlainRun(self.state, texts, self.name)
 
@@ -121,12 +125,12 @@ class SiemensRun(ParametricRun):
         return self._statements[row]
 
     def _is_head(self, row: int) -> bool:
-        """Whether a line says of which program it is, and nothing else."""
+        """True if a line only names the program that begins there."""
         code = self._begins[row].string
         return PROGRAM.match(code) is not None or code.lstrip()[:1] == "%"
 
     def _at_place(self, row: int, place: int) -> Number:
-        """The number of an expression in a line."""
+        """The value of an expression in a line."""
         return lambda _: self._scanner(row, place).real()
 
     def _read(self, row: int) -> Block:
@@ -141,7 +145,8 @@ class SiemensRun(ParametricRun):
     # Variables
 
     def _scope(self, name: str) -> tuple[Values, str]:
-        """Where a variable is kept, R parameters for all programs, and its name there."""
+        """Dictionary that holds a variable (R parameters: common to all programs), and its key, index as number."""
+        name = INDEX.sub(self._index, name)
         parameter, base = re.fullmatch(r"R\[?(\d+)\]?", name), name.partition("[")[0]
         if parameter:
             return self.variables.common, f"R{parameter[1]}"
@@ -151,8 +156,13 @@ class SiemensRun(ParametricRun):
             return scope, other + name.removeprefix(base)
         return self.variables.levels[-1], name
 
+    def _index(self, found: re.Match[str]) -> str:
+        """The value of a variable used as an index; the name of an axis is kept."""
+        scope, name = self._scope(found[0])
+        return f"{scope[name]:g}" if name in scope else found[0]
+
     def _variable(self, name: str, column: int) -> Value:
-        """The value of a variable; nan for a machine builder's in a move in machine coordinates."""
+        """The value of a variable; nan for a machine builder's one in a move in machine coordinates."""
         scope, name = self._scope(name)
         value = scope.get(name, scope.get(_array(name)))
         if name in self._texts:
@@ -170,7 +180,7 @@ class SiemensRun(ParametricRun):
         raise self._fail(self._at, problem, f"{name}=... before", column=column)
 
     def _define(self, name: str, value: Value, column: int, kind: str) -> None:
-        """Set a variable; `kind`: its type where it is declared."""
+        """Set a variable; `kind`: its type if it is declared here."""
         scope, name = self._scope(name)
         array = _array(name)
         if not (kind or scope is self.variables.common or scope.keys() & {name, array} or name in self._texts):
@@ -201,7 +211,7 @@ class SiemensRun(ParametricRun):
     # Flow
 
     def _ends_before(self, row: int) -> bool:
-        return False  # each file ends with a line of its own
+        return False  # an end-of-file line closes each file
 
     def _step(self, kind: str) -> Step | None:
         return SIEMENS_STEPS.get(kind) or super()._step(kind)
@@ -214,13 +224,13 @@ class SiemensRun(ParametricRun):
         return super()._steered(row)
 
     def _return(self, row: int, flow: Flow | Word) -> int:
-        """M17, RET, the end of a program: back to the call, or the end of all."""
+        """M17, RET, the end of a program: the line after the call, or the end of the run."""
         while self._levels and self._levels[-1].stop >= 0:
             self._levels.pop()
         return self._leave(row) if self._levels else len(self.lines)
 
     def _to_label(self, row: int, way: str, label: str) -> int:
-        """The line of a label: ahead (GOTOF), behind (GOTOB), first behind (REPEAT), or first ahead (GOTO)."""
+        """The line of a label: forward (GOTOF), backward (GOTOB), backward first (REPEAT), or forward first (GOTO)."""
         first = self._program_of(row)
         stop = min((end for end in self._ends if end > first), default=len(self.lines))
         rows = [place for place in self._labels.get(label, []) if first <= place < stop]
@@ -242,7 +252,7 @@ class SiemensRun(ParametricRun):
         return None if stays else self._to_label(row, way, label)
 
     def _scanner_of(self, row: int, text: str) -> SiemensScanner:
-        """An expression that does not stand at its place."""
+        """Scanner of an expression in text that is not part of the line."""
         return SiemensScanner(text, [1] * (len(text) + 1), self._place(row), "", lookup=self._variable)
 
     def _for(self, row: int, steering: Steering) -> int | None:
@@ -260,7 +270,7 @@ class SiemensRun(ParametricRun):
         return start + 1 if again else None
 
     def _range(self, row: int) -> tuple[str, float, float]:
-        """FOR: its variable, first and last value."""
+        """The variable, first value and last value of a FOR."""
         scanner = self._scanner(row, self._begins[row].end())
         scanner.part(NAME)
         name = scanner.part(NAME) + scanner.index()
@@ -273,7 +283,7 @@ class SiemensRun(ParametricRun):
         return None if self._value(steering) else self._structure.start[row] + 1
 
     def _times(self, scanner: SiemensScanner) -> int:
-        """P behind a call, or of a repeat."""
+        """The number of runs: P after a call, or after a repeat."""
         if not scanner.part(TIMES):
             return 1
         scanner.sign("=")
@@ -282,7 +292,7 @@ class SiemensRun(ParametricRun):
         return int(value)
 
     def _section(self, row: int, steering: Steering) -> int | None:
-        """REPEAT, REPEATB: blocks from a label on run again."""
+        """REPEAT, REPEATB: run the blocks from a label on again."""
         scanner = self._scanner(row, self._begins[row].end())
         section = SECTION.match(scanner.text, scanner.position)
         assert section is not None
@@ -322,7 +332,7 @@ class SiemensRun(ParametricRun):
     def _bound(
         self, row: int, first: int, scanner: SiemensScanner
     ) -> tuple[dict[str, float | None], dict[str, tuple[Values, str]]]:
-        """The parameters of PROC with the values of a call; those by reference (VAR), with the variables they name."""
+        """PROC's parameters with the values of a call; those by reference (VAR), with the variables that they name."""
         heads = (PROGRAM.match(code_text(line)) for line in self.lines[first : first + 20])
         parameters = PARAMETER.findall(next((head[3] for head in heads if head is not None and head[2]), ""))
         named = {place for place, (by, *_) in enumerate(parameters) if by}
@@ -342,7 +352,7 @@ class SiemensRun(ParametricRun):
         return bound, references
 
     def _load_sub(self, name: str) -> None:
-        """Read a subprogram's file from the folder, if it is there."""
+        """Read a subprogram's file from the folder, if it exists."""
         if self._load(self._files_called(name, SUFFIXES), (f"%_N_{name}_SPF",)) is not None:
             self.lines = (*self.lines, END_OF_FILE)
             self._structure_known = None

@@ -17,7 +17,7 @@ BY_T = "T changes the tool: the program has no M6"
 
 
 def select(state: State, block: CurrentBlock, code: str) -> None:
-    """T: the tool of the next M6; in a program without M6 it is changed here."""
+    """T: the tool for the next M6; in a program without M6 it is changed at once."""
     number = tool_number(state, block)
     block.take("T")
     block.refuse_if(number is None, "T", "is no tool", 'T1, T="MILL"')
@@ -28,7 +28,7 @@ def select(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def change(state: State, block: CurrentBlock, code: str) -> None:
-    """M6: the tool that T named, with its first cutting edge."""
+    """M6: change to the tool that T named, with its first cutting edge."""
     outside_contour(state, block, "another tool")
     turn = state.turn
     change_tool(state, block, "M6")
@@ -37,7 +37,7 @@ def change(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def edge(state: State, block: CurrentBlock, code: str) -> None:
-    """D: the cutting edge whose length and radius act; D0: none."""
+    """D: the cutting edge whose length and radius apply; D0: none."""
     number = block.whole("D", block.values["D"], 0) or 0
     if number > 1:
         state.assume(ONE_EDGE)

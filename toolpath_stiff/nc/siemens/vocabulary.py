@@ -1,4 +1,4 @@
-"""The table of Siemens' words: name, function, meaning, source; what is listed, and what is refused, and why.
+"""The table of Siemens' words: name, function, meaning, source; the words listed as ignored, those refused, and why.
 
 Codes that mean what they mean in G code are those of the one table (`codes.registry`). The programming manuals meant
 are those of the SINUMERIK 840D sl (Fundamentals, Job Planning) and of the 840D (Cycles, 11/2002).
@@ -15,7 +15,7 @@ from toolpath_stiff.nc.state import CurrentBlock, Flow, State
 CONTROLS = ("siemens",)
 MANUAL = "SIEMENS, SINUMERIK 840D"
 BASICS, PLANNING, CYCLES = f"{MANUAL}, Fundamentals", f"{MANUAL}, Job Planning", f"{MANUAL}, Cycles"
-# Codes of the one table that mean the same here.
+# Codes of `codes.registry` that mean the same here.
 SHARED = (
     "G17", "G18", "G19", "G90", "G91", "G93", "G94", "G95", "G96", "G97", "M0", "M1", "M2", "M3", "M4", "M5", "M7",
     "M8", "M9", "M19", "M30", "F", "S",
@@ -23,13 +23,13 @@ SHARED = (
 
 
 def mode(state: State, block: CurrentBlock, code: str) -> None:
-    """G0 to G3, CIP, CT: the motion that holds; SUPA: for its block. The block's own move comes last."""
+    """G0 to G3, CIP, CT: the modal motion; SUPA: for its block alone. The block's own move comes last."""
     if code in _MOTION:
         state.motion = code
 
 
 def side(state: State, block: CurrentBlock, code: str) -> None:
-    """G40, G41, G42: from the next straight move in the plane on."""
+    """G40, G41, G42: in force from the next straight move in the plane."""
     plain, on = state.plain, state.cutter
     same = SIDES[code] == ("R0" if on is None else "RL" if on.side > 0 else "RR")
     other = on is not None and code != "G40" and not same
@@ -39,13 +39,13 @@ def side(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def entry(state: State, block: CurrentBlock, code: str) -> None:
-    """NORM, G450: how a compensated contour begins and goes round corners; KONT, G451 otherwise."""
+    """NORM, G450, KONT, G451: how a compensated contour is entered and how it rounds outside corners."""
     state.plain.entry = "" if code in ("NORM", "G450") else code
     block.refuse_if(state.cutter is not None and state.plain.entry, code, "while G41 or G42 is on", "NORM and G450")
 
 
 def dwell(state: State, block: CurrentBlock, code: str) -> None:
-    """G4 F: a pause in seconds; G4 S: in turns of the spindle."""
+    """G4 F: a pause in seconds; G4 S: in revolutions of the spindle."""
     seconds, turns = (time_word(state, block, letter) for letter in "FS")
     if turns is not None:
         block.refuse_if(state.speed <= 0.0, "S", "counts turns of a spindle that stands", "S and M3 before it")
@@ -54,7 +54,7 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def fixed_point(state: State, block: CurrentBlock, code: str) -> None:
-    """G74, G75: to points that the machine has: left out, and where the tool then stands is not known."""
+    """G74, G75: moves to the machine's fixed points; ignored, and the position after them is unknown."""
     state.warnings.append(Remark(f"{code} goes to points of the machine: left out of the path", block.line))
     state.plain.unknown |= {0, 1, 2}
     block.free.clear()
@@ -121,9 +121,9 @@ LISTED = {
         "how the control plans ahead: the path is taken as programmed":
             "G9 G60 G64 G601 G602 G603 G641 G642 G643 G644 G645 G62 G621 BRISK BRISKA SOFT SOFTA DRIVE FFWON FFWOF "
             "COMPON COMPCURV COMPCAD COMPSURF COMPOF CYCLE832 DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC "
-            "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CFC CFCIN CFTCP FGROUP ORISON "
-            "ORISOF ORIWKS ORIMKS ORIRESET CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 HIGH_SPEED "
-            "ORIVECT ORIPLANE ORIAXES",
+            "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CFC CFIN CFTCP CUT2D "
+            "CPRECON CPRECOF FGROUP ORISON ORISOF ORIWKS ORIMKS ORIRESET CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 "
+            "HIGH_SPEED ORIVECT ORIPLANE ORIAXES",
         "message, stop of the look-ahead, display":
             "MSG STOPRE GROUP_BEGIN GROUP_END GROUP_ADDEND DISPLOF DISPLON NEWCONF WRITE SETAL PARAM_END EXTERN WAITM "
             "SETMS STOPREOF SAVE SBLOF SBLON ENDLABEL",
@@ -136,7 +136,7 @@ LISTED = {
 }  # fmt: skip
 WORDS = frozenset((
     "ADIS", "ADISPOS", "SPOS", "SPOSA", "OVR", "OVRRAP", "FGREF", "CTOL", "OTOL", "ACC", "H", "FRC", "FL", "LIMS",
-    "DISC", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF",
+    "ATOL", "DISC", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF",
 ))  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
 REFUSED = refused((
@@ -174,7 +174,7 @@ TABLE |= {
 
 
 def meaning_of(name: str) -> str:
-    """What a word is taken for.
+    """The meaning given to a word.
 
     Examples
     --------

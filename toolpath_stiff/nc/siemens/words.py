@@ -1,4 +1,4 @@
-"""The words of a block in Siemens' language, and what steers the run; values are worked out as they are read.
+"""The words of a block in Siemens' language, and the statements that steer the run; evaluated as they are read.
 
 SIEMENS, SINUMERIK 840D sl, Programming Manual Fundamentals, "Structure and contents of an NC program", "Non-modal
 absolute and incremental dimensions"; Job Planning, "Definition of user variables", "Control structures".
@@ -29,13 +29,13 @@ ADDRESSES = {
     "X1", "Y1", "Z1",
 }  # fmt: skip
 STEERING = ("ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "FOR", "IF", "WHILE", "UNTIL")
-OTHERWISE = {"T": "#", "RP": "PR", "AP": "PA", "CR": "R"}  # names that words then have
-SPINDLE = re.compile(r"([SM])1")  # of the master spindle
+OTHERWISE = {"T": "#", "RP": "PR", "AP": "PA", "CR": "R"}  # other names under which these words are kept
+SPINDLE = re.compile(r"([SM])1")  # address of the master spindle
 Define = Callable[[str, Value, int, str], None]  # sets a variable: name, value, column, its type if it is declared
 
 
 def steering_of(scanner: SiemensScanner, evaluate: Callable[[int], Number]) -> Steering | None:
-    """What a block does to the flow; None for one that acts. `evaluate`: the value of what stands at a place."""
+    """The effect of a block on the flow; None if it only acts. `evaluate`: the value of the expression at a place."""
     scanner.take(BLANK)
     begin, column, plain = scanner.position, scanner.column, PLAIN.match(scanner.text, scanner.position)
     name = scanner.take(NAME)
@@ -55,7 +55,7 @@ def steering_of(scanner: SiemensScanner, evaluate: Callable[[int], Number]) -> S
 
 
 def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
-    """The words of a block; variables are set on the way. Raises `InputError` with line and column."""
+    """The words of a block; sets variables along the way. Raises `InputError` with line and column."""
     words = list[Word]()
     while True:
         scanner.take(BLANK)
@@ -68,7 +68,7 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
             words.append(Word(letter, float(plain[2].replace("EX", "E")), column, plain[0]))
             continue
         literal = LITERAL.match(scanner.text, scanner.position)
-        if literal is not None and literal[1] in ADDRESSES:  # most of a program with tool vectors
+        if literal is not None and literal[1] in ADDRESSES:  # shortcut for most words
             scanner.position = literal.end()
             words.append(Word(OTHERWISE.get(literal[1], literal[1]), float(literal[2]), column, literal[0]))
             continue
@@ -77,7 +77,7 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
         if name == "DEF":
             _declare(scanner, define)
             continue
-        if name == "EXTERN":  # which says what a subprogram takes: its PROC does too
+        if name == "EXTERN":  # declares a subprogram's parameters: its PROC does too
             scanner.position = len(scanner.text)
             return [*words, Word(name, 0.0, column, name)]
         index = scanner.index()
@@ -110,7 +110,7 @@ def _addressed(scanner: SiemensScanner, name: str, column: int, begin: int) -> W
 
 
 def _named(scanner: SiemensScanner, name: str, column: int) -> list[Word]:
-    """A word without a number, and the parameters in its brackets where these are known by name."""
+    """A word without a number, and the parameters in its brackets if these are known by name."""
     scanner.take(BLANK)
     words = [Word(name, 0.0, column, name)]
     if name in SIGNATURES and scanner.begins("("):
@@ -129,7 +129,7 @@ def _declare(scanner: SiemensScanner, define: Define) -> None:
     """DEF REAL A=5, B[10]: variables with their first values."""
     kind = scanner.part(NAME)
     scanner.refuse_if(kind not in TYPES, f"DEF {kind} is not supported", f"DEF {', DEF '.join(TYPES)}")
-    scanner.index()  # the length of a text
+    scanner.index()  # skip the length of a text
     while True:
         column, name = scanner.column, scanner.part(NAME)
         scanner.refuse_if(not name, f"{scanner.rest()} is no name of a variable", "DEF REAL LENGTH=5", column=column)

@@ -103,11 +103,8 @@ const scene = {
   // The box of the cuts: of all, or of the operation that is looked at.
   box() {
     if (chosenOperation < 0) return data.box;
-    const [first, end] = operationRange(chosenOperation), box = [0, 1, 2].map(() => [Infinity, -Infinity]);
-    for (let i = first; i < end; i++) if (cutting(i)) box.forEach((ends, axis) => {
-      ends[0] = Math.min(ends[0], xyz[axis][i]);
-      ends[1] = Math.max(ends[1], xyz[axis][i]);
-    });
+    const [first, end] = operationRange(chosenOperation);
+    const box = extentOf(xyz, (i) => i >= first && i < end && cutting(i));
     return box[0][0] <= box[0][1] ? box : data.box;
   },
   draw(g, viewer) {

@@ -38,8 +38,10 @@ class MachineBody {
   }
   // What a view of the whole machine is fitted to: a ring and a ball do not reach the corners of their box.
   outline(pose) {
-    return [...(this.hangs && this.data.reach?.flat() || []), ...this.at(pose).flatMap(({ points }) => points),
-      ...this.feet.map(([x, y]) => [x, y, this.floor - 0.1 * this.size])];
+    const { size, floor } = this, thick = this.hangs ? 0 : 0.14 * size;
+    const feet = this.feet.map(([x, y]) => [x, y, floor - 0.1 * size]);
+    return [...feet, ...this.at(pose).flatMap(({ points }) => points)].flatMap((p) => cornersOf(p.map((v) =>
+      [v - thick, v + thick]))).concat(this.hangs && this.data.reach?.flat() || []);
   }
   drawReach(g, view) {
     const rows = this.data.reach, line = (points, close) => { trace(g, points.map((p) => view.project(p)), close);
@@ -65,13 +67,30 @@ class MachineBody {
       { name: "tool", link: "tool", points: [moved(pose, turn, [0, 0, joints.tool]), pose.slice(0, 3)] },
     ];
   }
+  // The floor in the light of a lamp above, with the shadows of struts, links and platform.
+  ground(g, view, bodies, height) {
+    const on = ([x, y]) => view.project([x, y, height]), [x, y] = on(centreOf(this.feet));
+    const far = 2.1 * this.size * view.zoom, lamp = g.createRadialGradient(0, 0, 0, 0, 0, far);
+    ["3c", "00"].forEach((alpha, at) => lamp.addColorStop(at, ink.rapid + alpha));
+    g.save();
+    g.transform(1, 0, 0, view.axes()[2][2], x, y);
+    g.fillStyle = lamp;
+    g.fillRect(-far, -far, 2 * far, 2 * far);
+    g.restore();
+    Object.assign(g, { globalAlpha: 0.17, lineCap: "round", lineJoin: "round" });
+    g.beginPath();
+    for (const { name, points } of bodies) if (name !== "bed") points.map(on).forEach(([px, py], k) =>
+      (k ? g.lineTo(px, py) : g.moveTo(px, py)));
+    stroke(g, "#0a0e12", (this.hangs ? 0.05 : 0.12) * this.size * view.zoom);
+    Object.assign(g, { globalAlpha: 1, lineCap: "butt" });
+  }
   // What is drawn at a pose, to be sorted by depth. Of `work`, [low, high] of X, Y and Z of the cuts, the part is drawn
   // on its table; `close`: the work is looked at, what stands before it lets it show through; `floor`: mm, of the legs.
   items(view, pose, { work, close, floor }) {
     const { size, hangs } = this, items = [], front = view.project(pose.slice(0, 3))[2] + 0.02 * size;
     const clear = close && hangs ? Math.max(0.1, Math.min(0.8, 1.2 - 0.5 * size * view.zoom / view.width)) : 1;
-    const metal = mix(ink.rapid, ink.panel, 0.25), pale = mix(metal, ink.panel, 0.4);
-    const dark = mix(metal, ink.plunge, 0.25), stand = mix(ink.rapid, ink.panel, 0.45);
+    const bright = mix(ink.panel, "#fff", 0.5), metal = mix(ink.rapid, bright, 0.25), pale = mix(metal, bright, 0.4);
+    const dark = mix(metal, ink.plunge, 0.25), stand = mix(ink.rapid, bright, 0.45);
     const through = (place) => Math.min(clear + 0.2, close && view.project(place)[2] > front ? 0.3 : 1);
     const colour = (link, name, plain) => (lit(this.lit, link, name) ? ink.accent : plain);
     const add = (shape, a, b, radius, paint, alpha = through(between(a, b, 0.5))) =>
@@ -94,7 +113,7 @@ class MachineBody {
       } else if (hangs) {
         const cut = between(a, b, 0.58), ends = colour("joints", name, colour(link, name, ink.plunge));
         add(cylinder, a, cut, 0.03, plain);
-        add(cylinder, cut, b, 0.019, colour(link, name, mix(ink.plunge, ink.panel, 0.45)));
+        add(cylinder, cut, b, 0.019, colour(link, name, mix(ink.plunge, bright, 0.45)));
         joint(a, 0.045, ends);
         joint(b, 0.032, ends);
       } else if (this.slides) add(beam, a, b, 0.13, plain);
@@ -110,14 +129,15 @@ class MachineBody {
     const frame = colour("frame", "", stand), ring = hangs ? byAngle(this.feet) : [];
     ring.forEach((p, i) => add(cylinder, p, ring[(i + 1) % ring.length], 0.022, frame));
     if (hangs && !close) for (const p of ring) add(cylinder, p, [p[0], p[1], floor], 0.016, frame);
-    const [[fx, fy, fz]] = this.feet;
-    if (!hangs && !this.slides) add(cylinder, [fx, fy, fz - 0.1 * size], [fx, fy, fz], 0.2, frame);
+    const [[fx, fy, fz]] = this.feet, ground = hangs ? floor : fz - 0.1 * size;
+    if (!hangs && !this.slides) add(cylinder, [fx, fy, ground], [fx, fy, fz], 0.2, frame);
+    if (!close) items.push({ depth: -2e9, paint: (g) => this.ground(g, view, bodies, ground) });
     if (this.slides || !work && !hangs) return items;
     // The table, which all else stands on, and the part.
     const [x, y, z] = work ?? [...(this.data.reach?.[0][0] ?? pose).slice(0, 2), floor].map((v) => [v, v]);
     const half = work ? 0.8 * Math.max(x[1] - x[0], y[1] - y[0]) : 0.22 * size, low = z[0] - (work ? 0.012 * size : 0);
     const about = (ends) => [-half, half].map((v) => (ends[0] + ends[1]) / 2 + v);
-    const below = close || !hangs ? low - 0.04 * size : Math.min(floor, low - 0.05 * size);
+    const below = close ? low - 0.04 * size : Math.min(ground, low - 0.05 * size);
     items.push({ ...block(view, [about(x), about(y), [below, low]], colour("table", "", pale)), depth: -1e9 });
     if (work) items.push({ ...block(view, [...[x, y].map(([a, b]) => [a - 0.01 * size, b + 0.01 * size]),
       [low, Math.max(z[0], low) + 1e-3]], mix(ink.curve, ink.panel, 0.88)), depth: -9e8 });

@@ -18,8 +18,7 @@ let chosen = d.recommended;
 const places = d.front.map((row, i) => placed(row, d.stiffness[i]));
 const before = d.before ? placed(d.before, d.stiffness[d.stiffness.length - 1]) : null;
 const n = d.position.length;
-const around = ({ xyz }) => xyz.map((axis) => axis.reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)],
-  [Infinity, -Infinity]));
+const around = ({ xyz }) => extentOf(xyz);
 const workspace = d.workspace[0].map((low, k) => [low, d.workspace[1][k]]);
 const bounded = d.workspace.flat().every((v) => v !== null);
 const whole = () => document.querySelector("input[name=zoom]:checked").value !== "path";

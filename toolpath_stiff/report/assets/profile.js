@@ -86,15 +86,11 @@ class Profile extends Stage {
     }
   }
   drawScales(g, left, right, top, bottom) {
-    g.lineWidth = 1;
-    g.strokeStyle = ink.line;
-    g.fillStyle = ink.muted;
+    Object.assign(g, { lineWidth: 1, strokeStyle: ink.line, fillStyle: ink.muted });
     aligned(g, "right", "middle");
     const up = ticks(this.low, this.high, 5), across = ticks(this.from, this.to, (right - left) / 110);
     for (const value of up.values) {
-      g.beginPath();
-      g.moveTo(left, this.y(value));
-      g.lineTo(right, this.y(value));
+      trace(g, [[left, this.y(value)], [right, this.y(value)]], false);
       g.stroke();
       if (this.y(value) > top + 9) g.fillText(group(value, up.digits), left - 6, this.y(value));  // clear of the unit
     }
@@ -128,9 +124,7 @@ class Profile extends Stage {
     }
   }
   level(g, value, colour, dash) {
-    g.beginPath();
-    g.moveTo(this.pad.left, this.y(value));
-    g.lineTo(this.right, this.y(value));
+    trace(g, [[this.pad.left, this.y(value)], [this.right, this.y(value)]], false);
     stroke(g, colour, 1.1, dash);
   }
   // Of the rows in one column of pixels the first, lowest, highest and last are drawn: no extreme is lost.

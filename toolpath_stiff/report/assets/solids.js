@@ -28,9 +28,8 @@ function cylinder(view, a, b, radius, colour, alpha = 1) {
       t * towards + Math.sqrt(1 - t * t) * LIGHT[2]) + (Math.abs(t - towards) < 0.3 ? 0.16 : 0)));
     g.globalAlpha = alpha;
     g.fillStyle = across;
-    g.beginPath();
-    g.moveTo(p[0] - nx, p[1] - ny); g.lineTo(q[0] - nx, q[1] - ny); g.lineTo(q[0] + nx, q[1] + ny);
-    g.lineTo(p[0] + nx, p[1] + ny); g.closePath(); g.fill();
+    trace(g, [[p, -1], [q, -1], [q, 1], [p, 1]].map(([end, side]) => [end[0] + side * nx, end[1] + side * ny]));
+    g.fill();
     if (Math.abs(facing) > 0.05) for (const end of [near === p ? q : p, near]) {
       g.beginPath();
       g.ellipse(end[0], end[1], wide, wide * Math.abs(facing), Math.atan2(ny, nx), 0, 7);
@@ -62,13 +61,8 @@ function prism(view, lower, upper, colour, alpha = 1) {
   }
   const middle = [...lower, ...upper].reduce((sum, p) => sum.map((v, i) => v + p[i]), [0, 0, 0]);
   return { depth: view.project(middle.map((v) => v / (2 * lower.length)))[2], paint: (g) => {
-    g.globalAlpha = alpha;
-    for (const [points, fill] of faces) {
-      trace(g, points);
-      g.fillStyle = fill;
-      g.fill();
-      stroke(g, fill, 0.7);  // no seams between faces
-    }
+    Object.assign(g, { globalAlpha: alpha, lineWidth: 0.7 });  // edges are drawn too: no seams between faces
+    for (const [points, colour] of faces) fill(g, points, colour);
     g.globalAlpha = 1;
   } };
 }

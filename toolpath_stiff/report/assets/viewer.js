@@ -107,16 +107,13 @@ class Viewer extends Stage {
   }
   drawTriad(g) {
     const [r, u] = this.axes(), x0 = 46, y0 = this.height - 46;
-    g.lineWidth = 1.5;
     aligned(g, "center", "middle");
+    g.fillStyle = ink.ink;
     ["X", "Y", "Z"].forEach((name, axis) => {
       const dx = r[axis] * 30, dy = -u[axis] * 30;
       if (Math.hypot(dx, dy) < 3) return;
-      g.strokeStyle = g.fillStyle = ink.ink;
-      g.beginPath();
-      g.moveTo(x0, y0);
-      g.lineTo(x0 + dx, y0 + dy);
-      g.stroke();
+      trace(g, [[x0, y0], [x0 + dx, y0 + dy]], false);
+      stroke(g, ink.ink, 1.5);
       g.fillText(name, x0 + dx * 1.3, y0 + dy * 1.3);
     });
   }
@@ -213,6 +210,9 @@ class Viewer extends Stage {
 function cornersOf(box) {
   return [0, 1, 2, 3, 4, 5, 6, 7].map((c) => box.map(([low, high], axis) => ((c >> axis) & 1 ? high : low)));
 }
+// [low, high] of X, Y and Z of those points that count.
+const extentOf = (xyz, counts = () => true) => xyz.map((axis) => axis.reduce((ends, v, i) => (counts(i)
+  ? [Math.min(ends[0], v), Math.max(ends[1], v)] : ends), [Infinity, -Infinity]));
 // A path: points, and the lines between them by class: of the scale, then rapids, plunges beside it, out of reach.
 const RAPIDS = CLASSES, PLUNGES = CLASSES + 1, UNREACHED = CLASSES + 2;
 class Path {

@@ -34,7 +34,7 @@ HOW_TO_READ = (
 
 
 def batch_page(outcomes: Sequence[ProgramOutcome]) -> str:
-    """The page's text, in the order of `outcomes`; links are relative to the folder of all reports."""
+    """Text of the page, in the order of `outcomes`; links are relative to the folder of all reports."""
     good, failed = good_and_failed(outcomes)
     every = counted(len(outcomes), "program")
     table = _table(good)
@@ -95,7 +95,7 @@ def _totals(good: Sequence[ProgramOutcome], failed: Sequence[ProgramOutcome]) ->
 
 @dataclass(frozen=True)
 class StiffnessScale:
-    """One scale of stiffness for all bars, N/mm: its ends, which are ticks, and the ticks."""
+    """Common scale of stiffness for all bars, N/mm: its ends, which are ticks, and the ticks."""
 
     low: float
     high: float
@@ -103,12 +103,12 @@ class StiffnessScale:
     required: float | None
 
     def at(self, value: float) -> float:
-        """Place of a value, in percent of the width."""
+        """Position of a value, in percent of the width."""
         return 100.0 * (value - self.low) / (self.high - self.low)
 
 
 def _scale(good: Sequence[ProgramOutcome]) -> StiffnessScale | None:
-    """A scale that holds the bars and the required level; None where there is no bar.
+    """Scale that spans the bars and the required level; None without bars.
 
     Programs that only plunge set it if there are no others.
     """
@@ -128,10 +128,10 @@ def _scale(good: Sequence[ProgramOutcome]) -> StiffnessScale | None:
 
 
 def _bar(outcome: ProgramOutcome, scale: StiffnessScale) -> Document:
-    """What is drawn of a program: span (kind, place and width) and lines, in per cent of the width."""
+    """Drawing of a program: span (kind, place and width) and lines, in per cent of the width."""
     low, mean, high, other = (outcome.figure(f"{name}_N_per_mm") for name in ("min", "mean", "max", "compare_mean"))
     lines, span = [("tick", tick) for tick in scale.ticks], None
-    if low is not None and low <= scale.high and high >= scale.low:  # those of plunges alone may lie beyond
+    if low is not None and low <= scale.high and high >= scale.low:  # figures of plunges may lie beyond
         kind = f"span{' plunge' * outcome.plunges_only}{' below' * bool(outcome.figure('lines_below_required'))}"
         span = (kind, scale.at(low), max(scale.at(high) - scale.at(low), 0.4))
         lines.append(("mean", mean))
@@ -139,7 +139,7 @@ def _bar(outcome: ProgramOutcome, scale: StiffnessScale) -> Document:
     return {"span": span, "lines": [(kind, scale.at(value)) for kind, value in lines]}
 
 
-Cell = tuple[str, Any]  # what it is sorted by, and what it shows
+Cell = tuple[str, Any]  # sort key, and content
 
 
 class Column(NamedTuple):
@@ -155,7 +155,7 @@ class Column(NamedTuple):
 
 
 def _figure(title: str, name: str, hint: str = "", digits: int = 0, flag: bool = False) -> Column:
-    """A column of a figure; of a count that had better be zero, with a flag where it is not."""
+    """Column of a figure; of a count that should be zero, with a flag where it is not."""
 
     def cell(outcome: ProgramOutcome) -> Cell:
         shown = outcome.number(name, digits)
@@ -209,13 +209,13 @@ def _table(good: Sequence[ProgramOutcome]) -> Document | None:
 
 
 def _link(outcome: ProgramOutcome) -> Cell:
-    """The name; it opens the report. Names need not be UTF-8, nor free of what addresses take otherwise."""
+    """Name of a program, linked to its report. Names need not be UTF-8, nor free of characters special in addresses."""
     address = quote(os.fsencode(outcome.opens))
     return outcome.name, markup('<a href="{}" title="{}">{}</a>', address, outcome.file, outcome.name)
 
 
 def _plunges(outcome: ProgramOutcome) -> Cell:
-    """Their mean; of a program that only plunges all other figures are theirs already."""
+    """Mean of the plunges; if a program only plunges, all other figures are theirs already."""
     shown = ONLY_PLUNGES if outcome.plunges_only else outcome.number("plunge_mean_N_per_mm")
     return _sorted_by(outcome, "plunge_mean_N_per_mm"), shown
 
@@ -229,5 +229,5 @@ def _place(outcome: ProgramOutcome) -> Cell:
 
 
 def files(outcomes: Sequence[ProgramOutcome]) -> dict[str, Content]:
-    """The overview of many programs: page and table."""
+    """Overview of many programs: page and table."""
     return {INDEX: batch_page(outcomes), SUMMARY: summary_csv(outcomes)}

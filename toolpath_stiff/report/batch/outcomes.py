@@ -1,4 +1,4 @@
-"""What became of many programs: the figures that are kept of each, as `summary.csv` and as a table on the terminal."""
+"""Outcomes of many programs: the figures kept of each, as `summary.csv` and as a table on the terminal."""
 
 import textwrap
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import WIDTH, counted, duration, plain, shortened
 
 MOST_NAME = 36  # columns of the terminal for the name
-# First columns of summary.csv -> what of the outcome they show.
+# First columns of summary.csv -> attribute of the outcome.
 TOLD = {"program": "name", "file": "file", "status": "status", "reason": "reason", "report": "opens"}
 # Its further columns, keys of the figures; the units are in the names.
 CUT = ("samples", "cutting_length_mm", "rapid_length_mm", "time_s", *FIGURES, "headline")
@@ -28,7 +28,7 @@ DECIMALS = {"_N": 3, "_mm": 4, "_um": 4, "_s": 3, "_deg": 5, "_percent": 3, "_ma
 
 @dataclass(frozen=True)
 class ProgramOutcome:
-    """What became of a program.
+    """Outcome of the analysis of one program.
 
     Attributes
     ----------
@@ -52,32 +52,32 @@ class ProgramOutcome:
 
     @property
     def status(self) -> str:
-        """Failed; partial, with samples out of reach left out; or done."""
+        """State of the program: "failed", "partial" (samples out of reach left out) or "done"."""
         if not self.figures:
             return "failed"
         return "partial" if self.figures["out_of_reach_samples"] else "done"
 
     @property
     def plunges_only(self) -> bool:
-        """True where its figures are of plunges, for it does nothing else."""
+        """True if its figures are of plunges, as it does nothing else."""
         return only_plunges(self.figures)
 
     def figure(self, name: str) -> Any:
-        """One of the figures; None where there is none."""
+        """Figure by name; None if it is missing."""
         return self.figures.get(name)
 
     def number(self, name: str, digits: int = 0) -> str:
-        """The same for people; "-" where there is none."""
+        """Figure as text; "-" if it is missing."""
         return number(self.figure(name), digits)
 
 
 def good_and_failed(outcomes: Sequence[ProgramOutcome]) -> tuple[list[ProgramOutcome], list[ProgramOutcome]]:
-    """The programs that have figures, and those that failed."""
+    """Programs that have figures, and programs that failed."""
     return [outcome for outcome in outcomes if outcome.figures], [o for o in outcomes if not o.figures]
 
 
 def figures_of(summary: Document) -> Document:
-    """The values of `COLUMNS` from a `summary.json`: small, however long the program."""
+    """Values of `COLUMNS` from a `summary.json`: small, however long the program."""
     flat = {
         **summary,
         **{f"weakest_{key}": value for key, value in (summary["weakest"] or {}).items()},
@@ -94,7 +94,7 @@ def figures_of(summary: Document) -> Document:
 
 
 def summary_csv(outcomes: Sequence[ProgramOutcome]) -> str:
-    """`summary.csv`: one row a program, failures too; a figure that does not exist is an empty cell."""
+    """`summary.csv`: one row per program, failures too; a missing figure is an empty cell."""
 
     def cell(name: str, value: object) -> str:
         if not isinstance(value, float):
@@ -107,13 +107,13 @@ def summary_csv(outcomes: Sequence[ProgramOutcome]) -> str:
 
 
 def columns_of(outcomes: Sequence[ProgramOutcome]) -> dict[str, list[Any]]:
-    """The same as values, column by column; None for a figure that does not exist."""
+    """`summary.csv` as values, column by column; None for a missing figure."""
     columns = {name: [getattr(outcome, of) for outcome in outcomes] for name, of in TOLD.items()}
     return columns | {name: [outcome.figure(name) for outcome in outcomes] for name in COLUMNS}
 
 
 def terminal_summary(outcomes: Sequence[ProgramOutcome]) -> str:
-    """One line a program that was analyzed, then the failures with their reasons; at most 100 columns but for these."""
+    """One line per program analyzed, then the failures with reasons; at most 100 columns except for these."""
     good, failed = good_and_failed(outcomes)
     lines = _program_table(good).lines() if good else []
     plunging = [plain(outcome.name) for outcome in good if outcome.plunges_only]

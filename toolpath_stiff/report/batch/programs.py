@@ -1,4 +1,4 @@
-"""Many programs: which ones files and folders name, and the report folder of each."""
+"""Many programs: those named by files and folders, and the report folder of each."""
 
 import os
 import re
@@ -12,12 +12,12 @@ from toolpath_stiff.report.words import counted
 
 # Endings of the files that a folder stands for: `.txt` is as often a note or a tool list.
 ENDINGS = (".nc", ".ngc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf", ".min", *EXTENSIONS)
-RESERVED = ("index.html", "summary.csv")  # what lies beside the report folders
+RESERVED = ("index.html", "summary.csv")  # names beside the report folders
 
 
 @dataclass(frozen=True)
 class Found:
-    """A program: the file as named (or as found below the folder named), and its path as seen from that folder."""
+    """A program: the file as named or found in the folder named, and its path relative to that folder."""
 
     file: str
     inside: Path
@@ -25,7 +25,7 @@ class Found:
 
 @dataclass(frozen=True)
 class FolderCount:
-    """What a folder argument holds."""
+    """Contents of a folder argument."""
 
     folder: str
     programs: int
@@ -38,7 +38,7 @@ class FolderCount:
 
 @dataclass(frozen=True)
 class Listed:
-    """A program to analyze: its file, a short name that no other program has, its report folder below `--out`."""
+    """A program to analyze: its file, a unique short name, its report folder below `--out`."""
 
     file: str
     name: str
@@ -46,7 +46,7 @@ class Listed:
 
 
 def find_programs(arguments: Sequence[str | Found]) -> tuple[list[Found], list[FolderCount]]:
-    """The programs that files and folders name, each file once, in the order given; those of a folder by name.
+    """Programs named by files and folders, each file once, in the order given; those of a folder by name.
 
     What was found before stays as it is.
 
@@ -71,7 +71,7 @@ def find_programs(arguments: Sequence[str | Found]) -> tuple[list[Found], list[F
 
 
 def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
-    """Programs in a folder and below it; hidden ones, and folders that are symbolic links, are not entered."""
+    """Programs in a folder and its subfolders; hidden ones, and folders that are symbolic links, are skipped."""
 
     def refuse(error: OSError) -> None:
         raise InputError(f"cannot read folder {str(error.filename)!r}: {error.strerror}")
@@ -84,7 +84,7 @@ def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
             path = Path(place, name)
             if name.startswith("."):
                 continue
-            # A symbolic link that leads nowhere is a program that cannot be read; a pipe would wait for ever.
+            # A broken symbolic link counts as a program that cannot be read; a pipe would block for ever.
             if path.suffix.lower() in ENDINGS and (path.is_file() or (path.is_symlink() and not path.exists())):
                 inside.append(Found(str(path), path.relative_to(folder)))
             else:
@@ -100,12 +100,12 @@ def _in_folder(folder: str) -> tuple[list[Found], FolderCount]:
 
 
 def _by_number(name: str) -> list[str | int]:
-    """A key that puts `part2` before `part10`."""
+    """Sort key that puts `part2` before `part10`."""
     return [int(part) if i % 2 else part for i, part in enumerate(re.split("([0-9]+)", name))]
 
 
 def report_folders(programs: Sequence[Found]) -> list[Listed]:
-    """A report folder for each program: its path as seen from the folder named, without the ending.
+    """Report folder of each program: its path relative to the folder named, without the ending.
 
     Where two would be the same (`part.nc` and `part.tap`; capitals do not count) or one lie within another, all keep
     their endings; where that is not enough, all have the folders above that they do not share; then they are numbered.
@@ -125,7 +125,7 @@ def report_folders(programs: Sequence[Found]) -> list[Listed]:
 
 
 def _clash(paths: Sequence[Path]) -> bool:
-    """Whether two are the same, one lies within another, or one has a name that is kept for the overview."""
+    """True if two paths are equal, one lies within another, or one has a name reserved for the overview."""
     keys = [tuple(part.casefold() for part in path.parts) for path in paths]
     above = {key[:n] for key in keys for n in range(1, len(key))}
     return len(set(keys)) < len(keys) or any(key in above or key[0] in RESERVED for key in keys)

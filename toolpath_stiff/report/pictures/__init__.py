@@ -1,1 +1,1 @@
-"""The pictures of results: a module a result, `PICTURES` with file name -> function; the first is `plot()`."""
+"""Pictures of results: one module a result, with `PICTURES`, file name -> function; the first is `plot()`."""

@@ -1,4 +1,4 @@
-"""The pictures of an analysis."""
+"""Pictures of an analysis."""
 
 from toolpath_stiff.report.pictures.part import part
 from toolpath_stiff.report.pictures.path import path

@@ -1,4 +1,4 @@
-"""Where model and measurements differ before and after a fit, seen from above; measured against modelled."""
+"""Differences of model and measurements before and after a fit, seen from above; measured against modelled."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ from toolpath_stiff.report.words import DEVIATION, MINUS_IS_SOFTER, percent, pla
 from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 SHOWN = 0.98  # share of the residuals that the colour scale holds
-BAND = 0.10  # drawn about measured = modelled
+BAND = 0.10  # relative band drawn about measured = modelled
 MAP = 2.05  # inch
 MAPS = "maps from above, X to the right; a point: mean of its readings"
 LEFT = 0.95  # inch
@@ -32,7 +32,7 @@ def before_after(
     held_out_percent: float | None,
     refitted_percent: float | None,
 ) -> Figure:
-    """Where model and measurements differ, seen from above, before and after, and measured against modelled.
+    """Differences of model and measurements, seen from above, before and after, and measured against modelled.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def panels(data: Readings) -> tuple[list[str], list[str]]:
 def maps(
     figure: Figure, data: Readings, residual: FloatArray, place: tuple[float, float, float], limit: float = 0.0
 ) -> None:
-    """Residuals seen from above, a row a plane, a column a direction, with their scale.
+    """Residuals seen from above, a row per plane, a column per direction, with their scale.
 
     `place`: left and upper edge of the maps, and the side of one, in inches. `limit`: end of the scale, %; else
     as the residuals need it.
@@ -75,7 +75,7 @@ def maps(
     (rows, columns), (left, top, side) = panels(data), place
     along, levels, limit = directions(data), planes(data), limit or _limit([residual])
     across, up = side * len(columns), side * len(rows)
-    # All maps stand in one frame, which takes a fraction of what a frame each would.
+    # All maps share one frame, which takes a fraction of the time of a frame each.
     axes = panel(figure, left, top - up, across, up, xlim=(0.0, len(columns)), ylim=(len(rows), 0.0))
     axes.set_axis_off()
     style: Look = {"rotation": 90, "ha": "right", "va": "center", "size": 9}
@@ -102,7 +102,7 @@ def _half_title(name: str, held_out: float | None, residual: FloatArray) -> str:
 
 
 def _limit(halves: Sequence[FloatArray]) -> float:
-    """End of the common colour scale, %: of both halves together, few extreme readings not taking the contrast."""
+    """End of the common colour scale, %, from both halves together, without a few extreme readings."""
     sizes = np.abs(deviation_percent(np.concatenate(halves)))
     sizes = sizes[np.isfinite(sizes)]
     return max(float(np.quantile(sizes, SHOWN)), 1e-3) if len(sizes) else 1.0
@@ -111,7 +111,7 @@ def _limit(halves: Sequence[FloatArray]) -> float:
 def _map(
     axes: Axes, data: Readings, residual: FloatArray, chosen: NDArray[np.bool_], corner: tuple[int, int]
 ) -> tuple[FloatArray, FloatArray]:
-    """The frame of a map in the unit square at `corner`; its discs (m, 2) there and their residuals (m,), %.
+    """Draw the frame of a map in the unit square at `corner`; its discs (m, 2) there and their residuals (m,), %.
 
     A disc a pose, readings of one pose averaged; poses above each other stand side by side.
     """
@@ -135,7 +135,7 @@ def _reach(data: Readings) -> float:
 
 
 def _spread(places: FloatArray, step: float) -> FloatArray:
-    """Points at one place moved onto a ring about it, so that each is seen."""
+    """Points at one place moved onto a ring around it, so that each is visible."""
     out = places.astype(float).copy()
     _, which, count = np.unique(np.round(places, 1), axis=0, return_inverse=True, return_counts=True)
     for group in np.flatnonzero(count > 1):
@@ -163,7 +163,7 @@ def _scatter_pair(figure: Figure, data: Readings, halves: Sequence[FloatArray], 
 
 
 def one_to_one(axes: Axes, low: float, high: float) -> None:
-    """Logarithmic axes of measured against modelled stiffness, N/mm, with the line where they are the same."""
+    """Set up logarithmic axes of measured against modelled stiffness, N/mm, with the line where they are equal."""
     line = np.array([low, high])
     axes.fill_between(line, line * (1.0 - BAND), line * (1.0 + BAND), color=WITHIN, lw=0, zorder=0)
     axes.plot(line, line, color=MUTED, lw=1.0, zorder=1)

@@ -1,4 +1,4 @@
-"""The pictures of a case study: the path in its regions, mean and range over the height."""
+"""Pictures of a case study: the path in its regions, mean and range over the height."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,9 +18,9 @@ BESIDE, PANEL = 1.3, 5.9  # inches: the scale of colours, the width of a panel
 
 
 def regions(study: CaseStudy) -> Figure:
-    """The regions, one panel a height, each path coloured by its stiffness, mean (range) beside it."""
+    """The regions, one panel per height, each path coloured by its stiffness, mean (range) beside it."""
     shown_heights = _drawn_heights(study)
-    # Plunges would stretch the scale of colours; the packaged square has none.
+    # Without plunges, which would stretch the colour scale; the packaged square has none.
     shown = [a.headline if study.is_own else a.counted for a in study.regions.values()]
     stiffness = [
         n_per_mm_from_n_per_m(a.at.stiffness[rows]) for a, rows in zip(study.regions.values(), shown, strict=True)
@@ -77,7 +77,7 @@ def _frame(study: CaseStudy) -> tuple[tuple[float, float], tuple[float, float]]:
 def _path(axes: Axes, study: CaseStudy, row: Document, ends: tuple[float, float]) -> LineCollection:
     analysis = study.regions[str(row["region"])]
     rows = np.flatnonzero(analysis.counted)
-    together = np.diff(rows) == 1  # no line across the rapids between two cuts
+    together = np.diff(rows) == 1  # draw no line across the rapids between two cuts
     points = mm_from_m(analysis.samples.position[rows, :2])
     values = n_per_mm_from_n_per_m(analysis.at.stiffness[rows])
     segments = np.stack([points[:-1], points[1:]], axis=1)[together]
@@ -97,7 +97,7 @@ def _path(axes: Axes, study: CaseStudy, row: Document, ends: tuple[float, float]
 
 
 def heights(study: CaseStudy) -> Figure:
-    """Mean and range of the path over its height, where they turn over marked."""
+    """Mean and range of the path over its height, with their turning points marked."""
     rows = study.summary["heights"]
     z = [row["z_mm"] for row in rows]
     turns = study.summary["limits_of_the_conclusions"]

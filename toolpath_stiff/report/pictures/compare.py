@@ -1,4 +1,4 @@
-"""Pictures of a comparison: measured against modelled, residuals by place and against what the model does not use."""
+"""Pictures of a comparison: measured against modelled, residuals by place and against variables outside the model."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.comparison.compare import Comparison
 from toolpath_stiff.comparison.residuals import ReadingNames, Variable, directions
-from toolpath_stiff.comparison.structure import SIGNIFICANT, FoundPattern
+from toolpath_stiff.comparison.structure import SIGNIFICANT
 from toolpath_stiff.inference.errors import deviation_percent
 from toolpath_stiff.report.colours import DIRECTIONS, MUTED, RED
 from toolpath_stiff.report.pictures.before_after import MAPS, maps, one_to_one, panels
@@ -27,7 +27,7 @@ WIDE = 7.5  # median deviations, some 5 standard deviations: readings further of
 
 
 def measured_modelled(comparison: Comparison) -> Figure:
-    """Measured against modelled stiffness, log-log, colour a direction, with the 10 % band."""
+    """Measured against modelled stiffness, log-log, one colour a direction, with the 10 % band."""
     data = comparison.data
     along = directions(data)
     modelled = n_per_mm_from_n_per_m(np.exp(comparison.log_model))
@@ -61,7 +61,7 @@ def measured_modelled(comparison: Comparison) -> Figure:
 
 
 def where_it_fails(comparison: Comparison) -> Figure:
-    """The residuals seen from above, plane by plane, direction by direction."""
+    """Residuals seen from above, plane by plane, direction by direction."""
     rows, columns = panels(comparison.data)
     width, height = max(1.9 + SIDE * len(columns), 11.0), 1.4 + SIDE * len(rows)
     question = "Where does the model fail? Alike all around, or on one side?"
@@ -71,12 +71,14 @@ def where_it_fails(comparison: Comparison) -> Figure:
 
 
 def variables(comparison: Comparison) -> Figure:
-    """Residual against the strongest variables in their order; readings far off stand at the edge."""
+    """Residuals against the strongest variables, in order; readings far off are drawn at the edge."""
     limits = _limits(comparison)
     panels: list[tuple[float, float, Variable | ReadingNames]] = []
     held_against: list[Variable | ReadingNames] = [*comparison.numbers, *comparison.names]
+    # What a pattern is about: its own variable, and those of patterns that are the same; or a level of this label.
+    about = [(t, [t.pattern.variable, *(s.partition(": ")[2] for s in t.pattern.same)]) for t in comparison.tests]
     for variable in held_against:
-        tests = [test for test in comparison.tests if _about(test, variable.name)]
+        tests = [t for t, names in about if any(f"{name} ".startswith(f"{variable.name} ") for name in names)]
         strongest = max((abs(test.statistic) for test in tests), default=0.0)
         panels.append((-strongest, min((test.p_adjusted for test in tests), default=1.0), variable))
     panels.sort(key=lambda panel: panel[0])
@@ -95,7 +97,7 @@ def variables(comparison: Comparison) -> Figure:
         axes.set_ylim(*limits)
         axes.tick_params(labelsize=7.5, pad=2, labelleft=not j)
         for axis in (axes.xaxis, axes.yaxis):
-            axis.set_label_coords(0.5, 0.0)  # without a name: none is to be kept clear of the figures
+            axis.set_label_coords(0.5, 0.0)  # fixed: without a name, no search for room beside the figures
         unit = str(getattr(variable, "unit", ""))
         name = plain(variable.name.removesuffix(f"_{unit}").replace("_", " ")) + (f", {unit}" if unit else "")
         axes.set_title(shortened(name, 30), fontsize=9, pad=3)
@@ -114,14 +116,8 @@ def _key(figure: Figure, comparison: Comparison) -> None:
         figure.text(left, low, f"\u25cf {axis}", color=DIRECTIONS[axis], **style)
 
 
-def _about(test: FoundPattern, name: str) -> bool:
-    """Whether a pattern is about this variable, or a level of this label, or the same as one that is."""
-    about = [test.pattern.variable, *(same.partition(": ")[2] for same in test.pattern.same)]
-    return any(variable == name or variable.startswith(f"{name} ") for variable in about)
-
-
 def _limits(comparison: Comparison) -> tuple[float, float]:
-    """Range shown: all, but a few wild readings do not squeeze the others."""
+    """Range of residuals shown: all, except that a few wild readings must not squeeze the others."""
     values = deviation_percent(comparison.residual)
     middle = float(np.median(values))
     reach = WIDE * float(np.median(np.abs(values - middle)))
@@ -181,7 +177,7 @@ def _name_levels(axes: Axes, names: list[str]) -> None:
 
 
 def _rank(name: str) -> tuple[float, str]:
-    """Order of levels: by number if they are numbers, else by letter."""
+    """Sort key of levels: numeric if they are numbers, otherwise alphabetic."""
     try:
         return float(_brief(name)), name
     except ValueError:
@@ -189,7 +185,7 @@ def _rank(name: str) -> tuple[float, str]:
 
 
 def _brief(name: str) -> str:
-    """A level's name without what the panel's title says."""
+    """Name of a level without the words in the panel's title."""
     for word in ("plane at z = ", " plane", " the axis", " third", "from", " mm"):
         name = name.replace(word, "")
     return name

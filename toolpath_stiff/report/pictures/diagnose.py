@@ -1,4 +1,4 @@
-"""Pictures of a diagnosis: the explanations, what the missing thing looks like, before and after."""
+"""Pictures of a diagnosis: explanations, portrait of what is missing, before and after."""
 
 import textwrap
 from collections.abc import Sequence
@@ -24,11 +24,11 @@ from toolpath_stiff.report.words import RESIDUAL_AXIS, counted, percent, plain, 
 MOST_BARS = 8
 ROW = 0.47  # inch a candidate
 PLACES = ((0.14, 13.79), (4.9, 4.34), (9.66, 1.82))  # left edge and width of words, errors, probabilities, inches
-BEYOND = 1.7  # times the base model's error: where the ladder's axis ends, and arrows stand for more
+BEYOND = 1.7  # multiple of the base model's error at which the ladder's axis ends; arrows stand for more
 
 
 def ladder(diagnosis: Diagnosis) -> Figure:
-    """Every explanation with its error at left-out points and its probability, best first.
+    """All explanations with their errors at left-out points and probabilities, the best first.
 
     As given, strut law refitted, what no effect describes (if it was weighed), then pairs and effects.
     """
@@ -59,7 +59,7 @@ def ladder(diagnosis: Diagnosis) -> Figure:
 
 
 def _words(axes: Axes, rows: Sequence[HypothesisRow]) -> None:
-    """What each row is, to the left of its figures, and how it stands, to their right; x in inches."""
+    """Write what each row is to the left of its figures, and how it stands to their right; x in inches."""
     for y, row in enumerate(rows):
         if row.standing:
             axes.axhspan(y - 0.5, y + 0.5, color=CHOSEN, lw=0)
@@ -82,7 +82,7 @@ def _errors(axes: Axes, rows: Sequence[HypothesisRow], diagnosis: Diagnosis) -> 
     lines += [] if base is None else [(base, f"strut law refitted {percent(base)}", INK, "--")]
     for (value, text, colour, style), side in zip(
         sorted(lines), ("right", "left"), strict=False
-    ):  # away from each other
+    ):  # drawn away from each other
         axes.axvline(value, color=colour, lw=1.3, ls=style, zorder=1)
         place: Look = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "size": 8.5, "ha": side}
         axes.annotate(text, (value, 1.0), xytext=(4 if side == "left" else -4, 3), color=colour, **place)
@@ -100,7 +100,7 @@ def _errors(axes: Axes, rows: Sequence[HypothesisRow], diagnosis: Diagnosis) -> 
             continue
         axes.plot(outside, y, "o", color=colour, mfc=colour if row.offered else "white", ms=8, zorder=4)
         if base is not None and row.held_out_gain_in_se and base != outside:
-            # Of the fall of the held-out error, from the fall in standard errors.
+            # Standard error of the fall of the held-out error, from the fall in standard errors.
             error = abs((base - outside) / row.held_out_gain_in_se)
             axes.plot([max(outside - error, 0.0), outside + error], [y, y], color=colour, lw=2.0, zorder=3)
     axes.set_xlabel("mean |modelled - measured| / measured, %; dot: left out, tick: in sample", size=9)
@@ -124,7 +124,7 @@ def _probability_axis(axes: Axes, end: float) -> None:
 
 
 def looks(diagnosis: Diagnosis) -> Figure | None:
-    """What is left of the readings over what the leading term varies with; how surely it is which link."""
+    """Residuals over the variable of the leading term, and the probability of each link."""
     portrait = diagnosis.portrait
     if portrait is None or not portrait.terms:
         return None
@@ -136,7 +136,7 @@ def looks(diagnosis: Diagnosis) -> Figure | None:
 
 
 def _points(axes: Axes, data: Readings, portrait: Portrait) -> None:
-    """Every reading before (hollow) and after (dots), over the variable or, of a constant, over the term's change."""
+    """Draw each reading before (hollow) and after (dots), over the variable or, if constant, over the term's change."""
     assert portrait.before is not None and portrait.after is not None and portrait.signature is not None
     label, si = variable_label(portrait.terms[0].term)
     across = portrait.values
@@ -174,7 +174,7 @@ def _bars(axes: Axes, portrait: Portrait) -> None:
 
 
 def fits(diagnosis: Diagnosis) -> Figure:
-    """Where the model fails, and what is left with the best explanation."""
+    """Errors of the model, and those left with the best explanation."""
     base, best = diagnosis.rows.refitted, None if diagnosis.verdict == "adequate" else diagnosis.rows.best
     word = "best of the catalogue:" if diagnosis.verdict == "unexplained" else "with"
     last = f"{word} {plain(best.label)}" if best else LAW_REFITTED

@@ -1,4 +1,4 @@
-"""The house style of pictures, and how a figure becomes a file."""
+"""House style of pictures, and conversion of figures to files."""
 
 import io
 import struct
@@ -28,7 +28,7 @@ STYLE: Look = {
     "axes.titlesize": 11.0,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
-    "axes.titley": 1.0,  # where it stands by itself as well; looking for what is in its way takes a tenth of a drawing
+    "axes.titley": 1.0,  # its default place, fixed: the search for obstacles takes a tenth of the drawing time
     "axes.grid": True,
     "axes.axisbelow": True,
     "grid.color": colours.GRID,
@@ -44,7 +44,7 @@ STYLE: Look = {
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Defaults of matplotlib with our style, whatever the user's own settings are; undone at the end."""
+    """Set matplotlib's defaults to our style, whatever the user's own settings; undone at the end."""
     with mpl.rc_context(), warnings.catch_warnings():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)  # type: ignore[arg-type]
@@ -53,7 +53,7 @@ def house_style() -> Iterator[None]:
 
 
 def picture_file(name: str, draw: Callable[..., Figure | None], result: Any, dpi: int = DPI, **look: Any) -> bytes:
-    """A picture as PNG or, as its name says, PDF, without metadata; b"" where there is nothing to show."""
+    """A picture as PNG or, by its name, PDF, without metadata; b"" if there is nothing to show."""
     with house_style():
         figure = draw(result, **look)
         if figure is None:

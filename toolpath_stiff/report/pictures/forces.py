@@ -1,4 +1,4 @@
-"""The picture of coefficients of the cutting force: mean forces of slots over the feed, with the fitted lines."""
+"""Picture of cutting force coefficients: mean forces of slots over the feed, with the fitted lines."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,7 +15,7 @@ TITLES = ("along the feed", "to its left", "along the tool")
 
 
 def lines(fit: CoefficientFit) -> Figure:
-    """Mean forces a slot on the tool, one panel a direction, one line a depth with its band of 95 %."""
+    """Mean forces on the tool, one panel per direction, one line per depth with its 95 % band."""
     name = fit.coefficients.material or "cutting forces"
     figure = new_figure(12.0, 4.6, f"{name}: mean force of {len(fit.records)} slots on the tool", NOTE)
     panels = [panel(figure, 0.8 + 3.95 * k, 0.7, 3.1, 2.75) for k in range(3)]

@@ -1,4 +1,4 @@
-"""Labels beside places of a picture, and the heading and legend of pictures of a path."""
+"""Labels beside points of a picture, and the heading and legend of pictures of a path."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -19,7 +19,7 @@ BESIDE = 12.0  # pixels from a place to its label
 
 
 def label_places(axes: Axes, places: Sequence[tuple[float, float]], texts: Sequence[str], below: bool = False) -> None:
-    """Ring places and write beside each, from the top down so that near labels stand below each other.
+    """Ring points and write beside each, from the top down so that labels close together do not overlap.
 
     `below`: rather below the place (a low point of a curve) than above it.
     """
@@ -35,7 +35,7 @@ def label_places(axes: Axes, places: Sequence[tuple[float, float]], texts: Seque
         left = near if side == "left" else near - wide
         above = [height - LINE for other, height in written if abs(other - left) < wide]
         written.append((left, min([y + (-LINE if below else LINE), *above])))
-        # A line and a text: an annotation's arrow takes as long to clip at the text as a view takes to draw.
+        # A line and a text, as clipping an annotation's arrow at its text takes as long as drawing a view.
         ends = in_data([(x, y), (near, max(written[-1][1], frame.y0 + LINE / 2))])
         axes.plot(*ends.T, color=INK, linewidth=0.8, zorder=9.5, clip_on=False)
         axes.text(ends[1, 0], ends[1, 1], text, ha=side, va="center", zorder=10, bbox=ground)
@@ -45,7 +45,7 @@ def label_places(axes: Axes, places: Sequence[tuple[float, float]], texts: Seque
 
 
 def add_heading(figure: Figure, analysis: Analysis) -> None:
-    """Program, machine, load, mean and range, and those of the plunges, above everything."""
+    """Write program, machine, load, mean and range, and those of the plunges, at the top."""
     width, height = figure.get_size_inches()
     name = shortened(plain(analysis.program.name), 70)
     text = (
@@ -57,6 +57,6 @@ def add_heading(figure: Figure, analysis: Analysis) -> None:
 
 
 def add_legend(figure: Figure, keys: Sequence[tuple[Artist, str]], corner: tuple[float, float], **layout: Any) -> None:
-    """What lines, markers and surfaces mean; `corner` in parts of the figure, the rest as of matplotlib's legend."""
+    """Add a legend of lines, markers, surfaces; `corner` in parts of the figure, the rest as in matplotlib's legend."""
     artists, texts = zip(*keys, strict=True)
     figure.legend(artists, texts, bbox_to_anchor=corner, borderaxespad=0.0, frameon=False, **layout)

@@ -1,4 +1,4 @@
-"""The pictures of a machine: at a pose, and of one that was checked with its doubtful joints."""
+"""Pictures of a machine: at a pose, and when checked, with its doubtful joints."""
 
 from typing import cast
 
@@ -36,7 +36,7 @@ def machine_at(_: object, *, machine: MachineTool, pose: FloatArray) -> Figure:
         for n, (name, points) in enumerate(bodies):
             colour, shown = COLOURS.get(name, STRUT), mm_from_m(points)[:, seen]
             axes.plot(*shown.T, "o-", color=colour, lw=1.8, ms=5)
-            share = 0.3 + 0.08 * (n % 6)  # those behind each other have their names at different places
+            share = 0.3 + 0.08 * (n % 6)  # names at different places, so that those behind each other stay legible
             if len(shown) == 2:
                 place = (1.0 - share) * shown[0] + share * shown[1]
                 axes.annotate(name, tuple(place), fontsize=9, color=colour, bbox=LABEL)
@@ -52,7 +52,7 @@ def machine_at(_: object, *, machine: MachineTool, pose: FloatArray) -> Figure:
 
 
 def _bodies_of_struts(machine: Hexapod, joints: FloatArray) -> list[tuple[str, FloatArray]]:
-    """Struts by number with the platform's joints (6, 3) m, and the outlines of frame and platform."""
+    """Struts by number, with the platform's joints (6, 3) m, and the outlines of frame and platform."""
     bodies = [(f"{i}", np.stack(ends)) for i, ends in enumerate(zip(machine.frame_joints, joints, strict=True), 1)]
     for name, body in (("base", machine.frame_joints), ("platform", joints)):
         beside = body[:, :2] - body[:, :2].mean(axis=0)

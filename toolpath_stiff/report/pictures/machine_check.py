@@ -1,4 +1,4 @@
-"""The picture of a machine that was checked."""
+"""Picture of a checked machine."""
 
 from toolpath_stiff.report.pictures.machine import machine_checked
 

@@ -1,4 +1,4 @@
-"""The picture of a stiffness map: every slice, one colour scale for all."""
+"""Picture of a stiffness map: every slice, on one colour scale."""
 
 from typing import Any
 
@@ -18,16 +18,16 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 CONTOURS = 9
 ACROSS = 3  # panels in a row
 LEFT, BOTTOM, TOP, RIGHT = 0.75, 0.6, 1.05, 1.5  # inches around the panels
-RIM = 0.9  # of the way to the edge: where a joint beyond it is named
+RIM = 0.9  # share of the way to the edge at which a joint beyond it is named
 TOGETHER = 0.05  # of half a panel: joints closer than this are named together
 LABEL = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.2}
 
 
 def stiffness_map(planes: StiffnessMap) -> Figure:
-    """Every slice, one colour scale for all."""
+    """All slices, on one colour scale."""
     slices = len(planes.z)
     rows = -(-slices // ACROSS)
-    columns = -(-slices // rows)  # rows filled evenly: four slices are two and two
+    columns = -(-slices // rows)  # rows filled evenly: four slices make two and two
     wide = float(np.ptp(planes.x)) / float(np.ptp(planes.y))
     side = 7.6 if slices == 1 else 4.6
     width, height = columns * side * min(wide, 1.6) + 1.9, rows * side + 1.5
@@ -68,7 +68,7 @@ def _slice(axes: Axes, planes: StiffnessMap, i: int, stiffness: FloatArray, low:
 
 
 def _directions(axes: Axes, joints: FloatArray) -> None:
-    """Where struts meet the frame, named at their place; those beyond the edge at the rim, with an arrow."""
+    """Mark and name the frame joints of the struts; those beyond the edge at the rim, with an arrow."""
     middle, half = (0.5 * np.array([b + s * a for a, b in (axes.get_xlim(), axes.get_ylim())]) for s in (1.0, -1.0))
     beyond = np.max(np.abs(joints - middle) / half, axis=1)  # above 1 outside
     places = np.where(beyond[:, None] > 1.0, middle + RIM * (joints - middle) / beyond[:, None], joints)

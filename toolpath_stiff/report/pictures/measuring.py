@@ -1,4 +1,4 @@
-"""The picture of records of force and deflection."""
+"""Picture of records of force and deflection."""
 
 import math
 

@@ -20,7 +20,7 @@ from toolpath_stiff.units import mm_from_m, rad_from_deg, um_from_m
 
 WIDTH, MOST_HEIGHT = 12.0, 9.0  # inches
 TOP, BOTTOM, BESIDE = 1.35, 1.0, 0.4
-YAW, PITCH = 30.0, 40.0  # deg, from where the part is seen
+YAW, PITCH = 30.0, 40.0  # deg, direction from which the part is seen
 MOST_QUADS = 30_000  # of walls and of floors
 
 
@@ -59,7 +59,7 @@ def part(analysis: Analysis) -> Figure | None:
 
 
 def _seen(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(m, 4) to the right and up on the picture, and (m,) how near, of points (m, 4, 3); as the page looks at them."""
+    """(m, 4) right and (m, 4) up on the picture, and (m,) nearness, of points (m, 4, 3); as the page sees them."""
     sa, ca = np.sin(rad_from_deg(YAW)), np.cos(rad_from_deg(YAW))
     sp, cp = np.sin(rad_from_deg(PITCH)), np.cos(rad_from_deg(PITCH))
     x, y, z = np.moveaxis(points, 2, 0)

@@ -25,11 +25,11 @@ from toolpath_stiff.units import mm_from_m, n_per_mm_from_n_per_m
 
 WIDTH, MOST_HEIGHT = 14.0, 11.0  # inches
 LEFT, RIGHT, TOP, BOTTOM, BETWEEN = 0.95, 0.45, 1.35, 0.75, 1.05  # inches around and between the views
-MOST_POINTS = 500_000  # drawn one by one; beyond, stretches of the path are
+MOST_POINTS = 500_000  # most points drawn one by one; beyond, stretches of the path are drawn
 UNREACHABLE, PLUNGE = -1, CLASSES  # without a colour of the scale; a lower class wins where segments are joined
 STROKE = 1.5  # points
 TITLE = 6.0  # points above a view
-POINT = 0.05  # of the colour scale's length: the end beyond which there are values
+POINT = 0.05  # length of the pointed end, beyond which there are values, over the colour scale's
 THINNEST = 0.38  # a view's shorter side, of the longest: a flat part still gets a readable side view
 
 
@@ -70,8 +70,8 @@ def path(analysis: Analysis) -> Figure:
 def _coloured_lines(
     analysis: Analysis, limits: tuple[float, float], colours: FloatArray
 ) -> tuple[FloatArray, list[tuple[IntArray, Any]], list[tuple[FloatArray, Look]]]:
-    """Points of the path; segments and colour of each class, in drawing order; points and style of the other lines."""
-    # A corner is two samples at one point: one of them is enough, and the line through it stays one line.
+    """Points of the path; segments and colour of each class, in drawing order; points and style of other lines."""
+    # A corner is two samples at one point: one is enough, and keeps the line through it whole.
     samples, stiffness = analysis.samples, analysis.at.stiffness
     moved = np.flatnonzero(np.logical_or.reduce([axis[1:] != axis[:-1] for axis in samples.position.T]))
     points = mm_from_m(samples.position[np.append(moved, moved[-1] + 1 if len(moved) else 0)])
@@ -102,7 +102,7 @@ def _coloured_lines(
 
 
 def _merged(points: FloatArray, rapid: BoolArray, classes: IntArray) -> tuple[FloatArray, BoolArray, IntArray]:
-    """Segments joined over equal stretches of the path, each in its weakest class; the shape keeps the ends.
+    """Segments joined over equal stretches of the path, each in its weakest class; the outline keeps the ends.
 
     A stretch of such a path is a pixel or two long, and matplotlib would hold three copies of every point.
     """
@@ -115,7 +115,7 @@ def _merged(points: FloatArray, rapid: BoolArray, classes: IntArray) -> tuple[Fl
 
 
 def _thinned(points: FloatArray, strokes: Sequence[tuple[IntArray, Any]], axes: Axes) -> list[tuple[IntArray, Any]]:
-    """Strokes without the segments that others are drawn over: of some between the same two spots the last stays.
+    """Strokes without segments that others cover: of those between the same two spots only the last stays.
 
     `points` (n, 2) are those of a view. Seen from the side, the passes over a surface lie upon each other, and line by
     line they take longer to draw than to compute. A spot is half a pixel wide.
@@ -131,7 +131,7 @@ def _thinned(points: FloatArray, strokes: Sequence[tuple[IntArray, Any]], axes: 
 
 
 def _polyline(points: FloatArray, segments: IntArray) -> FloatArray:
-    """(m, d) one line through the segments (i, i + 1), broken by nan where they do not join."""
+    """(m, d) a single line through the segments (i, i + 1), broken by nan where they do not join."""
     breaks = np.flatnonzero(np.diff(segments) != 1) + 1
     order = np.concatenate([[0], breaks, [len(segments)]])
     runs = order[1:] - order[:-1]
@@ -190,7 +190,7 @@ def _legend(
     below, above = beyond_scale(analysis, limits)
     figure.colorbar(
         ScalarMappable(Normalize(*limits), colormaps[STIFFNESS].resampled(CLASSES)),
-        cax=panel(figure, x, middle + 0.25, across, 0.22),  # which holds the points at its ends too
+        cax=panel(figure, x, middle + 0.25, across, 0.22),  # the axes include the points at its ends
         orientation="horizontal", extend=("neither", "max", "min", "both")[2 * below + above],
         extendfrac=POINT, label="stiffness along the load, N/mm",
         ticks=MaxNLocator(max(2, int(across / 0.75)), steps=[1, 2, 2.5, 5, 10]),

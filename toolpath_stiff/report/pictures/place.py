@@ -18,20 +18,20 @@ G68_NOTE = "follows the program's own G17 and G54, and holds until G69"
 WIDTH, HEIGHT = 8.27, 11.69  # inch, A4
 LEFT, COLUMN = 0.1, 0.34  # of the width
 LINE = 0.0185  # of the height
-VALUE_LETTERS, FULL_LETTERS = 66, 96  # that fit beside a name, and across the sheet
+VALUE_LETTERS, FULL_LETTERS = 66, 96  # letters that fit beside a name, and across the sheet
 SMALLEST_SKETCH = 0.2  # of the height
-UNDERLAY = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}  # of names over the path
+UNDERLAY = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}  # background of names over the path
 
 
 def setup_sheet(placed: Placement) -> Figure:
-    """What `placement.json` says of the chosen placement; warnings that find no room are counted."""
+    """The chosen placement as in `placement.json`; warnings for which there is no room are counted."""
     warnings = [
         line
         for text in placed.warnings
         for line in textwrap.wrap(plain(text), FULL_LETTERS, initial_indent="! ", subsequent_indent="   ")
     ]
     rows = _rows(placed)
-    # The sketch gives way to the text.
+    # The sketch shrinks to make room for the text.
     below = sum(len(part) * LINE + 0.006 for _, part in rows) + 0.06
     room = int((0.86 - below - SMALLEST_SKETCH - 0.08) / LINE)
     if len(warnings) > room:
@@ -56,7 +56,7 @@ def _heading(figure: Figure, placed: Placement) -> float:
 
 
 def _down(figure: Figure, top: float, lines: list[str], step: float, left: float = LEFT, **style: Any) -> float:
-    """Write lines from a height down; returns how far down they reach."""
+    """Write lines downwards from a height; returns the height reached."""
     for line in lines:
         figure.text(left, top, line, **style)
         top -= step

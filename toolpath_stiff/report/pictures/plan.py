@@ -1,4 +1,4 @@
-"""The picture of a plan: its poses, a panel a height."""
+"""Picture of a plan: its poses, one panel per height."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from toolpath_stiff.report.pictures.style import new_figure
 from toolpath_stiff.report.words import plain, shortened
 from toolpath_stiff.units import mm_from_m
 
-# Colours told apart by eyes that see no red or green (Okabe and Ito 2008), and shapes beside them.
+# Colours that the colour-blind can tell apart (Okabe and Ito 2008), with different shapes.
 MARKS = (
     ("o", "#ffffff"),
     ("^", "#e69f00"),
@@ -28,15 +28,15 @@ MARKS = (
 )
 PANEL = 3.5  # inches a side
 MOST_ACROSS = 5  # panels in a row
-MOST_LEVELS = 8  # heights with a panel of their own; more are put together, neighbours with neighbours
+MOST_LEVELS = 8  # most heights with their own panel; if there are more, neighbours share one
 NARROWEST = 8.0  # inches, for the headings
-ROOM = 1.2  # half a panel, of the farthest pose: marks lean and have labels
+ROOM = 1.2  # half a panel over the farthest pose: room for leaning marks and labels
 CLOSE = 0.06  # m between marks whose labels would cover each other
 ARROW = 0.16  # of the panel's half width, for a tilt of 25 degrees
 
 
 def plan(of: Plan) -> Figure:
-    """The visits, a panel a height."""
+    """The visits, one panel per height."""
     choice, name = of.choice, of.machine.name
     if isinstance(choice, RivalPlan):
         first, second = (rival.name for rival in choice.rivals[:2])
@@ -48,7 +48,7 @@ def plan(of: Plan) -> Figure:
 
 
 def visits_drawn(visits: Visits, chosen: Sequence[int], kinds: Sequence[str], heading: tuple[str, str]) -> Figure:
-    """A panel a height.
+    """Visits, one panel per height.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def visits_drawn(visits: Visits, chosen: Sequence[int], kinds: Sequence[str], he
 
 
 def _numbers(visits: Visits, chosen: Sequence[int]) -> list[str]:
-    """Labels of the visits, their numbers in measuring order; visits to one pose share a label."""
+    """Labels of the visits: their numbers in measuring order; visits to one pose share a label."""
     poses = [visits.pose[v].tobytes() for v in chosen]
     return [", ".join(str(k + 1) for k, other in enumerate(poses) if other == pose) for pose in poses]
 
@@ -92,7 +92,7 @@ def _numbers(visits: Visits, chosen: Sequence[int]) -> list[str]:
 def _marks(
     axes: Axes, poses: FloatArray, kinds: Sequence[str], numbers: Sequence[str], here: IntArray, half: float
 ) -> None:
-    """Poses by kind, the tilt of the spindle as a line toward where it leans, numbered in measuring order."""
+    """Draw poses by kind, the spindle's tilt as a line in the direction it leans, numbered in measuring order."""
     names = list(dict.fromkeys(kinds))
     labelled: set[str] = set()
     for k in here:
@@ -107,7 +107,7 @@ def _marks(
         axes.plot(x, y, marker, ms=8, mfc=colour, mec=INK, mew=1.2, zorder=6, ls="none")
         if numbers[k] not in labelled:
             box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.8}
-            # Towards the middle, so that labels stay in their panel; each elsewhere where marks crowd.
+            # Towards the middle, so that labels stay in their panel; at different places where marks crowd.
             near = [j for j in here if np.abs(poses[j, :2] - poses[k, :2]).max() < CLOSE]
             place = list(dict.fromkeys(numbers[j] for j in near)).index(numbers[k]) % 4
             left, above = (x > 0.25 * half) != (place >= 2), place % 2 == 0

@@ -27,7 +27,7 @@ Curve = tuple[FloatArray, FloatArray]  # mm along the path, N/mm
 
 
 def profile(analysis: Analysis) -> Figure:
-    """Stiffness against path length; on the other machine a second curve; the required level, red below it.
+    """Stiffness over path length; a second curve for the other machine; the required level, red below it.
 
     Plunges beside the headline are grey and do not set the axis.
     """
@@ -58,7 +58,7 @@ def profile(analysis: Analysis) -> Figure:
 def _curve(
     axes: Axes, analysis: Analysis, curve: Curve, columns: int, look: tuple[str, str, int], plunges: str
 ) -> None:
-    """The curve of a machine; the plunges that it leaves out as thin lines.
+    """Draw the curve of a machine, with the plunges it leaves out as thin lines.
 
     `look`: colour of the curve and of the plunges, order. `plunges`: their name; one that
     begins with "_" does not enter the legend (matplotlib's rule).
@@ -84,7 +84,7 @@ def _runs(rows: BoolArray) -> tuple[IntArray, IntArray]:
 
 def _draw_band(axes: Axes, s: FloatArray, band: tuple[FloatArray, FloatArray], columns: int) -> None:
     low, high = band
-    # Rows that keep the extremes of both edges: a band drawn on either's rows alone would cut the other's.
+    # Rows that keep the extremes of both edges: rows of one edge alone would clip the other's.
     keep = np.union1d(extremes_by_column(s, low, columns), extremes_by_column(s, high, columns))
     axes.fill_between(s[keep], low[keep], high[keep], color=CURVE_BLUE, alpha=0.18, lw=0, zorder=3, label="95 % band")
 

@@ -1,4 +1,4 @@
-"""Figures with their heading, places in inches, axes of figures in thousands, scales of colours."""
+"""Figures with heading, positions in inches, axis figures in thousands, colour scales."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ Look = dict[str, Any]  # arguments of matplotlib by name
 
 
 def new_figure(width: float, height: float, title: str = "", note: str = "", left: float = 0.3) -> Figure:
-    """An empty figure in inches, without pyplot and without a display; a heading and, below, how it is read."""
+    """An empty figure in inches, without pyplot or display; a heading and, below it, how to read it."""
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
     figure.text(left / width, 1.0 - 0.4 / height, title, size=14, weight="bold")
     figure.text(left / width, 1.0 - 0.68 / height, note, size=9.5, color=colours.MUTED)
@@ -24,19 +24,19 @@ def new_figure(width: float, height: float, title: str = "", note: str = "", lef
 
 
 def panel(figure: Figure, left: float, bottom: float, width: float, height: float, **options: Any) -> Axes:
-    """Axes at a place in inches."""
+    """Axes at a position in inches."""
     across, up = figure.get_size_inches()
     return figure.add_axes((left / across, bottom / up, width / across, height / up), **options)
 
 
 def in_thousands(*axes: Axis) -> None:
-    """Write the figures along some axes as a page does, "45 123"."""
+    """Write the figures along axes as a page does, "45 123"."""
     for axis in axes:
         axis.set_major_formatter(lambda value, _: number(value))
 
 
 def round_ticks(axis: Axis, low: float, high: float) -> None:
-    """Round figures along a logarithmic axis, not so many that they touch, in thousands."""
+    """Put round figures along a logarithmic axis, few enough not to touch, in thousands."""
     powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
     steps = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if high < 12.0 * low else (1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)
     axis.set_major_locator(FixedLocator([v for p in powers for s in steps if low <= (v := s * p) <= high]))
@@ -45,12 +45,12 @@ def round_ticks(axis: Axis, low: float, high: float) -> None:
 
 
 def open_frame(axes: Axes, *sides: str) -> None:
-    """Take away the frame at the top, to the right and at `sides`."""
+    """Remove the frame at the top, to the right and at `sides`."""
     axes.spines[["top", "right", *sides]].set_visible(False)
 
 
 def colour_scale(drawn: Any, bar: Axes, label: str) -> None:
-    """Put the scale of what was drawn in colours into axes of its own."""
+    """Draw the colour scale of `drawn` into axes of its own."""
     bar.figure.colorbar(drawn, cax=bar, label=label)
     in_thousands(bar.yaxis)
     bar.grid(visible=False)

@@ -1,4 +1,4 @@
-"""Physical effects along the load path, one flat file each; what a file of your own imports."""
+"""Physical effects along the load path, one flat file each; also the names that a user's effect file imports."""
 
 from toolpath_stiff.stiffness.contract import LINKS, Conditions, Effect, LoadPath, Parameter
 

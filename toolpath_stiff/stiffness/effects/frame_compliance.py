@@ -42,7 +42,7 @@ class FrameCompliance(Effect):
         return form
 
     def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:
-        """By its own two springs under the pull of its two struts."""
+        """Displacement by the vertex's own two springs under the pull of its two struts."""
         if p["vertex"] not in (0, vertex):
             return None
         struts, radial = frame_vertices(path.machine.frame_joints)[vertex - 1]
@@ -52,7 +52,7 @@ class FrameCompliance(Effect):
         return np.asarray(moved)
 
     def finding(self, p: Values) -> str:
-        """Which part gives way, by how much."""
+        """Clause on which vertex gives way, and by how much."""
         sizes = sizes_in_words([(p["radial"], "nm/N radially"), (p["vertical"], "nm/N vertically")])
         which = f"frame vertex {p['vertex']} gives" if p["vertex"] else "all three frame vertices give"
         return f"{which} way by about {sizes}"
@@ -67,9 +67,9 @@ def frame_vertices(frame_joints: FloatArray) -> list[tuple[list[int], FloatArray
     return _vertices(np.asarray(frame_joints, dtype=float).tobytes())
 
 
-@lru_cache(maxsize=64)  # a fit asks for the same frame at every size
+@lru_cache(maxsize=64)  # a fit evaluates the same frame at every size
 def _vertices(joints: bytes) -> list[tuple[list[int], FloatArray]]:
-    """`frame_vertices` of six joints, to be read only."""
+    """`frame_vertices` of six joints; read-only."""
     frame_joints = np.frombuffer(joints).reshape(6, 3)
     from_centre = frame_joints - frame_joints.mean(axis=0)
     order = np.argsort(np.arctan2(from_centre[:, 1], from_centre[:, 0]), kind="stable")

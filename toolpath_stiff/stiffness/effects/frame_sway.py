@@ -48,7 +48,7 @@ class FrameSway(Effect):
         return at_the_tip(path, body_on_springs(path, (p["sideways"], p["sideways"], p["vertical"]), p["rocking"]))
 
     def vertex_displacement(self, path: LoadPath, p: Values, forces: FloatArray, vertex: int) -> FloatArray | None:
-        """With the body that all six struts pull at."""
+        """Displacement with the body that all six struts pull on."""
         joints = path.machine.frame_joints
         pulls = forces[..., None] * path.struts.directions
         moment = np.cross(joints, pulls).sum(axis=1) * np.array([1.0, 1.0, 0.0])

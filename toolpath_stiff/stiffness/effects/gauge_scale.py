@@ -34,7 +34,7 @@ class GaugeScale(Effect):
     )
 
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:
-        """Scaled where the gauge was used."""
+        """Stiffness scaled where the gauge was used."""
         used = np.ones(len(stiffness), dtype=bool)
         if p["direction"]:
             if path.direction is None:
@@ -45,7 +45,7 @@ class GaugeScale(Effect):
         return np.where(used, (1.0 + p["scale"]) * stiffness, stiffness)
 
     def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
+        """Clause on which readings are off, to which side, and by how much."""
         where = f" along {'XYZ'[p['direction'] - 1]}" if p["direction"] else ""
         where += f" in set-up {p['setup']}" if p["setup"] else ""
         return f"readings{where} are about {about(p['scale'])} % too {'high' if p['scale'] > 0.0 else 'low'}"

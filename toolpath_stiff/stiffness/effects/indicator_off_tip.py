@@ -26,7 +26,7 @@ class IndicatorOffTip(Effect):
     parameters = (Parameter("height", "mm", 1e-3, (0.0, 200.0), (2.0, 50.0), EXPERIENCE, meaning=MEANING),)
 
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:
-        """Load over the deflection of the point that is touched."""
+        """Load over the deflection of the point that the indicator touches."""
         if path.direction is None:
             return stiffness
         jacobian, load = path.struts.jacobian, np.zeros((len(path), 6, 1))

@@ -29,5 +29,5 @@ class JointCompliance(Effect):
     )
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
-        """The constant, for every strut and pose."""
+        """The constant compliance, for every strut and pose."""
         return np.full((len(path), 6), p["compliance"])

@@ -40,7 +40,7 @@ class JointMomentStiffness(Effect):
         return np.asarray(p["stiffness"] * np.swapaxes(rotations, 1, 2) @ rotations)
 
     def finding(self, p: Values) -> str:
-        """What is off, to which side, by how much."""
+        """Clause on the resistance of the joints to turning."""
         return f"the joints resist turning by about {about(p['stiffness'] / 1e3)} kN m/rad at each end of each strut"
 
 

@@ -34,14 +34,14 @@ class JointOffset(Effect):
     )
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
-        """With that joint moved."""
+        """The machine with that joint moved."""
         number, ends = int(p["joint"]) - 1, ("frame_joints", "platform_joints")
         name, joints = ends[number // 6], np.array(getattr(machine, ends[number // 6]))
         joints[number % 6] += [p[axis] for axis in "xyz"]
         return machine.with_changes(**{name: joints})
 
     def finding(self, p: Values) -> str:
-        """Which joint, how far."""
+        """Clause on which joint is displaced, and how far."""
         number = int(p["joint"]) - 1
         sizes = sizes_in_words([(p[axis], f"mm along {'-' if p[axis] < 0.0 else ''}{axis.upper()}") for axis in "xyz"])
         end = "platform" if number // 6 else "frame"

@@ -34,5 +34,5 @@ class LoadCellCurvature(Effect):
     )
 
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:
-        """Scaled by the load."""
+        """Stiffness scaled by the load."""
         return np.asarray(stiffness * np.maximum(1.0 + p["curvature"] * path.force, LEAST_READ))

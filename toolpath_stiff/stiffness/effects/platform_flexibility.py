@@ -47,7 +47,7 @@ class PlatformFlexibility(Effect):
         return form
 
     def finding(self, p: Values) -> str:
-        """Which part gives way, by how much."""
+        """Clause on the stiffness of the bars."""
         stiffness = n_per_um_from_n_per_m(p["bar_stiffness"])
         return f"the platform is flexible: its bars have about {about(stiffness)} N/um each"
 
@@ -93,14 +93,14 @@ def free_platform_flexibility(platform_joints: FloatArray) -> FloatArray:
     return _free_flexibility(np.asarray(platform_joints, dtype=float).tobytes())
 
 
-@lru_cache(maxsize=64)  # a fit asks for the same joints at every size of the bars
+@lru_cache(maxsize=64)  # a fit evaluates the same joints at every size of the bars
 def _free_flexibility(joints: bytes) -> FloatArray:
-    """`free_platform_flexibility` of six joints, as one array that nobody writes to."""
+    """`free_platform_flexibility` of six joints, as one read-only array."""
     platform_joints = np.frombuffer(joints).reshape(6, 3)
     nodes = platform_nodes(platform_joints)
     first, last = np.array(platform_bars(platform_joints)).T
     bars, each = nodes[last] - nodes[first], np.arange(len(first))
-    ends = np.zeros((len(first), len(nodes), 3))  # how much a bar is stretched by motions of its ends
+    ends = np.zeros((len(first), len(nodes), 3))  # stretch of a bar by motions of its ends
     with np.errstate(invalid="ignore"):  # a bar without a length
         ends[each, last] = bars / np.linalg.norm(bars, axis=1, keepdims=True)
     ends[each, first] = -ends[each, last]

@@ -25,7 +25,7 @@ class PlatformRadiusError(Effect):
     parameters = (Parameter("error", "mm", 1e-3, (-60.0, 60.0), (-3.0, 3.0), EXPERIENCE, meaning=MEANING),)
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
-        """Joints on the wider circle; one on the tool axis has no outward direction and stays."""
+        """The machine with joints on the wider circle; one on the tool axis has no outward direction and stays."""
         joints = machine.platform_joints.copy()
         radius = np.hypot(joints[:, 0], joints[:, 1])
         off_axis = radius > 0.0

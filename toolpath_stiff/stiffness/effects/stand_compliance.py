@@ -33,7 +33,7 @@ class StandCompliance(Effect):
     )
 
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:
-        """Load over the deflection with the stand's."""
+        """Load over the deflection, with the stand's added."""
         if path.direction is None:
             return stiffness
         x, y, z = path.direction.T**2

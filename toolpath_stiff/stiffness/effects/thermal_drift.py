@@ -26,7 +26,7 @@ class ThermalDrift(Effect):
     )
 
     def reading(self, stiffness: FloatArray, path: LoadPath, p: Values) -> FloatArray:
-        """Force over the deflection as read; nan where drift against the load swallows the whole deflection."""
+        """Force over the deflection as read; nan where drift against the load cancels the whole deflection."""
         if path.time is None:
             return stiffness
         deflection = path.force / stiffness + p["rate"] * path.time

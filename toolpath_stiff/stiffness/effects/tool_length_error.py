@@ -22,5 +22,5 @@ class ToolLengthError(Effect):
     parameters = (Parameter("error", "mm", 1e-3, (-60.0, 60.0), (-10.0, 10.0), POCKET, meaning=MEANING),)
 
     def geometry(self, machine: Hexapod, p: Values) -> Hexapod:
-        """Platform joints further above the tip."""
+        """The machine with platform joints further above the tip."""
         return machine.with_changes(platform_joints=machine.platform_joints + np.array([0.0, 0.0, p["error"]]))

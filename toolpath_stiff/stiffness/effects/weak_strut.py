@@ -23,12 +23,12 @@ class WeakStrut(Effect):
     )
 
     def strut_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
-        """What this strut's compliance is above the law's."""
+        """Excess of this strut's compliance over the law's."""
         more = np.zeros((len(path), 6))
         which = int(p["strut"]) - 1
         more[:, which] = (1.0 / p["factor"] - 1.0) / path.machine.strut_law.stiffness(path.struts.lengths[:, which])
         return more
 
     def finding(self, p: Values) -> str:
-        """Which strut, by how much."""
+        """Clause on which strut is soft, and by how much."""
         return f"strut {p['strut']} is about {about(100.0 * (1.0 - p['factor']))} % too soft"

@@ -1,1 +1,1 @@
-"""Effects on elements of the load path, for machines that are described by these; one flat file each."""
+"""Effects on elements of the load path, for machines described by elements; one flat file each."""

@@ -13,7 +13,7 @@ CLOSED = (
     "lost motion is stated between -3 and 3 % of the rated moment, of 58 to 4410 N m (Nabtesco, RV-E series, RV-6E to "
     "RV-450E)"
 )
-SMALLEST = 1e-3  # N m in a joint: below, the gap adds nothing that shows
+SMALLEST = 1e-3  # N m in a joint: below it the gap adds nothing visible
 
 
 class GearBacklash(Effect):

@@ -28,7 +28,7 @@ class GravitySag(Effect):
     parameters = (Parameter("share", "%", 0.01, (0.0, 200.0), (30.0, 100.0), TYPICAL, meaning="of the whole sag"),)
 
     def stands(self, machine: MachineTool, joints: FloatArray, p: Values) -> tuple[MachineTool, FloatArray]:
-        """Each joint turned by its torsion under the weight."""
+        """Joint values with each joint turned by its torsion under the weight."""
         if not any(map(turns, machine.elements)):
             return machine, joints
         stance, sagged, start = machine.standing(joints), np.array(joints), 0

@@ -22,7 +22,7 @@ class JointBending(Effect):
     )
 
     def element_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
-        """Of its rotations about x and y."""
+        """Compliance of its rotations about x and y."""
         more, first = path.element_zeros(), path.element(p["element"])[0].start
         more[:, first + 3 : first + 5] = p["compliance"]
         return more

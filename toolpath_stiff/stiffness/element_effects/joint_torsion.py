@@ -22,7 +22,7 @@ class JointTorsion(Effect):
     )
 
     def element_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
-        """Of its rotation about z alone."""
+        """Compliance of its rotation about z alone."""
         more = path.element_zeros()
         more[:, path.element(p["element"])[0].start + 5] = p["compliance"]
         return more

@@ -26,5 +26,5 @@ class JointZeroError(Effect):
     )
 
     def stands(self, machine: MachineTool, joints: FloatArray, p: Values) -> tuple[MachineTool, FloatArray]:
-        """Turned by the error."""
+        """Joint values with the joint turned by the error."""
         return machine, joints + p["error"] * (np.arange(joints.shape[1]) == machine.joint_of(p["element"]))

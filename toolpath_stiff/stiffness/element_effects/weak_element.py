@@ -24,12 +24,12 @@ class WeakElement(Effect):
     )
 
     def element_compliance(self, path: LoadPath, p: Values) -> FloatArray | None:
-        """What this element's compliance is above the file's."""
+        """Excess of this element's compliance over the file's."""
         more = path.element_zeros()
         columns, load = path.element(p["element"])
         more[:, columns] = (1.0 / p["factor"] - 1.0) * load.compliance
         return np.asarray(more)
 
     def finding(self, p: Values) -> str:
-        """Which element, by how much."""
+        """Clause on which element is soft, and by how much."""
         return f"{p['element']} is about {about(100.0 * (1.0 - p['factor']))} % too soft"

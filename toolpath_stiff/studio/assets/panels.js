@@ -10,8 +10,8 @@ const table = (head, rows) => h("div", { class: "scroll", tabindex: "0", role: "
   h("table", {}, h("thead", {}, h("tr", {}, head.map((t) => h("th", { scope: "col" }, t)))),
   h("tbody", {}, rows.map((row) => h("tr", {}, row.map((cell) => h("td", typeof cell === "string" && cell.length > 24
     ? { class: "long" } : {}, cell)))))));
-const figures = (pairs) => h("div", { class: "figures" }, pairs.map(([name, value, id]) => h("div", {},
-  h("b", id ? { id } : {}, value), h("span", {}, name))));
+const figures = (pairs) => h("div", { class: "figures" }, pairs.map(([name, value, id, before]) => h("div", {},
+  h("b", id ? { id } : {}, value), h("span", {}, name), before ? h("span", { class: "before" }, before) : null)));
 // The gauge.
 const STAGES = [["as_given", "as the file stands"], ["refitted", "strut law refitted"], ["now", "effects on"],
   ["left_out", "at left-out points"]];
@@ -268,18 +268,14 @@ function setUp(p, state, act) {
   ];
 }
 function placementFigures(now, state, id) {
-  const before = state.placement?.before;
-  const v = (key, of = (value) => group(value)) => {
-    const [here, there] = [now, before].map((one) => (Number.isFinite(one?.[key]) ? of(one[key]) : "\u2013"));
-    return [here, ` before ${there}`];
-  };
-  const share = (value) => group(100 * value, 1);
-  const shown = [["mean N/mm", v("mean_N_per_mm"), "pl-mean"], ["range N/mm", v("range_N_per_mm"), "pl-range"],
-    ["weakest N/mm", v("min_N_per_mm"), "pl-min"], ["margin of cuts, %", v("margin", share), "pl-margin"],
-    ["margin of rapids, %", v("rapid_margin", share)]];
-  return h("div", { id }, h("div", { class: "figures" }, shown.map(([name, [here, there], key]) => h("div", {},
-    h("b", key ? { id: key } : {}, here), h("span", {}, name), h("span", { class: "before" }, there)))),
-    now && now.mean_N_per_mm === null ? h("p", { class: "warning" }, "A cut is out of reach here.") : null);
+  const told = (one, key) => (!Number.isFinite(one?.[key]) ? "\u2013"
+    : key.endsWith("margin") ? group(100 * one[key], 1) : group(one[key]));
+  const shown = [["mean N/mm", "mean_N_per_mm", "pl-mean"], ["range N/mm", "range_N_per_mm", "pl-range"],
+    ["weakest N/mm", "min_N_per_mm", "pl-min"], ["margin of cuts, %", "margin", "pl-margin"],
+    ["margin of rapids, %", "rapid_margin"]];
+  return h("div", { id }, figures(shown.map(([name, key, label]) => [name, told(now, key), label,
+    ` before ${told(state.placement?.before, key)}`])),
+  now && now.mean_N_per_mm === null ? h("p", { class: "warning" }, "A cut is out of reach here.") : null);
 }
 // The boundary of the reach at the height of program zero, from above: the farthest crossing of each meridian.
 function outline(reach, z) {

@@ -27,8 +27,7 @@ class MachineScene {
   // [low, high] of X, Y and Z of the cuts; null without a program.
   work() {
     const path = this.paths[0];
-    return path ? path.xyz.map((of) => of.reduce(([low, high], v, i) => (path.of[i] === RAPIDS ? [low, high]
-      : [Math.min(low, v), Math.max(high, v)]), [Infinity, -Infinity])) : null;
+    return path ? extentOf(path.xyz, (i) => path.of[i] !== RAPIDS) : null;
   }
   box() {
     if (!this.state) return [[-1, 1], [-1, 1], [-1, 1]];
@@ -40,7 +39,7 @@ class MachineScene {
   outline() {
     if (!this.state || this.focus === "part" && this.paths[0]) return null;
     const { body } = this, r = this.state.readings, work = this.work();
-    if (this.focus !== "work" || !body.hangs) return body.outline(this.pose);
+    if (this.focus !== "work" || !body.hangs) return [...body.outline(this.pose), ...(work ? cornersOf(work) : [])];
     const near = [...(r ? r.x_mm.map((x, i) => [x, r.y_mm[i], r.z_mm[i]]) : []), ...(work ? cornersOf(work) : [])];
     return near.length ? [...near, ...body.at(this.pose).at(-2).points] : body.data.reach.flat();
   }

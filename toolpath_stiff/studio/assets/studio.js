@@ -1,6 +1,6 @@
 // The page: it asks for the state, draws it, posts what is to be done, and hears of every change.
 const scene = new MachineScene();
-let state = JSON.parse($("state").textContent), panel = "effects", here = -1, which = "now", playing = 0, version = -1;
+let state = JSON.parse($("data")?.textContent ?? "null"), panel = "effects", here = -1, which = "now";
 const readonly = state !== null;
 document.body.classList.toggle("readonly", readonly);
 if (readonly) for (const id of ["tools", "drop"]) $(id).remove();
@@ -92,7 +92,7 @@ Object.assign(act, {
 });
 // The machine, the profile.
 const view = new Viewer($("scene"), scene, { point, pick, step: (by) => stepReading(by) });
-let profile = null;
+let profile = null, playing = 0;
 function describe(i) {
   const r = state.readings, d = scene.deviation[i], turned = [r.a_deg[i], r.b_deg[i], r.c_deg[i]];
   const along = ["dx", "dy", "dz"].map((k) => r[k][i]), axis = along.findIndex((v) => Math.abs(v) > 0.999);
@@ -344,7 +344,7 @@ function drawJob(job) {
     job.total && job.done > began.done && run > 1 ? `about ${Math.ceil(run)} s left` : ""].filter(Boolean).join(", ");
   $("cancel").hidden = !job;
 }
-let asking = null;
+let asking = null, version = -1;
 async function refresh() {
   if (readonly) return;
   asking ??= (async () => {
@@ -422,11 +422,11 @@ else {
     if (e.key.toLowerCase() === "z") { e.preventDefault(); act({ do: "undo" }); }
   });
   const news = new EventSource("/events");
-  news.onmessage = (e) => {
+  news.onmessage = async (e) => {
     const told = JSON.parse(e.data);
     drawJob(told.job);
     if (told.message) tell(told.message);
-    if (told.version !== version) refresh();
+    for (let k = 0; k < 2 && told.version !== version; k++) await refresh();  // one under way may be of before
   };
   news.onerror = () => { $("job").textContent = "the studio does not answer; it resumes when it is started again"; };
   refresh();
