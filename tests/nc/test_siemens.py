@@ -126,6 +126,7 @@ REFUSALS = {
     'MCALL CYCLE81(10,0,2,-5)\nHOLES1(0,0,0,10,10,3,0,,"1,3",,1)': "HOLES1 with hidden positions",
     "MCALL CYCLE81(10,0,2,-5)\nHOLES2(0,0,10,0,90,4,1010)": "VARI=1010 goes from hole to hole on the circle",
     'CYCLE81("A",0,2,-5)': "CYCLE81 with the text 'A' for RTP",
+    "CYCLE84(10,0,2,-5,,,3,,1,,200,200,1)": "AXN=1 is another axis",
     "CYCLE82(10,0,2,-5,,-1)": "DTB=-1 is no time in seconds",
     "CYCLE82(10,0,2,-5,,1,0,0,20)": "AMODE=20 counts dwells in revolutions",
     "CYCLE83(10,0,2,-20,,-5,,2,0,-1,1,1)": "DTS=-1 is no time in seconds",

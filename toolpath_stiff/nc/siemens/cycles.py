@@ -70,6 +70,8 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     block.refuse_if(turns, "AMODE", "counts dwells in revolutions", "seconds")
     shank = values.get("GMODE", 0.0) // 10 % 10
     block.refuse_if(shank, "GMODE", "counts the depth from a diameter or the shank", "0: from the tip")
+    other = values.get("AXN", 3.0) not in (0.0, 3.0)
+    block.refuse_if(other, "AXN", "is another axis than that of the tool", "none")
     if code == "CYCLE83":
         first = values["RFP"] - abs(values["FDPR"]) if values.get("FDPR") else values.get("FDEP", bottom)
         block.refuse_if(not bottom <= first < values["RFP"], None, "CYCLE83 whose first depth does not fit", "FDPR")
@@ -77,8 +79,6 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
         block.refuse_if(factor, "DAM", "is a factor of the pecks, or counts as AMODE says", "0, or mm")
         least = min(values.get("MDEP") or values.get("DAM") or math.inf, values["RFP"] - first)
         block.refuse_if((first - bottom) / least > MOST_STROKES, None, "CYCLE83 with too many strokes", "a larger FDPR")
-        other = values.get("AXN", 3.0) not in (0.0, 3.0)
-        block.refuse_if(other, "AXN", "is another axis than that of the tool", "none")
         values |= {"FIRST": first, "LEAST": least}
     if code in TAPS:
         values["PIT"] = abs(values.get("PIT", 0.0)) or COARSE.get(round(abs(values.get("MPIT", 0.0))), 0.0)
