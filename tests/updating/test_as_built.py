@@ -47,7 +47,7 @@ def test_the_true_machine_and_its_struts_agree_with_it(weak):
     assert np.abs(moved - factors).mean() < np.abs(factors).mean()
 
 
-def test_the_machine_file_holds_it_and_foretells_the_same(weak):
+def test_the_machine_file_holds_it_and_predicts_the_same(weak):
     found = weak[1]
     again = parse_machine(machine_toml(found.corrected))
     assert again.as_built == pytest.approx(found.as_built.as_built, abs=2e-8)

@@ -44,7 +44,7 @@ from toolpath_stiff.stiffness.catalogue import known_effects
 from toolpath_stiff.stiffness.sizes import joined
 
 FEWEST_POSES = 3
-JOINTS_FIRST = "all joints refitted foretell pose after pose better (--joints)"
+JOINTS_FIRST = "all joints refitted predict pose after pose better (--joints)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +144,7 @@ def _support_of_joints(task: PullTask, given: LadderStep, fitted: LadderStep) ->
     if not in_se > NEEDED:
         reasons.append(f"the error at left-out poses falls by {in_se:.1f} standard errors: {NEEDED:g} is needed")
     elif not outvoted(votes(task.problem, fitted.fit, {AS_GIVEN: given.fit})[AS_GIVEN]):
-        reasons.append("the file's torsions foretell pose after pose as well")
+        reasons.append("the file's torsions predict pose after pose as well")
     else:
         families = PullField(task, given.fit).families(of_instrument=True)
         rivals = {family.name: family.best for family in families if family.best}

@@ -194,8 +194,8 @@ class Update(FolderResult):
             clauses.append(f"{of} {left:.2f} % at left-out points, scatter {floor:.2f} %")
         refitted = self.steps[self.steps.index(self.model) - bool(self.kept_law)].held
         if len(of_instrument) < len(names) and gain_in_standard_errors(refitted, last) < -RISEN:
-            foretold = f"{100 * refitted.mean_error:.2f} % beside the refitted one"
-            clauses.append(f"{left:.2f} % are left at left-out points beside the strut law as given, {foretold}")
+            predicted = f"{100 * refitted.mean_error:.2f} % beside the refitted one"
+            clauses.append(f"{left:.2f} % are left at left-out points beside the strut law as given, {predicted}")
         return clauses
 
     @property
@@ -395,7 +395,7 @@ class Update(FolderResult):
             f"an effect is kept if the error at left-out points falls by more than {NEEDED:g} standard error, no "
             "parameter ends at its bound, and its gain in likelihood is beyond what the best of all candidates gains "
             "by chance once in twenty campaigns: the strut law refitted with and without it, or kept with and without "
-            "it where a refitted one foretells left-out points no better"
+            "it where a refitted one predicts left-out points no better"
         )
         if self.widening > 1.0:
             sentences.append(

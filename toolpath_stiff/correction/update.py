@@ -8,14 +8,14 @@ An effect is supported if
 
 - the error at left-out points falls by more than one standard error of that fall, paired by point;
 - no parameter ends at its upper bound, and not all end at zero;
-- of an effect of the machine, no error of the instrument foretells left-out poses as well (`inference.votes`), and the
+- of an effect of the machine, no error of the instrument predicts left-out poses as well (`inference.votes`), and the
   other way, unless the user says which to believe;
 - its gain in likelihood, the strut law refitted with and without it, is more than the best of all candidates reaches
   by chance in one campaign of twenty: the relative gate of the diagnosis. The gain is counted in units of the scatter
   that remains, so that data which no effect explains do not lend every effect significance.
 
 Of several effects each is judged beside the others. Effects of the machine that a refitted law can stand for are judged
-beside the file's law, with and without them, where that law foretells with them as well as a refitted one: which of the
+beside the file's law, with and without them, where that law predicts with them as well as a refitted one: which of the
 two gives way the readings do not tell, but either takes the error away. Where `--auto` finds no effect it does so with
 the law.
 """
@@ -285,9 +285,9 @@ def support_of(
     if not as_free:
         refitted = refine(task.problem, before.fit)
         if outvoted(votes(task.problem, refitted, {LAW_GIVEN: fit})[LAW_GIVEN]):
-            reasons.append(f"the {LAW_REFITTED} alone foretells left-out poses better")
+            reasons.append(f"the {LAW_REFITTED} alone predicts left-out poses better")
         elif believed == INSTRUMENT != task.believe and not outvoted(votes(task.problem, fit, {"": refitted})[""]):
-            reasons.append(f"the {LAW_REFITTED} alone foretells left-out poses as well")
+            reasons.append(f"the {LAW_REFITTED} alone predicts left-out poses as well")
     instruments = dict[str, str]()
     if not reasons:  # an effect refused anyway needs no vote
         if believed == MACHINE and not as_free:
@@ -344,7 +344,7 @@ def mistakable(task: UpdateTask, rivals: Mapping[str, str], believed: str) -> li
     kind = "an error of the instrument" if believed == MACHINE else "an effect of the machine"
     tells = joined([f"{tells} would tell {name}" for name, tells in rivals.items()])
     return [
-        f"{kind} foretells left-out poses as well: {joined(list(rivals))}; {tells}; "
+        f"{kind} predicts left-out poses as well: {joined(list(rivals))}; {tells}; "
         f"--believe {believed} (believe='{believed}') takes it for the {believed}'s"
     ]
 

@@ -351,10 +351,10 @@ def _warnings(cut: Cut, struck: BoolArray) -> tuple[str, ...]:
     on_the_spot = cut.turning & ~samples.tangent.any(axis=1)
     large = (np.abs(np.nan_to_num(cut.wall_mean)).max(axis=1) > THIN * cut.ae) & (cut.ae > 0.0)
     for rows, words in (
-        (large, f"walls off by over {THIN:g} of the width of cut, foretold too large: the chip is not thinner for it"),
+        (large, f"walls off by over {THIN:g} of the width of cut, predicted too large: the chip is not thinner for it"),
         (struck, "rapids run into material, which counts as still there afterwards"),
         (plunges, "plunges: cutting with the end is not modelled, no force is known there"),
-        (cut.turning & ~on_the_spot, "the tool turns on its way: no error of the surface is foretold there"),
+        (cut.turning & ~on_the_spot, "the tool turns on its way: no error of the surface is predicted there"),
         (on_the_spot, "the tool turns on the spot: it takes off what it meets, no force is known there"),
     ):  # fmt: skip
         warnings += cut.lines_warning(rows, words)

@@ -90,17 +90,34 @@ DIALECTS = {
         GENERIC,
         Dialect("linuxcnc", keeps_heights=False, repeats_in_p=False, additional=()),
         Dialect(
-            "fanuc", increments=True, dwell=MILLISECONDS, retract="G98", keeps_heights=True, repeats_in_p=True,
-            cycle_repeats="KL", semicolon=False, aliases=INCH_METRIC, additional=("G54.1",), feed_needs_point=("inch",),
+            "fanuc",
+            increments=True,
+            dwell=MILLISECONDS,
+            retract="G98",
+            keeps_heights=True,
+            repeats_in_p=True,
+            cycle_repeats="KL",
+            semicolon=False,
+            aliases=INCH_METRIC,
+            additional=("G54.1",),
+            feed_needs_point=("inch",),
         ),
         Dialect(
-            "haas", increments=True, dwell=BY_POINT, retract="G98", keeps_heights=True, repeats_in_p=False,
-            semicolon=False, aliases={"G234": "G43.4"}, additional=("G154",), feed_needs_point=("mm", "inch"),
+            "haas",
+            increments=True,
+            dwell=BY_POINT,
+            retract="G98",
+            keeps_heights=True,
+            repeats_in_p=False,
+            semicolon=False,
+            additional=("G154",),
+            feed_needs_point=("mm", "inch"),
+            aliases={"G234": "G43.4"},
         ),
         Dialect("heidenhain", retract="G98", repeats_in_p=False, additional=()),
         Dialect("siemens", additional=()),
     )
-}  # fmt: skip
+}
 # Dialects that are separate languages, each with its reader -> their names.
 LANGUAGES = {"heidenhain": "Heidenhain's conversational language", "siemens": "Siemens' own language (Sinumerik)"}
 
