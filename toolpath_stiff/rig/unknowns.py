@@ -5,8 +5,7 @@ worn, damaged or badly set machines show; no source gives figures for them. The 
 stiffness by 4 to 15 % rms.
 """
 
-from toolpath_stiff.rig.oddities import ODDITIES
-from toolpath_stiff.rig.unknown_ends import END_KINDS
+from toolpath_stiff.rig.unknown_ends import END_KINDS, ODDITIES
 from toolpath_stiff.rig.unknown_struts import STRUT_KINDS
 
 UNKNOWNS = {**STRUT_KINDS, **END_KINDS}
