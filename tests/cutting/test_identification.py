@@ -256,7 +256,9 @@ def test_a_stated_spread_is_the_same_for_all():
     }
     coefficients = coefficients_from(table, lambda key, mistake, expected: InputError(mistake))
     assert coefficients.deviation * SHOWN == pytest.approx([80, 20, 240, 2, 2, 0.1])
-    assert coefficients.origin.startswith("a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed; the force at the edge")
+    assert coefficients.origin.startswith(
+        "a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed; the force at the edge"
+    )
     given = coefficients_from({**table, "edge_sets_in_um": 0.01}, lambda key, mistake, expected: InputError(mistake))
     assert (given.taper, given.document()["edge_sets_in_um"]) == (1e-8, 0.01)
     assert given.origin == "a guess; Kac not known: 0 +- 0.3 Ktc and 1 Kte assumed"

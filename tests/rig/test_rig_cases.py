@@ -16,7 +16,7 @@ from toolpath_stiff.rig.hidden import Nuisances, disturb_readings
 from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.nominal import load_nominal
 from toolpath_stiff.rig.sizes import whitened_length
-from toolpath_stiff.rig.unknown_ends import ODDITIES
+from toolpath_stiff.rig.unknowns import ODDITIES
 
 NIST = load_nominal("nist")
 

@@ -271,7 +271,8 @@ def test_an_exercise_on_elements_is_made_measured_and_opened(tmp_path, capsys):
     assert main(["rig", "measure", folder, "--at", str(plan), "--out", str(tmp_path / "more.csv")]) == 0
     assert len((tmp_path / "more.csv").read_text().splitlines()) == 3
     capsys.readouterr()
-    for claim, verdict in (("table_compliance", "right"), ("outside", "wrong"), ("frame_compliance", "wrong")):
+    claims = {"table_compliance": "right", "outside": "wrong", "frame_compliance": "wrong", "frame_sway": "wrong"}
+    for claim, verdict in claims.items():
         assert main(["rig", "reveal", folder, "--claim", claim, "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["verdict"] == verdict
     assert main(["rig", "reveal", folder, "--claim", "table_compliance"]) == 0

@@ -26,13 +26,14 @@ from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
 from toolpath_stiff.rig.sizes import Scale
-from toolpath_stiff.rig.unknown_ends import ODDITIES
-from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
+from toolpath_stiff.rig.unknowns import ODDITIES, OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
 BUILT = ("springs", "fem")  # ways to build a machine, the first by default
 # Shares of blind draws that hide each kind, unless one is requested (assumed).
 BLIND = {"none": 0.2, "one": 0.45, "two": 0.15, "outside": 0.2}
+
+DESCRIBED = ("links", "names", "variables")
 
 # One stream of random numbers for each purpose, so that a change in one leaves the others as they were.
 _STREAMS = ("kind", "campaign", "machine", "noise")
@@ -189,7 +190,8 @@ def draw_case(
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
             parameters, strength = scale.draw(name, wanted, rng)
             true = with_effect(true, name, parameters)
-            words = {key: getattr(HIDEABLE[name], key) for key in ("links", "names", "variables")}
+            # What a description may name; of an oddity none is asked for.
+            words = {} if name in ODDITIES else {key: getattr(HIDEABLE[name], key) for key in DESCRIBED}
             right = {key: sorted(some) for key, some in words.items() if some is not None}
             effects.append({"effect": name, "parameters": parameters, **strength, **right})
     true = disturb_machine(true, nuisances, streams["machine"])

@@ -136,7 +136,7 @@ def _links(hidden: HiddenMachine, state: PosedRows, lengths: FloatArray) -> Link
         joints=partial(_joint_give, hidden),
         moment=hidden.moment,
         bars=hidden.bars,
-        vertices=lambda forces: np.repeat(hidden.vertices[None, : state.nominal.corners], len(forces), axis=0),
+        vertices=hidden.vertices[: state.nominal.corners],
         ends=_ends(hidden, state),
     )
     act = None if hidden.unknown is None else OUTSIDE[hidden.unknown.kind].act
@@ -202,8 +202,6 @@ def _ends(hidden: HiddenMachine, state: PosedRows) -> tuple[End, ...]:
 
 def gauge(hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) factor on the readings of one direction or one set-up."""
-    if not hidden.gauge_target:
-        return np.ones(len(rows.force))
     if hidden.gauge_target in ("X", "Y", "Z"):
         # Only loads along the axis itself are read by that axis's gauge.
         hit = np.abs(rows.direction[:, "XYZ".index(hidden.gauge_target)]) > 1.0 - 1e-9

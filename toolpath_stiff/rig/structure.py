@@ -135,7 +135,7 @@ class Links:
     bars
         N/m, bars of the platform truss; inf is rigid.
     vertices
-        Secant compliance (n, v, 2) m/N of the frame's vertices, radial and vertical, from strut forces (n, 6) N.
+        (vertices, 2) m/N, radial and vertical.
     ends
         Whatever carries the whole load.
     """
@@ -144,7 +144,7 @@ class Links:
     joints: Callable[[FloatArray], FloatArray]
     moment: float | FloatArray
     bars: float
-    vertices: Callable[[FloatArray], FloatArray]
+    vertices: FloatArray
     ends: tuple[End, ...]
 
     def with_ends(self, *ends: tuple[FloatArray, FloatArray | float]) -> Self:
@@ -179,12 +179,13 @@ def solved(state: PosedRows, links: Links) -> tuple[FloatArray, FloatArray, Floa
     load[:, tip : tip + 3] = state.rows.direction
     # The workpiece is pushed back: the load on it is -direction, so its give counts with the same sign.
     load[:, ends:] = np.stack([np.einsum("ni,ni->n", state.rows.direction, end.lever) for end in links.ends], axis=1)
-    of_ends = np.stack([end.compliance for end in links.ends], axis=1)
+    vertices = np.broadcast_to(links.vertices.ravel(), (n, links.vertices.size))
+    others = np.column_stack([vertices, *(end.compliance for end in links.ends)])
     per_stretch = links.struts @ stretch  # (n, 6, N) N/m
     fixed = platform_springs + np.swapaxes(stretch, 1, 2) @ per_stretch
     forces, compliance = np.zeros((n, 6)), np.zeros(n)
     for _ in range(SECANT_STEPS):
-        give = np.concatenate([links.joints(forces), links.vertices(forces).reshape(n, -1), of_ends], axis=1)
+        give = np.concatenate([links.joints(forces), others], axis=1)
         # A link's unknown counts in units of the root of its compliance: its spring is 1, and rigid it does not move.
         unit = np.ones((n, size))
         unit[:, first:] = np.sqrt(give)

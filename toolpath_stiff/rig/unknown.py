@@ -55,8 +55,7 @@ def kind(
 
     `role`: `act` or `read`.
     """
-    if links:
-        more.update(links=frozenset(links.split(",")), variables=frozenset(variables.split(",")))
+    more.update(links=frozenset(links.split(",")), variables=frozenset(variables.split(",")))
     columns = tuple(filter(None, more.pop("needs", "").split(",")))
 
     def registered(physics: Physics) -> Physics:
