@@ -23,7 +23,7 @@ HEADING = "x_mm,y_mm,z_mm,nx,ny,nz,deviation_um"
 def measured(factor=1.0, off_line=0, by_um=0.0, noise_um=0.3, own=False, share=(0.0, 1.0)):
     """Rows of a file: points of the true walls between shares of their height.
 
-    Off by `factor` times the error foretold at that height, one line `by_um` further out.
+    Off by `factor` times the error predicted at that height, one line `by_um` further out.
     """
     rng = np.random.default_rng(3)
     program = parse_program(TEXT)
@@ -69,7 +69,7 @@ def test_points_at_one_height_are_held_against_the_error_there(tmp_path, share):
     compared = compare(tmp_path, measured(share=share, noise_um=0.05))
     assert compared.factor[0] == pytest.approx(1.0, abs=0.02)
     assert not any(row["fails"] for row in compared.lines)
-    assert (compared.height[compared.foretold != 0.0] <= 6e-3 * share[1] + 1e-6).all()
+    assert (compared.height[compared.predicted != 0.0] <= 6e-3 * share[1] + 1e-6).all()
 
 
 def test_the_line_where_the_model_fails(tmp_path):

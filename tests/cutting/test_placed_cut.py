@@ -1,4 +1,4 @@
-"""The placement of least surface error: foretold as the chain has it, better than now, and nothing else worse."""
+"""The placement of least surface error: predicted as the chain has it, better than now, and nothing else worse."""
 
 from __future__ import annotations
 

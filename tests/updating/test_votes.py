@@ -98,13 +98,13 @@ def test_a_name_has_outvoted_every_rival_and_says_by_how_much():
     assert found.verdict == "identified" and all(outvoted(each) for each in found.main.votes.values())
     document = found.to_dict()
     assert document["votes"][0]["rival"] == next(iter(found.main.votes)) and document["votes"][0]["outvoted"]
-    assert f"{document['votes'][0]['rival']} foretells pose after pose worse by" in document["text"]
+    assert f"{document['votes'][0]['rival']} predicts pose after pose worse by" in document["text"]
     rivals = {entry["effect"]: entry["vote"] for entry in document["candidates"]}
     assert rivals["weak_strut"] is None and rivals["table_compliance"]["gain"] > SMALL
 
 
 def test_untilted_a_table_is_a_tool_whose_axes_differ():
-    """The same readings to the last digit: the form that is fair to the tool foretells as well as the table."""
+    """The same readings to the last digit: the form that is fair to the tool predicts as well as the table."""
     judgement = judged(7, "paper", "table_compliance", STRONG)
     rivals = fair_rivals(judgement.problem, judgement.fits["table_compliance"], judgement.base)
     against = votes(judgement.problem, judgement.fits["table_compliance"], rivals)

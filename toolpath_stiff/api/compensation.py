@@ -151,9 +151,9 @@ def compare_walls(
     model, setup = on.running(part), _known(cut_setup(cut, material, stock_mm))
     points, normal, deviation, notes = read_walls(str(data), columns)
     first, place = read_at(part, origin, model.machine.default_origin)
-    foretold = evaluate_cut(model, first, place, setup, m_from_mm(step_mm), progress)
-    notes = (*notes, *foretold.assumptions, *foretold.warnings)
-    compared = compare_points(foretold, first.moves, points, normal, deviation, notes)
+    predicted = evaluate_cut(model, first, place, setup, m_from_mm(step_mm), progress)
+    notes = (*notes, *predicted.assumptions, *predicted.warnings)
+    compared = compare_points(predicted, first.moves, points, normal, deviation, notes)
     return replace(compared, inputs=(str(data), *part.inputs, *on.inputs, *setup.inputs))
 
 

@@ -1,7 +1,7 @@
 """Measured walls compared with the errors predicted for a cut: where the model of cut and machine fails.
 
 A point is held against the final wall beside which it lies: its measured deviation along the normal, out of the part,
-against the error that is foretold at its height. The lines of the program are the places; a line fails where its mean
+against the error that is predicted at its height. The lines of the program are the places; a line fails where its mean
 residual is beyond twice what scatter and the band of the model explain.
 """
 
@@ -14,7 +14,7 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.cutting.compensation import places_beside
 from toolpath_stiff.cutting.cut import Cut
-from toolpath_stiff.cutting.cutters import radii_of
+from toolpath_stiff.cutting.cutters import of_tools
 from toolpath_stiff.cutting.passes import profile_at
 from toolpath_stiff.cutting.tip import walls_beside
 from toolpath_stiff.documents import certain, records, without_nan
@@ -62,8 +62,8 @@ class WallComparison(FolderResult):
         (n,) line of the program that makes the wall; 0 left, 1 right of its feed.
     height
         (n,) m above the lower end of the wall.
-    measured, foretold, deviation
-        (n,) m, + material left: measured, foretold at the point's height, the model's standard deviation there.
+    measured, predicted, deviation
+        (n,) m, + material left: measured, predicted at the point's height, the model's standard deviation there.
     others
         Points that lie on no final wall of the program.
     notes
@@ -79,7 +79,7 @@ class WallComparison(FolderResult):
     side: IntArray
     height: FloatArray
     measured: FloatArray
-    foretold: FloatArray
+    predicted: FloatArray
     deviation: FloatArray
     others: int
     notes: tuple[str, ...]
@@ -88,11 +88,11 @@ class WallComparison(FolderResult):
     @property
     def factor(self) -> tuple[float, float]:
         """Ratio of measured to predicted errors by least squares, and its standard deviation from their scatter."""
-        square = float((self.foretold**2).sum())
+        square = float((self.predicted**2).sum())
         if not square:
             return float("nan"), float("nan")
-        factor = float((self.measured * self.foretold).sum()) / square
-        rest = self.measured - factor * self.foretold
+        factor = float((self.measured * self.predicted).sum()) / square
+        rest = self.measured - factor * self.predicted
         return factor, float(np.sqrt((rest**2).sum() / max(len(rest) - 1, 1) / square))
 
     @property
@@ -100,8 +100,8 @@ class WallComparison(FolderResult):
         """For each line and side: points, measured and predicted error, residual, its uncertainty, verdict."""
         keys, which = np.unique(np.stack([self.line, self.side]), axis=1, return_inverse=True)
         count = np.bincount(which)
-        residuals = um_from_m(self.measured - self.foretold)
-        values = {"measured": um_from_m(self.measured), "foretold": um_from_m(self.foretold), "residual": residuals}
+        residuals = um_from_m(self.measured - self.predicted)
+        values = {"measured": um_from_m(self.measured), "predicted": um_from_m(self.predicted), "residual": residuals}
         means = {name: np.bincount(which, column) / count for name, column in values.items()}
         squares = np.bincount(which, (residuals - means["residual"][which]) ** 2)
         pooled = squares.sum() / max(len(residuals) - len(count), 1)  # a line of few points takes the others' scatter
@@ -115,7 +115,7 @@ class WallComparison(FolderResult):
     def to_dict(self) -> dict[str, Any]:
         """Content of compare.json."""
         factor, spread = self.factor
-        sizes = {"measured": self.measured, "residual": self.measured - self.foretold}
+        sizes = {"measured": self.measured, "residual": self.measured - self.predicted}
         means = {f"mean_{name}_um": float(um_from_m(np.abs(values).mean())) for name, values in sizes.items()}
         document = {"points": len(self.line), "on_no_final_wall": self.others, **means, "factor": factor}
         further = {"factor_sd": spread, "lines": self.lines, "notes": list(self.notes)}
@@ -123,12 +123,12 @@ class WallComparison(FolderResult):
 
     def to_frame(self) -> DataFrame:
         """One row per point: line, side, height on the wall (mm), measured and predicted error, its deviation (um)."""
-        columns = {f"{name}_um": um_from_m(getattr(self, name)) for name in ("measured", "foretold", "deviation")}
+        columns = {f"{name}_um": um_from_m(getattr(self, name)) for name in ("measured", "predicted", "deviation")}
         place = {"line": self.line, "side": np.array(["left", "right"])[self.side], "height_mm": mm_from_m(self.height)}
         return frame_of({**place, **columns})
 
     def _short(self) -> str:
-        return f"{len(self.line)} points, measured {self.factor[0]:.2f} times the foretold"
+        return f"{len(self.line)} points, measured {self.factor[0]:.2f} times the predicted"
 
 
 def compare_walls(
@@ -142,7 +142,7 @@ def compare_walls(
     station, side = np.nonzero(np.isfinite(cut.wall_mean) & upright[:, None])
     aslant = np.isfinite(cut.wall_mean).any(axis=1) & ~upright
     notes = (*notes, *cut.lines_warning(aslant, "left alone: the tool stands aslant"))
-    samples, radius = cut.samples.take(station), radii_of(cut.cutters, cut.samples.tool[station])
+    samples, radius = cut.samples.take(station), of_tools(cut.cutters, cut.samples.tool[station], "radius")
     surface, into = walls_beside(cut.samples, cut.cutters, station, side)
     height = samples.position[:, 2, None] + cut.wall_heights[station, side] + np.array([-FARTHEST, FARTHEST])
     nearest = np.full(len(points), -1)
@@ -164,15 +164,15 @@ def compare_walls(
     rows, sides = station[nearest[on]], side[nearest[on]]
     ends, mean = cut.wall_heights[rows, sides], cut.wall_mean[rows, sides]
     height = np.clip(points[on, 2] - cut.samples.position[rows, 2], ends[:, 0], ends[:, 1])
-    foretold = profile_at(cut.wall_profiles[rows, sides], ends, height[:, None])[:, 0]
+    predicted = profile_at(cut.wall_profiles[rows, sides], ends, height[:, None])[:, 0]
     known = np.abs(mean) > 0.0  # an error of the coefficients scales the errors at all heights alike
-    scaled = np.divide(np.abs(foretold), np.abs(mean), out=np.ones(len(mean)), where=known)
+    scaled = np.divide(np.abs(predicted), np.abs(mean), out=np.ones(len(mean)), where=known)
     return WallComparison(
         line=cut.samples.line[rows],
         side=sides,
         height=height - ends[:, 0],
         measured=np.where(np.isnan(deviation), off, deviation)[on],
-        foretold=foretold,
+        predicted=predicted,
         deviation=cut.deviation[rows, sides] * scaled,
         others=int((~on).sum()),
         notes=notes,

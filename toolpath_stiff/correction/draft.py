@@ -167,7 +167,7 @@ def draft_text(
     lines += [
         "",
         "# The readings that this was drawn from, a mark each. They cannot confirm it: judged by them it is",
-        "# `described`, and `identified` only when readings that are not among them foretell it.",
+        "# `described`, and `identified` only when readings that are not among them predict it.",
         "[drawn_from]",
         'readings = """',
         *(" ".join(marks[k : k + MARKS_A_LINE]) for k in range(0, len(marks), MARKS_A_LINE)),

@@ -142,7 +142,7 @@ class Support:
     likelihood_gain, threshold
         Twice the log likelihood gained, in units of the scatter that remains; what chance alone reaches.
     instruments
-        Of an effect of the machine: errors of the instrument that foretell left-out poses as well; of one of the
+        Of an effect of the machine: errors of the instrument that predict left-out poses as well; of one of the
         instrument: effects of the machine.
     """
 

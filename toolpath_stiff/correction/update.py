@@ -8,27 +8,27 @@ An effect is supported if
 
 - the error at left-out points falls by more than one standard error of that fall, paired by point;
 - no parameter ends at its upper bound, and not all end at zero;
-- of an effect of the machine, no error of the instrument foretells left-out poses as well (`inference.votes`), and the
+- of an effect of the machine, no error of the instrument predicts left-out poses as well (`inference.votes`), and the
   other way, unless the user says which to believe;
 - its gain in likelihood, the strut law refitted with and without it, is more than the best of all candidates reaches
   by chance in one campaign of twenty: the relative gate of the diagnosis. The gain is counted in units of the scatter
   that remains, so that data which no effect explains do not lend every effect significance.
 
 Of several effects each is judged beside the others. Effects of the machine that a refitted law can stand for are judged
-beside the file's law, with and without them, where that law foretells with them as well as a refitted one: which of the
+beside the file's law, with and without them, where that law predicts with them as well as a refitted one: which of the
 two gives way the readings do not tell, but either takes the error away. Where `--auto` finds no effect it does so with
 the law.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.correction.additions import parse_addition
-from toolpath_stiff.correction.as_built import as_built
+from toolpath_stiff.correction.as_built import last_step
 from toolpath_stiff.correction.machines import data_hash, fitted_machine
 from toolpath_stiff.correction.mean_error import update_by_mean_error
 from toolpath_stiff.correction.result import NEEDED, Update
@@ -83,10 +83,11 @@ def update(task: UpdateTask, build: Callable[[Any], Update] | None = None) -> Up
     effect_files = tuple(map(str, task.effect_files))
     request = task.request or Asked(tuple(task.files), task.machine.name, effect_files)
     result = update_by_mean_error(task) if task.objective == MEAN_ERROR else (build or build_ladder)(task)
-    of_struts = build is None and result.accepted and not (result.question or result.search)
-    if of_struts and (built := as_built(task, result.last)):
-        result = replace(result, as_built=built[0], steps=(*result.steps, built[1]))
-    # The command that repeats the fit does not depend on where results go.
+    if build is None and result.changed and not (result.question or result.search):
+        built, step = last_step(task, result.last)
+        written = replace(result, as_built=built, steps=(*result.steps[: None if built else -1], step))
+        result = written if written.accepted or result.accepted else result
+    # Where its results go does not matter to the command that repeats the fit.
     words = options(
         add=list(task.add), strut_law=task.strut_law and build is None,
         joints=task.strut_law and build is not None, keep_strut_law=task.keep_strut_law, auto=task.auto,
@@ -225,22 +226,16 @@ class Field:
         Model and scatter; the fit of the machine as it is there, its law refitted.
     threshold
         The gain that chance alone reaches.
+    families
+        `_families`, worked out once.
     """
 
     def __init__(self, problem: Problem, threshold: float) -> None:
         self.problem, self.threshold, self.none = problem, threshold, base_fit(problem, law_free=True)
-
-    @cached_property
-    def of_instrument(self) -> tuple[Family, ...]:
-        """Effects of the instrument, the likeliest first."""
-        return self._families(of_instrument=True)
-
-    @cached_property
-    def of_machine(self) -> tuple[Family, ...]:
-        """Effects of the machine, the likeliest first."""
-        return self._families(of_instrument=False)
+        self.families = cache(self._families)
 
     def _families(self, *, of_instrument: bool) -> tuple[Family, ...]:
+        """Effects of the instrument, or of the machine, the likeliest first."""
         every = testable_effects(self.problem.predictor)[0]
         effects = [effect for effect in every if effect.is_instrument == of_instrument]
         return tuple(f for f in score_families(self.problem, effects, self.none) if f.best is not None)
@@ -290,15 +285,15 @@ def support_of(
     if not as_free:
         refitted = refine(task.problem, before.fit)
         if outvoted(votes(task.problem, refitted, {LAW_GIVEN: fit})[LAW_GIVEN]):
-            reasons.append(f"the {LAW_REFITTED} alone foretells left-out poses better")
+            reasons.append(f"the {LAW_REFITTED} alone predicts left-out poses better")
         elif believed == INSTRUMENT != task.believe and not outvoted(votes(task.problem, fit, {"": refitted})[""]):
-            reasons.append(f"the {LAW_REFITTED} alone foretells left-out poses as well")
+            reasons.append(f"the {LAW_REFITTED} alone predicts left-out poses as well")
     instruments = dict[str, str]()
     if not reasons:  # an effect refused anyway needs no vote
         if believed == MACHINE and not as_free:
             rivals = rivals_of_law(task.problem, before.fit)
         else:
-            families = others.of_instrument if believed == MACHINE else others.of_machine
+            families = others.families(of_instrument=believed == MACHINE)
             likely = {family.name: family.best.candidates for family in families if family.best}
             law_free = others.none.law_free
             rivals = {name: add_effect(task.problem, before.fit, c, law_free) for name, c in likely.items()}
@@ -349,7 +344,7 @@ def mistakable(task: UpdateTask, rivals: Mapping[str, str], believed: str) -> li
     kind = "an error of the instrument" if believed == MACHINE else "an effect of the machine"
     tells = joined([f"{tells} would tell {name}" for name, tells in rivals.items()])
     return [
-        f"{kind} foretells left-out poses as well: {joined(list(rivals))}; {tells}; "
+        f"{kind} predicts left-out poses as well: {joined(list(rivals))}; {tells}; "
         f"--believe {believed} (believe='{believed}') takes it for the {believed}'s"
     ]
 
@@ -359,8 +354,8 @@ def next_effect(
 ) -> tuple[LadderStep | None, list[Support]]:
     """The most likely effect that the data support on top of a step, and the judgement of each effect tried."""
     others, tried = field_of(task, before.fit), list[Support]()
-    families = sorted((*others.of_instrument, *others.of_machine), key=lambda f: (-f.log_evidence, f.name))
-    for family in families[:TRIED]:
+    families = [family for side in (True, False) for family in others.families(of_instrument=side)]
+    for family in sorted(families, key=lambda f: (-f.log_evidence, f.name))[:TRIED]:
         task.progress(f"fitting {family.name}")
         candidates = family.best.candidates if family.best else ()  # the choice that is the likeliest by its tables
         step = step_up(task, before, [candidates])

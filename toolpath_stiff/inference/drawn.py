@@ -81,7 +81,7 @@ class Drawn:
             return f"{form}, and the {self.new} others are of fewer than {FEWEST_POINTS} points: too few to confirm it"
         return (
             f"{form}; the {self.new} others {'confirm' if self.confirmed else 'do not confirm'} it: their log "
-            f"probability, foretold, is {self.gain:.1f} above {self.rival} (more than {CONFIRMS:g} confirms it)"
+            f"probability, predicted, is {self.gain:.1f} above {self.rival} (more than {CONFIRMS:g} confirms it)"
         )
 
 

@@ -366,7 +366,7 @@ def _changes(problem: PullProblem) -> tuple[FloatArray, FloatArray]:
 def verdict_of(problem: PullProblem, base: Fit, fits: Sequence[Fit], known: bool) -> tuple[str, list[Fit]]:
     """The verdict, in the terms of a hexapod's diagnosis, and the explanations that it leaves.
 
-    "adequate": nothing is missing that shows; "identified": one, which foretells pose after pose better than every
+    "adequate": nothing is missing that shows; "identified": one, which predicts pose after pose better than every
     other one beyond chance; "ambiguous": several; "unexplained": none. `known`: whether somebody states the noise; else
     nothing can be said to be missing from the candidates together, which are what it was estimated by, and nothing is
     named where they leave more than good readings scatter by.

@@ -2,7 +2,7 @@
 
 A rival is outvoted where the sum of them is
 
-- more than `SMALL`: below, two models foretell so much alike that the spread of the differences says little of the
+- more than `SMALL`: below, two models predict so much alike that the spread of the differences says little of the
   error of their sum (Sivula, Magnusson, Matamoros and Vehtari 2020, Uncertainty in Bayesian leave-one-out
   cross-validation based model comparison, arXiv 2008.10296);
 - above 0 in all but `CHANCE` of the draws of a Bayesian bootstrap over the poses (Rubin 1981), which unlike a standard
@@ -67,4 +67,4 @@ def vote_document(rival: str, differences: FloatArray) -> Document:
 def vote_words(rival: str, differences: FloatArray) -> str:
     """Votes against a rival as a clause."""
     gain, error = float(differences.sum()), standard_error(differences)
-    return f"{rival} foretells pose after pose {'worse' if gain > 0.0 else 'better'} by {abs(gain):.1f} +- {error:.1f}"
+    return f"{rival} predicts pose after pose {'worse' if gain > 0.0 else 'better'} by {abs(gain):.1f} +- {error:.1f}"

@@ -123,7 +123,7 @@ def _votes(diagnosis: Diagnosis) -> list[Part]:
         rows.append((rival, gain, chance, "outvoted" if outvoted(votes) else "not beyond chance"))
     first = next((name for name in diagnosis.explanations if name in diagnosis.fits), "")
     remark = (
-        f"By how much {plain(first)} foretells pose after pose better than each rival of another part: log "
+        f"By how much {plain(first)} predicts pose after pose better than each rival of another part: log "
         "probability, summed over the poses; and how often not, in draws of the poses. A name needs all of these."
     )
     return [remark if rows else "", ShownTable(("rival", ">gain", ">chance of none", ""), rows)]

@@ -6,10 +6,10 @@ from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import figure
 
 COLUMNS = {
-    "line": "line", "side": "side", ">points": "points", ">measured um": "measured_um", ">foretold": "foretold_um",
+    "line": "line", "side": "side", ">points": "points", ">measured um": "measured_um", ">predicted": "predicted_um",
     ">residual": "residual_um", ">sure beyond": "sure_um", "verdict": "fails",
 }  # fmt: skip
-VERDICT = {True: "the model fails", False: "as foretold"}
+VERDICT = {True: "the model fails", False: "as predicted"}
 
 
 def text(comparison: WallComparison) -> str:
@@ -23,8 +23,8 @@ def text(comparison: WallComparison) -> str:
         [
             f"{document['points']} points on final walls{others}",
             f"  measured    {document['mean_measured_um']:.2f} um in the mean of sizes",
-            f"  residual    {document['mean_residual_um']:.2f} um, measured less foretold at the height of each point",
-            f"  factor      {factor:.2f} +- {2.0 * spread:.2f}, measured over foretold",
+            f"  residual    {document['mean_residual_um']:.2f} um, measured less predicted at the height of each point",
+            f"  factor      {factor:.2f} +- {2.0 * spread:.2f}, measured over predicted",
             "",
             *ShownTable([*COLUMNS], cells).lines(least=4),
             *(f"note: {note}" for note in comparison.notes),
