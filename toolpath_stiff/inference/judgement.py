@@ -452,7 +452,9 @@ def put_to_vote(
     )
 
 
-def _votes_of_few(problem: Problem, families: Sequence[Family], fit: Fit, rivals: Mapping[str, Fit]) -> Votes:
+def _votes_of_few(
+    problem: Problem, families: Sequence[Family], fit: Fit, rivals: Mapping[str, Fit]
+) -> dict[str, FloatArray]:
     """Votes for an explanation; a rival of more effects is one of so many more, whose prior weight counts, too."""
     own = _prior(families, len(fit.names))
     return {
