@@ -247,7 +247,7 @@ def robot_case(seed: int, hidden: str | None, noise: float) -> tuple[str, Table,
             moved = np.linalg.norm(pulled(true, joints, force) - sound) / np.linalg.norm(sound)
             low, high = (size, high) if moved < share else (low, size)
         where = {"element": ELEMENTS[name].format(part["part"] + 1)} if name in ELEMENTS else {}
-        fault_keys = {"effect": name, "names": sorted(fault.names), "parameters": {**where, "by": size}}
+        fault_keys = {"effect": name, "names": sorted(fault.names or ()), "parameters": {**where, "by": size}}
         effects = [fault_keys | {"size": float(moved)}]
     moved_by = pulled(true, joints, force)
     sd = np.maximum(noise * np.linalg.norm(moved_by, axis=1), NOISE_FLOOR)
