@@ -5,10 +5,10 @@ elements otherwise in each direction). Sizes are drawn: 4 to 20 % rms of element
 springs; pairs 10 and 5 %. A verdict's first explanation is added, or a draft; where that is refused, what `--auto`
 finds. `believed`: the same with `--believe machine`, for faults of the machine. Errors are means along 24 poses amid
 those measured, X, Y, Z, against the true stiffness; 12 more lie beyond. A pose that a machine as written does not reach
-is left out of both errors, and counted. Of `known` cases, half of them sound, nothing
-is to be found: the effect is added by its name, to judge the bands alone. All machines weigh alike in the shares that
-bands hold. A `draft` is made of every other clamping of a tilted campaign and put to all readings, and to those of the
-same machine without what it was read off (`gone`).
+is left out of both errors, and counted. Of `known` cases, half of them sound, nothing is to be found: the effect is
+added by its name, to judge the bands alone. All machines weigh alike in the shares that bands hold. A `draft` is made
+of every other clamping of a tilted campaign and put to all readings, and to those of the same machine without what it
+was read off (`gone`).
 """
 
 import argparse

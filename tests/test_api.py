@@ -213,7 +213,7 @@ NO_EXAMPLE = {
     "Plan": {"rows", "sentences", "notes", "visits"},
     "Analysis": {  # arrays in SI and what figures and pictures are made from
         *("machine", "moves", "path", "operations", "operation", "parameter_band", "figures", "weakest_rows"),
-        *("counted", "along_axis", "plunging", "headline", "set_aside", "out_of_reach"),
+        *("counted", "along_axis", "move_lengths", "plunging", "headline", "set_aside", "out_of_reach"),
     },
     "Case": {"preview", "record", "next_result"},
     "Update": {

@@ -9,6 +9,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+import toolpath_stiff as tps
 from toolpath_stiff.analysis.evaluation import evaluate
 from toolpath_stiff.analysis.grid import map_stiffness
 from toolpath_stiff.analysis.loads import parse_load
@@ -97,3 +98,11 @@ def test_mistakes(tmp_path, monkeypatch, capsys, arguments, words):
     assert main(["map", *arguments]) == 2
     assert words in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kind", ["serial", "rotary_delta", "pentapod"])
+def test_a_map_of_another_machine_is_about_its_program_zero(kind, tmp_path):
+    assert main(["machine", "new", str(tmp_path / "m.toml"), "--kind", kind]) == 0
+    machine = tps.Machine.load(tmp_path / "m.toml")
+    (plane,) = tps.map_stiffness(machine, points=5).to_dict()["slices"]
+    assert plane["z_mm"] == pytest.approx(1e3 * machine.stated.default_origin[2]) and plane["reachable_share"] > 0.5

@@ -348,7 +348,7 @@ def test_without_a_stock_it_is_the_blank_that_the_program_states(tmp_path, name)
     read = parse_program(BLANKS[name], name)
     old, new, *_ = MISSING["stock"]
     stated, given = cut_of(read, tmp_path, SETUP.replace(old, new)), cut_of(read, tmp_path)
-    assert stated.removed.sum() > 1e-9 and "BLK FORM, WORKPIECE" in stated.stock.origin
+    assert stated.removed.sum() > 1e-9 and "BLK FORM, WORKPIECE" in stated.work.stock.origin
     np.testing.assert_allclose(stated.wall_mean, given.wall_mean, rtol=1e-9)
     np.testing.assert_allclose(stated.removed, given.removed, rtol=1e-9, atol=1e-18)
 

@@ -57,7 +57,7 @@ def as_a_whole(moves, abc):
     return replace(turned, **dict(zip(("start", "end"), ends, strict=True)))
 
 
-@pytest.mark.parametrize(("abc", "corner"), zip(TILTS, [0.0, 5.0, 2.0], strict=True))  # every tilt, every form of tool
+@pytest.mark.parametrize(("abc", "corner"), [*zip(TILTS, [0.0, 5.0, 2.0], strict=True)])  # each once
 def test_a_cut_turned_as_a_whole_is_the_same_cut(abc, corner):
     text = HEAD + FACED + BODY
     moves = parse_program(text).moves

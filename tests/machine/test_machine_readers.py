@@ -194,6 +194,12 @@ def test_freecads_machine_is_read_in_the_order_of_its_parents(tmp_path):
     expected = about[1] @ (about[0] @ (tip - a) + a - c) + c
     in_work = position[0] + [0.0, 0.0, -0.08]  # work axes begin at the last joint
     np.testing.assert_allclose(in_work, expected, atol=1e-12)
+    old = json.loads(freecad())
+    old["machine"]["axes"]["X"]["joint"] = [[1, 0, 0], [0, 0, 0]]  # as files of linear axes had it
+    file.write_text(json.dumps(old))
+    again = filled(tps.machine_from_freecad(file).text)
+    in_order = np.array([[values[name] for name in again.joint_names]])
+    np.testing.assert_array_equal(again.forward(in_order)[0], position)
     orphans = {name: axis("table_rotary", "rotary", [1, 0, 0]) for name in "AC"}
     file.write_text(freecad(**orphans))
     with pytest.raises(InputError, match=r"which of X, A, C carries which. Give them from the base outwards: --order"):
@@ -237,6 +243,9 @@ def test_a_bad_urdf_is_one_line(tmp_path, text, tip, words):
         ("freecad", "m.fcm", freecad(Y=axis("head_linear", "linear", [0, -1, 0])), "mirrored"),
         ("freecad", "m.fcm", freecad(A=axis("spindle", "rotary", [1, 0, 0])), "table_... or head_..."),
         ("freecad", "m.fcm", freecad(A=axis("table_rotary", "rotary", [1, 0, 0], low=5, high=5)), "min below max"),
+        ("freecad", "m.fcm", freecad(A=axis("table_rotary", "prismatic", [1, 0, 0])), "has the type 'prismatic'"),
+        ("freecad", "m.fcm", freecad(A=axis("table_rotary", "rotary", [0, 0, 0])), "axis A: joint"),
+        ("freecad", "m.fcm", freecad(A=axis("table_rotary", "rotary", [1, 0])), "three numbers each"),
         ("freecad", "m.fcm", "{}", "not a FreeCAD machine"),
         ("linuxcnc", "m.hal", "setp genserkins.ALPHA-0 0\nsetp genserkins.A-0 0\n", "genserkins.D-0 is not set"),
         ("linuxcnc", "m.hal", "".join(f"setp genserkins.{n}-{i} -90\n" for i in range(6) for n in ("ALPHA", "A", "D")),

@@ -108,7 +108,8 @@ def test_missing_file_and_folder(tmp_path):
     [
         ("", "empty"),
         ("tool,length\n1,5", "expected length_mm"),
-        ("tool,diameter_mm\n1,5", "missing"),
+        ("tool,diameter_mm\n1,5", "G43 needs the length of tool 1"),
+        ("number,length_mm\n1,5", "missing|not known"),
         ("tool,length_mm\n1,abc", "length_mm = 'abc'"),
         ("tool,length_mm\n1.5,10", "tool number 1.5; expected a whole number"),
         ("tool,length_mm\n1,10\n1,20", "appears twice"),

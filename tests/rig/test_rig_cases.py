@@ -15,8 +15,8 @@ from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.hidden import Nuisances, disturb_readings
 from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.nominal import load_nominal
-from toolpath_stiff.rig.oddities import ODDITIES
 from toolpath_stiff.rig.sizes import whitened_length
+from toolpath_stiff.rig.unknowns import ODDITIES
 
 NIST = load_nominal("nist")
 

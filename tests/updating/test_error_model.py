@@ -9,6 +9,7 @@ import pytest
 
 from tests.conftest import as_written
 from tests.updating.cases import campaign, dense, readings_by_hand
+from toolpath_stiff.correction.as_built import last_step
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.errors import InputError
@@ -38,19 +39,21 @@ def root(covariance):
 def test_bands_hold_as_often_as_they_say():
     """Of machines drawn as expected 95 % lie within the bands; were these 10 % narrower or wider, this would fail.
 
-    Nothing of the machine: a straight line in x and a constant, its readings, nuisances and form, solved here.
+    Nothing of the machine: a straight line in x and a constant, its readings, nuisances and form, solved here; of every
+    other one the nuisances stand where they most likely are.
     """
     rng, noise = as_written(0), noise_models(campaign(100, "paper")[0], stated=(0.02, 0.01))[0]
     shares, size = np.array([*GEOMETRIES.values()]), np.array([*FORMS.values()])
     inside, widths = [], (0.9, 1.0, 1.1)
-    for _ in range(DRAWS):
+    for draw in range(DRAWS):
         poses = np.repeat(rng.uniform(-0.5, 0.5, (MEASURED + ELSEWHERE, 3)), 3, axis=0)
         n, m = len(poses), 3 * MEASURED
         axes, nuisance = np.tile(np.eye(3), (n // 3, 1)), rng.standard_normal((42, 3)) / 42**0.5
         shared = 0.01 * (np.sin(4.0 * poses @ rng.standard_normal((3, 42))) + axes @ nuisance.T).T
         jacobian = np.stack([np.ones(n), poses[:, 0]], axis=1)
         clamps = np.arange(n) // 3
-        covariance = Covariance(np.full(m, 0.02**2), Groups.by(clamps[:m]), 0.01**2, shared[:, :m])
+        moved = shared[: 42 * (draw % 2), :m]
+        covariance = Covariance(np.full(m, 0.02**2), Groups.by(clamps[:m]), 0.01**2, moved)
         place = coordinates(poses, np.zeros((n, 3)))
         geometry = rng.choice([*GEOMETRIES], p=shares / shares.sum())
         form = rng.choice([*FORMS], p=size / size.sum()) * root(alike(place, axes)) @ rng.standard_normal(n)
@@ -60,13 +63,16 @@ def test_bands_hold_as_often_as_they_say():
         weighted = scatter.precision.times(jacobian[:m].T)
         fitted = np.linalg.inv(weighted @ jacobian[:m] + np.eye(2) / 0.2**2)
         law = fitted @ weighted @ read
-        fit = Fit((), (), (), law, read - jacobian[:m] @ law, jacobian[:m], fitted, scatter)
+        left = read - jacobian[:m] @ law
+        fit = Fit((), (), (), law, left, jacobian[:m], fitted, scatter)
         data = readings_by_hand(np.exp(read), poses[:m], axes[:m], point=np.arange(m) // 3)
-        errors = error_model(fit, data, replace(noise, repeat=np.full(m, 0.02), strut_spread=1.0, joint_error=1.0))
+        told = replace(noise, repeat=np.full(m, 0.02), strut_spread=1.0, joint_error=1.0)
+        errors = error_model(fit, data, told, shared[:, :m])
         factors = jacobian[m:] @ errors.loadings
-        factors[:, -42:] -= errors.struts * shared.T[m:]
+        factors[:, -42:] -= errors.of_geometry(shared.T[m:])
         sd = np.sqrt((factors**2).sum(axis=1) + errors.form(errors.nearness(place[m:])) ** 2)
-        off = np.abs(wrong[m:] - jacobian[m:] @ law) / sd
+        foretold = jacobian[m:] @ law + shared[: len(moved), m:].T @ (moved @ scatter.precision.times(left))
+        off = np.abs(wrong[m:] - foretold) / sd
         inside.append([np.mean(off < 1.96 * width) for width in widths])
     narrower, held, wider = np.mean(inside, axis=0)
     assert abs(held - 0.95) < 0.012
@@ -79,6 +85,8 @@ def fitted():
     """A machine fitted to a tilted campaign of the rig, sound but for its nuisances."""
     data, _ = campaign(100)
     update = build_ladder(UpdateTask(NIST, data, add=["spindle_compliance"], strut_law=True, force=True))
+    built, step = last_step(update.task, update.last)
+    update = replace(update, as_built=built, steps=(*update.steps, step))
     return update, update.fitted(PROVENANCE)
 
 
@@ -87,20 +95,33 @@ def test_an_update_writes_how_far_it_may_be_off(fitted):
     again = parse_machine(machine_toml(machine))
     errors, read = machine.uncertainty.errors, again.uncertainty.errors
     assert errors.loadings.shape == (len(machine.uncertainty.names), 2 + len(update.last.fit.free) + 42)
-    for name in ("loadings", "struts", "joints", "near", "away", "places"):
+    for name in ("loadings", "struts", "joints", "near", "away", "places", "learned"):
         np.testing.assert_allclose(getattr(read, name), getattr(errors, name), rtol=1e-9, atol=1e-9)
     assert machine_toml(again) == machine_toml(machine)
-    # By how much scatter, struts and joints move law and sizes, through the least squares written out.
-    fit, noise = update.last.fit, update.noise
-    of_fit, covariance = error_model(fit, update.task.data, noise), fit.scatter.covariance
-    by_reading = fit.covariance @ fit.jacobian.T @ np.linalg.inv(dense(covariance))
+    # By how much scatter, struts and joints move law and sizes, and what readings tell of these: the normal equations
+    # of all of them together, written out.
+    fit, problem = update.known, update.task.problem
+    shared = problem.scatter.covariance.shared[:42]
+    columns = np.concatenate([fit.jacobian, shared.T], axis=1)
+    blocks = np.linalg.inv(dense(replace(fit.scatter.covariance, shared=shared[:0])))
+    count, prior = len(fit.covariance), np.concatenate([[0.2**-2] * 2, np.zeros(len(fit.free)), np.ones(42)])
+    scale = 1.0 / np.sqrt(np.diag(columns.T @ blocks @ columns) + prior)
+    whole = np.linalg.inv(scale[:, None] * (columns.T @ blocks @ columns + np.diag(prior)) * scale) * np.outer(
+        scale, scale
+    )
+    of_fit = error_model(fit, update.task.data, update.noise, shared)
     own, geometry = np.split(of_fit.loadings, [-42], axis=1)
-    of_geometry = by_reading @ covariance.shared[:42].T * (of_fit.struts / noise.strut_spread)
-    scale = np.sqrt(np.diag(fit.covariance))[:, None]
-    assert geometry / scale == pytest.approx(of_geometry / scale, abs=1e-6)
-    assert of_fit.struts / noise.strut_spread == pytest.approx(of_fit.joints / noise.joint_error)
-    ratio = (own @ own.T) / (by_reading @ dense(replace(covariance, shared=covariance.shared[:0])) @ by_reading.T)
+    alone = np.linalg.inv(fit.jacobian.T @ blocks @ fit.jacobian + np.diag(prior[:count]))
+    ratio = (own @ own.T) / alone
     assert ratio == pytest.approx(np.full_like(ratio, ratio[0, 0]), rel=1e-4)
+    of_geometry = of_fit.struts / update.noise.strut_spread
+    assert of_geometry == pytest.approx(of_fit.joints / update.noise.joint_error)
+    # Were scatter and tolerances as assumed, the offsets' errors would be C: C - C^2 by scatter, C^2 by what it hides.
+    offsets, left = whole[count:, count:], np.eye(42) - of_fit.learned.T @ of_fit.learned
+    by_scatter = ratio[0, 0] / of_geometry**2 * (offsets - offsets @ offsets)
+    assert left @ left == pytest.approx(by_scatter + offsets @ offsets, abs=0.02)
+    moves = -whole[:count, count:] @ np.linalg.inv(offsets) @ left / np.sqrt(np.diag(whole)[:count, None])
+    assert geometry / np.sqrt(np.diag(whole)[:count, None]) == pytest.approx(of_geometry * moves, abs=1e-4)
 
 
 def test_the_form_is_least_known_away_from_the_measured_poses(fitted):
@@ -174,6 +195,7 @@ def test_regions_are_quarters_of_the_points():
 )
 def test_errors_that_cannot_be_read(fitted, before, after, message):
     text = machine_toml(fitted[1])
-    assert before in text
+    at = text.index("[uncertainty.errors]")
+    assert before in text[at:]
     with pytest.raises(InputError, match=message):
-        parse_machine(text.replace(before, after))
+        parse_machine(text[:at] + text[at:].replace(before, after))

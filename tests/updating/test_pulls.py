@@ -151,7 +151,8 @@ def test_components_in_turned_axes_and_poses_without_joints(tmp_path: Path) -> N
     write("asked.csv", head, [row[:-1] for row in turned])
     asked = tps.diagnose(str(tmp_path / "asked.csv"), ROBOT)
     assert asked.verdict == "unexplained" and "is the sensor in other axes?" in str(asked)
-    write("gaps.csv", head, [[*row[:10], "NaN" if i % 4 else row[10], *row[11:]] for i, row in enumerate(rows)])
+    gaps = [[*row[:10], "NaN" if i % 4 else row[10], *row[11:]] for i, row in enumerate(rows)]
+    write("gaps.csv", head, [*gaps, [*rows[0][:9], "", "n/a", "", rows[0][-1]]])
     as_read, other = (tps.diagnose(str(tmp_path / name), ROBOT) for name in ("a.csv", "turned.csv"))
     assert other.labels == as_read.labels == ["joint_torsion, joint 2"]
     assert other.error_as_given == pytest.approx(as_read.error_as_given, rel=1e-9)
@@ -357,7 +358,7 @@ def test_a_pull_far_off_is_named_and_not_counted(tmp_path: Path) -> None:
     none[0, :6], none[0, 12] = rows[0, :6], SD_UM
     found = tps.diagnose(written(tmp_path / "w.csv", head, np.vstack([rows, none])), off)
     assert found.verdict == "unexplained" and f"{tmp_path / 'w.csv'}:6 x" in found.wild and len(found.wild) == 3
-    assert found.error_as_given < 40.0 and "1 rows of no force" in str(found)
+    assert found.error_as_given < 40.0 and "1 rows of no force, or of which nothing" in str(found)
 
 
 def test_tables_of_pulls_are_refused_where_stiffnesses_are_read(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ def cut_document(path: EvaluatedPath, cut: Cut, tolerance: float | None) -> Docu
     everything = np.arange(len(cut.samples))
     operations, tools = parts_of_path(path)
     document: dict[str, object] = {
-        "stock": cut.stock.origin,
+        "stock": cut.work.stock.origin,
         "coefficients": cut.coefficients.document(),
         "tools": [_tool(cut, number) for number in cut.cutters],
         "machine_only": cut.machine_only,

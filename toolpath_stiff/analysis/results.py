@@ -107,24 +107,20 @@ class Analysis(EvaluatedPath, FolderResult):
         """Moves in machine coordinates; made anew each time, as a long program's take a fifth of all memory."""
         return place(self.program.moves, self.origin)
 
-    def _value(self, name: str) -> float:
-        value = self.figures[name]
-        return np.nan if value is None else float(value)
-
     @property
     def mean_N_per_mm(self) -> float:  # noqa: N802  (newton)
         """Mean stiffness over the length of the cuts, plunges along the tool axis left out; nan without any."""
-        return self._value("mean_N_per_mm")
+        return float(np.asarray(self.figures["mean_N_per_mm"], dtype=float))
 
     @property
     def min_N_per_mm(self) -> float:  # noqa: N802
         """Smallest stiffness of these cuts."""
-        return self._value("min_N_per_mm")
+        return float(np.asarray(self.figures["min_N_per_mm"], dtype=float))
 
     @property
     def range_N_per_mm(self) -> float:  # noqa: N802
         """Largest less smallest stiffness of these cuts."""
-        return self._value("range_N_per_mm")
+        return float(np.asarray(self.figures["range_N_per_mm"], dtype=float))
 
     @property
     def complete(self) -> bool:

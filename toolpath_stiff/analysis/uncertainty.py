@@ -95,7 +95,7 @@ def parameter_band(
         direction[rows] = load_directions(load, compliance, samples.position[rows], turn, samples.tangent[rows])[0]
         paths = core.load_paths(model, samples.position[rows], turn, tools, force)
         by_geometry = np.concatenate([geometry_slopes(model, path, direction[rows][some]) for some, path in paths])
-        factors[rows, -GEOMETRY:] -= stiffness[rows, None] * by_geometry * errors.geometry
+        factors[rows, -GEOMETRY:] -= stiffness[rows, None] * errors.of_geometry(by_geometry)
     near = errors.nearness(place)
     return ParameterBand(names, factors, stiffness * errors.form(near), near < FEW, place, direction)
 

@@ -26,8 +26,8 @@ def cut_setup(cut: Cutting, material: Material, stock_mm: StockBox) -> CutSetup 
         return None
     if material is None:
         raise InputError("--stock without --material", hint="say --material NAME, or --cut FILE with both")
-    box = ",".join(map(str, stock_mm)) if isinstance(stock_mm, Sequence) and not isinstance(stock_mm, str) else stock_mm
-    return setup_of(material, box)
+    words = stock_mm if stock_mm is None or isinstance(stock_mm, str) else ",".join(map(str, stock_mm))
+    return setup_of(material, words)
 
 
 def cut_template(file: str | Path = "cut.toml") -> TextFile:

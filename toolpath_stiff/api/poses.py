@@ -18,7 +18,9 @@ from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.defaults import FORCE
 from toolpath_stiff.errors import InputError, InputErrors, UnreachableError
 from toolpath_stiff.hints import command_line
+from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.options import Option, checked, finite_number, low_high, numbers
+from toolpath_stiff.poses import pose_in_mm
 from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.tables import Columns, read_table
 from toolpath_stiff.toml_reader import shortened
@@ -128,9 +130,9 @@ def _angles(text: str) -> tuple[float, ...]:
 def map_stiffness(
     machine: Machine | str | Path,
     *,
-    x_mm: Annotated[tuple[float, float], Option("--x", "LO:HI", read=low_high)] = (-150.0, 150.0),
-    y_mm: Annotated[tuple[float, float], Option("--y", "LO:HI", read=low_high)] = (-150.0, 150.0),
-    z_mm: Annotated[float | Sequence[float], Option("--z", "MM", read=finite_number)] = 1200.0,
+    x_mm: Annotated[tuple[float, float] | None, Option("--x", "LO:HI", read=low_high)] = None,
+    y_mm: Annotated[tuple[float, float] | None, Option("--y", "LO:HI", read=low_high)] = None,
+    z_mm: Annotated[float | Sequence[float] | None, Option("--z", "MM", read=finite_number)] = None,
     load: Annotated[str, Option("--load", "DIRECTION")] = "radial",
     tilt_deg: Annotated[tuple[float, float, float], Option("--tilt", "A,B,C", read=_angles)] = (0.0, 0.0, 0.0),
     points: Annotated[int, Option("--points", at_least=2, at_most=MOST_POINTS)] = 61,
@@ -144,9 +146,9 @@ def map_stiffness(
     machine
         A machine, its name or its file.
     x_mm, y_mm
-        (low, high) of the planes.
+        (low, high) of the planes; unless given, 150 mm to either side of the default origin, of hexapods of the axis.
     z_mm
-        Height, or heights.
+        Height, or heights; unless given, that of the default origin, of hexapods 1200.
     load
         Direction of the load: radial, axial, softest, x, y, z or "DX,DY,DZ".
     tilt_deg
@@ -175,6 +177,10 @@ def map_stiffness(
     55242
     """
     on = machine_from(machine)
+    paper, stated = (0.0, 0.0, 1200.0), on.stated  # of its Figures 8 and 9
+    middle = paper if isinstance(stated, Hexapod) else pose_in_mm(stated.default_origin)
+    x_mm, y_mm = x_mm or (middle[0] - 150.0, middle[0] + 150.0), y_mm or (middle[1] - 150.0, middle[1] + 150.0)
+    z_mm = middle[2] if z_mm is None else z_mm
     heights = sorted([float(z_mm)] if isinstance(z_mm, int | float) else [float(z) for z in z_mm])
     if len(set(heights)) < len(heights):
         raise InputError(f"heights {heights}: one appears twice", expected="each height once")

@@ -14,7 +14,7 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.column_names import Mapped
 from toolpath_stiff.cutting.compensation import places_beside
 from toolpath_stiff.cutting.cut import Cut
-from toolpath_stiff.cutting.cutters import radii_of
+from toolpath_stiff.cutting.cutters import of_tools
 from toolpath_stiff.cutting.passes import profile_at
 from toolpath_stiff.cutting.tip import walls_beside
 from toolpath_stiff.documents import certain, records, without_nan
@@ -142,7 +142,7 @@ def compare_walls(
     station, side = np.nonzero(np.isfinite(cut.wall_mean) & upright[:, None])
     aslant = np.isfinite(cut.wall_mean).any(axis=1) & ~upright
     notes = (*notes, *cut.lines_warning(aslant, "left alone: the tool stands aslant"))
-    samples, radius = cut.samples.take(station), radii_of(cut.cutters, cut.samples.tool[station])
+    samples, radius = cut.samples.take(station), of_tools(cut.cutters, cut.samples.tool[station], "radius")
     surface, into = walls_beside(cut.samples, cut.cutters, station, side)
     height = samples.position[:, 2, None] + cut.wall_heights[station, side] + np.array([-FARTHEST, FARTHEST])
     nearest = np.full(len(points), -1)

@@ -1,10 +1,14 @@
-"""Most likely positions of struts and joints, from the residuals that an update leaves.
+"""What an update writes: law and sizes for what goes along with them, struts and joints where they most likely are.
 
-Every fit counts struts that are not alike and joints off their places as scatter that all readings share (`noise`).
-What they scatter by on this machine the readings tell, as far as they can: of offsets u of prior covariance 1 with
-columns S, in residuals r of covariance V, the likeliest are S^T V^-1 r (Rasmussen and Williams 2006, Gaussian Processes
-for Machine Learning, 2.1). With law and sizes alone even an effect of exactly the true form leaves as much along a path
-as unlike struts and joints make.
+Every fit counts struts that are not alike, joints off their places and links that give a little though the model takes
+them for rigid as scatter that all readings share (`noise`). That is right for a verdict. But a law that was fitted
+beside offsets which nobody writes takes the blame off what is written: a sound machine of beams comes out too stiff. So
+what is written is fitted anew, beside no offsets but those that are written with it.
+
+What struts and joints scatter by on this machine the readings tell, as far as they can: of offsets u of prior
+covariance 1 with columns S, in residuals r of covariance V, the likeliest are S^T V^-1 r (Rasmussen and Williams 2006,
+Gaussian Processes for Machine Learning, 2.1). With law and sizes alone an effect of the true form itself leaves as
+much along a path as unlike struts and joints make.
 """
 
 from dataclasses import replace
@@ -16,6 +20,7 @@ from toolpath_stiff.correction.steps import LadderStep
 from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.inference.covariances import Groups
 from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors, held_out
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.error_model import GEOMETRY
@@ -28,18 +33,19 @@ CERTAIN = 2.0  # standard errors by which the error at left-out points must fall
 DIGITS = 9  # decimals of ln and m on which all processors agree
 
 
-def as_built(task: UpdateTask, before: LadderStep) -> tuple[Hexapod, LadderStep] | None:
-    """The machine with the most likely offsets, and this step; None if left-out points do not support them."""
-    fit, noise = before.fit, task.noise_model
-    known = fit.scatter.covariance.shared[:GEOMETRY]
-    pull = fit.scatter.precision.times(known)
+def last_step(task: UpdateTask, before: LadderStep) -> tuple[Hexapod | None, LadderStep]:
+    """The machine with the likeliest offsets, None where left-out points ask for none, and the last step."""
+    geometry, noise = task.problem.scatter.covariance.shared[:GEOMETRY], task.noise_model
+    plain = LadderStep.of(before.name, _fitted(task, before.fit, geometry[:0]), task.data)
+    fit = _fitted(task, before.fit, geometry)
+    pull = fit.scatter.precision.times(geometry)
     likely = pull @ fit.residual
-    held = _held_out(fit, known, pull, held_out(fit, task.data.point))
-    falls = gain_in_standard_errors(before.held, held.of_readings(task.data.tip))
-    if np.abs(likely).max() > FURTHEST or not falls > (CERTAIN if before.instruments else 0.0):
-        return None
-    if before.instruments and 100 * before.held.mean_error > LACKING * noise.floor_percent:
-        return None  # residuals left by the form of an instrument's error are not the machine's
+    held = _held_out(fit, geometry, pull, held_out(fit, task.data.point))
+    falls = gain_in_standard_errors(plain.held, held.of_readings(task.data.tip))
+    # What the form of an instrument's error leaves is none of the machine's.
+    lacking = before.instruments and 100 * plain.held.mean_error > LACKING * noise.floor_percent
+    if lacking or np.abs(likely).max() > FURTHEST or not falls > (CERTAIN if before.instruments else 0.0):
+        return None, plain
     sd = np.repeat([noise.strut_spread, noise.joint_error], [6, GEOMETRY - 6])
     earlier = np.zeros(GEOMETRY) if task.machine.as_built is None else task.machine.as_built
     machine = task.machine.with_changes(
@@ -48,6 +54,18 @@ def as_built(task: UpdateTask, before: LadderStep) -> tuple[Hexapod, LadderStep]
     modelled = Predictor(machine, task.data, task.effect_files).log_stiffness(fit.law, fit.effects)
     residual = task.problem.observed - modelled
     return machine, LadderStep.of(AS_BUILT, replace(fit, residual=residual), task.data, held)
+
+
+def _fitted(task: UpdateTask, fit: Fit, shared: FloatArray) -> Fit:
+    """Law and sizes anew beside no other offsets of all readings than those (k, n), the first of the fit's own.
+
+    How well they are known the others count for all the same.
+    """
+    covariance, others = replace(fit.scatter.covariance, shared=shared), fit.scatter.covariance.shared[len(shared) :]
+    bare = replace(fit, scatter=replace(fit.scatter, covariance=covariance))
+    refitted = refine(task.problem, bare, fit.law_free)
+    moved = refitted.covariance @ refitted.scatter.precision.times(refitted.jacobian.T) @ others.T
+    return replace(refitted, covariance=refitted.covariance + moved @ moved.T)
 
 
 def _held_out(fit: Fit, known: FloatArray, pull: FloatArray, held: HeldOut) -> HeldOut:

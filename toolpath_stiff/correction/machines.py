@@ -152,7 +152,8 @@ def uncertainty_of(
     sd = np.array([_certain(float(sd)) for sd in fitted.sd])
     if errors is not None:
         of_keys = np.array(slopes) / np.where(sd > 0.0, sd, np.inf)
-        errors = replace(errors, loadings=np.round(of_keys[:, None] * errors.loadings[rows], LOADING_DIGITS))
+        loadings, learned = of_keys[:, None] * errors.loadings[rows], np.round(errors.learned, LOADING_DIGITS)
+        errors = replace(errors, loadings=np.round(loadings, LOADING_DIGITS), learned=learned)
     certain = replace(fitted, sd=sd, correlation=np.round(fitted.correlation, 9), errors=errors)
     kept = None if machine.uncertainty is None else machine.uncertainty.without(names)
     return kept.beside(certain) if kept and kept.names else certain

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, ClassVar
 
 from toolpath_stiff.arrays import AnyArray
@@ -73,6 +73,7 @@ class PullField(Field):
     def __init__(self, task: UpdateTask, before: Fit) -> None:
         assert isinstance(task.problem, PullProblem)
         self.problem, self.threshold, self.none = task.problem, GAIN, before
+        self.families = cache(self._families)
 
     @cached_property
     def _fits(self) -> list[Fit]:
@@ -145,7 +146,8 @@ def _support_of_joints(task: PullTask, given: LadderStep, fitted: LadderStep) ->
     elif not outvoted(votes(task.problem, fitted.fit, {AS_GIVEN: given.fit})[AS_GIVEN]):
         reasons.append("the file's torsions predict pose after pose as well")
     else:
-        rivals = {family.name: family.best for family in PullField(task, given.fit).of_instrument if family.best}
+        families = PullField(task, given.fit).families(of_instrument=True)
+        rivals = {family.name: family.best for family in families if family.best}
         instruments = as_well(task.problem, fitted.fit, rivals)
         reasons = mistakable(task, instruments, MACHINE)
     gained = 2.0 * (fitted.fit.log_posterior - given.fit.log_posterior) / dispersion(fitted.fit)

@@ -21,9 +21,10 @@ from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.error_model import error_model
 from toolpath_stiff.inference.errors import LAW_REFITTED, errors_text
 from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
-from toolpath_stiff.machine.error_model import ErrorModel
+from toolpath_stiff.machine.error_model import GEOMETRY, ErrorModel
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.portrait.portrait import LACKING
@@ -138,15 +139,14 @@ class Update(FolderResult):
         """Judgement by which the strut law stays as given beside effects; None if the data support the refitted law."""
         return next((support for support in self.turned_down if support.effect == LAW_REFITTED), None)
 
-    @property
+    @cached_property
     def known(self) -> Fit:
-        """The fit that gives the uncertainty of law and sizes: keeping a law as given makes nothing better known.
+        """The fit that says how well law and sizes are known, its residuals those beside the machine as it was.
 
-        Unless the refitted one leaves nothing of a size that is written.
+        A law that stays as given is no better known for it.
         """
-        fit = self.model.fit if self.changed else self.steps[0].fit
-        refitted = self.steps[self.steps.index(self.model) - 1].fit if self.changed and self.kept_law else fit
-        return refitted if {*fit.free} <= {*refitted.free} else fit
+        kept, fit = self.changed and self.kept_law is not None, self.last.fit
+        return refine(self.task.problem, fit, kept or fit.law_free) if kept or self.as_built else fit
 
     @property
     def changed(self) -> bool:
@@ -161,7 +161,7 @@ class Update(FolderResult):
         Counted by the mean error, which users see. The fit is by likelihood, which bounds the factor by which readings
         are off, not the difference: where nothing fits, the one can fall while the other multiplies.
         """
-        before, after = self.steps[0].error, self.model.error
+        before, after = self.steps[0].error, self.last.error
         return not after - before <= max(WORSE * before, WORSE * self.noise.floor_percent / 100.0)
 
     @cached_property
@@ -228,9 +228,9 @@ class Update(FolderResult):
         """Error of the last model to expect at a pose; None if too little was measured to tell."""
         if self.search:
             return None
-        given = self.model.fit if self.kept_law else None
-        data, moved = self.task.problem.predictor.data, self.as_built is not None
-        return error_model(self.known, data, self.noise, given, moved=moved)
+        given, problem = self.last.fit if self.kept_law else None, self.task.problem
+        geometry = problem.scatter.covariance.shared[:GEOMETRY]
+        return error_model(self.known, problem.predictor.data, self.noise, geometry, given)
 
     @cached_property
     def corrected(self) -> Hexapod | None:
@@ -373,7 +373,7 @@ class Update(FolderResult):
     def _errors(self) -> str:
         """Mean error of every step; if the law is kept, also the error that refitting it would leave."""
         steps = [(step.name.replace("+ ", "with ", 1), 100.0 * step.error) for step in self.steps]
-        kept = self.refitted not in self.steps and not self.search
+        kept = LAW_REFITTED not in [step.name for step in self.steps] and not self.search
         law = [(f"({LAW_REFITTED} alone)", 100.0 * self.refitted.error)] if kept else []
         return errors_text(steps[0][1], None, [*law, *steps[1:]])
 

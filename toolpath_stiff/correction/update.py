@@ -22,13 +22,13 @@ the law.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.correction.additions import parse_addition
-from toolpath_stiff.correction.as_built import as_built
+from toolpath_stiff.correction.as_built import last_step
 from toolpath_stiff.correction.machines import data_hash, fitted_machine
 from toolpath_stiff.correction.mean_error import update_by_mean_error
 from toolpath_stiff.correction.result import NEEDED, Update
@@ -83,10 +83,11 @@ def update(task: UpdateTask, build: Callable[[Any], Update] | None = None) -> Up
     effect_files = tuple(map(str, task.effect_files))
     request = task.request or Asked(tuple(task.files), task.machine.name, effect_files)
     result = update_by_mean_error(task) if task.objective == MEAN_ERROR else (build or build_ladder)(task)
-    of_struts = build is None and result.accepted and not (result.question or result.search)
-    if of_struts and (built := as_built(task, result.last)):
-        result = replace(result, as_built=built[0], steps=(*result.steps, built[1]))
-    # The command that repeats the fit does not depend on where results go.
+    if build is None and result.changed and not (result.question or result.search):
+        built, step = last_step(task, result.last)
+        written = replace(result, as_built=built, steps=(*result.steps[: None if built else -1], step))
+        result = written if written.accepted or result.accepted else result
+    # Where its results go does not matter to the command that repeats the fit.
     words = options(
         add=list(task.add), strut_law=task.strut_law and build is None,
         joints=task.strut_law and build is not None, keep_strut_law=task.keep_strut_law, auto=task.auto,
@@ -225,22 +226,16 @@ class Field:
         Model and scatter; the fit of the machine as it is there, its law refitted.
     threshold
         The gain that chance alone reaches.
+    families
+        `_families`, worked out once.
     """
 
     def __init__(self, problem: Problem, threshold: float) -> None:
         self.problem, self.threshold, self.none = problem, threshold, base_fit(problem, law_free=True)
-
-    @cached_property
-    def of_instrument(self) -> tuple[Family, ...]:
-        """Effects of the instrument, the likeliest first."""
-        return self._families(of_instrument=True)
-
-    @cached_property
-    def of_machine(self) -> tuple[Family, ...]:
-        """Effects of the machine, the likeliest first."""
-        return self._families(of_instrument=False)
+        self.families = cache(self._families)
 
     def _families(self, *, of_instrument: bool) -> tuple[Family, ...]:
+        """Effects of the instrument, or of the machine, the likeliest first."""
         every = testable_effects(self.problem.predictor)[0]
         effects = [effect for effect in every if effect.is_instrument == of_instrument]
         return tuple(f for f in score_families(self.problem, effects, self.none) if f.best is not None)
@@ -298,7 +293,7 @@ def support_of(
         if believed == MACHINE and not as_free:
             rivals = rivals_of_law(task.problem, before.fit)
         else:
-            families = others.of_instrument if believed == MACHINE else others.of_machine
+            families = others.families(of_instrument=believed == MACHINE)
             likely = {family.name: family.best.candidates for family in families if family.best}
             law_free = others.none.law_free
             rivals = {name: add_effect(task.problem, before.fit, c, law_free) for name, c in likely.items()}
@@ -359,8 +354,8 @@ def next_effect(
 ) -> tuple[LadderStep | None, list[Support]]:
     """The most likely effect that the data support on top of a step, and the judgement of each effect tried."""
     others, tried = field_of(task, before.fit), list[Support]()
-    families = sorted((*others.of_instrument, *others.of_machine), key=lambda f: (-f.log_evidence, f.name))
-    for family in families[:TRIED]:
+    families = [family for side in (True, False) for family in others.families(of_instrument=side)]
+    for family in sorted(families, key=lambda f: (-f.log_evidence, f.name))[:TRIED]:
         task.progress(f"fitting {family.name}")
         candidates = family.best.candidates if family.best else ()  # the choice that is the likeliest by its tables
         step = step_up(task, before, [candidates])

@@ -9,7 +9,7 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.coefficients import Coefficients
-from toolpath_stiff.cutting.cutters import Cutter, radii_of
+from toolpath_stiff.cutting.cutters import Cutter, of_tools
 from toolpath_stiff.cutting.engagement import engage
 from toolpath_stiff.cutting.final_surface import final_strip, walls_of_passes
 from toolpath_stiff.cutting.forces import mean_force, peak_force
@@ -17,7 +17,6 @@ from toolpath_stiff.cutting.passes import walls_of_all_passes
 from toolpath_stiff.cutting.patches import Contact, Patches, of_stations
 from toolpath_stiff.cutting.setup import CutSetup, cutters_of, spindle_of, stock_of
 from toolpath_stiff.cutting.stations import samples_seen
-from toolpath_stiff.cutting.stock import Stock
 from toolpath_stiff.cutting.surface_error import HEIGHTS, floor_error, shares, wall_error
 from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.tip import machine_deviation, station_axes, tip_compliances, with_tools
@@ -103,11 +102,6 @@ class Cut:
     wall_profiles: AnyArray
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
-
-    @property
-    def stock(self) -> Stock:
-        """The stock before the first cut."""
-        return self.work.stock
 
     @property
     def wall_mean(self) -> FloatArray:
@@ -214,9 +208,7 @@ def evaluate_cut(
 
 def _feed_per_tooth(samples: Samples, cutters: Mapping[int, Cutter], spindle: FloatArray) -> FloatArray:
     """(n,) m; nan where the spindle is stopped or nothing cuts."""
-    teeth = np.ones(len(samples))
-    for number, cutter in cutters.items():
-        teeth[samples.tool == number] = cutter.flutes
+    teeth = of_tools(cutters, samples.tool, "flutes", 1.0)
     per_second = np.where(samples.cutting & (np.abs(spindle) > 0.0), teeth * np.abs(spindle) / (2.0 * np.pi), np.nan)
     return np.asarray(samples.feed / per_second)
 
@@ -270,7 +262,7 @@ def _note_engagement(cut: Cut, patches: Patches) -> None:
     ahead = np.minimum(patches.entry, np.pi), np.minimum(patches.exit, np.pi)
     left, right = (np.cos(angle) for angle in ahead)
     widths = np.maximum.reduceat(left, first) - np.minimum.reduceat(right, first)
-    cut.ae[rows] = radii_of(cut.cutters, cut.samples.tool[rows]) * widths
+    cut.ae[rows] = of_tools(cut.cutters, cut.samples.tool[rows], "radius") * widths
 
 
 def _evaluate(
@@ -324,7 +316,7 @@ def _enter(cut: Cut, rows: IntArray, surfaces: slice, mean: FloatArray, values: 
 def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str, ...]:
     """All assumptions made, one sentence each."""
     sentences = [
-        f"stock: {cut.stock.origin}",
+        f"stock: {cut.work.stock.origin}",
         f"coefficients of {cut.coefficients.material}: {cut.coefficients.origin}",
     ]
     sentences += [sentence for cutter in cut.cutters.values() for sentence in cutter.origin]

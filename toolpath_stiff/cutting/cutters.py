@@ -68,13 +68,18 @@ class Cutter:
         """m, half of the diameter."""
         return self.diameter / 2.0
 
+    @property
+    def flat(self) -> float:
+        """m, radius of the flat part of its end."""
+        return self.radius - self.corner_radius
 
-def radii_of(cutters: Mapping[int, Cutter], tools: IntArray) -> FloatArray:
-    """(n,) m, radius of the cutter of each tool number (n,); 0 for tools that do not cut."""
-    radii = np.zeros(len(tools))
+
+def of_tools(cutters: Mapping[int, Cutter], tools: IntArray, name: str, without: float = 0.0) -> FloatArray:
+    """(n,) attribute of the cutter of each tool number (n,); `without` for tools that do not cut."""
+    values = np.full(len(tools), without)
     for number, cutter in cutters.items():
-        radii[tools == number] = cutter.radius
-    return radii
+        values[tools == number] = getattr(cutter, name)
+    return values
 
 
 def merged_tool(table: ToolEntry, further: ToolEntry) -> ToolEntry:
@@ -134,12 +139,9 @@ def _beam(given: Mapping[str, float], material: str) -> tuple[float, float, str]
     assumed = []
     if "core_mm" not in given:
         assumed.append(f"a core of {CORE_SHARE:g} of the diameter")
+    modulus = given.get("modulus_GPa", MODULI.get(material.lower(), MODULI["carbide"]))
     if "modulus_GPa" not in given:
-        known = material.lower() in MODULI
-        modulus = MODULI[material.lower()] if known else MODULI["carbide"]
-        assumed.append(f"{modulus:g} GPa{'' if known else ' (carbide)'}")
-    else:
-        modulus = given["modulus_GPa"]
+        assumed.append(f"{modulus:g} GPa{'' if material.lower() in MODULI else ' (carbide)'}")
     core = m_from_mm(given.get("core_mm", CORE_SHARE * given["diameter_mm"]))
     length, stress = m_from_mm(given["stick_out_mm"]), pa_from_gpa(modulus)
     lateral = length**3 / (3.0 * stress * math.pi * core**4 / 64.0)

@@ -27,7 +27,7 @@ def mean_force(contact: Contact) -> FloatArray:
     """(n, 3) N on the tool, mean over a revolution of the spindle."""
     force, values = np.zeros((len(contact.feed), 3)), contact.coefficients.values[:, None]
     for block, part in contact.blocks():
-        force[block] = _sideways(mean_forces_of_sets(part, values), part.turning)
+        force[block] = mean_forces_of_sets(part, values)[..., 0]
     return force
 
 
@@ -38,8 +38,7 @@ def peak_force(contact: Contact) -> FloatArray:
     flutes = TURN * np.arange(cutter.flutes if cutter.run_out else 1)[:, None] / cutter.flutes
     for block, part in contact.blocks():
         angle = (_peak_angles(part)[:, None] + flutes).reshape(len(part.feed), -1)
-        force = forces_of_sets(part, angle, values)
-        force = _sideways(force, part.turning[:, None])
+        force = forces_of_sets(part, angle, values)[..., 0]
         largest = np.abs(force).argmax(axis=1)
         peaks[block] = np.take_along_axis(force, largest[:, None], axis=1)[:, 0]
     return peaks
@@ -72,28 +71,21 @@ def force_at(contact: Contact, angle: FloatArray) -> FloatArray:
 
     With a spindle that turns counter-clockwise the angles count counter-clockwise from the right of the feed.
     """
-    forces = forces_of_sets(contact, angle, contact.coefficients.values[:, None])
-    return _sideways(forces, contact.turning[:, None])
-
-
-def _sideways(force: FloatArray, turning: FloatArray) -> FloatArray:
-    """(..., 3) forces in the stations' frame, from forces (..., 3, 1) computed mirrored."""
-    force[..., 1, 0] *= turning
-    return force[..., 0]
+    return forces_of_sets(contact, angle, contact.coefficients.values[:, None])[..., 0]
 
 
 def forces_of_sets(contact: Contact, angle: FloatArray, values: FloatArray) -> FloatArray:
-    """(n, a, 3, k) forces at angles (n, a) of k sets of coefficients, values (6, k).
-
-    Mirrored across the feed where the spindle turns counter-clockwise.
-    """
+    """(n, a, 3, k) forces at angles (n, a), as of `force_at`, of k sets of coefficients, values (6, k)."""
     seen = contact.seen_clockwise()
     force = _cylinder_forces(seen, angle, values)
-    return force + torus_forces(seen, angle, values) if contact.cutter.corner_radius else force
+    if contact.cutter.corner_radius:
+        force += torus_forces(seen, angle, values)
+    force[..., 1, :] *= contact.turning[:, None, None]
+    return force
 
 
 def mean_forces_of_sets(contact: Contact, values: FloatArray) -> FloatArray:
-    """(n, 3, k) mean forces over a revolution of k sets of coefficients (6, k); mirrored as `forces_of_sets`."""
+    """(n, 3, k) mean forces over a revolution of k sets of coefficients, values (6, k)."""
     seen = contact.seen_clockwise()
     straight = seen.above(seen.cutter.corner_radius)
     rows, arcs = straight.station, np.stack([straight.entry, straight.exit], axis=1)
@@ -103,7 +95,10 @@ def mean_forces_of_sets(contact: Contact, values: FloatArray) -> FloatArray:
         moments += count * (integrals[..., 1:] - integrals[..., :1])
     moments *= ((straight.high - straight.low) / TURN)[:, None]
     force = _of_moments(_per_station(moments, rows, len(seen.feed)), seen.lag, values)[:, 0]
-    return force + torus_mean(seen, values) if seen.cutter.corner_radius else force
+    if seen.cutter.corner_radius:
+        force += torus_mean(seen, values)
+    force[:, 1] *= seen.turning[:, None]
+    return force
 
 
 def _cylinder_forces(contact: Contact, angle: FloatArray, values: FloatArray) -> FloatArray:

@@ -100,12 +100,8 @@ class Contact(ArrayColumns):
 
     def above(self, height: float) -> Patches:
         """Patches above a height (m): those on the cylinder."""
-        patches = self.patches
-        if not height:
-            return patches
-        return replace(patches, low=np.maximum(patches.low, height)).take(patches.high > height)
+        return replace(self.patches, low=np.maximum(self.patches.low, height)).take(self.patches.high > height)
 
     def below(self, height: float) -> Patches:
         """Patches below a height (m): those on the corner."""
-        patches = self.patches
-        return replace(patches, high=np.minimum(patches.high, height)).take(patches.low < height)
+        return replace(self.patches, high=np.minimum(self.patches.high, height)).take(self.patches.low < height)

@@ -7,7 +7,7 @@ import numpy as np
 
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray, product
-from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.cutters import Cutter, of_tools
 from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.workpiece import Window, Workpiece
 from toolpath_stiff.nc.courses import points_along
@@ -50,10 +50,8 @@ def stations_at(
         motion[:, :2].T, level, out=np.tile([[1.0], [0.0]], len(move)), where=level > 0.0
     )
     stations["level"], stations["down"] = level, -motion[:, 2]
-    for number, cutter in cutters.items():
-        rows = tool == number
-        stations["reach"][rows], stations["flat"][rows] = cutter.radius, cutter.radius - cutter.corner_radius
-        stations["longest"][rows] = np.nan_to_num(cutter.cutting_length, nan=np.inf)
+    stations["reach"], stations["flat"] = (of_tools(cutters, tool, name) for name in ("radius", "flat"))
+    stations["longest"] = np.nan_to_num(of_tools(cutters, tool, "cutting_length"), nan=np.inf)
     stations["move"], stations["path"] = move, path
     stations["piece"] = pieces_at(work, move, path)
     rapid = work.first[move + 1] == work.first[move]

@@ -34,8 +34,8 @@ class Stock:
 
     Examples
     --------
-    >>> box_stock((0.0, 0.0, -0.02), (0.1, 0.08, 0.0), "given")
-    <Stock: 100 x 80 mm, z -20 to 0 mm: given>
+    >>> [end.tolist() for end in box_stock((0.0, 0.0, -0.02), (0.1, 0.08, 0.0), "given").ends]
+    [[0.0, 0.0, -0.02], [0.1, 0.08, 0.0]]
     """
 
     corner: FloatArray
@@ -49,11 +49,6 @@ class Stock:
         """(3,) m, lowest and highest corner of the bounding box."""
         high = np.append(self.corner + self.cell * self.top.shape, self.top.max())
         return np.append(self.corner, self.bottom.min()), high
-
-    def __repr__(self) -> str:
-        x, y = mm_from_m(self.cell * self.top.shape)
-        low, high = mm_from_m(float(self.bottom.min())), mm_from_m(float(self.top.max()))
-        return f"<Stock: {x:g} x {y:g} mm, z {low:g} to {high:g} mm: {self.origin}>"
 
     def tops(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """(n,) m, height of the top at points x, y; -inf outside the stock."""

@@ -64,7 +64,7 @@ def wall_error(
         normal = np.broadcast_to([0.0, outward, 0.0], (*heights.shape, 3))
         chosen = contact.of(cut)
         tip = _tip_angle(chosen, np.full_like(heights, angle), heights)
-        error[cut, side], slope, acting = _errors(chosen, tip, _pull(chosen, normal, compliance[cut]))
+        error[cut, side], slope, acting = _errors(chosen, tip, product(normal, compliance[cut]))
         deviation[cut, side] = _deviation((slope * weights[:, None]).sum(axis=1), contact.coefficients)
         force[cut, side] = (acting * weights[:, None]).sum(axis=1)
     return error, deviation, force
@@ -87,7 +87,7 @@ def floor_error(contact: Contact, compliance: FloatArray, strip: FloatArray) -> 
         Errors, nan where no surface stays; (n,) m, standard deviation of their mean that comes from the coefficients.
     """
     corner = contact.cutter.corner_radius
-    flat = contact.cutter.radius - corner
+    flat = contact.cutter.flat
     count = STRIPS if flat > 0.0 else 1  # a scallop is narrow, and a ball passes each of its points once
     error, deviation = np.full((len(strip), count), np.nan), np.full(len(strip), np.nan)
     cut = np.flatnonzero(np.isfinite(strip).all(axis=1))
@@ -99,7 +99,7 @@ def floor_error(contact: Contact, compliance: FloatArray, strip: FloatArray) -> 
     along = np.sqrt(1.0 - out * out) / np.hypot(*chosen.feed.T)[:, None]
     slope = chosen.feed[:, :, None] * along[:, None]
     normal = np.stack([-slope[:, 1], -np.sign(aside) * out, slope[:, 0]], axis=-1)  # perpendicular to a ramp's feed
-    pull = _pull(chosen, normal, compliance[cut])
+    pull = product(normal, compliance[cut])
     ahead = np.arccos(np.clip(aside / max(flat, 1e-9), -1.0, 1.0))  # beyond the flat end: beside the axis
     height = corner - np.sqrt(np.maximum(corner**2 - beyond**2, 0.0))
     # On a slope the end passes a point again, higher up: behind the axis when it climbs, ahead when it descends.
@@ -118,15 +118,8 @@ def _tip_angle(contact: Contact, angle: FloatArray, height: FloatArray) -> Float
     return np.where(contact.turning[:, None] < 0.0, np.pi - angle, angle) + contact.lag[:, None] * height
 
 
-def _pull(contact: Contact, normal: FloatArray, compliance: FloatArray) -> FloatArray:
-    """(n, h, 3) m/N, error per force as `forces.forces_of_sets` counts it, for normals (n, h, 3)."""
-    pull = product(normal, compliance)
-    pull[..., 1] *= contact.turning[:, None]
-    return pull
-
-
 def _errors(contact: Contact, tip: FloatArray, pull: FloatArray) -> Passes:
-    """The lowest of the passes of all flutes."""
+    """The lowest of the passes of all flutes; `pull` (n, h, 3) m/N is the error per force."""
     cutter = contact.cutter
     radii = flute_radii(cutter) if cutter.run_out else np.zeros(1)
     lowest = np.zeros(tip.shape), np.zeros((*tip.shape, 6)), np.zeros((*tip.shape, 3))
@@ -139,7 +132,6 @@ def _errors(contact: Contact, tip: FloatArray, pull: FloatArray) -> Passes:
             passes.append(((pull[block] * force).sum(axis=-1) + short, slope, force))
         for whole, values in zip(lowest, _lowest(passes), strict=True):
             whole[block] = values
-    lowest[2][..., 1] *= contact.turning[:, None]
     return lowest
 
 

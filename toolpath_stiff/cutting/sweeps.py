@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered, product
-from toolpath_stiff.cutting.cutters import Cutter
+from toolpath_stiff.cutting.cutters import Cutter, of_tools
 from toolpath_stiff.cutting.tilts import TURNING, axes_along, tilts_of, upright_frames
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
@@ -107,10 +107,7 @@ def _ends_of(moves: Moves, cutters: Mapping[int, Cutter], cuts: BoolArray) -> tu
         mistake = f"tool {moves.tool[unknown[0]]} cuts and its geometry is not known"
         hint = "give it a [[tool]] in the file of --cut"
         raise ProgramError(mistake, hint=hint, line=int(moves.line[unknown[0]]))
-    radius, flat = np.zeros(len(moves)), np.zeros(len(moves))
-    for tool in np.unique(moves.tool[cuts]).tolist():
-        radius[cuts & (moves.tool == tool)] = cutters[tool].radius
-        flat[cuts & (moves.tool == tool)] = cutters[tool].radius - cutters[tool].corner_radius
+    radius, flat = (np.where(cuts, of_tools(cutters, moves.tool, name), 0.0) for name in ("radius", "flat"))
     return radius, flat
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff.arrays import FloatArray, IntArray, product
-from toolpath_stiff.cutting.cutters import Cutter, radii_of
+from toolpath_stiff.cutting.cutters import Cutter, of_tools
 from toolpath_stiff.path.placing import place_orientations
 from toolpath_stiff.path.sampling import Samples
 from toolpath_stiff.rotations import along_tool_axis, rotation_matrices
@@ -37,7 +37,7 @@ def walls_beside(
     """(m, 3) m, foot of the wall beside each sample (`sides`: 0 left, 1 right), and its normal into the part."""
     some = samples.take(rows)
     into = axes_at(some)[:, :, 1] * np.where(sides == 0, 1.0, -1.0)[:, None]
-    return some.position + radii_of(cutters, some.tool)[:, None] * into, into
+    return some.position + of_tools(cutters, some.tool, "radius")[:, None] * into, into
 
 
 def tip_compliances(
@@ -57,11 +57,8 @@ def tip_compliances(
 
 def with_tools(compliance: FloatArray, samples: Samples, cutters: Mapping[int, Cutter]) -> FloatArray:
     """The compliance with that of each tool added, where it is known."""
-    total = compliance.copy()
-    for number, cutter in cutters.items():
-        beam = np.nan_to_num([cutter.lateral_compliance, cutter.lateral_compliance, cutter.axial_compliance])
-        total[samples.tool == number] += np.diag(beam)
-    return total
+    lateral, axial = (of_tools(cutters, samples.tool, f"{which}_compliance") for which in ("lateral", "axial"))
+    return compliance + np.eye(3) * np.nan_to_num(np.stack([lateral, lateral, axial], axis=1))[:, None]
 
 
 def machine_deviation(

@@ -307,9 +307,9 @@ def assumptions(diagnosis: Diagnosis) -> list[str]:
         "stiffness, as far as these data could show them; typical sizes rank, bounds alone exclude: assumed",
         f"gates: {100 * FALSE_ALARM:g} % false alarms, explanations are dropped below {100 * ADEQUATE:g} %; "
         f"the plausible set holds {100 * HELD:g} %",
-        f"a name has predicted pose after pose better than every rival of another part, by {SMALL:g} of log probability "
-        f"and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, or by {SMALL:g} without the pose that "
-        "says most; else it is one of several",
+        "a name has predicted pose after pose better than every rival of another part, "
+        f"by {SMALL:g} of log probability and in {100 * (1 - CHANCE):g} % of bootstrap draws over the poses, "
+        f"or by {SMALL:g} without the pose that says most; else it is one of several",
         f"a model is adequate where its refitted strut law moves the stiffness by up to {100 * LEFT:g} % (95 %), or "
         "nothing else explains the readings as well beside the file's law; and where no effect may hide more (95 %) "
         "beside what struts and joints leave on average: assumed",

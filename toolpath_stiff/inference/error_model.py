@@ -4,7 +4,9 @@ The logarithm of the true stiffness differs from a fit's by three errors, whose 
 
     scatter    of readings and clampings, which law and sizes have taken up: times `SCATTERS` of the noise model;
     geometry   struts that are not alike, joints off their places: times `GEOMETRIES` of what the noise model assumes.
-               They belong to the machine: where law and sizes have taken them up they are no error, elsewhere they are;
+               They belong to the machine: where law and sizes have taken them up they are no error, elsewhere they are.
+               Of a machine that has them where they most likely are (`as_built`): what readings leave unknown of them,
+               and the scatter that they have taken up;
     form       what neither describes (links that the model takes for rigid, too), smooth over poses and different by
                direction, of `FORMS` (relative sd). An effect that is added was chosen for fitting these readings, and
                its form is its part's only nearly: what it changes is off by some `SHARE` of it.
@@ -17,12 +19,14 @@ scatter, not for the stiffness under it.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import erfc
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray, IntArray, TextArray
 from toolpath_stiff.defaults import NORMAL_95
+from toolpath_stiff.inference.discrepancies import Kernel
 from toolpath_stiff.inference.evidence import Fit, law_prior
 from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.noise import Noise
@@ -40,19 +44,21 @@ FORMS = {0.0: 3.0, 0.0025: 0.5, 0.005: 0.5, 0.01: 0.5, 0.02: 0.5, 0.04: 0.5, 0.0
 SHARE, SHARE_FACTOR = 0.05, 3.0
 FEWEST_PLACES, HALVINGS = 8, 2  # fewest distinct poses; number of times regions are halved
 MOST_READINGS = 400  # spread over the campaign, from which the sizes are read
-MOST_DIRECTIONS, FORM_IN_AXES = 12, 0.01  # most directions of a region's errors beyond scatter; form to rank them
-TAILS = 4.0  # degrees of freedom of the scatter's prior
+MOST_DIRECTIONS, FORM_IN_AXES = 12, 0.01  # along which a region's errors may be other than scatter; by what form
+MOST_LEARNED = 20  # directions in which readings tell of struts and joints; what they tell of others is left out
+TAILS = 4.0  # degrees of freedom of the expected scatter
 ROUNDING, BISECTIONS = 1e-12, 25
 
 
 def error_model(
-    fit: Fit, data: Readings, noise: Noise, given: Fit | None = None, *, moved: bool = False
+    fit: Fit, data: Readings, noise: Noise, shared: FloatArray, given: Fit | None = None
 ) -> ErrorModel | None:
-    """Error model of a fit to n readings; None if too few poses were measured.
+    """The errors of a fit to n readings under their scatter; None where too few poses were measured to tell.
 
-    Its loadings are those of law and free sizes, in units of the fit. `given`: the same effects beside the machine
-    file's law, if that is what is written: either may be right. `moved`: struts and joints stand where the readings
-    have them, and are off by what is left.
+    Its loadings are those of law and free sizes, in units of the fit. `shared` (42, n): what struts and joints, one
+    standard deviation off, change of ln k; a fit whose scatter holds them goes with the machine that has them where
+    they most likely are. `given`: the same effects beside the machine file's law, if that is what is written: either
+    may be right.
     """
     place = coordinates(data.position, data.angles)
     places = np.unique(place, axis=0)
@@ -60,50 +66,58 @@ def error_model(
         return None
     rows = np.unique(np.linspace(0, len(data) - 1, min(len(data), MOST_READINGS)).round().astype(np.int64))
     jacobian, residual, covariance = fit.jacobian[rows], fit.residual[rows], fit.scatter.covariance
-    shared, common = covariance.shared[:GEOMETRY], covariance.groups.spread(covariance.common)
+    common = covariance.groups.spread(covariance.common)
     same = covariance.groups.of[rows, None] == covariance.groups.of[rows]
     parts = (
         np.diag(covariance.own_variance[rows]) + common[rows] * same,
         shared[:, rows].T @ shared[:, rows],
         alike(place[rows], data.direction[rows]),
     )
-    assumed = parts[0] + covariance.shared[:, rows].T @ covariance.shared[:, rows]
+    moved = covariance.shared[:, rows]
+    assumed = parts[0] + moved.T @ moved
     sizes = np.stack([axis.ravel() for axis in np.meshgrid(SCATTERS, [*GEOMETRIES], [*FORMS], indexing="ij")], axis=1)
     beyond = np.log(SCATTERS) / np.sqrt(0.5 / noise.freedom)
     expected = (1.0 + beyond**2 / TAILS) ** (-0.5 * (TAILS + 1.0))
     prior = expected[:, None, None] * np.array([*GEOMETRIES.values()])[:, None] * _expected_forms(fit)
-    log_weights, away, taken = np.log(prior.ravel()), list[FloatArray](), np.zeros((2, 2))
-    known = shared[:, rows] if moved else shared[:0, rows]
+    log_weights, away = np.log(prior.ravel()), list[FloatArray]()
     for out in regions(place[rows], data.point[rows]):
-        left, foretold = _left_out(out, jacobian, assumed, fit.law_free, known)
+        left = _left_out(out, jacobian, assumed, fit.law_free, moved)
         log_weights += _log_likelihoods(left @ residual, [left @ part @ left.T for part in parts], sizes**2)
         away.append(np.diag(left @ parts[2] @ left.T))
-        taken += _by_scatter_and_geometry(left, out, parts), _by_scatter_and_geometry(left + foretold, out, parts)
     weights = np.exp(log_weights - log_weights.max())
     weights /= weights.sum()
 
-    by_reading = fit.covariance @ fit.scatter.precision.times(fit.jacobian.T)  # of each unknown
-    taken_up = by_reading * covariance.own_variance
-    taken_up += common * covariance.groups.sums(by_reading)[:, covariance.groups.of]
-    own, geometry = _root(taken_up @ by_reading.T), by_reading @ shared.T
-    every, law_alone = np.arange(len(rows)), np.eye(len(rows)) - jacobian @ _estimator(jacobian, assumed, fit.law_free)
-    left = law_alone - known.T @ np.linalg.solve(assumed, known.T).T @ law_alone
-    unknown = _unknown(*(_by_scatter_and_geometry(m, every, parts) for m in (left, law_alone)))
-    further = max(_unknown(*taken) - unknown, 0.0)
-    near = float(np.diag(left @ parts[2] @ left.T).mean())
-    here = [fit.jacobian @ own, shared.T - fit.jacobian @ geometry]
-    typical = np.array([*(float((part**2).sum(axis=1).mean()) for part in here), near]) * [1.0, unknown, 1.0]
-    factor = _coverage_factor(weights, sizes**2 @ typical)
+    precision = replace(covariance, shared=shared[:0]).precision
+    weighted = precision.times(fit.jacobian.T)
+    certain = scaled_inverse(weighted @ fit.jacobian + law_prior(len(weighted), fit.law_free))
+    own, geometry = _root(certain), certain @ (weighted @ shared.T)
+    left = shared.T - fit.jacobian @ geometry
+    values, vectors = np.linalg.eigh(precision.times(left.T) @ left if len(moved) else np.zeros((GEOMETRY, GEOMETRY)))
+    # By how much offsets of which so much is known are off: by scatter that they have taken up, by what is not told.
+    told = np.maximum(values, 0.0)
+    by_scatter, untold = told / (1.0 + told) ** 2, 1.0 / (1.0 + told) ** 2
+    offsets = ((left @ vectors) ** 2).mean(axis=0)
+    every = _left_out(rows[:0], jacobian, assumed, fit.law_free, moved)
+    near = float(np.diag(every @ parts[2] @ every.T).mean())
+    far = max(float(np.concatenate(away).mean()), near)
+    of_parameters = float(((fit.jacobian @ own) ** 2).sum(axis=1).mean())
+    factor = _coverage_factor(weights, sizes**2 @ [of_parameters + by_scatter @ offsets, untold @ offsets, near])
     scatter, of_geometry, form = (factor * np.sqrt(weights @ sizes**2)).tolist()
-    apart = float((here[1] ** 2).sum(axis=1).mean())
-    far = form**2 * max(float(np.concatenate(away).mean()), near) + of_geometry**2 * further * apart
-    of_geometry *= float(np.sqrt(unknown))
+    learned = _learned(np.sqrt((scatter / of_geometry) ** 2 * by_scatter + untold), vectors)
+    geometry = geometry - geometry @ learned.T @ learned
     either = np.zeros((len(own), 0)) if given is None else _apart(fit, given)[:, None] * np.sqrt(0.5)
     return ErrorModel(
         np.concatenate([either, scatter * own, of_geometry * geometry], axis=1),
         of_geometry * noise.strut_spread, of_geometry * noise.joint_error,
-        form * float(np.sqrt(near)), float(np.sqrt(far)), places,
+        form * float(np.sqrt(near)), form * float(np.sqrt(far)), places, learned,
     )  # fmt: skip
+
+
+def _learned(left: FloatArray, vectors: FloatArray) -> FloatArray:
+    """(r, 42) rows A: errors u become u - A^T A u, where of those along `vectors` (42, 42) shares `left` (42,) stay."""
+    shrunk = (vectors * (1.0 - np.minimum(left, 1.0))) @ vectors.T
+    kernel, mean = Kernel(lambda i: shrunk[i], np.diag(shrunk)), float(np.diag(shrunk).mean())
+    return kernel.features(MOST_LEARNED).T * np.sqrt(mean) if mean > ROUNDING else np.zeros((1, len(left)))
 
 
 def _expected_forms(fit: Fit) -> FloatArray:
@@ -146,31 +160,18 @@ def _estimator(jacobian: FloatArray, covariance: FloatArray, law_free: bool) -> 
 
 def _left_out(
     out: IntArray, jacobian: FloatArray, assumed: FloatArray, law_free: bool, known: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """(m, n) each: matrix from readings to the errors of m left-out ones, and matrix of the part that `known` predicts.
+) -> FloatArray:
+    """(m, n) matrix by which readings make the errors of m that are left out, of all if none is.
 
     `known` (k, n): by how much offsets, of which the readings that stay tell, change each reading.
     """
-    kept = np.delete(np.arange(len(jacobian)), out)
-    left, foretold = np.eye(len(jacobian))[out], np.zeros((len(out), len(jacobian)))
-    covariance = assumed[np.ix_(kept, kept)]
+    kept, out = np.delete(np.arange(len(jacobian)), out), out if len(out) else np.arange(len(jacobian))
+    left, covariance = np.eye(len(jacobian))[out], assumed[np.ix_(kept, kept)]
     estimator = _estimator(jacobian[kept], covariance, law_free)
-    left[:, kept] = -jacobian[out] @ estimator
-    if len(known):
-        by_others = np.linalg.solve(covariance, known[:, kept].T).T
-        foretold[:, kept] = known[:, out].T @ (by_others - by_others @ jacobian[kept] @ estimator)
-    return left - foretold, foretold
-
-
-def _by_scatter_and_geometry(left: FloatArray, out: IntArray, parts: Sequence[FloatArray]) -> FloatArray:
-    """(2,) squares of errors of left-out stiffnesses, by scatter (not of their own readings) and by geometry."""
-    pulled = left - np.eye(left.shape[1])[out]
-    return np.array([float(((m @ part) * m).sum()) for m, part in ((pulled, parts[0]), (left, parts[1]))])
-
-
-def _unknown(after: FloatArray, before: FloatArray) -> float:
-    """Share of the squares by geometry that known offsets leave, with the scatter that these have taken up."""
-    return float((after.sum() - before[0]) / before[1]) if before[1] > 0.0 else 1.0
+    by_others = np.linalg.solve(covariance, known[:, kept].T).T
+    left[:, kept] -= jacobian[out] @ estimator
+    left[:, kept] -= known[:, out].T @ (by_others - by_others @ jacobian[kept] @ estimator)
+    return left
 
 
 def _log_likelihoods(error: FloatArray, parts: Sequence[FloatArray], squares: FloatArray) -> FloatArray:

@@ -416,7 +416,7 @@ def put_to_vote(
             standing = likely
         else:
             rivals = {name: fit for name, fit in fits.items() if name != NONE or gates.none_stands}
-            ballots = votes(problem, fits[top], rivals_of(fits[top], rivals))
+            ballots = _votes_of_few(problem, candidates.families, fits[top], rivals_of(fits[top], rivals))
             ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
             lost = {name for name, differences in ballots.items() if outvoted(differences)}
             open_rivals = [name for name in ballots if name not in lost]
@@ -450,6 +450,17 @@ def put_to_vote(
         shortened(problem, fits | instead, order),
         ballots,
     )
+
+
+def _votes_of_few(
+    problem: Problem, families: Sequence[Family], fit: Fit, rivals: Mapping[str, Fit]
+) -> dict[str, FloatArray]:
+    """Votes for an explanation; a rival of more effects is one of so many more, whose prior weight counts, too."""
+    own = _prior(families, len(fit.names))
+    return {
+        name: gain + np.log(max(own / _prior(families, max(len(rivals[name].names), 1)), 1.0)) / len(gain)
+        for name, gain in votes(problem, fit, rivals).items()
+    }
 
 
 def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:

@@ -33,11 +33,16 @@ def parts_of(fit: Fit) -> tuple[str, ...]:
 def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
     """Explanations to outvote besides the model alone: those of other parts, and those with fewer of the same effects.
 
-    `fits`: all explanations by name; of those with more effects the search has its own price.
+    `fits`: all explanations by name. Of those with more effects, that add to its own part the search has its own price.
     """
     own, names = parts_of(fit), {*fit.names}
-    others = {name: other for name, other in fits.items() if {*other.names} != names and len(other.names) <= len(names)}
-    return {name: o for name, o in others.items() if parts_of(o) != own or {*o.names} < names}
+
+    def rival(other: Fit) -> bool:
+        if len(other.names) > len(names):
+            return {*parts_of(other)}.isdisjoint(own)
+        return {*other.names} != names and (parts_of(other) != own or {*other.names} < names)
+
+    return {name: other for name, other in fits.items() if rival(other)}
 
 
 def rivals_of_law(problem: Problem, given: Fit, machine: Sequence[str] = ()) -> dict[str, Fit]:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from toolpath_stiff.arrays import BoolArray, FloatArray
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine import parallel_file
 from toolpath_stiff.machine.elements import Element, Stance
 from toolpath_stiff.machine.parallel import Carriage, Legs, Parallel
@@ -37,11 +37,13 @@ SCHEMA = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Level(Parallel):
-    """Common part of linear and rotary deltas: three parallelograms that keep the effector level.
+class Delta(Parallel):
+    """Three parallelograms that keep the effector level, moved by carriages.
 
     Attributes
     ----------
+    tower_radius
+        m, of the rods' joints on the carriages about the machine's axis.
     effector_joint_radius, effector_joint_height
         m, of the rods' joints about the effector's axis, and above the tip of the reference tool.
     rod_length, rod_spacing
@@ -50,9 +52,11 @@ class Level(Parallel):
         m/N of one rod with its joints.
     """
 
+    kind: ClassVar[str] = "delta"
     turns: ClassVar[int] = 0
     outwards: ClassVar[FloatArray] = OUTWARDS  # (3, 3), from the machine's axis to each tower
 
+    tower_radius: float
     effector_joint_radius: float
     effector_joint_height: float
     rod_length: float
@@ -64,42 +68,38 @@ class Level(Parallel):
         refuse_words(self.name, abc, "")
         return rotation_matrices(abc)
 
-    def level(self, axes: FloatArray) -> BoolArray:
-        """(n,) True where tool axes (n, 3, 3) are those that the rods keep."""
-        return np.asarray(np.abs(axes - np.eye(3)).max(axis=(1, 2)) < 1e-9)
+    def legs_at(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> Legs:
+        """The six rods; nan where a joint would be too far away, or the tool is turned."""
+        arms = self._effector_arms(extension)
+        level = np.abs(axes - np.eye(3)).max(axis=(1, 2)) < 1e-9
+        places = np.where(level[:, None, None], tip[:, None] + arms.reshape(-1, 3, 2, 3).mean(axis=2), np.nan)
+        joints = self.joints_of(places)
+        rods = self.feet(joints) - tip[:, None] - arms
+        compliance = np.full((len(tip), 6), self.rod_compliance)
+        return Legs(joints, rods / self.rod_length, arms, compliance, self.carriage_axes(joints))
 
-    def effector_arms(self, extension: FloatArray) -> FloatArray:
+    def joints_of(self, places: FloatArray) -> FloatArray:
+        """(n, 3) heights of the carriages, whose rods reach places (n, 3, 3) m on the effector."""
+        apart = ((self.tower_radius * self.outwards - places)[..., :2] ** 2).sum(axis=-1)
+        return np.asarray(places[..., 2] + np.sqrt(self.rod_length**2 - apart))
+
+    def feet(self, joints: FloatArray) -> FloatArray:
+        """(n, 6, 3) m, the rods' joints on carriages at heights (n, 3) m."""
+        height: FloatArray = np.repeat(joints, 2, axis=1)[..., None] * UP
+        return rod_joints(self.outwards, self.tower_radius, self.rod_spacing) + height
+
+    def carriage_axes(self, joints: FloatArray) -> FloatArray | None:
+        """(n, 3, 3, 3) axes of the bodies that move the rods; None: they do not turn."""
+        return None
+
+    def _effector_arms(self, extension: FloatArray) -> FloatArray:
         """(n, 6, 3) m from the tip to the rods' joints, of tools (n,) m longer than the reference tool."""
         height = UP * (self.effector_joint_height + extension)[:, None, None]
         return rod_joints(self.outwards, self.effector_joint_radius, self.rod_spacing) + height
 
-
-@dataclass(frozen=True, kw_only=True)
-class Delta(Level):
-    """A linear delta; `carriage_joint_radius` m of the rods' joints about the machine's axis."""
-
-    kind: ClassVar[str] = "delta"
-
-    carriage_joint_radius: float
-
-    def legs_at(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> Legs:
-        """The six rods; nan where a carriage is too far away, or the tool is turned."""
-        arms = self.effector_arms(extension)
-        towers = (self.carriage_joint_radius - self.effector_joint_radius) * OUTWARDS[:, :2]
-        apart = ((towers - tip[:, None, :2]) ** 2).sum(axis=-1)
-        height = np.sqrt(np.where(self.level(axes)[:, None], self.rod_length**2 - apart, np.nan))
-        carriages = tip[:, 2:] + arms[:, :1, 2] + height
-        rods = self._feet(carriages) - tip[:, None] - arms
-        return Legs(carriages, rods / self.rod_length, arms, np.full((len(tip), 6), self.rod_compliance))
-
-    def _feet(self, carriages: FloatArray) -> FloatArray:
-        """(n, 6, 3) m, the rods' joints on carriages at heights (n, 3) m."""
-        height: FloatArray = np.repeat(carriages, 2, axis=1)[..., None] * UP
-        return rod_joints(self.outwards, self.carriage_joint_radius, self.rod_spacing) + height
-
     def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
-        """(n, 6, 3) m each: the rods' joints on the carriages and on the effector."""
-        return self._feet(stance.joints), stance.position[:, None] + self.effector_arms(np.zeros(1))
+        """(n, 6, 3) m each: the rods' joints on what moves them and on the effector."""
+        return self.feet(stance.joints), stance.position[:, None] + self._effector_arms(np.zeros(1))
 
 
 def rod_joints(outwards: FloatArray, radius: float, spacing: float) -> FloatArray:
@@ -108,17 +108,17 @@ def rod_joints(outwards: FloatArray, radius: float, spacing: float) -> FloatArra
     return np.stack([radius * outwards - sides, radius * outwards + sides], axis=1).reshape(6, 3)
 
 
-def level_fields(toml: MachineToml, values: Sections) -> dict[str, Any]:
+def rod_fields(toml: MachineToml, values: Sections) -> dict[str, Any]:
     """Arguments of a delta of either drive that its own sections do not give."""
-    names = ("effector_joint_radius", "effector_joint_height", "rod_length", "rod_spacing")
+    lengths = {key.removesuffix("_mm"): m_from_mm(values[""][key]) for key in RODS}
     rod = {"legs": parallel_file.axial("rod", 6), "rod_compliance": m_from_nm(values["rod"]["compliance_nm_per_N"])}
-    return {**parallel_file.shared_fields(toml, values), **parallel_file.lengths(values[""], *names), **rod}
+    return {**parallel_file.shared_fields(toml, values), **lengths, **rod}
 
 
 def read(toml: MachineToml) -> Delta:
     """A delta of a machine file. Raises `InputError`."""
     values = read_sections(toml, SCHEMA, parallel_file.OPTIONAL, stated=False)
-    carriage, fields = values["carriage"], level_fields(toml, values)
+    carriage, fields = values["carriage"], rod_fields(toml, values)
     radius = m_from_mm(values[""]["carriage_joint_radius_mm"])
     least = abs(radius - fields["effector_joint_radius"])
     if fields["rod_length"] <= least:
@@ -136,5 +136,5 @@ def read(toml: MachineToml) -> Delta:
         **fields,
         joint_range=parallel_file.span(toml, "limits", ("carriage_mm", "carriage_mm"), *ends),
         carriages=tuple(carriages),
-        carriage_joint_radius=radius,
+        tower_radius=radius,
     )

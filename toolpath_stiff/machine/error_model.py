@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -48,6 +48,8 @@ class ErrorModel:
         Standard deviation of what the model lacks, relative: at measured poses, and away from all of them.
     places
         (m, 6) `coordinates` of the measured poses.
+    learned
+        (r, 42) A: of the struts' and joints' errors u, in these deviations, readings leave u - A^T A u.
     """
 
     loadings: FloatArray
@@ -56,11 +58,12 @@ class ErrorModel:
     near: float
     away: float
     places: FloatArray
+    learned: FloatArray = field(default_factory=lambda: np.zeros((1, GEOMETRY)))
 
-    @property
-    def geometry(self) -> FloatArray:
-        """(42,) standard deviations of the struts and of the joints' coordinates."""
-        return np.repeat([self.struts, self.joints], [6, GEOMETRY - 6])
+    def of_geometry(self, slopes: FloatArray) -> FloatArray:
+        """(n, 42) errors by struts and joints, of (n, 42) slopes to them: those by what readings leave unknown."""
+        errors = slopes * np.repeat([self.struts, self.joints], [6, GEOMETRY - 6])
+        return np.asarray(errors - errors @ self.learned.T @ self.learned)
 
     @property
     def poses(self) -> tuple[FloatArray, FloatArray]:
@@ -81,10 +84,10 @@ class ErrorModel:
         return replace(self, loadings=self.loadings[rows])
 
     def beside(self, later: ErrorModel) -> ErrorModel:
-        """Error model of the parameters of both; struts, joints and form as in the later one."""
-        first, second = self.loadings, later.loadings
-        known, added = first.shape[1] - GEOMETRY, second.shape[1] - GEOMETRY
-        both = np.zeros((len(first) + len(second), known + added + GEOMETRY))
-        both[: len(first), :known], both[len(first) :, known : known + added] = first[:, :known], second[:, :added]
-        both[:, known + added :] = np.concatenate([first[:, known:], second[:, added:]])
+        """Of the parameters of both; struts, joints and form as the later one has them."""
+        (first, geometry), (second, later_geometry) = (
+            np.hsplit(errors.loadings, [-GEOMETRY]) for errors in (self, later)
+        )
+        none = np.zeros((len(first), second.shape[1])), np.zeros((len(second), first.shape[1]))
+        both = np.block([[first, none[0], geometry], [none[1], second, later_geometry]])
         return replace(later, loadings=both)

@@ -35,6 +35,11 @@ def machine_from_fcm(text: str, order: Sequence[str], file: str) -> tuple[str, l
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         expected = "machine.axes.NAME with role, joint and limits; units metric or imperial"
         raise fault(f"not a FreeCAD machine: {error}", expected) from None
+    for name, (origin, direction) in joints.items():
+        if not (np.shape(origin) == np.shape(direction) == (3,) and np.linalg.norm(direction) > 0.0):
+            raise fault(f"axis {name}: joint {axes[name]['joint']}", "an origin and a direction, three numbers each")
+        if axes[name].get("type") not in ("linear", "rotary"):
+            raise fault(f"axis {name} has the type {axes[name].get('type')!r}", expected="linear or rotary")
     linear = [joints[name][1] for name in "XYZ" if name in joints]
     if len(linear) == 3 and np.linalg.det(np.array(linear)) < 0.0:
         raise fault("axes X, Y, Z are mirrored (left-handed)", expected="a right-handed frame")
@@ -52,7 +57,7 @@ def machine_from_fcm(text: str, order: Sequence[str], file: str) -> tuple[str, l
         names = _in_order({n: axis for n, axis in axes.items() if roles[n].startswith(role)}, order, fault)
         side, before = {"head": "tool", "table": "work"}[role], np.zeros(3)
         for name in names:
-            (origin, axis), sort = joints[name], str(axes[name].get("type"))
+            (origin, axis), sort = joints[name], axes[name]["type"]
             place = FixedFrame(np.eye(3), m_from_mm(scale * (origin - before)))
             bounds = m_from_mm(scale * ends[name]) if sort == "linear" else rad_from_deg(ends[name])
             towards = -axis if side == "work" else axis  # a table moves against the programmed axis
@@ -66,8 +71,10 @@ def machine_from_fcm(text: str, order: Sequence[str], file: str) -> tuple[str, l
 def _joint(axis: Document) -> tuple[FloatArray, FloatArray]:
     joint = axis["joint"]
     origin, direction = (joint["origin"], joint["axis"]) if isinstance(joint, dict) else joint
+    if not isinstance(joint, dict) and not np.any(direction):
+        origin, direction = direction, origin  # older files of linear axes
     vector = np.array(direction, dtype=float)
-    return np.array(origin, dtype=float), vector / np.linalg.norm(vector)
+    return np.array(origin, dtype=float), vector / (np.linalg.norm(vector) or 1.0)
 
 
 def _in_order(axes: dict[str, Document], order: Sequence[str], fault: Fault) -> list[str]:

@@ -52,11 +52,6 @@ def shared_fields(toml: MachineToml, values: Sections) -> dict[str, Any]:
     }
 
 
-def lengths(section: Document, *names: str) -> dict[str, Any]:
-    """Name -> m of its key in mm."""
-    return {name: m_from_mm(section[f"{name}_mm"]) for name in names}
-
-
 def axial(name: str, count: int) -> tuple[Element, ...]:
     """Struts or rods of this name, numbered from 1."""
     return tuple(Element(f"{name} {i + 1}", "struts", ("axial",)) for i in range(count))

@@ -12,9 +12,9 @@ import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.machine import parallel_file
-from toolpath_stiff.machine.delta import OUTWARDS, ROD, RODS, UP, Level, level_fields, rod_joints
+from toolpath_stiff.machine.delta import OUTWARDS, ROD, RODS, UP, Delta, rod_fields, rod_joints
 from toolpath_stiff.machine.elements import Element, Stance
-from toolpath_stiff.machine.parallel import Carriage, Legs
+from toolpath_stiff.machine.parallel import Carriage
 from toolpath_stiff.machine.schema import Key, MachineToml, read_sections
 from toolpath_stiff.units import m_from_mm, rad_from_deg
 
@@ -25,23 +25,21 @@ SCHEMA = {
     "arm": {"length_mm": parallel_file.LENGTH, **parallel_file.GIVE},
     **parallel_file.SHARED,
 }
-ARMS = -OUTWARDS
 
 
 @dataclass(frozen=True, kw_only=True)
-class RotaryDelta(Level):
-    """A rotary delta; the hips lie in the plane z = 0.
+class RotaryDelta(Delta):
+    """A delta moved by arms; `tower_radius` is that of their axes, the hips, which stand in the plane z = 0.
 
     Attributes
     ----------
-    hip_radius, arm_length
-        m, of the arms' axes about the machine's axis; from there to the rods' joints.
+    arm_length
+        m, from a hip to the rods' joints.
     """
 
     kind: ClassVar[str] = "rotary_delta"
-    outwards: ClassVar[FloatArray] = ARMS
+    outwards: ClassVar[FloatArray] = -OUTWARDS
 
-    hip_radius: float
     arm_length: float
 
     @property
@@ -49,46 +47,37 @@ class RotaryDelta(Level):
         """Kind of each arm's joint: "rotary"."""
         return ("rotary",) * 3
 
-    def legs_at(self, tip: FloatArray, axes: FloatArray, extension: FloatArray) -> Legs:
-        """The six rods; nan where an arm does not reach, or the tool is turned."""
-        arms = self.effector_arms(extension)
-        foot = tip[:, None] + arms.reshape(-1, 3, 2, 3).mean(axis=2)
-        u, y = (foot * ARMS).sum(axis=-1) - self.hip_radius, (foot * np.cross(UP, ARMS)).sum(axis=-1)
-        z, thigh = foot[..., 2], self.arm_length
+    def joints_of(self, places: FloatArray) -> FloatArray:
+        """(n, 3) rad of the arms, whose rods reach places (n, 3, 3) m on the effector."""
+        u, z, thigh = (places * self.outwards).sum(axis=-1) - self.tower_radius, places[..., 2], self.arm_length
+        y = (places * np.cross(UP, self.outwards)).sum(axis=-1)
         share = (thigh**2 + u**2 + y**2 + z**2 - self.rod_length**2) / (2.0 * thigh * np.hypot(u, z))
-        angles = np.where(self.level(axes)[:, None], -np.arctan2(z, u) - np.arccos(share), np.nan)
-        knees, turns = self._knees(angles)
-        rods = np.repeat(knees - foot, 2, axis=1)
-        compliance = np.full((len(tip), 6), self.rod_compliance)
-        return Legs(angles, rods / self.rod_length, arms, compliance, turns)
+        return np.asarray(-np.arctan2(z, u) - np.arccos(share))
 
-    def _knees(self, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n, 3, 3) m, ends of the arms; (n, 3, 3, 3) their axes: along the arm, along its hip, square to both."""
-        c, s = np.cos(angles)[..., None], np.sin(angles)[..., None]
-        along, across = c * ARMS - s * UP, s * ARMS + c * UP
-        turns = np.stack([along, np.broadcast_to(np.cross(UP, ARMS), along.shape), across], axis=-1)
-        return self.hip_radius * ARMS + self.arm_length * along, turns
+    def carriage_axes(self, joints: FloatArray) -> FloatArray:
+        """(n, 3, 3, 3) axes of the arms: along the arm, along its hip, square to both."""
+        c, s = np.cos(joints)[..., None], np.sin(joints)[..., None]
+        hips = np.broadcast_to(np.cross(UP, self.outwards), (len(joints), 3, 3))
+        return np.stack([c * self.outwards - s * UP, hips, s * self.outwards + c * UP], axis=-1)
 
-    def leg_ends(self, stance: Stance) -> tuple[FloatArray, FloatArray]:
-        """(n, 6, 3) m each: the rods' joints on the arms and on the effector."""
-        knees = np.repeat(self._knees(stance.joints)[0], 2, axis=1)
-        return knees + rod_joints(ARMS, 0.0, self.rod_spacing), stance.position[:, None] + self.effector_arms(
-            np.zeros(1)
-        )
+    def feet(self, joints: FloatArray) -> FloatArray:
+        """(n, 6, 3) m, the rods' joints at the ends of the arms."""
+        along = self.carriage_axes(joints)[..., 0]
+        knees: FloatArray = np.repeat(self.arm_length * along, 2, axis=1)
+        return knees + rod_joints(self.outwards, self.tower_radius, self.rod_spacing)
 
     def lines(self, stance: Stance) -> list[tuple[str, FloatArray]]:
-        """The arms, and the lines that other machines with rods have."""
-        knees, hips = self._knees(stance.joints)[0], self.hip_radius * ARMS
-        arms = [
-            (f"arm {i + 1}", np.stack([np.broadcast_to(hips[i], knees[:, i].shape), knees[:, i]], 1)) for i in range(3)
-        ]
+        """The arms, and what other machines of rods have."""
+        knees = self.feet(stance.joints).reshape(-1, 3, 2, 3).mean(axis=2)
+        hips = np.broadcast_to(self.tower_radius * self.outwards, knees.shape)
+        arms = [(f"arm {i + 1}", np.stack([hips[:, i], knees[:, i]], axis=1)) for i in range(3)]
         return [*arms, *super().lines(stance)]
 
 
 def read(toml: MachineToml) -> RotaryDelta:
     """A rotary delta of a machine file. Raises `InputError`."""
     values = read_sections(toml, SCHEMA, parallel_file.OPTIONAL, stated=False)
-    arm, fields = values["arm"], level_fields(toml, values)
+    arm, fields = values["arm"], rod_fields(toml, values)
     low, high = values["limits"]["arm_deg"].tolist()
     if not low < high:
         raise toml.fault("limits", "arm_deg", f": {high:g} is not above {low:g}", expected="min below max, in deg")
@@ -96,7 +85,7 @@ def read(toml: MachineToml) -> RotaryDelta:
     joints, give = np.array([[length, -aside, 0.0], [length, aside, 0.0]]), parallel_file.give_of(arm)
     return RotaryDelta(
         **fields,
-        **parallel_file.lengths(values[""], "hip_radius"),
+        tower_radius=m_from_mm(values[""]["hip_radius_mm"]),
         joint_range=(rad_from_deg(low), rad_from_deg(high)),
         carriages=tuple(
             Carriage(Element(f"arm {i + 1}", "frame"), (2 * i, 2 * i + 1), np.eye(3), give, joints) for i in range(3)

@@ -21,6 +21,7 @@ STATED = {
     "loadings": Key(shape=(1, 0), many=True, low=-np.inf, high=np.inf),
     "struts_percent": Key(unit="%", low=0.0, high=np.inf),
     "joints_mm": Key(unit="mm", low=0.0, high=np.inf),
+    "learned": Key(shape=(1, GEOMETRY), many=True, low=-np.inf, high=np.inf),
     "form_percent": Key(unit="%", shape=(2,), low=0.0, high=np.inf),
     "places_mm_deg": Key(unit="mm, deg", shape=(1, 6), many=True),
 }
@@ -63,14 +64,15 @@ def _read_errors(toml: MachineToml, table: object, parameters: int) -> ErrorMode
     if not isinstance(table, dict):
         raise toml.fault(section, "", f" = {table!r}", f"a section [{section}]")
     values = read_section(toml, section, table, STATED)
-    loadings, struts, joints, (near, away), places = (values[key] for key in STATED)
+    loadings, struts, joints, learned, (near, away), places = (values[key] for key in STATED)
     if len(loadings) != parameters or loadings.shape[1] < GEOMETRY:
         raise toml.fault(section, "loadings", "", f"a row of {GEOMETRY} numbers or more for each parameter")
     if away < near:
         raise toml.fault(section, "form_percent", "", "the second no smaller: at the measured places, away from them")
     position, angles = np.hsplit(places, 2)
     places = coordinates(m_from_mm(position), rad_from_deg(angles))
-    return ErrorModel(loadings, 0.01 * struts, m_from_mm(joints), 0.01 * float(near), 0.01 * float(away), places)
+    form = (0.01 * float(near), 0.01 * float(away))
+    return ErrorModel(loadings, 0.01 * struts, m_from_mm(joints), *form, places, learned)
 
 
 def _is_correlation(matrix: FloatArray) -> bool:

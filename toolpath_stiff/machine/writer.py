@@ -40,7 +40,7 @@ HEADINGS = {
     "uncertainty": "What was fitted to measurements: standard deviations in the units of the keys, and correlations.",
     "uncertainty.errors": "How far the stiffness may be off at a pose, for bands. Rows of loadings: by how many of\n"
     "# its standard deviations each parameter is off by scatter, then by struts 1 to 6 and the joints' coordinates.\n"
-    "# form_percent: what the model lacks, at the measured places and away from them.",
+    "# learned: rows A, by which readings shrink the latter; form_percent: what the model lacks, here and elsewhere.",
 }
 
 
@@ -127,6 +127,7 @@ def fitted_lines(machine: MachineTool) -> list[str]:
                 "loadings": errors.loadings,
                 "struts_percent": 100.0 * errors.struts,
                 "joints_mm": mm_from_m(errors.joints),
+                "learned": errors.learned,
                 "form_percent": [100.0 * errors.near, 100.0 * errors.away],
                 "places_mm_deg": np.round(np.hstack([mm_from_m(position), deg_from_rad(angles)]), 6),
             }

@@ -179,17 +179,9 @@ def _check_built_in(request: Request, run: ProgramRun) -> Checked:
         program = on_the_part(program, request, state) if len(program.moves) else program
     except InputError as error:
         errors = [*errors, error]
-        program = replace(
-            program,
-            moves=Recorder().moves(),
-            kinematics=request.controller.kinematics.label if request.controller.kinematics else "",
-        )
-    return Checked(
-        program=program,
-        complete=not errors,
-        used=_used_codes(tally, run.meaning),
-        findings=findings_of(errors, program),
-    )
+        kinematics = request.controller.kinematics
+        program = replace(program, moves=Recorder().moves(), kinematics=kinematics.label if kinematics else "")
+    return Checked(program, not errors, _used_codes(tally, run.meaning), findings_of(errors, program))
 
 
 def _run_to_the_end(run: ProgramRun, g_code: bool) -> tuple[list[InputError], list[Remark]]:
@@ -228,12 +220,7 @@ def _check_by_linuxcnc(request: Request, may_lack: bool = False) -> Checked:
         program = request.program(
             Record(request.name), origin=origin, interpreter="linuxcnc", dialect=request.controller.label
         )
-    return Checked(
-        program=program,
-        complete=not errors,
-        used=_codes_in_lines(request),
-        findings=findings_of(errors, program),
-    )
+    return Checked(program, not errors, _codes_in_lines(request), findings_of(errors, program))
 
 
 def _codes_in_lines(request: Request) -> tuple[UsedCode, ...]:

@@ -119,10 +119,7 @@ DIALECTS = {
     )
 }
 # Dialects that are separate languages, each with its reader -> their names.
-LANGUAGES = {
-    "heidenhain": "Heidenhain's conversational language",
-    "siemens": "Siemens' own language (Sinumerik)",
-}
+LANGUAGES = {"heidenhain": "Heidenhain's conversational language", "siemens": "Siemens' own language (Sinumerik)"}
 
 
 def dialect_named(name: str) -> Dialect:

@@ -187,7 +187,7 @@ class Frames:
 
 def standing(start: list[float], end: list[float]) -> list[float]:
     """End of a move, with the start's numbers for axes that differ by rounding only."""
-    return [s if abs(e - s) < STILL * max(1.0, abs(s)) else e for s, e in zip(start, end, strict=True)]
+    return [s if s == e or abs(e - s) < STILL * max(1.0, abs(s)) else e for s, e in zip(start, end, strict=True)]
 
 
 def shifted(program: Numbers, shift: float, offset: float) -> Numbers:

@@ -73,11 +73,7 @@ def recovered(
         origin=origin,
         origin_source=source,
         warnings=(*program.warnings, *warnings),
-        assumptions=(
-            *program.assumptions,
-            kinematics.assumption(switched=any(on for _, on in tip_held)),
-            *assumptions,
-        ),
+        assumptions=(*program.assumptions, kinematics.assumption(switched=any(on for _, on in tip_held)), *assumptions),
         kinematics=kinematics.label,
         jumps=tuple(jump._replace(moves=int(np.searchsorted(of_move, jump.moves))) for jump in program.jumps),
     )

@@ -6,13 +6,7 @@ from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.controller import DIALECTS, LANGUAGES, UNKNOWN_CONTROL, Controller
-from toolpath_stiff.nc.languages import (
-    CUTTER_LOCATION_FILE,
-    READ,
-    foreign_program,
-    recognise,
-    refused_program,
-)
+from toolpath_stiff.nc.languages import CUTTER_LOCATION_FILE, READ, foreign_program, recognise, refused_program
 from toolpath_stiff.nc.lines import read_lines, split_lines
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, RAPID, ReadProgram
 from toolpath_stiff.nc.parametric.families import line_with_variables

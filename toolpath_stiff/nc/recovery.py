@@ -206,12 +206,7 @@ def _without_rounding(points: FloatArray) -> FloatArray:
 
 
 def _on_the_part(
-    moves: Moves,
-    kinematics: PostedKinematics,
-    held: BoolArray,
-    length: FloatArray,
-    move: IntArray,
-    share: FloatArray,
+    moves: Moves, kinematics: PostedKinematics, held: BoolArray, length: FloatArray, move: IntArray, share: FloatArray
 ) -> Moves:
     """Rows of the pieces, each from its share of its move; arcs that stay arcs; ends still those of the moves."""
     arc = moves.arc_sweep != 0.0

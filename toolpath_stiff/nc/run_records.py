@@ -17,7 +17,7 @@ MOST_ERRORS = 100
 
 @contextmanager
 def collector_at_rest() -> Iterator[None]:
-    """Python does not look for cycles meanwhile: a run leaves none, and most of its time went to looking."""
+    """Context without Python's search for cycles of objects: a run leaves none, and would spend its time looking."""
     was = gc.isenabled()
     gc.disable()
     try:

@@ -164,7 +164,7 @@ def _csv_tools(text: str, file: str) -> Iterator[tuple[int, ToolEntry]]:
     numbers_of = (*columns[:4], *CUTTER_KEYS)
     table = parse_table(text, file, Columns(numbers_of, columns[4:6]))
     unknown = [f"{name!r} is not known" for name in table.heading if name not in columns]
-    for problem in unknown + [f"{name!r} is missing" for name in columns[:2] if name not in table.heading]:
+    for problem in unknown + [f"{name!r} is missing" for name in columns[:1] if name not in table.heading]:
         raise Place(file, table.heading_line).fail(f"column {problem}", f"columns {', '.join(columns)}")
     for line, cells in table.rows:
         try:

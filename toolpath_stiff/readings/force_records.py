@@ -67,18 +67,15 @@ def read_records(
         signal[:, 0] = np.arange(len(signal)) / signal[:, 0]
     for name in dict.fromkeys(names.tolist()):
         rows = np.flatnonzero(names == name)
+        wrong = {"time_s": (np.diff(signal[rows, 0], prepend=-np.inf) <= 0.0, "later than the row before")}
         for setting, column in (("spindle_rpm", rate), ("depth_mm", depth), (feed, fed)):
             odd = (column[rows] != column[rows[0]]) | (column[rows] <= 0.0)
-            if setting in needed and odd.any():
+            wrong[setting] = odd, f"above 0 and the same in all rows of a record, {column[rows[0]]:g}"
+        for setting, (odd, expected) in wrong.items():
+            if setting in (*needed, "time_s") and odd.any():
                 row = int(rows[np.argmax(odd)])
-                mistake, line = f"{setting} = {column[row]:g}", int(lines[row])
-                expected = f"above 0 and the same in all rows of a record, {column[rows[0]]:g}"
-                raise MeasurementError(mistake, expected=expected, file=file, line=line)
-        back = np.diff(signal[rows, 0]) <= 0.0
-        if back.any():
-            line = int(lines[rows[1 + np.argmax(back)]])
-            expected = "a row for each moment of a record"
-            raise MeasurementError("time_s does not rise", expected=expected, file=file, line=line)
+                mistake = f"{setting} = {table.record(table.rows[row][1]).get(setting, '')}"
+                raise MeasurementError(mistake, expected=expected, file=file, line=int(lines[row]))
         turns_a_second = float(rate[rows[0]]) / s_from_min(1.0)
         per_tooth = float(fed[rows[0]]) / (s_from_min(1.0) * turns_a_second * flutes if feed == FEEDS[1] else 1.0)
         settings = (m_from_mm(per_tooth), m_from_mm(float(depth[rows[0]])), turns_a_second)

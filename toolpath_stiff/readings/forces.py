@@ -176,8 +176,6 @@ def fit_coefficients(
         raise MeasurementError(fault, expected="3 or more, so that a straight line can be wrong; 5 are better")
     force, told = np.array(forces), cutter.flutes > 1 and bool(np.isfinite(waves).all())
     run_out, angle = np.full(len(feed), np.nan), np.zeros(len(feed))
-    if told:
-        cutter = replace(cutter, run_out=0.0)
     for _ in range(ROUNDS):  # with run-out some teeth cut less, which bends the lines a little
         response = slot_responses(cutter, feed, depth, angle)
         values, covariance, determined = least_squares(response, force)

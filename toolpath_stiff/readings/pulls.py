@@ -156,19 +156,25 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
         raise MeasurementError("pulls beside stiffnesses", hint="give one kind of files at a time")
     for table in tables:
         _check_columns(table, machine)
-        loaded = replace(table, rows=tuple(row for row in table.rows if not _unloaded(table.record(row[1]))))
+        loaded = replace(table, rows=tuple(row for row in table.rows if not _empty(table.record(row[1]))))
         of_file, errors = parsed_rows(loaded, partial(_Pull.of, table.file, joints))
         if errors:
             raise InputErrors(errors)
         rows += of_file
-        unloaded = len(table.rows) - len(loaded.rows)
+        empty = len(table.rows) - len(loaded.rows)
         notes += [
             *table.notes,
-            *([f"{table.file}: {unloaded} rows of no force and no displacement are passed over"] if unloaded else []),
+            *(
+                [f"{table.file}: {empty} rows of no force, or of which nothing was read, are passed over"]
+                if empty
+                else []
+            ),
             *unused(table, used),
         ]
     if not rows:
-        raise MeasurementError("no rows below the heading", file=tables[0].file)
+        raise MeasurementError(
+            "nothing read in any row", expected="pulls below the heading", file=tables[0].file, line=1
+        )
     return _of_rows(rows, machine, notes)
 
 
@@ -259,10 +265,14 @@ class _Pull:
         )  # fmt: skip
 
 
-def _unloaded(record: Mapping[str, str]) -> bool:
-    """True if a row states no motion under no force: the origin of the readings."""
-    cells = [record.get(name, "").strip() for name in (*FORCE, TENSION, "force_N", *MOVED, "displacement_um")]
-    return any(cells) and set("".join(cells)) <= set("+-.0")
+def _empty(record: Mapping[str, str]) -> bool:
+    """True if a row states no motion under no force, the origin of the readings, or nothing was read."""
+    force, moved = (
+        [record.get(name, "").strip() for name in names]
+        for names in ((*FORCE, TENSION, "force_N"), (*MOVED, "displacement_um"))
+    )
+    unread = all(cell.lower() in ("", *NOT_READ) for cell in moved)
+    return any(force) and (unread or set("".join(force + moved)) <= set("+-.0"))
 
 
 def _component(record: Mapping[str, str], name: str) -> float:

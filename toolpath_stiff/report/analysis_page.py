@@ -114,7 +114,7 @@ OUT_OF_REACH, PLUNGE = 8, 16  # flags beside the motion
 
 
 def _data(analysis: Analysis, rows: IntArray) -> Document:
-    """What the page's script reads of some samples: lengths in mm, angles in degrees, stiffness in N/mm.
+    """Data of some samples for the page's script: lengths in mm, angles in degrees, stiffness in N/mm.
 
     Positions are 16-bit fractions of the path's own box (`frame`: a 1 m box gives 0.015 mm), stiffness and margin of
     their own ranges, NONE where there is none.
@@ -158,7 +158,7 @@ def _data(analysis: Analysis, rows: IntArray) -> Document:
 
 
 def _part(analysis: Analysis, rows: IntArray) -> Document:
-    """The finished part in machine coordinates, its error in um, the page's row of the sample that made each place."""
+    """Finished part in machine coordinates, its error in um, and the page's row of the sample that made each place."""
     from toolpath_stiff.report.surface import error_limit, in_machine, surface_of
 
     assert analysis.cut is not None

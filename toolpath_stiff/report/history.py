@@ -22,7 +22,7 @@ def _row(strut: StrutOverTime) -> tuple[str, ...]:
 
 
 def history_text(history: StrutHistory, undated: bool = False) -> list[str]:
-    """Lines for the terminal; without dates and without both signs of the force only where `undated` are wanted."""
+    """Lines for the terminal; without dates and without both signs of the force, only if `undated` are wanted."""
     if not (undated or any(len(strut.dates) > 1 or strut.sides for strut in history.struts)):
         return []
     scatter = history.scatter_percent

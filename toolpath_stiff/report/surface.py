@@ -67,7 +67,7 @@ def _foot_and_top(cut: Cut, side: int, rows: IntArray) -> tuple[FloatArray, Floa
 
 def _floors(cut: Cut, most: int) -> Quads:
     """Cells of the surface, seen from above, that are not walls."""
-    size = cut.stock.cell * cut.stock.top.shape
+    size = cut.work.stock.cell * cut.work.stock.top.shape
     x, y, top, owner = finished_surface(cut.work, cut.samples, float(np.sqrt(size.prod() / most)))
     corners = [(slice(None, -1), slice(None, -1)), (slice(1, None), slice(None, -1)), (slice(1, None), slice(1, None))]
     corners.append((slice(None, -1), slice(1, None)))

@@ -91,17 +91,14 @@ class SideShift:
             self._shifts = {row: knots for row, knots in shifts.items() if row not in self.refused}
             self._joint = self._joints()
             self._ramp_neighbours()
-            moved = sorted({*self._shifts, *self._joint, *(row - 1 for row in self._joint)})
-            self.courses = {row: self._course(row) for row in moved if self._moves(row)}
+            shifted = {row for row, (_, shift) in self._shifts.items() if shift.any()}
+            moved = sorted(shifted | {row for joint, by in self._joint.items() if by for row in (joint - 1, joint)})
+            self.courses = {row: self._course(row) for row in moved}
             turned = {row for row, course in self.courses.items() if self._turned(row, course)}
             if not turned:
                 break
             near = {other for row in turned for other in (row - 1, row, row + 1) if other in self._shifts}
             self.refused |= dict.fromkeys(near or self._shifts, "it, or its neighbour, is shorter than the shift")
-
-    def _moves(self, row: int) -> bool:
-        shifted = row in self._shifts and bool(self._shifts[row][1].any())
-        return shifted or bool(self._joint.get(row) or self._joint.get(row + 1))
 
     def _left(self, row: int, point: complex) -> complex:
         """Unit vector to the left of the feed of a move at a point of its plan."""

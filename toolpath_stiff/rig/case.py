@@ -24,11 +24,10 @@ from toolpath_stiff.rig.fem_path import path_truth
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, disturb_machine, disturb_readings, readings
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
-from toolpath_stiff.rig.oddities import ODDITIES
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
 from toolpath_stiff.rig.sizes import Scale
 from toolpath_stiff.rig.unknown import Kind
-from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
+from toolpath_stiff.rig.unknowns import ODDITIES, OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
 BUILT = ("springs", "fem")  # ways to build a machine, the first by default

@@ -106,8 +106,6 @@ class Links:
         (vertices, 2) m/N, radial and vertical.
     ends
         Whatever carries the whole load.
-    loose
-        What the vertices give beside `vertices`, (n, vertices, 2) m/N, from strut forces (n, 6) N.
     """
 
     struts: FloatArray
@@ -116,7 +114,6 @@ class Links:
     bars: float
     vertices: FloatArray
     ends: tuple[End, ...]
-    loose: Callable[[FloatArray], FloatArray] | None = None
 
     @property
     def count(self) -> int:
@@ -165,9 +162,6 @@ def solved(
     compliance = np.zeros(n)
     for _ in range(SECANT_STEPS):
         give[:, :6] = links.joints(forces)
-        if links.loose is not None:
-            extra = links.vertices + links.loose(forces)
-            give[:, 6 : 6 + links.vertices.size] = extra.reshape(n, -1)
         held = np.ones((n, size))
         held[:, first:] = give > 0.0
         springs = np.zeros((n, size))

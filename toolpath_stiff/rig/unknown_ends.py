@@ -19,7 +19,6 @@ HALF_SPAN = 0.4  # m, half the distance of a bed's feet (assumed)
 FLOOR = -0.3  # m, height about which a bed rocks that stands on a weak floor (assumed)
 SUPPORTS = 0.35  # m, radius of the circle of a table's three bearings (assumed)
 SOFTENING = 1.5  # K over which a damping plate takes up its softness (assumed; the rig's shop warms by as much)
-HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
 
 # A spring between tool and work in base axes may sit in the frame as well as under the table: `BASE`. Temperature
 # follows the clock of the campaign, so order and time may stand for it. What turns about an axis has one constant
@@ -28,6 +27,25 @@ HOSE_LOAD = 500.0  # N, load at which a hose's pull is quoted
 BASE = "table,frame"
 AZIMUTH = uniform("azimuth", 0.0, 2.0 * np.pi)
 HOLDS = drawn(uniform("holds", 800.0, 2500.0), lambda *_: {"setup": "riser"})
+
+
+@act(BASE, "y", SOFT)
+def cracked_bed(links: Links, state: CommandedRows, u: Unknown) -> Links:
+    """The workpiece side gives way where y is positive only."""
+    give = np.where(state.rows.position[:, 1] > 0.0, u.size, 0.0)
+    return links.with_ends((X, give), (Y, give))
+
+
+@act(BASE, "y", SOFT)
+def saddle_overhang(links: Links, state: CommandedRows, u: Unknown) -> Links:
+    """The workpiece side gives way along X, growing with the square of y."""
+    return links.with_ends((X, u.size * (state.rows.position[:, 1] / REACH) ** 2))
+
+
+@read("instrument", "x", 0.5, shape=signed)
+def cable_drag(rows: Rows, u: Unknown) -> FloatArray:
+    """A cable pulls along X in proportion to x, and the gauge reads it."""
+    return np.asarray(1.0 + u.size * rows.position[:, 0] / REACH * np.abs(rows.direction[:, 0]))
 
 
 @act(BASE, "x", SOFT)
@@ -120,13 +138,6 @@ def load_cell_hysteresis(rows: Rows, u: Unknown) -> FloatArray:
     anew = np.concatenate([[True], rows.time[1:] <= rows.time[:-1]])
     drop = np.where(anew, 0.0, np.maximum(before - rows.force, 0.0))
     return np.asarray(1.0 + u.size * drop / max(float(rows.force.max()), 1.0))
-
-
-@read("instrument", "y,load", 0.6, shape=signed, columns="force_N")
-def hose_pull(rows: Rows, u: Unknown) -> FloatArray:
-    """A hose pulls along Y the more, the further it is drawn out in y: it counts most where the load is small."""
-    pull = u.size * rows.position[:, 1] / REACH * HOSE_LOAD / rows.force
-    return np.asarray(1.0 + pull * np.abs(rows.direction[:, 1]))
 
 
 @read("instrument", "tilt", 12.0)

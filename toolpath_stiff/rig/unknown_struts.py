@@ -6,14 +6,13 @@ from functools import partial
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.draws import drawn, one_strut, side, uniform, whole
+from toolpath_stiff.rig.draws import drawn, one_strut, side, uniform
 from toolpath_stiff.rig.structure import Links
 from toolpath_stiff.rig.unknown import ALL, ONE, SOFT, CommandedRows, Kind, Unknown, beyond, kind, opened
 
 STRUT_KINDS: dict[str, Kind] = {}
 act = partial(kind, STRUT_KINDS, "act")
 
-SWING = np.sin(np.radians(20.0)) ** 2  # squared sine of the swing at which compliances are quoted
 SLIP_LOAD = 300.0  # N, load at which a sticking joint carries half of what it does at rest (assumed)
 LEAST_FORCE = 0.1  # N, below which a secant compliance is held
 PRELOAD_GROWS = 0.3  # of the campaign, time constant of a machine that warms up (assumed)
@@ -29,10 +28,11 @@ def _coupled(links: Links, shares: FloatArray, compliance: float) -> Links:
     return dataclasses.replace(links, struts=np.asarray(np.linalg.inv(flexibility), dtype=np.float64))
 
 
-@act(ALL, "tilt,radius,strut length,z", SOFT)
-def joint_swing(links: Links, state: CommandedRows, u: Unknown) -> Links:
-    """The forks of the platform joints bend the more, the further they swing out: c = c0 sin^2."""
-    return links.with_joints(u.size * state.swing / SWING)
+@act("joints,struts,platform", "load", 6e6, columns="force_N")
+def joint_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
+    """Sticking joints that slip: rotational secant stiffness m0 F0 / (F0 + F), Masing's element smeared out."""
+    held = SLIP_LOAD / (SLIP_LOAD + state.rows.force)
+    return dataclasses.replace(links, moment=links.moment + u.size * held[:, None] * np.ones(6))
 
 
 @act(ALL, "constant,tilt,radius,strut length", SOFT)
@@ -43,13 +43,6 @@ def cardan_fork(links: Links, state: CommandedRows, u: Unknown) -> Links:
     radial = joints - np.einsum("nki,ni->nk", joints, axis)[:, :, None] * axis[:, None, :]
     pin = radial / np.linalg.norm(radial, axis=2, keepdims=True)
     return links.with_joints(u.size * np.einsum("nki,nki->nk", state.units, pin) ** 2)
-
-
-@act("joints,struts,platform", "load", 6e6, columns="force_N")
-def joint_slip(links: Links, state: CommandedRows, u: Unknown) -> Links:
-    """Sticking joints that slip: rotational secant stiffness m0 F0 / (F0 + F), Masing's element smeared out."""
-    held = SLIP_LOAD / (SLIP_LOAD + state.rows.force)
-    return dataclasses.replace(links, moment=links.moment + u.size * held[:, None] * np.ones(6))
 
 
 @act(ONE, "strut force,load", 50e-6, shape=one_strut, columns="force_N")
@@ -108,31 +101,3 @@ def strut_heating(links: Links, state: CommandedRows, u: Unknown) -> Links:
 def warm_up_preload(links: Links, state: CommandedRows, u: Unknown) -> Links:
     """Joints gain their preload as the machine warms up: c = c0 exp(-t / tau) over the campaign."""
     return links.with_joints(u.size * np.exp(-state.rows.elapsed / PRELOAD_GROWS)[:, None] * np.ones(6))
-
-
-@act("frame", "constant", SOFT, shape=whole("vertex", 0, 3))
-def frame_oval(links: Links, state: CommandedRows, u: Unknown) -> Links:
-    """The frame's ring goes oval: the radial loads of two posts act against each other, c (R1 - R2)^2."""
-    vertices = state.nominal.vertices
-    side = np.where(vertices == u.shape["vertex"], 1.0, np.where(vertices == (u.shape["vertex"] + 1) % 3, -1.0, 0.0))
-    outward = state.place.frame_joints * np.array([1.0, 1.0, 0.0])
-    outward /= np.linalg.norm(outward, axis=2, keepdims=True)
-    return _coupled(links, np.einsum("nki,nki->nk", state.units, outward) * side, u.size)
-
-
-# The second or third post: loads along +X, +Y and +Z never pull the first one of the paper's machine down.
-@act("frame", "force sign,direction", SOFT, shape=whole("vertex", 1, 3))
-def loose_vertex_bolt(links: Links, state: CommandedRows, u: Unknown) -> Links:
-    """A bolt of one post is loose: pulled down the post gives, a third as much outwards; pressed it sits."""
-    vertex = u.shape["vertex"]
-    mine = state.nominal.vertices == vertex
-    down = state.units[:, :, 2] * mine
-
-    def loose(forces: FloatArray) -> FloatArray:
-        # A strut in tension pulls its vertex towards the platform, along the strut.
-        pulled = opened(-np.einsum("nk,nk->n", forces, down))
-        give = np.zeros((len(forces), *links.vertices.shape))
-        give[:, vertex, 0], give[:, vertex, 1] = u.size * pulled / 3.0, u.size * pulled
-        return give
-
-    return dataclasses.replace(links, loose=loose)

@@ -12,7 +12,7 @@ OWN = ("studio/scene.js", "studio/panels.js", "studio/studio.js")
 
 
 def page() -> str:
-    """The live page; it holds no state and no token."""
+    """The live page, without any state or token."""
     return _page("toolpath_stiff studio", connect="connect-src 'self'; ")
 
 

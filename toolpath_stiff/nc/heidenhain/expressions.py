@@ -81,16 +81,8 @@ class Formula(Scanner):
     literal: ClassVar = re.compile(NUMBER)
     operator: ClassVar = re.compile(r"DIV|LEN|ANG|[-+*/^]")
     name: ClassVar = re.compile(rf"{PARAMETER.pattern}|[A-Z]+")
-    ranks: ClassVar[Mapping[str, int]] = {
-        "+": 1,
-        "-": 1,
-        "*": 2,
-        "/": 2,
-        "DIV": 2,
-        "^": 3,
-        "LEN": 1,
-        "ANG": 1,
-    }  # how tightly an operator binds
+    # How tightly an operator binds.
+    ranks: ClassVar[Mapping[str, int]] = {"+": 1, "-": 1, "LEN": 1, "ANG": 1, "*": 2, "/": 2, "DIV": 2, "^": 3}
     operations: ClassVar[Mapping[str, Callable[[float, float], float]]] = {
         **ARITHMETIC, "DIV": truediv, "^": math.pow, "LEN": math.hypot,
         "ANG": lambda a, b: trimmed(math.degrees(math.atan2(a, b)) % 360.0),

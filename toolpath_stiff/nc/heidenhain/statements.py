@@ -32,7 +32,7 @@ _WORD = re.compile(
     rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
     r"|([XYZABCUVW])(?![A-Z])"
     rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"|[FRM](?![A-Z\d])"
-    r"|\([^)]*\)?|(\S)",  # a remark, as simulators write it; anything else that is no word
+    r"|\([^)]*\)?|(\S)"  # a remark, as simulators write it; anything else that is no word
 )
 _LABEL = re.compile(r'\s*/?\s*(?:N?\d+\s+)?/?\s*LBL\s*(?:0*(\d+)|"([^"]*)")\s*$')
 PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
