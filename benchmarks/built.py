@@ -15,17 +15,14 @@ import argparse
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from statistics import fmean, median
 
 from benchmarks.bars import Figure, Record, middle_of, share
-from benchmarks.built_cases import BUILT, GROUPS, JUDGED, SERIES, links_of_effects, make_jobs, run
+from benchmarks.built_cases import BUILT, GROUPS, JUDGED, SERIES, diagnosed, links_of_effects, make_jobs
 from benchmarks.case_loop import document, run_benchmark, sound
 from benchmarks.pages import table
 
 FIRST_SEED = 91_000_000
-RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_built.jsonl"
-OUT = Path(__file__).parent / "built.md"
 SMALL, RISE = 3.0, 0.3  # % left that `adequate` may leave; points by which an update may raise an error
 ABOVE_FLOOR = 1.2  # of the median error of sound machines as they are: what scatter of their parts leaves
 COUNTS = {"sound": 50, "single": 70, "pair": 30, "outside": 70, "known": 60, "draft": 16}
@@ -174,9 +171,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for group, count in COUNTS.items():
         parser.add_argument(f"--{group}", type=int, default=count, help=f"cases of each build (default: {count})")
     return run_benchmark(
-        parser, arguments, lambda args: make_jobs(args.first_seed, vars(args), args.built), run, report,
-        records=RECORDS, out=OUT,
-    )  # fmt: skip
+        parser, arguments, lambda args: make_jobs(args.first_seed, vars(args), args.built), diagnosed, report
+    )
 
 
 if __name__ == "__main__":

@@ -2,8 +2,8 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from functools import cache, partial
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,12 @@ import numpy as np
 
 import toolpath_stiff as tps
 from benchmarks.bars import Record
-from benchmarks.case_loop import record_of
-from benchmarks.diagnosis_cases import kinds_of
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.planning.result import plan_csv
 from toolpath_stiff.rig import case as rig
 from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, Table, campaign
 from toolpath_stiff.rig.effects import CATALOGUE
-from toolpath_stiff.rig.exercise import csv_text, read_plan
+from toolpath_stiff.rig.exercise import NUMBERS, TEXTS, csv_text, read_plan
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.fem_path import path_truth
 from toolpath_stiff.rig.nominal import load_nominal
@@ -50,7 +48,7 @@ def make_jobs(first_seed: int, counts: Mapping[str, int], built: Sequence[str]) 
     """So many cases of each group on each build, the kinds in turn; a case's seed is that of no other."""
     jobs = []
     for number, way in enumerate(built):
-        named, outside = kinds_of(way)
+        named, _, outside = rig.hideable({*NUMBERS, *TEXTS}, fem=way == "fem")  # all columns of a tilted campaign
         rng = np.random.default_rng([first_seed, number])
         for place, group in enumerate(GROUPS):
             kinds = rng.permutation(outside if group in ("outside", "draft") else named).tolist()
@@ -82,12 +80,8 @@ def small_campaign(seed: int) -> Table:
     }  # fmt: skip
 
 
-def run(job: Job) -> Record:
-    """The record of a case; with `error`, the traceback, where it failed."""
-    return record_of(asdict(job), partial(_judged, job))
-
-
-def _judged(job: Job, folder: Path) -> Record:
+def diagnosed(job: Job, folder: Path) -> Record:
+    """What is made of a case, beside the truth."""
     if job.group == "draft":
         return drafted(job, folder)
     plan = small_campaign(job.seed)

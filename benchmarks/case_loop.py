@@ -8,6 +8,7 @@ import tempfile
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from functools import partial
 from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
@@ -16,51 +17,51 @@ from benchmarks.bars import Figure, Record, bars_table, summary
 from benchmarks.pages import write_page
 from toolpath_stiff.rig.case import BUILT
 
+HERE = Path(__file__).parent
+
 
 def run_benchmark(
     parser: argparse.ArgumentParser,
     arguments: Sequence[str] | None,
     make_jobs: Callable[[argparse.Namespace], Sequence[Any]],
-    run: Callable[[Any], Record],
+    diagnosed: Callable[[Any, Path], Record],
     report: Callable[[Sequence[Record], str], tuple[str, bool]],
-    *,
-    records: Path,
-    out: Path | None = None,
 ) -> int:
     """The exit code of a benchmark on blind cases, 1 if a bar is not cleared; its page is printed and written.
 
-    `make_jobs` makes the cases that the options say, `run` the record of a case, `report` the page of all records and
-    of the command, and whether all bars are cleared. `records` and `out` are the usual files for them.
+    `make_jobs` makes the cases that the options say, `diagnosed` is that of `record_of`, `report` the page of all
+    records and of the command, and whether all bars are cleared.
     """
+    name = parser.prog.rpartition(".")[2]
+    records, page = HERE.parent / "reports" / f"benchmark_{name}.jsonl", HERE / f"{name}.md"
     if "--built" not in parser.format_usage():
         parser.add_argument("--built", choices=BUILT, default=BUILT[0], help=f"machines (default: {BUILT[0]})")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
     parser.add_argument("--records", type=Path, default=records, help="JSON lines, one a case")
     parser.add_argument("--resume", action="store_true", help="keep the cases that --records holds")
     parser.add_argument("--table-only", action="store_true", help="print the tables from --records again")
-    parser.add_argument("--out", type=Path, default=out, help="markdown file to write")
+    parser.add_argument("--out", type=Path, default=page, help="markdown file to write")
     args = parser.parse_args(arguments)
     if not args.table_only:
-        run_cases(make_jobs(args), run, args.jobs, args.records, resume=args.resume)
+        run_cases(make_jobs(args), diagnosed, args.jobs, args.records, resume=args.resume)
     made = [json.loads(line) for line in args.records.read_text(encoding="utf-8").splitlines()]
     text, cleared = report(made, f"{parser.prog} {shlex.join(sys.argv[1:] if arguments is None else arguments)}")
     print(text)
-    if args.out:
-        write_page(args.out, text, of_records=args.table_only)
+    write_page(args.out, text, of_records=args.table_only)
     return 0 if cleared else 1
 
 
-def record_of(heading: Record, work: Callable[[Path], Record]) -> Record:
-    """The heading of a case and what work in a folder of its own says; with `error`, the traceback, where it failed."""
+def record_of(diagnosed: Callable[[Any, Path], Record], job: Any) -> Record:
+    """A case and what became of it in a folder of its own; with `error`, the traceback, where it failed."""
     try:
         with tempfile.TemporaryDirectory() as folder:
-            return heading | work(Path(folder))
+            return asdict(job) | diagnosed(job, Path(folder))
     except Exception:  # a case that breaks must be counted, not end the run
-        return heading | {"error": traceback.format_exc()}
+        return asdict(job) | {"error": traceback.format_exc()}
 
 
 def run_cases(
-    jobs: Sequence[Any], run: Callable[[Any], Record], workers: int, into: Path, *, resume: bool = False
+    jobs: Sequence[Any], diagnosed: Callable[[Any, Path], Record], workers: int, into: Path, *, resume: bool = False
 ) -> None:
     """Each record is written as it comes, a line of JSON; `resume` keeps those there of cases that did not break."""
     into.parent.mkdir(parents=True, exist_ok=True)
@@ -69,7 +70,7 @@ def run_cases(
     jobs = [job for job in jobs if not any(asdict(job).items() <= record.items() for record in records)]
     with into.open("w", encoding="utf-8") as stream, Pool(workers) as pool:
         stream.writelines(json.dumps(record) + "\n" for record in records)
-        for count, record in enumerate(pool.imap_unordered(run, jobs, chunksize=1), 1):
+        for count, record in enumerate(pool.imap_unordered(partial(record_of, diagnosed), jobs, chunksize=1), 1):
             stream.write(json.dumps(record) + "\n")
             stream.flush()
             if count % 10 == 0 or count == len(jobs):

@@ -1,4 +1,4 @@
-"""Blind cases of the benchmarks: what the rig can hide, and a diagnosis as a record."""
+"""Blind cases of the benchmarks: a diagnosis as a record, a large campaign."""
 
 import time
 from collections.abc import Sequence
@@ -13,15 +13,6 @@ from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.rig import case as case_module
 from toolpath_stiff.rig import exercise
-from toolpath_stiff.rig.exercise import NUMBERS, TEXTS
-
-COLUMNS = {*NUMBERS, *TEXTS}  # of a tilted campaign
-
-
-def kinds_of(built: str) -> tuple[list[str], list[str]]:
-    """What can be hidden in and outside the catalogue, so that a tilted campaign shows it."""
-    inside, _, outside = case_module.hideable(COLUMNS, fem=built == "fem")
-    return inside, outside
 
 
 def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: Any) -> tuple[dict[str, Any], Document]:
@@ -32,14 +23,13 @@ def judged(rows: dict[str, Any], truth: dict[str, Any], folder: Path, **stated: 
     start = time.process_time()
     diagnosis = diagnose(machine, read_measurements(file, machine), **stated)
     found = diagnosis.to_dict()
-    cpu = time.process_time() - start
     record = {
         "truth": right_names(truth, found["plausible"]),
         "kind": truth["kind"],
         "effects": truth["effects"],
         "verdict": found["verdict"],
         "plausible": found["plausible"],
-        "cpu": round(cpu, 2),
+        "cpu": round(time.process_time() - start, 2),
     }
     return record, found
 

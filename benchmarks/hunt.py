@@ -16,13 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.conformance import LINUXCNC
 from benchmarks.hunt_compensation import Beside, Tolerances
 from benchmarks.hunt_programs import Harsh, Parametric, Zeros
 from benchmarks.pages import page_parser, table, tell
 from tests.nc import rs274
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.nc.codes.code import code_name
-from toolpath_stiff.nc.controller import DIALECTS, UNKNOWN_CONTROL, Controller
+from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.lines import split_lines
 from toolpath_stiff.nc.linuxcnc.reader import fenced
 from toolpath_stiff.nc.moves import MOTION_NAMES, ReadProgram
@@ -196,7 +197,6 @@ def page(counts: Counter[str], programs: int, seed: int) -> str:
 
 
 KINDS = (Harsh, Zeros, Harsh, Parametric, Beside, Tolerances)
-LINUXCNC = Controller(DIALECTS["linuxcnc"])
 
 
 def program_of(seed: int) -> str:

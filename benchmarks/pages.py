@@ -35,18 +35,13 @@ def bar(clears: bool, text: str) -> str:
     return text if clears else f"{text}: NOT CLEARED"
 
 
-def write_page(file: str | Path, text: str, *, of_records: bool = False) -> None:
-    """Write a page, with a last line on the run that made it.
+def mark(passed: bool) -> str:
+    """Whether a bar is cleared, in a cell of its own."""
+    return "pass" if passed else "**FAIL**"
 
-    Parameters
-    ----------
-    file
-        The page.
-    text
-        What it holds, in markdown.
-    of_records
-        Whether it tabulates the records of an earlier run.
-    """
+
+def write_page(file: str | Path, text: str, *, of_records: bool = False) -> None:
+    """Write a page, with a last line on the run that made it; `of_records`: it tabulates those of an earlier run."""
     what = "Tabulated anew from an earlier run's records" if of_records else "Run"
     day, name = STARTED
     write_atomically(file, f"{text.rstrip()}\n\n{what} on {day}, commit {name}.\n")

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.pages import page_parser, table, tell
+from benchmarks.pages import mark, page_parser, table, tell
 from toolpath_stiff.analysis.loads import parse_load
 from toolpath_stiff.errors import UnreachableError
 from toolpath_stiff.machine.file import load_machine
@@ -91,7 +91,7 @@ def kept(program: ReadProgram) -> tuple[Row, bool]:
     samples = found.best.samples
     rapids = int((~samples.cutting & ~found.best.at.reachable).sum())
     if before is None:
-        return (program.name, "out of reach", "", "", rapids, "said", _verdict(not rapids)), not rapids
+        return (program.name, "out of reach", "", "", rapids, "said", mark(not rapids)), not rapids
     change = [
         100.0 * (getattr(now, key) / getattr(before, key) - 1.0)
         for key in ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm")
@@ -99,12 +99,8 @@ def kept(program: ReadProgram) -> tuple[Row, bool]:
     worse = change[0] < -1e-7 or change[1] > 1e-7 or change[2] < -1e-7
     said = bool(found.worse) and found.warnings[0].startswith("WORSE")
     passed = (not worse or said) and rapids == 0
-    cells = (*(f"{value:+.2f}" for value in change), rapids, "said" if said else "-", _verdict(passed))
+    cells = (*(f"{value:+.2f}" for value in change), rapids, "said" if said else "-", mark(passed))
     return (program.name, *cells), passed
-
-
-def _verdict(passed: bool) -> str:
-    return "yes" if passed else "NO"
 
 
 def grid_placements() -> np.ndarray:
@@ -161,7 +157,7 @@ def against_grid(name: str) -> tuple[Row, bool]:
     if name == "pocket.nc":
         passed &= cpu <= CPU_SECONDS
     figures_of_search = (f"{100.0 * by:.3f} %", f"{poses:,}", f"{cpu:.1f}")
-    return (name, len(path), *figures_of_search, _verdict(passed)), passed
+    return (name, len(path), *figures_of_search, mark(passed)), passed
 
 
 def ends(program: ReadProgram) -> tuple[Row, bool]:
@@ -185,7 +181,7 @@ def ends(program: ReadProgram) -> tuple[Row, bool]:
         best = n_per_mm_from_n_per_m(float(values.max()))
         short.append((best - ours) / abs(best) if np.isfinite(best) else 0.0)
     passed = max(short) <= SHORT_OF_END
-    return (program.name, *(f"{100.0 * value:.2f}" for value in short), len(front), _verdict(passed)), passed
+    return (program.name, *(f"{100.0 * value:.2f}" for value in short), len(front), mark(passed)), passed
 
 
 def main() -> int:

@@ -14,14 +14,13 @@ from pathlib import Path
 
 import toolpath_stiff as tps
 from benchmarks.bars import Record, share
-from benchmarks.case_loop import document, record_of, run_benchmark, sound
+from benchmarks.case_loop import document, run_benchmark, sound
 from benchmarks.pages import table
 from toolpath_stiff.rig.exercise import csv_text
 from toolpath_stiff.rig.robot import FAULTS, robot_case
 from toolpath_stiff.rig.sizes import DETECTABLE
 
 FIRST_SEED = 92_000_000
-RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_robots.jsonl"
 NOISE = 0.02
 LINKS = {"link 1": "upper arm", "link 2": "forearm"}  # of the rig, as the machine file has them
 WHOLE = {"loose_foot": "foot", "soft_spindle": "spindle"}
@@ -43,23 +42,19 @@ def labels(effect: Record) -> set[str]:
     return {name if name == "spindle_compliance" else f"{name}, {place}" for name in effect["names"]}
 
 
-def run(job: Job) -> Record:
-    """The record of a case."""
-
-    def work(folder: Path) -> Record:
-        text, pulls, truth = robot_case(job.seed, job.hidden, NOISE)
-        (folder / "robot.toml").write_text(text, encoding="utf-8")
-        said = {name: column for name, column in pulls.items() if job.stated or name != "sd_um"}
-        (folder / "pulls.csv").write_text(csv_text(said), encoding="utf-8")
-        verdict = tps.diagnose(folder / "pulls.csv", folder / "robot.toml").to_dict()
-        effect = truth["effects"][0] if truth["effects"] else {"effect": "none", "names": [], "parameters": {}}
-        return {
-            "kind": truth["kind"], "effect": effect["effect"], "part": effect["parameters"].get("element", ""),
-            "right": sorted(labels(effect)), "seen": effect.get("detectability", 0.0), "verdict": verdict["verdict"],
-            "plausible": verdict["plausible"],
-        }  # fmt: skip
-
-    return record_of({"seed": job.seed, "hidden": job.hidden, "stated": job.stated}, work)
+def diagnosed(job: Job, folder: Path) -> Record:
+    """What a diagnosis says, beside the truth."""
+    text, pulls, truth = robot_case(job.seed, job.hidden, NOISE)
+    (folder / "robot.toml").write_text(text, encoding="utf-8")
+    said = {name: column for name, column in pulls.items() if job.stated or name != "sd_um"}
+    (folder / "pulls.csv").write_text(csv_text(said), encoding="utf-8")
+    verdict = tps.diagnose(folder / "pulls.csv", folder / "robot.toml").to_dict()
+    effect = truth["effects"][0] if truth["effects"] else {"effect": "none", "names": [], "parameters": {}}
+    return {
+        "kind": truth["kind"], "effect": effect["effect"], "part": effect["parameters"].get("element", ""),
+        "right": sorted(labels(effect)), "seen": effect.get("detectability", 0.0), "verdict": verdict["verdict"],
+        "plausible": verdict["plausible"],
+    }  # fmt: skip
 
 
 def named(record: Record) -> bool:
@@ -101,13 +96,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
     parser.add_argument("--cases", type=int, default=200, help="default: 200")
     parser.add_argument("--hidden", choices=("none", "one", "outside", *FAULTS), help="drawn unless given")
-
     parser.add_argument("--unstated", action="store_true", help="without the column that says how readings scatter")
-
-    def jobs(args: argparse.Namespace) -> list[Job]:
-        return [Job(args.first_seed + k, args.hidden, not args.unstated) for k in range(args.cases)]
-
-    return run_benchmark(parser, arguments, jobs, run, report, records=RECORDS)
+    return run_benchmark(
+        parser, arguments,
+        lambda args: [Job(args.first_seed + k, args.hidden, not args.unstated) for k in range(args.cases)],
+        diagnosed, report,
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -9,17 +9,14 @@ import argparse
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
 
 from benchmarks.bars import Record
 from benchmarks.case_loop import document, run_benchmark, sound
 from benchmarks.pages import table
 from benchmarks.spoiled_bars import false_name, figures, named_rows, slip_found, slip_visible
-from benchmarks.spoiled_cases import GROUPS, Job, make_jobs, run
+from benchmarks.spoiled_cases import GROUPS, diagnosed, make_jobs
 
 FIRST_SEED = 52_000_000  # chosen once, before the first run
-RECORDS = Path(__file__).parent.parent / "reports" / "benchmark_spoiled.jsonl"
-OUT = Path(__file__).parent / "spoiled.md"
 
 
 def slips_table(records: Sequence[Record]) -> list[str]:
@@ -72,11 +69,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )  # fmt: skip
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"default: {FIRST_SEED}")
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS, metavar="GROUP", help=", ".join(GROUPS))
-
-    def make(args: argparse.Namespace) -> list[Job]:
-        return make_jobs(args.first_seed, args.cases, args.only, args.built)
-
-    return run_benchmark(parser, arguments, make, run, report, records=RECORDS, out=OUT)
+    return run_benchmark(
+        parser, arguments, lambda args: make_jobs(args.first_seed, args.cases, args.only, args.built), diagnosed, report
+    )
 
 
 if __name__ == "__main__":

@@ -3,11 +3,10 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.case_loop import record_of
 from benchmarks.diagnosis_cases import judged
 from tests.rig.slips import SLIPS, slipped_case, with_stated_noise
 from toolpath_stiff.errors import InputError, InputErrors
@@ -64,12 +63,7 @@ def make_jobs(first_seed: int, cases: int, groups: Sequence[str] = GROUPS, built
     return [replace(job, built=built) for job in jobs if job.group in groups]
 
 
-def run(job: Job) -> dict[str, Any]:
-    """The record of a case; with `error`, the traceback, where it failed."""
-    return record_of(asdict(job), lambda folder: _diagnosed(job, folder))
-
-
-def _diagnosed(job: Job, folder: Path) -> dict[str, Any]:
+def diagnosed(job: Job, folder: Path) -> dict[str, Any]:
     """Draw, disturb, diagnose, and what the document says of noise and rows."""
     nuisances = Nuisances(outliers=job.outliers)
     size = PAIR_SIZES if job.hidden == "two" else None

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks import built
-from benchmarks.built_cases import GROUPS, make_jobs, run, small_campaign
-from benchmarks.case_loop import run_cases
+from benchmarks.built_cases import GROUPS, diagnosed, make_jobs, small_campaign
+from benchmarks.case_loop import record_of, run_cases
 from benchmarks.pages import write_page
 
 TABLE = {"hidden": "floor_tilts", "names": [], "links": ["frame", "table"], "size": 0.1}
@@ -76,7 +77,7 @@ def test_jobs_have_seeds_of_their_own_and_turn_through_the_kinds():
 
 def test_a_run_goes_on_where_it_was_stopped(tmp_path):
     jobs = make_jobs(2000, {**dict.fromkeys(GROUPS, 0), "sound": 1}, ["fem", "springs"])
-    first = run(jobs[0])
+    first = record_of(diagnosed, jobs[0])
     assert "error" not in first, first["error"]
     assert {"before", "after", "verdict", "readings", "cpu"} <= first.keys()
     file = tmp_path / "records.jsonl"
@@ -84,14 +85,14 @@ def test_a_run_goes_on_where_it_was_stopped(tmp_path):
     file.write_text(f"{json.dumps(first)}\n{json.dumps(broken)}\n")
     run_cases(jobs, _kept, 1, file, resume=True)
     records = [json.loads(line) for line in file.read_text().splitlines()]
-    assert records == [first, {"seed": jobs[1].seed}]
+    assert records == [first, asdict(jobs[1]) | {"kept": True}]
     text, _ = built.report([first], "command")
     assert "| fem | sound: called ill |" in text
     assert "springs |" not in text
 
 
-def _kept(job):
-    return {"seed": job.seed}
+def _kept(job, folder):
+    return {"kept": folder.is_dir()}
 
 
 def test_every_page_names_the_day_and_the_commit_of_its_run(tmp_path):
@@ -107,7 +108,7 @@ def test_every_page_names_the_day_and_the_commit_of_its_run(tmp_path):
 
 def test_a_draft_is_put_to_readings_that_it_has_not_seen(tmp_path):
     job = make_jobs(8_840_000, {**dict.fromkeys(GROUPS, 0), "draft": 1}, ["springs"])[0]
-    record = run(job)
+    record = record_of(diagnosed, job)
     assert "error" not in record, record["error"]
     assert ("same" in record) == ("gone" in record) == bool(record["drafted"])
     draft = {"built": "springs", "group": "draft", "seed": 1, "drafted": ["missing"], "same": True, "gone": True}

@@ -38,6 +38,7 @@ void rtapi_print_msg(int level, const char *format, ...) {}
 PIN(hal_pin_float_newf)
 PIN(hal_pin_s32_newf)
 PIN(hal_pin_u32_newf)
+PIN(hal_pin_bit_newf)
 int hal_param_float_newf(int way, double *value, int id, const char *format, ...) {
     va_list names; va_start(names, format); keep(format, names, value); va_end(names); return 0; }
 int hal_pin_bit_new(const char *name, int way, void **pin, int id) { *pin = calloc(1, 8); return 0; }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import toolpath_stiff as tps
 from tests.machine.linuxcnc_kinematics import Module
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.chain import STILL
 from toolpath_stiff.machine.chain_search import all_solutions
 from toolpath_stiff.machine.file import load_machine, parse_machine
+from toolpath_stiff.machine.kinematics import forward_kinematics, solve_struts
 from toolpath_stiff.machine.limits import machine_limits
 from toolpath_stiff.rotations import roll_pitch_yaw, rotation_matrices
 
@@ -204,6 +207,21 @@ def test_the_delta_is_lineardeltakins(folder):
     near(1e3 * joints, [module.inverse(p + height, 3) for p in pose])
     position, _ = machine.forward(joints)
     near(1e3 * position, [(module.forward(j) - height)[:3] for j in 1e3 * joints])
+
+
+def test_hexapods_are_genhexkins(folder):
+    hal = (Path(__file__).parents[2] / "programs/hexapod.hal").read_text()
+    machine = parse_machine(tps.machine_from_linuxcnc(Path(__file__).parents[2] / "programs/hexapod.hal", "mm").text)
+    pins = {f"genhexkins.{pin}": float(value) for pin, value in re.findall(r"setp genhexkins\.(\S+)\s+(\S+)", hal)}
+    module = Module("genhexkins", pins, folder)
+    pose = np.random.default_rng(5).uniform(-1.0, 1.0, (200, 6)) * [60, 60, 60, 10, 10, 10]
+    pose[:, 2] += 1e3 * machine.default_origin[2]
+    lengths = solve_struts(machine, pose[:, :3] / 1e3, rotation_matrices(np.deg2rad(pose[:, 3:]))).lengths
+    near(1e3 * lengths, [module.inverse(p, 6) for p in pose])
+    found = forward_kinematics(machine, lengths) * np.repeat([1e3, 180.0 / np.pi], 3)
+    with suppress(AssertionError):
+        module.forward(1e3 * lengths[0], pose[0])  # its first call says no, whatever it is given
+    near(found, [module.forward(length, p) for length, p in zip(1e3 * lengths, pose + 0.5, strict=True)])
 
 
 def test_rotarydeltakins(folder):

@@ -16,7 +16,7 @@ from toolpath_stiff.cli.main import main
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig import beams, fem, fem_parts
 from toolpath_stiff.rig.case import draw_case
-from toolpath_stiff.rig.effects import at_strength, draw_shape, with_effect
+from toolpath_stiff.rig.effects import with_effect
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.fem_path import pulled, reference_rows
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
@@ -225,9 +225,9 @@ def test_indicators_beside_the_tip_add_up():
 @pytest.mark.parametrize("name", FAULTS)
 def test_each_fault_changes_what_its_link_says(name):
     """An instrument's fault changes readings alone; another the stiffness itself, and grows with its size."""
-    fault, shape = FAULTS[name], draw_shape(name, np.random.default_rng(3), 3, ["riser"])
+    fault, shape = FAULTS[name], FAULTS[name].shape(np.random.default_rng(3), 3, ["riser"])
     assert fault.names <= set(tps.effects().to_frame()["name"])
-    machines = [with_effect(SOUND, name, at_strength(name, shape, strength)) for strength in (0.02, 0.2)]
+    machines = [with_effect(SOUND, name, fault.grown(strength, shape)) for strength in (0.02, 0.2)]
     true, shown = ([np.log(f(m) / f(SOUND)) for m in machines] for f in (
         lambda m: m.stiffness(NIST, COMPLETE), lambda m: readings(NIST, m, COMPLETE)
     ))  # fmt: skip
@@ -271,7 +271,8 @@ def test_an_exercise_on_elements_is_made_measured_and_opened(tmp_path, capsys):
     assert main(["rig", "measure", folder, "--at", str(plan), "--out", str(tmp_path / "more.csv")]) == 0
     assert len((tmp_path / "more.csv").read_text().splitlines()) == 3
     capsys.readouterr()
-    for claim, verdict in (("table_compliance", "right"), ("outside", "wrong"), ("frame_compliance", "wrong")):
+    claims = {"table_compliance": "right", "outside": "wrong", "frame_compliance": "wrong", "frame_sway": "wrong"}
+    for claim, verdict in claims.items():
         assert main(["rig", "reveal", folder, "--claim", claim, "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["verdict"] == verdict
     assert main(["rig", "reveal", folder, "--claim", "table_compliance"]) == 0

@@ -15,12 +15,18 @@ from toolpath_stiff.rig.exercise import score, seal, unseal
 from toolpath_stiff.rig.hidden import HiddenMachine, readings
 from toolpath_stiff.rig.kinematics import commanded_lengths, rotations
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.unknown import LINKS, VARIABLES, Unknown
+from toolpath_stiff.rig.unknown import Unknown
 from toolpath_stiff.rig.unknowns import OUTSIDE, UNKNOWNS
 
 FEW = rows_at([[100, -200, 800], [-150, 260, 1100]], [[10, -15, 20], [0, 12, -5]])
 FEW = dataclasses.replace(FEW, setup=np.array(["riser"] * 3 + ["table"] * 3), temperature=np.full(6, 21.0))
 SHAPES = {name: kind.shape(np.random.default_rng(1)) for name, kind in UNKNOWNS.items()}
+# Words of a description.
+LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
+VARIABLES = (
+    *("constant", "x", "y", "z", "radius", "tilt", "strut length", "strut force", "force sign"),
+    *("load", "time", "order", "setup", "temperature", "direction"),
+)
 STIFFENS = ("joint_slip",)
 GEOMETRY = ("screw_lead",)  # softer here, stiffer there
 

@@ -36,8 +36,8 @@ DIGITS = 9  # decimals of ln and m on which all processors agree
 def last_step(task: UpdateTask, before: LadderStep) -> tuple[Hexapod | None, LadderStep]:
     """The machine with the likeliest offsets, None where left-out points ask for none, and the last step."""
     geometry, noise = task.problem.scatter.covariance.shared[:GEOMETRY], task.noise_model
-    plain = LadderStep.of(before.name, _fitted(task, before.fit, geometry[:0]), task.data)
-    fit = _fitted(task, before.fit, geometry)
+    plain = LadderStep.of(before.name, fitted_beside(task, before.fit, geometry[:0], before.fit.law_free), task.data)
+    fit = fitted_beside(task, before.fit, geometry, before.fit.law_free)
     pull = fit.scatter.precision.times(geometry)
     likely = pull @ fit.residual
     held = _held_out(fit, geometry, pull, held_out(fit, task.data.point))
@@ -56,15 +56,15 @@ def last_step(task: UpdateTask, before: LadderStep) -> tuple[Hexapod | None, Lad
     return machine, LadderStep.of(AS_BUILT, replace(fit, residual=residual), task.data, held)
 
 
-def _fitted(task: UpdateTask, fit: Fit, shared: FloatArray) -> Fit:
-    """Law and sizes anew beside no other offsets of all readings than those (k, n), the first of the fit's own.
+def fitted_beside(task: UpdateTask, fit: Fit, shared: FloatArray, law_free: bool) -> Fit:
+    """Law and sizes anew beside no other offsets of all readings than those (k, n), the first of the noise model's.
 
     How well they are known the others count for all the same.
     """
-    covariance, others = replace(fit.scatter.covariance, shared=shared), fit.scatter.covariance.shared[len(shared) :]
+    covariance, others = replace(fit.scatter.covariance, shared=shared), task.problem.scatter.covariance.shared
     bare = replace(fit, scatter=replace(fit.scatter, covariance=covariance))
-    refitted = refine(task.problem, bare, fit.law_free)
-    moved = refitted.covariance @ refitted.scatter.precision.times(refitted.jacobian.T) @ others.T
+    refitted = refine(task.problem, bare, law_free)
+    moved = refitted.covariance @ refitted.scatter.precision.times(refitted.jacobian.T) @ others[len(shared) :].T
     return replace(refitted, covariance=refitted.covariance + moved @ moved.T)
 
 

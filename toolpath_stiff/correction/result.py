@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from toolpath_stiff.correction.as_built import fitted_beside
 from toolpath_stiff.correction.machines import fitted_machine
 from toolpath_stiff.correction.steps import LadderStep, Support, dispersion
 from toolpath_stiff.correction.task import UpdateTask
@@ -21,7 +22,6 @@ from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.error_model import error_model
 from toolpath_stiff.inference.errors import LAW_REFITTED, errors_text
 from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.machine.error_model import GEOMETRY, ErrorModel
@@ -146,7 +146,8 @@ class Update(FolderResult):
         A law that stays as given is no better known for it.
         """
         kept, fit = self.changed and self.kept_law is not None, self.last.fit
-        return refine(self.task.problem, fit, kept or fit.law_free) if kept or self.as_built else fit
+        anew = self.task, fit, fit.scatter.covariance.shared, kept or fit.law_free
+        return fitted_beside(*anew) if kept or self.as_built else fit
 
     @property
     def changed(self) -> bool:

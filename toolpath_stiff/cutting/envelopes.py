@@ -18,7 +18,7 @@ from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray
 
 CLEAR = 1e-9  # m, height by which a piece must lie below another to outdo it
 ROUNDED = 1e-12  # m: a contact shallower than this removes nothing, in any frame
-NEWTON = 8  # steps: heights to 1e-9 m
+NEWTON, SETTLED = 12, 1e-9  # steps at most, the last as a share of sin^2 kappa: heights to 1e-9 m
 FLATTEST = 1e-6  # slope; smaller ones change heights by less than a nanometre
 Index = tuple[IntArray, IntArray, IntArray, FloatArray]
 Grid = tuple[FloatArray, float, tuple[int, int]]  # corner (3,) and size of cells, m; cells along y and z
@@ -72,8 +72,11 @@ def down_slope(
         sine = np.sqrt(1.0 - square)
         out, rest = flat + corner * sine, 1.0 - slope * slope * square / (1.0 - square)
         change = out * corner / sine * rest + (out * slope / (1.0 - square)) ** 2
-        square = square + (out * out * rest - beside * beside) / change
-        square = np.minimum(np.maximum(square, 0.0), room / (room + slope * slope))
+        step = square + (out * out * rest - beside * beside) / change
+        step = np.minimum(np.maximum(step, 0.0), room / (room + slope * slope)) - square
+        square = square + step
+        if np.all(np.abs(step) < SETTLED * (1.0 - square)):  # one after the other, where it is compiled
+            break
     return slope * (flat + corner * np.sqrt(1.0 - square)) * np.sqrt(square / (1.0 - square))
 
 

@@ -222,10 +222,6 @@ class CandidateTable:
     def _splines(self) -> dict[float, Callable[[FloatArray], FloatArray]]:
         return {sign: spline(logs, ratio) for sign, (logs, ratio) in self.knots.items()}
 
-    def reach(self, sign: float) -> float:
-        """Largest size tabulated in a direction."""
-        return float(np.exp(self.knots[sign][0][-1]))
-
     def delta(self, sizes: FloatArray) -> FloatArray:
         """(..., n) for sizes (..., p)."""
         size, out = sizes[..., 0], np.asarray(sizes @ self.columns.T)  # linear on a side without knots

@@ -189,32 +189,22 @@ class Predictor:
 
     def strut_part_and_slopes(self, law: ArrayLike = NO_CHANGE) -> tuple[FloatArray, FloatArray]:
         """`strut_part`, and its derivatives (..., 2, n) to the law's logarithms: they add up to minus the part."""
-        first, second = self._law_terms(law)
+        logs, rule = np.asarray(law, dtype=float), self.machine.strut_law
+        first, second = (  # (..., 6, m) N/m: contributions of the law's two constants to each strut
+            constant * np.exp(logs[..., k, None, None]) * self._law_shares[k]
+            for k, constant in enumerate((rule.stiffness_1, rule.stiffness_2))
+        )
         stiffness = first + second
-        energy = self._squared_forces / stiffness
+        energy = np.ascontiguousarray(self._timeless.products.T) / stiffness
         part = energy.sum(axis=-2)
         by_first = (energy * (first / stiffness)).sum(axis=-2)
         which = self._timeless.which
         return part[..., which], -np.stack([by_first, part - by_first], axis=-2)[..., which]
 
-    def _law_terms(self, law: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """(..., 6, m) N/m each: contributions of the law's two constants, scaled by laws (..., 2), to each strut."""
-        logs = np.asarray(law, dtype=float)
-        rule, (first, second) = self.machine.strut_law, self._law_shares
-        return (
-            rule.stiffness_1 * np.exp(logs[..., 0, None, None]) * first,
-            rule.stiffness_2 * np.exp(logs[..., 1, None, None]) * second,
-        )
-
     @cached_property
     def _law_shares(self) -> tuple[FloatArray, FloatArray]:
         """(6, m) shares of the law's two constants in each strut's stiffness, by its length."""
         return self.machine.strut_law.weights(np.ascontiguousarray(self._timeless.path.struts.lengths.T))
-
-    @cached_property
-    def _squared_forces(self) -> FloatArray:
-        """(6, m) squared strut forces per unit load; of loops beside the tip, products of real and virtual ones."""
-        return np.ascontiguousarray(self._timeless.products.T)
 
     @cached_property
     def joint_columns(self) -> FloatArray:

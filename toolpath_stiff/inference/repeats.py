@@ -170,12 +170,11 @@ def scatter_apart(data: Readings, every: Repeats) -> tuple[float | FloatArray, f
             continue
         total = np.exp(logs)
         clamping = np.array([part.clamping for part in known])
-        own_clampings = kind == "in set-up" or every.apart
-        if not own_clampings:
+        if kind == "along" and not every.apart:
             clamping = np.full(len(known), min(every.clamping, float(total.min()) / np.sqrt(2.0)))
         repeat = np.array([np.sqrt(p.total**2 - c**2 * p.clamps) for p, c in zip(known, clamping, strict=True)])
         each = ", ".join(f"{100 * t:.2g} % {kind} {name}" for t, name in zip(total, names, strict=True))
-        return repeat[which], clamping[which] if own_clampings else float(clamping[0]), f"; {each}"
+        return repeat[which], clamping[which] if np.ptp(clamping) > 0.0 else float(clamping[0]), f"; {each}"
     return every.repeat, every.clamping, ""
 
 

@@ -208,7 +208,7 @@ class Placement(FolderResult):
         for figure, key in FIGURES.items() if self.present is not None else ():
             chosen, before = getattr(self.chosen, key), getattr(self.present, key)
             by = chosen - before if figure == "range" else before - chosen
-            if by > ROUNDING * max(chosen, before):
+            if by > ROUNDING * self.present.mean_N_per_mm:
                 values = {"chosen_N_per_mm": chosen, "before_N_per_mm": before, "worse_by_N_per_mm": by}
                 worse.append({"figure": figure, **values})
         return worse

@@ -9,7 +9,7 @@ so that the scatter is known; random order, so that a drift looks like nothing e
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -86,13 +86,7 @@ class Campaign:
     @property
     def minutes(self) -> float:
         """Minutes of work."""
-        visits, costs = self.visits, self.visits.menu.costs
-        changes = {
-            "setup": sum(before != after for before, after in pairwise(visits.setup.tolist())),
-            "tool": sum(before != after for before, after in pairwise(visits.extension.tolist())),
-        }
-        counts = {"pose": len(visits), "reading": len(visits.readings), **changes}
-        return float(sum(count * costs[name] for name, count in counts.items()))
+        return self.visits.minutes(self.chosen)
 
     @property
     def sentences(self) -> list[str]:

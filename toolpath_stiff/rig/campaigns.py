@@ -3,6 +3,7 @@
 A `Table` maps column names of measurement files to arrays or lists of one length, in shop units.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -46,18 +47,19 @@ def campaign(layout: str, nominal: Nominal, plan: Table | None, rng: Generator) 
     return paper_campaign() if layout == "paper" else tilted_campaign(nominal, rng)
 
 
+def _table(rows: Sequence[Sequence[Any]], *columns: str) -> Table:
+    """Table of rows that begin with a pose."""
+    named = zip((*POSE, *columns), zip(*rows, strict=True), strict=True)
+    return {name: list(values) if name in ("direction", "setup") else np.array(values) for name, values in named}
+
+
 def paper_campaign() -> Table:
     """The paper's 14 points along X, Y, Z: 42 rows in the order of its Table 1."""
     poses = [(x, y, z, setup) for z, setup in PAPER_HEIGHTS for x, y in PAPER_POINTS]
-    rows = [(*pose, number, axis) for number, pose in enumerate(poses, 1) for axis in AXES]
-    x, y, z, setup, point, direction = zip(*rows, strict=True)
-    return {
-        **{name: np.array(values, dtype=float) for name, values in zip(POSE[:3], (x, y, z), strict=True)},
-        **dict.fromkeys(POSE[3:], np.zeros(len(rows))),
-        "direction": list(direction),
-        "setup": list(setup),
-        "point": np.array(point),
-    }
+    rows = [
+        (x, y, z, 0, 0, 0, axis, setup, number) for number, (x, y, z, setup) in enumerate(poses, 1) for axis in AXES
+    ]
+    return _table(rows, "direction", "setup", "point")
 
 
 def tilted_campaign(nominal: Nominal, rng: Generator) -> Table:
@@ -75,14 +77,8 @@ def tilted_campaign(nominal: Nominal, rng: Generator) -> Table:
             minutes = round(minutes + float(rng.uniform(0.5, 1.5)), 1)
             placed = (setup, clamp, repeat, int(pose) + 1, minutes, _extension(int(pose)), warm)
             rows.append((*poses[pose], *jobs[job], *placed))
-    columns = zip((*POSE, *_TILTED_COLUMNS), zip(*rows, strict=True), strict=True)
-    return {name: list(values) if name in ("direction", "setup") else np.array(values) for name, values in columns}
-
-
-_TILTED_COLUMNS = (
-    *("direction", "force_N", "setup", "clamp", "repeat"),
-    *("point", "time_min", "tool_extension_mm", "temperature_C"),
-)
+    columns = "direction force_N setup clamp repeat point time_min tool_extension_mm temperature_C"
+    return _table(rows, *columns.split())
 
 
 def _extension(pose: int) -> float:

@@ -5,7 +5,7 @@ effect alone.
 """
 
 import zlib
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,22 +17,23 @@ from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.campaigns import AXES, DEFAULT_SETUP, POSE, Table, campaign
-from toolpath_stiff.rig.effects import BEYOND, CATALOGUE, Hideable, with_effect
+from toolpath_stiff.rig.effects import BEYOND, CATALOGUE, HIDEABLE, with_effect
 from toolpath_stiff.rig.fem import FemMachine, sound_machine
-from toolpath_stiff.rig.fem_faults import FAULTS, Fault
+from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.fem_path import path_truth
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, disturb_machine, disturb_readings, readings
 from toolpath_stiff.rig.loops import with_loops
 from toolpath_stiff.rig.nominal import Nominal, load_nominal
 from toolpath_stiff.rig.rows import ROOM_TEMPERATURE, Rows
 from toolpath_stiff.rig.sizes import Scale
-from toolpath_stiff.rig.unknown import Kind
 from toolpath_stiff.rig.unknowns import ODDITIES, OUTSIDE, UNKNOWNS
 from toolpath_stiff.units import m_from_mm, n_per_mm_from_n_per_m, rad_from_deg, s_from_min
 
 BUILT = ("springs", "fem")  # ways to build a machine, the first by default
 # Shares of blind draws that hide each kind, unless one is requested (assumed).
 BLIND = {"none": 0.2, "one": 0.45, "two": 0.15, "outside": 0.2}
+
+DESCRIBED = ("links", "names", "variables")
 
 # One stream of random numbers for each purpose, so that a change in one leaves the others as they were.
 _STREAMS = ("kind", "campaign", "machine", "noise")
@@ -189,11 +190,10 @@ def draw_case(
             rng = np.random.default_rng([seed, len(_STREAMS), zlib.crc32(name.encode())])
             parameters, strength = scale.draw(name, wanted, rng)
             true = with_effect(true, name, parameters)
-            kind = UNKNOWNS.get(name)  # names that a description may use
-            words = {} if kind is None else {"links": sorted(kind.links), "variables": sorted(kind.variables)}
-            if name in FAULTS:
-                words = {"links": sorted(FAULTS[name].links), "names": sorted(FAULTS[name].names)}
-            effects.append({"effect": name, "parameters": parameters, **strength, **words})
+            # What a description may name; of an oddity none is asked for.
+            words = {} if name in ODDITIES else {key: getattr(HIDEABLE[name], key) for key in DESCRIBED}
+            right = {key: sorted(some) for key, some in words.items() if some is not None}
+            effects.append({"effect": name, "parameters": parameters, **strength, **right})
     true = disturb_machine(true, nuisances, streams["machine"])
     truth: dict[str, object] = {
         "hidden": list(names),
@@ -216,17 +216,15 @@ def _sizes(size: float | Sequence[float] | None, count: int) -> Sequence[float |
     return sizes
 
 
-def hideable(columns: Container[str], *, fem: bool) -> tuple[list[str], list[str], list[str]]:
+def hideable(columns: Container[str], *, fem: bool) -> tuple[list[str], ...]:
     """Names that a campaign with these columns can show: in the catalogue, outside it, and unknowns.
 
     `fem`: on a machine of finite elements, where what lies outside is unknown.
     """
     outside = {name: fault for name, fault in FAULTS.items() if not fault.names}
     inside = {name: fault for name, fault in FAULTS.items() if fault.names}
-    kinds: tuple[Mapping[str, Hideable | Fault | Kind], ...]
     kinds = (inside, outside, outside) if fem else (CATALOGUE, ODDITIES, UNKNOWNS)
-    shown = [[name for name, kind in some.items() if all(c in columns for c in kind.columns)] for some in kinds]
-    return shown[0], shown[1], shown[2]
+    return tuple([name for name, kind in some.items() if all(c in columns for c in kind.columns)] for some in kinds)
 
 
 def _names(hidden: str | Sequence[str] | None, table: Table, rng: Generator, *, fem: bool) -> tuple[str, ...]:
@@ -242,7 +240,7 @@ def _names(hidden: str | Sequence[str] | None, table: Table, rng: Generator, *, 
     if hidden == "none":
         return ()
     names = tuple(hidden.split(",")) if isinstance(hidden, str) else tuple(hidden)
-    everything: Mapping[str, Hideable | Fault | Kind] = FAULTS if fem else {**CATALOGUE, **OUTSIDE}
+    everything = FAULTS if fem else CATALOGUE | OUTSIDE
     if strange := [name for name in names if name not in everything]:
         expected = f"none, one, two, three, outside, unknown, or of {', '.join(everything)}"
         raise InputError(f"nothing called {strange[0]!r} to hide", expected=expected)

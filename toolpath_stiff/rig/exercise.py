@@ -18,24 +18,21 @@ from typing import Any
 
 import numpy as np
 
-from toolpath_stiff import defaults
+from toolpath_stiff import column_files, defaults
 from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.errors import InputError, InputErrors
 from toolpath_stiff.files import Content, read_bytes, read_text
 from toolpath_stiff.results_folder import Rules, write_folder
 from toolpath_stiff.rig.campaigns import DEFAULT_SETUP, POSE, Table
 from toolpath_stiff.rig.case import DrawnCase, clamp_of, rows_of
-from toolpath_stiff.rig.effects import BEYOND, CATALOGUE
+from toolpath_stiff.rig.effects import BEYOND, HIDEABLE
 from toolpath_stiff.rig.fem import FemMachine
-from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances
 from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.loops import LOOP_PATTERN, LOOP_WORDS
 from toolpath_stiff.rig.nominal import Nominal, parse_nominal
-from toolpath_stiff.rig.robot import FAULTS as ROBOT_FAULTS
 from toolpath_stiff.rig.robot import robot_case
 from toolpath_stiff.rig.unknown import Unknown
-from toolpath_stiff.rig.unknowns import OUTSIDE
 
 MAGIC = b"tps-rig-sealed-2\n"
 DIGEST = hashlib.sha256().digest_size
@@ -120,8 +117,7 @@ def score(hidden: list[str], claim: list[str]) -> str:
     """
     claimed, truth = set(claim) - set(SOUND), set(hidden)
     if claimed & set(OTHER):
-        of_robots = {name for name, fault in ROBOT_FAULTS.items() if not fault.names}
-        claimed = (claimed - set(OTHER)) | ((truth & {*BEYOND, *of_robots}) or {"outside"})
+        claimed = (claimed - set(OTHER)) | ((truth & BEYOND) or {"outside"})
     if claimed == truth:
         return "right" if truth else "correctly none"
     return "partly" if claimed & truth else "wrong"
@@ -129,12 +125,8 @@ def score(hidden: list[str], claim: list[str]) -> str:
 
 def csv_text(table: Table) -> str:
     """The table as CSV, each number in the shortest form that is exact to ten digits."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(table)
-    for row in zip(*table.values(), strict=True):
-        writer.writerow([value if isinstance(value, str) else f"{value + 0.0:.10g}" for value in row])
-    return stream.getvalue()
+    columns = [[v if isinstance(v, str) else f"{v + 0.0:.10g}" for v in values] for values in table.values()]
+    return column_files.csv_text(table, zip(*columns, strict=True))
 
 
 def read_plan(file: str, nominal: Nominal) -> Table:
@@ -247,8 +239,8 @@ def measured_again(folder: str | Path, plan_file: str, visit: int = 1) -> tuple[
 def reveal(folder: str | Path, claim: str) -> dict[str, Any]:
     """Hidden truth and score of a claim: `verdict`, `claim`, `hidden`, `kind`, `effects`, `seed`, `layout`."""
     claims = [name.strip() for name in claim.split(",") if name.strip()]
-    of_robots = (*ROBOT_FAULTS, *(name for fault in ROBOT_FAULTS.values() for name in fault.names))
-    known = tuple(dict.fromkeys((*SOUND, *OTHER, *CATALOGUE, *OUTSIDE, *FAULTS, *of_robots)))
+    names = (name for kind in HIDEABLE.values() for name in sorted(kind.names or ()))
+    known = dict.fromkeys((*SOUND, *OTHER, *HIDEABLE, *names))
     alone = len(claims) == 1 or (claims and not {*SOUND} & {*claims})
     if not alone or not {*claims} <= {*known}:
         raise InputError(f"a claim {claim!r}", expected=f"none, or one or several of {', '.join(known)}")

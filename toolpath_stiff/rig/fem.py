@@ -20,12 +20,11 @@ from toolpath_stiff.rig import beams, fem_parts
 from toolpath_stiff.rig.beams import NODE, STEEL, arm
 from toolpath_stiff.rig.fem_parts import frame_corners, mean_radius, table_top
 from toolpath_stiff.rig.fem_path import reference_rows
-from toolpath_stiff.rig.hidden import HERTZ_LOAD, HiddenMachine, readings, strut_stiffness, true_geometry
-from toolpath_stiff.rig.kinematics import commanded_lengths, rotations
+from toolpath_stiff.rig.hidden import HERTZ_LOAD, HiddenMachine, posed, readings, strut_stiffness
 from toolpath_stiff.rig.nominal import Nominal, parse_nominal
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import Motions
-from toolpath_stiff.rig.unknown import CommandedRows, opened
+from toolpath_stiff.rig.structure import Motions, PosedRows
+from toolpath_stiff.rig.unknown import opened
 
 JOINT_SHARE = 0.02  # of a strut's nominal compliance that sits in each of its two joints
 JOINT_TURNING = 2e3  # N m/rad, what a sound joint resists
@@ -109,7 +108,7 @@ class FemMachine(HiddenMachine):
         """Motions under the loads of the rows, as of a machine of springs; a strut's joints are those at both ends."""
         state, pose, struts, give = solved(nominal, self, rows)
         columns, pull, extra = moved(self, rows, struts[pose], give[pose])
-        down = (state.place.work_point - state.place.platform_joints.mean(axis=1))[pose]
+        down = (state.work_point - state.platform_joints.mean(axis=1))[pose]
         body = columns[:, 12:15] + np.cross(columns[:, 15:18], down)  # the platform carried on to the tip
         tip, platform = (np.einsum("ni,ni->n", rows.direction, ends) for ends in (columns[:, 6:9], body))
         work, corners, force = _work(self, rows, state, pose), frame_corners(nominal), rows.force[:, None]
@@ -134,7 +133,7 @@ class FemMachine(HiddenMachine):
         return replace(self, **factors, clamping_axes=np.exp(CLAMPING_SPREAD * rng.standard_normal(3)))
 
 
-def strut_give(machine: FemMachine, state: CommandedRows) -> tuple[FloatArray, FloatArray]:
+def strut_give(machine: FemMachine, state: PosedRows) -> tuple[FloatArray, FloatArray]:
     """(n, 6) m/N along the struts, and (n, 6) m/N of both joints of each: the linear parts."""
     nominal, every = state.nominal, range(6)
     first, last = nominal.law_ends
@@ -145,7 +144,7 @@ def strut_give(machine: FemMachine, state: CommandedRows) -> tuple[FloatArray, F
     number, start, worn = machine.worn
     proper = proper + worn * ((share >= start) & (share <= start + WORN) & (np.arange(6) == number))
     give = 2.0 * joint + machine.joint + machine.swing * state.swing
-    held = state.units[:, machine.seat_strut, None] @ state.place.rotation
+    held = state.units[:, machine.seat_strut, None] @ state.rotation
     give[:, machine.seat_strut] += (held[:, 0] @ machine.seat) ** 2
     return np.asarray(proper), np.asarray(give)
 
@@ -157,7 +156,7 @@ def extra_give(machine: FemMachine, forces: FloatArray) -> FloatArray:
     return np.asarray(contact + loose + machine.opening * forces * opened(forces))
 
 
-def solved(nominal: Nominal, machine: FemMachine, rows: Rows) -> tuple[CommandedRows, IntArray, FloatArray, FloatArray]:
+def solved(nominal: Nominal, machine: FemMachine, rows: Rows) -> tuple[PosedRows, IntArray, FloatArray, FloatArray]:
     """Assemble and condense every distinct pose of the rows.
 
     Returns
@@ -173,61 +172,56 @@ def solved(nominal: Nominal, machine: FemMachine, rows: Rows) -> tuple[Commanded
     """
     key = np.column_stack([rows.position, rows.angles, rows.extension])
     _, first, pose = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    visited = rows.take(first)
-    turned = rotations(visited.angles)
-    lengths = commanded_lengths(nominal, visited.position, turned, visited.extension)
-    state = CommandedRows(nominal, visited, lengths, true_geometry(nominal, machine, visited, turned, lengths))
+    state = posed(nominal, machine, rows.take(first))
     struts = np.stack(strut_give(machine, state), axis=-1)
     stiffness, columns = assembled(machine, state, struts.sum(axis=-1))
     return state, pose.ravel(), struts, np.swapaxes(columns, 1, 2) @ np.linalg.solve(stiffness, columns)
 
 
-def assembled(machine: FemMachine, state: CommandedRows, strut: FloatArray) -> tuple[FloatArray, FloatArray]:
+def assembled(machine: FemMachine, state: PosedRows, strut: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Stiffness (p, N, N) of frame, struts and platform, and the columns (p, N, q) of `solved`."""
-    nominal, place, count = state.nominal, state.place, len(strut)
+    nominal, count = state.nominal, len(strut)
     frame = fem_parts.frame_stiffness(nominal, machine.members, machine.feet, machine.brackets)
     upper, corners = len(frame), frame_corners(nominal)
     hub = upper + 6 * NODE
     total = np.zeros((count, hub + 2 * NODE, hub + 2 * NODE))
     total[:, :upper, :upper] = frame
-    turn = np.einsum("ab,nij->naibj", np.eye(16), place.rotation).reshape(count, 48, 48)
+    turn = np.einsum("ab,nij->naibj", np.eye(16), state.rotation).reshape(count, 48, 48)
     total[:, upper:, upper:] = turn @ _platforms(machine, state) @ np.swapaxes(turn, 1, 2)
     if machine.hose[0] > 0.0:
         side, azimuth = mean_radius(nominal.frame_joints), machine.hose[1]
         far = [side * np.cos(azimuth), side * np.sin(azimuth), 0.5 * side + table_top(nominal)]
-        away = far - place.platform_joints.mean(axis=1)
+        away = far - state.platform_joints.mean(axis=1)
         away = away / np.linalg.norm(away, axis=1, keepdims=True)
         total[:, hub : hub + 3, hub : hub + 3] += machine.hose[0] * away[:, :, None] * away[:, None, :]
     columns = np.zeros((count, hub + 2 * NODE, 19 + upper))
     columns[:, hub + NODE :, 6:12] = columns[:, hub : hub + NODE, 12:18] = np.eye(NODE)
     columns[:, upper + 2 : hub : NODE, 18] = -WEIGHT * (mean_radius(nominal.platform_joints) / 0.305) ** 3 / 6.0
     columns[:, :upper, 19:] = np.eye(upper)
-    length = np.linalg.norm(place.platform_joints - place.frame_joints, axis=2)
-    elements = beams.spread(state.units, 1.0 / strut, 0.0 * strut, _bending(length, machine.turning))
+    elements = beams.spread(state.units, 1.0 / strut, 0.0 * strut, _bending(state.distances, machine.turning))
     reach, pull = np.tile(np.eye(12), (count, 1, 1)), np.zeros((count, 12))
     for k, corner in enumerate(nominal.vertices):
         where = np.concatenate([NODE * corner + np.arange(NODE), upper + NODE * k + np.arange(NODE)])
-        reach[:, :6, :6] = arm(place.frame_joints[:, k] - corners[corner])
+        reach[:, :6, :6] = arm(state.frame_joints[:, k] - corners[corner])
         total[:, where[:, None], where] += np.swapaxes(reach, 1, 2) @ elements[:, k] @ reach
         pull[:, :3], pull[:, 6:9] = -state.units[:, k], state.units[:, k]
         columns[:, where, k] = np.einsum("nji,nj->ni", reach, pull)
     return total, columns
 
 
-def _platforms(machine: FemMachine, state: CommandedRows) -> FloatArray:
+def _platforms(machine: FemMachine, state: PosedRows) -> FloatArray:
     """(p, 48, 48) platform with its tool, in platform axes."""
-    nominal, place, extension = state.nominal, state.place, state.rows.extension
-    joints = (place.platform_joints - place.work_point[:, None]) @ place.rotation
+    nominal, extension = state.nominal, state.rows.extension
+    joints = (state.platform_joints - state.work_point[:, None]) @ state.rotation
     give = np.diag([*machine.bearings, 0.0, 0.0, 0.0])
     give[3:, 3:] += np.outer(machine.flange, machine.flange)
-    lengths, first, which = np.unique(extension, return_index=True, return_inverse=True)
-    made = []
-    for length, pose in zip(lengths.tolist(), first, strict=True):
-        below = -(length + machine.tip_error)
-        there = joints[pose] + [0.0, 0.0, below]
-        made.append(fem_parts.platform_stiffness(
-            nominal, there, below, machine.rim, machine.spokes, give, machine.tool
-        ))  # fmt: skip
+    lengths, first, which = np.unique(extension + machine.tip_error, return_index=True, return_inverse=True)
+    made = [
+        fem_parts.platform_stiffness(
+            nominal, joints[pose] - [0.0, 0.0, below], -below, machine.rim, machine.spokes, give, machine.tool
+        )
+        for below, pose in zip(lengths.tolist(), first, strict=True)
+    ]
     return np.array(made)[which.ravel()]
 
 
@@ -274,13 +268,13 @@ def between(nominal: Nominal, machine: FemMachine, rows: Rows, above: float) -> 
     """(n,) m by which the work and a point `above` m over the tip move apart along the load."""
     state, pose, struts, give = solved(nominal, machine, rows)
     columns = moved(machine, rows, struts[pose], give[pose])[0]
-    touched = columns[:, 6:9] + np.cross(columns[:, 9:12], above * state.place.rotation[pose, :, 2])
+    touched = columns[:, 6:9] + np.cross(columns[:, 9:12], above * state.rotation[pose, :, 2])
     return np.asarray(np.einsum("ni,ni->n", rows.direction, touched) + _work(machine, rows, state, pose))
 
 
-def _work(machine: FemMachine, rows: Rows, state: CommandedRows, pose: IntArray) -> FloatArray:
+def _work(machine: FemMachine, rows: Rows, state: PosedRows, pose: IntArray) -> FloatArray:
     """(n,) m of give of table and riser along the load."""
-    tips = state.place.work_point
+    tips = state.work_point
     table = fem_parts.table_give(state.nominal, tips, machine.mounts, machine.plate, machine.floor)[pose]
     along = np.einsum("ni,nij,nj->n", rows.direction, table, rows.direction)
     riser = machine.riser * (rows.setup == "riser") * (1.0 - rows.direction[:, 2] ** 2)

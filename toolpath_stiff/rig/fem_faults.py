@@ -1,38 +1,25 @@
 """Faults of the machine of finite elements: soft, loose, worn, misplaced or misread parts.
 
-`links` are those whose give has this signature at the tip (words of `unknown.LINKS`), `names` the effects of the
+`links` are those whose give has this signature at the tip (`draws.Hideable`), `names` the effects of the
 catalogue, by their titles, that are a right name of the fault; without one it lies outside the catalogue. Limits are
 assumed: beyond them a machine would be noticed without a diagnosis; they lie within what the catalogue admits.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.draws import Draw, Shape, drawn, nothing, one_strut, signed, uniform, whole
+from toolpath_stiff.rig.draws import Change, Draw, Hideable, Shape, drawn, nothing, one_strut, signed, uniform, whole
 
-Change = Callable[[Any, Shape], Shape]  # of a `FemMachine` and a shape with `size`
 SOFT = 80e-9  # m/N, largest compliance that is tried: several times the tip's
 CRACKED = 1000.0  # an element's stiffness divided by one more than this is next to none
 
 
-@dataclass(frozen=True)
-class Fault:
-    """A fault: description, fields it changes, largest size (SI), further draws, columns needed to show it."""
-
-    links: frozenset[str]
-    names: frozenset[str]
-    limit: float
-    change: Change
-    shape: Draw
-    columns: tuple[str, ...]
-
-
-def _fault(links: str, names: str, limit: float, change: Change, shape: Draw = nothing, needs: str = "") -> Fault:
-    return Fault(frozenset(links.split(",")), frozenset(names.split()), limit, change, shape, tuple(needs.split()))
+def _fault(links: str, names: str, limit: float, change: Change, shape: Draw = nothing, needs: str = "") -> Hideable:
+    where, right = frozenset(links.split(",")), frozenset(names.split())
+    return Hideable(change, limit, shape, tuple(needs.split()), links=where, names=right)
 
 
 def _grown(name: str, *pattern: float) -> Change:
@@ -71,7 +58,7 @@ _direction = drawn(_azimuth, uniform("upward", -1.0, 1.0))
 _strut = _number("strut", 6)
 ONE, ALL, WORK = "one strut,joints", "joints,struts", "table,frame"
 
-FAULTS: dict[str, Fault] = {
+FAULTS: dict[str, Hideable] = {
     # In the catalogue, by the titles of its effects.
     "spindle_bearings_soft": _fault("tool", "spindle_compliance", SOFT, _grown("bearings", 1, 1, 0)),
     "spindle_thrust_bearing_soft": _fault("tool", "spindle_compliance", SOFT, _grown("bearings", 0, 0, 1)),

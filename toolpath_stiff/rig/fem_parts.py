@@ -36,8 +36,7 @@ def table_top(nominal: Nominal) -> float:
 
 def frame_corners(nominal: Nominal) -> FloatArray:
     """(v, 3) m, corners of the frame's upper ring: each amid the joints that it holds."""
-    count = int(nominal.vertices.max()) + 1
-    return np.array([nominal.frame_joints[nominal.vertices == k].mean(axis=0) for k in range(count)])
+    return np.array([nominal.frame_joints[nominal.vertices == k].mean(axis=0) for k in range(nominal.corners)])
 
 
 def frame_stiffness(nominal: Nominal, members: FloatArray, feet: FloatArray, brackets: FloatArray) -> FloatArray:

@@ -8,8 +8,8 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.rig.campaigns import POSE
 from toolpath_stiff.rig.closure import ClosureError
 from toolpath_stiff.rig.fem_parts import mean_radius
-from toolpath_stiff.rig.hidden import HiddenMachine, true_geometry
-from toolpath_stiff.rig.kinematics import commanded_lengths, reachable, rotations
+from toolpath_stiff.rig.hidden import HiddenMachine, posed
+from toolpath_stiff.rig.kinematics import reachable
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m
@@ -63,10 +63,8 @@ def path_truth(nominal: Nominal, machine: HiddenMachine, rows: Rows, rng: Genera
 
 def _taken(nominal: Nominal, machine: HiddenMachine, pose: FloatArray) -> bool:
     """True if the true machine can take a pose (6,) that the nominal one reaches."""
-    rows = pulled(pose[None, :3], pose[None, 3:])
-    turned = rotations(rows.angles)
     try:
-        true_geometry(nominal, machine, rows, turned, commanded_lengths(nominal, rows.position, turned, rows.extension))
+        posed(nominal, machine, pulled(pose[None, :3], pose[None, 3:]))
     except ClosureError:
         return False
     return True

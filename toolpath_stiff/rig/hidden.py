@@ -8,8 +8,9 @@ campaign adds, whether or not something is hidden.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.random import Generator
@@ -19,8 +20,8 @@ from toolpath_stiff.rig.closure import true_poses
 from toolpath_stiff.rig.kinematics import commanded_lengths, platform_points, rotations
 from toolpath_stiff.rig.nominal import Nominal
 from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import End, Geometry, Links, Motions, radial, solved
-from toolpath_stiff.rig.unknown import CommandedRows, Unknown
+from toolpath_stiff.rig.structure import End, Links, Motions, PosedRows, solved
+from toolpath_stiff.rig.unknown import Unknown
 from toolpath_stiff.rig.unknowns import OUTSIDE
 from toolpath_stiff.units import n_per_m_from_n_per_mm, n_per_mm_from_n_per_m
 
@@ -93,7 +94,8 @@ class HiddenMachine:
 
     def stiffness(self, nominal: Nominal, rows: Rows) -> FloatArray:
         """(n,) N/m, secant stiffness between tool and workpiece along the load."""
-        return np.asarray(1.0 / solved(*assembled(nominal, self, rows), rows.direction, rows.force)[0])
+        state = posed(nominal, self, rows)
+        return np.asarray(1.0 / solved(state, _links(self, state, state.lengths))[0])
 
     def displacement(self, nominal: Nominal, rows: Rows) -> FloatArray:
         """(n,) m, reading of the indicator."""
@@ -101,18 +103,18 @@ class HiddenMachine:
 
     def motions(self, nominal: Nominal, rows: Rows, lengths: FloatArray) -> Motions:
         """Motions under the rows' loads; `lengths` (n,) m of struts measured alone, nan: as in the pose."""
-        n = len(rows.force)
-        place, links = assembled(nominal, self, rows, np.repeat(np.nan_to_num(lengths)[:, None], 6, axis=1))
-        compliance, moved, stretch = solved(place, links, rows.direction, rows.force)
-        own = moved[:, -links.count :]
-        joints, vertices, ends = np.split(own, [6, 6 + links.vertices.size], axis=1)
-        outward = np.stack([radial(place, vertex) for vertex in range(len(links.vertices))], axis=1)
+        n, corners, state = len(rows.force), nominal.corners, posed(nominal, self, rows)
+        links = _links(self, state, np.where(lengths[:, None] > 0.0, lengths[:, None], state.lengths))
+        compliance, moved, stretch = solved(state, links)
+        first = moved.shape[1] - len(links.ends) - 2 * corners
+        joints, vertices, sizes = np.split(moved[:, first - 6 :], [6, 6 + 2 * corners], axis=1)
+        outward = np.stack([state.radial(vertex) for vertex in range(corners)], axis=1)
         give = vertices.reshape(n, -1, 2)
-        at = {"spindle": np.zeros(n), "table": np.zeros(n), "": np.zeros(n)}
-        for end, size in zip(links.ends, ends.T, strict=True):
-            at[end.link] += np.einsum("ni,ni->n", rows.direction, end.lever) * size
+        along = {"spindle": np.zeros(n), "table": np.zeros(n), "": np.zeros(n)}
+        for end, size in zip(links.ends, sizes.T, strict=True):
+            along[end.link] += np.einsum("ni,ni->n", rows.direction, end.lever) * size
         return Motions(
-            tip=compliance, spindle=at["spindle"], table=at["table"],
+            tip=compliance, spindle=along["spindle"], table=along["table"],
             struts=np.einsum("nki,ni->nk", stretch, moved), joints=joints,
             alone=np.diagonal(np.linalg.inv(links.struts), axis1=1, axis2=2),
             vertices=give[..., :1] * outward + give[..., 1:] * AXES[2], outward=outward,
@@ -127,30 +129,24 @@ def readings(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> FloatArray:
     return np.asarray(shown)
 
 
-def assembled(
-    nominal: Nominal, hidden: HiddenMachine, rows: Rows, struts: FloatArray | None = None
-) -> tuple[Geometry, Links]:
-    """True geometry and compliant links; `struts` (n, 6) m replace the strut lengths of the pose where positive."""
-    turned = rotations(rows.angles)
-    lengths = commanded_lengths(nominal, rows.position, turned, rows.extension)
-    place = true_geometry(nominal, hidden, rows, turned, lengths)
+def _links(hidden: HiddenMachine, state: PosedRows, lengths: FloatArray) -> Links:
+    """Compliant links, struts of `lengths` (n, 6) m."""
     links = Links(
-        struts=strut_stiffness(nominal, hidden, lengths if struts is None else np.where(struts > 0.0, struts, lengths)),
-        joints=_joint_law(hidden),
+        struts=strut_stiffness(state.nominal, hidden, lengths),
+        joints=partial(_joint_give, hidden),
         moment=hidden.moment,
         bars=hidden.bars,
-        vertices=hidden.vertices[: nominal.vertices.max() + 1],
-        ends=_ends(nominal, hidden, rows, place),
+        vertices=hidden.vertices[: state.nominal.corners],
+        ends=_ends(hidden, state),
     )
-    if hidden.unknown is not None and (act := OUTSIDE[hidden.unknown.kind].act) is not None:
-        links = act(links, CommandedRows(nominal, rows, lengths, place), hidden.unknown)
-    return place, links
+    act = None if hidden.unknown is None else OUTSIDE[hidden.unknown.kind].act
+    return links if act is None else act(links, state, hidden.unknown)
 
 
-def true_geometry(
-    nominal: Nominal, hidden: HiddenMachine, rows: Rows, turned: FloatArray, lengths: FloatArray
-) -> Geometry:
+def posed(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> PosedRows:
     """Places of joints and tip when struts of the commanded lengths carry the true platform on the true frame."""
+    turned = rotations(rows.angles)
+    lengths = commanded_lengths(nominal, rows.position, turned, rows.extension)
     frame = nominal.frame_joints + hidden.frame_errors
     platform = nominal.platform_joints + hidden.platform_errors
     radius = np.linalg.norm(nominal.platform_joints[:, :2], axis=1, keepdims=True)
@@ -159,12 +155,14 @@ def true_geometry(
     start = rows.position + rows.extension[:, None] * turned[:, :, 2]
     origin, rotation = true_poses(lengths, frame, platform, start, turned)
     below = rows.extension + hidden.tip_error
-    return Geometry(
+    return PosedRows(
+        nominal=nominal,
+        rows=rows,
+        lengths=lengths,
         work_point=origin - below[:, None] * rotation[:, :, 2],
         rotation=rotation,
         platform_joints=platform_points(platform, origin, rotation, np.zeros(len(origin))),
         frame_joints=np.broadcast_to(frame, (len(origin), 6, 3)),
-        vertices=nominal.vertices,
     )
 
 
@@ -183,40 +181,27 @@ def strut_stiffness(nominal: Nominal, hidden: HiddenMachine, lengths: FloatArray
     return np.asarray((law * hidden.strut_factors)[:, :, None] * np.eye(6))
 
 
-def _joint_law(hidden: HiddenMachine) -> Callable[[FloatArray], FloatArray]:
+def _joint_give(hidden: HiddenMachine, forces: FloatArray) -> FloatArray:
     """Secant compliance along the struts: constant, Hertzian (elongation as F^(2/3)), clearance (g at any load)."""
-
-    def secant(forces: FloatArray) -> FloatArray:
-        size = np.maximum(np.abs(forces), SLACK_LOAD)
-        contact = hidden.hertz * np.cbrt(HERTZ_LOAD / size)
-        return np.asarray(hidden.joint + contact + hidden.clearance / size)
-
-    return secant
+    size = np.maximum(np.abs(forces), SLACK_LOAD)
+    return np.asarray(hidden.joint + hidden.hertz * np.cbrt(HERTZ_LOAD / size) + hidden.clearance / size)
 
 
-def _ends(nominal: Nominal, hidden: HiddenMachine, rows: Rows, place: Geometry) -> tuple[End, ...]:
+def _ends(hidden: HiddenMachine, state: PosedRows) -> tuple[End, ...]:
     """Links that carry the whole load: spindle in platform axes; table; table rocking about base x and y; set-up."""
-    n = len(rows.force)
-    radial, axial = hidden.spindle
-    grown = np.ones(n)
-    if nominal.tool_length > 0.0:
-        grown = (1.0 + rows.extension / nominal.tool_length) ** hidden.overhang_exponent
-    here = (rows.setup == hidden.setup) & bool(hidden.setup)
+    n, tool, (radial, axial) = len(state.lengths), state.nominal.tool_length, hidden.spindle
+    grown = (1.0 + state.rows.extension / tool) ** hidden.overhang_exponent if tool > 0.0 else 1.0
+    here = (state.rows.setup == hidden.setup) & bool(hidden.setup)
     ends: list[tuple[str, FloatArray, FloatArray | float]]
-    ends = [
-        ("spindle", place.rotation[:, :, j], c)
-        for j, c in enumerate((radial * grown, radial * grown, np.full(n, axial)))
-    ]
+    ends = [("spindle", state.rotation[:, :, j], c) for j, c in enumerate((radial * grown, radial * grown, axial))]
     ends += [("table", AXES[j], hidden.table[j]) for j in range(3)]
-    ends += [("table", np.cross(AXES[j], place.work_point), hidden.rocking) for j in range(2)]
+    ends += [("table", np.cross(AXES[j], state.work_point), hidden.rocking) for j in range(2)]
     ends += [("table", AXES[j], np.where(here, hidden.setup_compliance[j], 0.0)) for j in range(3)]
     return tuple(End(link, np.broadcast_to(lever, (n, 3)), np.broadcast_to(c, (n,))) for link, lever, c in ends)
 
 
 def gauge(hidden: HiddenMachine, rows: Rows) -> FloatArray:
     """(n,) factor on the readings of one direction or one set-up."""
-    if not hidden.gauge_target:
-        return np.ones(len(rows.force))
     if hidden.gauge_target in ("X", "Y", "Z"):
         # Only loads along the axis itself are read by that axis's gauge.
         hit = np.abs(rows.direction[:, "XYZ".index(hidden.gauge_target)]) > 1.0 - 1e-9

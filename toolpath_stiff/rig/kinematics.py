@@ -14,8 +14,8 @@ def rotations(angles: FloatArray) -> FloatArray:
 
 def commanded_lengths(nominal: Nominal, tips: FloatArray, turned: FloatArray, extension: FloatArray) -> FloatArray:
     """(n, 6) m, strut lengths for tool tips (n, 3), rotations (n, 3, 3) and tools longer by `extension` (n,)."""
-    joints = platform_points(nominal.platform_joints, tips, turned, extension)
-    return np.asarray(np.linalg.norm(joints - nominal.frame_joints, axis=2))
+    strut = platform_points(nominal.platform_joints, tips, turned, extension) - nominal.frame_joints
+    return np.asarray(np.linalg.norm(strut, axis=2))
 
 
 def platform_points(points: FloatArray, tips: FloatArray, turned: FloatArray, extension: FloatArray) -> FloatArray:

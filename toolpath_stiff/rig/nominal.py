@@ -66,6 +66,11 @@ class Nominal:
         return float(self.law_lengths[0]), float(self.law_lengths[-1])
 
     @property
+    def corners(self) -> int:
+        """Number of the frame's vertices."""
+        return int(self.vertices.max()) + 1
+
+    @property
     def vertices(self) -> IntArray:
         """(6,) number of the frame vertex that holds each strut, counted from 0 in the order of the struts."""
         azimuth = np.arctan2(self.frame_joints[:, 1], self.frame_joints[:, 0])

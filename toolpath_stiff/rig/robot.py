@@ -5,9 +5,7 @@ joints; it stands where its Denavit-Hartenberg rows put it, computed here.
 """
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -17,6 +15,7 @@ from toolpath_stiff.documents import Document, to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.rig.beams import NODE, add, bending, spread, springs
 from toolpath_stiff.rig.campaigns import Table
+from toolpath_stiff.rig.draws import Change, Hideable, whole
 from toolpath_stiff.units import deg_from_rad, mm_from_m, um_from_m
 
 RIGID = 1e12, 1e11  # N/m and N m/rad of what does not give way: a thousandth of a nm/N
@@ -72,38 +71,30 @@ class Robot:
     creep: float = 0.0
 
 
-def _soft(field: str) -> Callable[[Robot, int, float], Document]:
-    """Change that multiplies the compliances of a field, of one joint, by 1 + size."""
-    return lambda r, i, size: {field: getattr(r, field) * (1.0 + size * (np.arange(6) == i))}
+def _fault(names: str, change: Change, parts: int = 1, largest: float = 30.0) -> Hideable:
+    """A fault: right names in the catalogue, its change for a drawn part and a size, parts where it may sit."""
+    return Hideable(change, largest, whole("part", 0, parts), names=frozenset(names.split()))
 
 
-@dataclass(frozen=True)
-class RobotFault:
-    """A fault: right names in the catalogue, parts where it may sit, its change for a size, its largest size."""
-
-    names: tuple[str, ...]
-    parts: tuple[int, ...]
-    change: Callable[[Robot, int, float], Document]
-    largest: float
+def _softened(field: str, count: int = 1) -> Change:
+    """Multiply the compliances of a field, of one of `count` elements, by 1 + size."""
+    return lambda r, p: {field: getattr(r, field) * (1.0 + p["size"] * (np.arange(count) == p["part"]))}
 
 
-JOINTS = tuple(range(6))
-FAULTS: dict[str, RobotFault] = {
-    "joint_torsion": RobotFault(("joint_torsion", "weak_element"), JOINTS, _soft("torsion"), 30.0),
-    "joint_bending": RobotFault(("joint_bending", "weak_element"), JOINTS[:3], _soft("bending"), 30.0),
-    "soft_link": RobotFault(
-        ("weak_element",), (0, 1), lambda r, i, s: {"arms": r.arms / (1.0 + s * (np.arange(2) == i))[:, None]}, 30.0
+FAULTS: dict[str, Hideable] = {
+    "joint_torsion": _fault("joint_torsion weak_element", _softened("torsion", 6), 6),
+    "joint_bending": _fault("joint_bending weak_element", _softened("bending", 6), 3),
+    "soft_link": _fault(
+        "weak_element", lambda r, p: {"arms": r.arms / (1.0 + p["size"] * (np.arange(2) == p["part"]))[:, None]}, 2
     ),
-    "loose_foot": RobotFault(("weak_element",), (0,), lambda r, i, s: {"mount": r.mount * (1.0 + s)}, 30.0),
-    "soft_spindle": RobotFault(
-        ("spindle_compliance", "weak_element"), (0,), lambda r, i, s: {"spindle": r.spindle * (1.0 + s)}, 100.0
+    "loose_foot": _fault("weak_element", _softened("mount")),
+    "soft_spindle": _fault("spindle_compliance weak_element", _softened("spindle"), largest=100.0),
+    "backlash": _fault(
+        "gear_backlash", lambda r, p: {"gap": r.gap + 1e-4 * p["size"] * (np.arange(6) == p["part"])}, 6
     ),
-    "backlash": RobotFault(
-        ("gear_backlash",), JOINTS, lambda r, i, s: {"gap": r.gap + 1e-4 * s * (np.arange(6) == i)}, 30.0
-    ),
-    "balancer": RobotFault((), (0,), lambda r, i, s: {"balancer": 1e6 * s}, 30.0),
-    "crosstalk": RobotFault((), (0,), lambda r, i, s: {"crosstalk": s}, 0.5),
-    "creep": RobotFault((), (0,), lambda r, i, s: {"creep": s}, 0.5),
+    "balancer": _fault("", lambda r, p: {"balancer": 1e6 * p["size"]}),
+    "crosstalk": _fault("", lambda r, p: {"crosstalk": p["size"]}, largest=0.5),
+    "creep": _fault("", lambda r, p: {"creep": p["size"]}, largest=0.5),
 }
 ELEMENTS = {**dict.fromkeys(("joint_torsion", "joint_bending", "backlash"), "joint {}"), "soft_link": "link {}"}
 
@@ -133,38 +124,40 @@ def invented(rng: Generator) -> Robot:
 
 def machine_text(robot: Robot, name: str) -> str:
     """Machine file of the arm as it is believed to be."""
-
-    def row(heading: str, **keys: Any) -> str:
-        written = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in keys.items()}
-        rows = [f"{key} = {json.dumps(value)}" for key, value in written.items()]
-        return "\n".join([heading, *rows])
-
-    parts = [f'name = "{name}"\nkind = "serial"\nsource = "invented by tps rig new --built serial"']
+    tables: list[tuple[str, Document]] = [
+        ("", {"name": name, "kind": "serial", "source": "invented by tps rig new --built serial"})
+    ]
     for i, (alpha, a, offset, d) in enumerate(robot.rows):
-        low, high = np.round(deg_from_rad(LIMITS[i]), 6).tolist()
-        angles = {"alpha_deg": round(deg_from_rad(alpha), 9), "offset_deg": round(deg_from_rad(offset), 9)}
-        lengths = {"a_mm": round(mm_from_m(a), 9), "d_mm": round(mm_from_m(d), 9)}
-        parts.append(row("[[axis]]", name=f"J{i + 1}", type="R", **angles, **lengths, min_deg=low, max_deg=high))
+        low, high = np.round(deg_from_rad(LIMITS[i]), 6)
+        angles = {"alpha_deg": np.round(deg_from_rad(alpha), 9), "offset_deg": np.round(deg_from_rad(offset), 9)}
+        lengths = {"a_mm": np.round(mm_from_m(a), 9), "d_mm": np.round(mm_from_m(d), 9)}
+        axis = {"name": f"J{i + 1}", "type": "R", **angles, **lengths, "min_deg": low, "max_deg": high}
+        tables.append(("[[axis]]", axis))
     tip = np.round(mm_from_m(robot.tip), 9)
-    parts.append(row("[tool]", tip_mm=tip, x_axis=TOOL[:, 0], z_axis=TOOL[:, 2]))
-    mount, spindle = 1e9 * robot.mount, 1e9 * robot.spindle
-    give = {"translation_nm_per_N": mount[:3], "rotation_nrad_per_Nm": mount[3:]}
-    parts.append(row("[[element]]", name="foot", type="spring", at="base", **give))
-    give = {"torsion_nrad_per_Nm": 1e9 * robot.torsion, "bending_nrad_per_Nm": 1e9 * robot.bending}
-    parts.append(row("[[element]]", name="joints", type="joint", **give))
+    tables.append(("[tool]", {"tip_mm": tip, "x_axis": TOOL[:, 0], "z_axis": TOOL[:, 2]}))
     ends = mm_from_m(np.array([[robot.rows[2, 1], 0.0, 0.0], [robot.rows[3, 1], robot.rows[3, 3], 0.0]]))
+
+    def spring(at: str, moves: FloatArray, turns: FloatArray) -> Document:
+        give = {"translation_nm_per_N": 1e9 * moves, "rotation_nrad_per_Nm": 1e9 * turns}
+        return {"name": {"base": "foot", "tip": "spindle"}[at], "type": "spring", "at": at, **give}
+
+    give = {"torsion_nrad_per_Nm": 1e9 * robot.torsion, "bending_nrad_per_Nm": 1e9 * robot.bending}
+    elements = [spring("base", robot.mount[:3], robot.mount[3:]), {"name": "joints", "type": "joint", **give}]
     arms = zip(("upper arm", "forearm"), ("J2", "J3"), ends, 1e-6 * robot.arms, strict=True)
     for arm, frame, end, (ea, ei, gj) in arms:
-        place: Table = {"from_mm": [0.0, 0.0, 0.0], "to_mm": np.round(end, 9), "z_axis": [0.0, 0.0, 1.0]}
-        stiff = {"EA_MN": float(ea), "EIy_MNm2": float(ei), "EIz_MNm2": float(ei), "GJ_MNm2": float(gj)}
-        parts.append(row("[[element]]", name=arm, type="beam", frame=frame, **place, **stiff))
-    give = {"translation_nm_per_N": spindle, "rotation_nrad_per_Nm": np.zeros(3)}
-    parts.append(row("[[element]]", name="spindle", type="spring", at="tip", **give))
+        where = {"frame": frame, "from_mm": np.zeros(3), "to_mm": np.round(end, 9), "z_axis": [0.0, 0.0, 1.0]}
+        stiff = {"EA_MN": ea, "EIy_MNm2": ei, "EIz_MNm2": ei, "GJ_MNm2": gj}
+        elements.append({"name": arm, "type": "beam", **where, **stiff})
+    elements.append(spring("tip", robot.spindle, np.zeros(3)))
+    tables += [("[[element]]", element) for element in elements]
     middles = [*(0.5 * ends), 0.5 * mm_from_m(robot.tip)]
     hanging = zip(("upper arm", "forearm", "spindle"), ("J2", "J3", "J6"), MASSES, middles, strict=True)
     for what, frame, mass, centre in hanging:
-        parts.append(row("[[mass]]", name=what, kg=mass, frame=frame, centre_mm=np.round(centre, 9)))
-    return "\n\n".join(parts) + "\n"
+        tables.append(("[[mass]]", {"name": what, "kg": mass, "frame": frame, "centre_mm": np.round(centre, 9)}))
+    written = (
+        [heading, *(f"{key} = {json.dumps(to_dict(value))}" for key, value in of.items())] for heading, of in tables
+    )
+    return "\n\n".join("\n".join(lines).lstrip() for lines in written) + "\n"
 
 
 def frames(robot: Robot, joints: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -246,15 +239,15 @@ def robot_case(seed: int, hidden: str | None, noise: float) -> tuple[str, Table,
     if names:
         name = str(streams[1].choice(names))
         fault = FAULTS[name]
-        part, share = int(streams[1].choice(fault.parts)), float(np.exp(streams[1].uniform(*np.log(SHARES))))
-        low, high = 1e-4, fault.largest
+        part, share = fault.shape(streams[1]), float(np.exp(streams[1].uniform(*np.log(SHARES))))
+        low, high = 1e-4, fault.limit
         for _ in range(18):  # size at which the readings change by that share, rms; at most the largest size
             size = float(np.sqrt(low * high))
-            true = replace(robot, **fault.change(robot, part, size))
+            true = replace(robot, **fault.change(robot, part | {"size": size}))
             moved = np.linalg.norm(pulled(true, joints, force) - sound) / np.linalg.norm(sound)
             low, high = (size, high) if moved < share else (low, size)
-        where = {"element": ELEMENTS[name].format(part + 1)} if name in ELEMENTS else {}
-        fault_keys = {"effect": name, "names": list(fault.names), "parameters": {**where, "by": size}}
+        where = {"element": ELEMENTS[name].format(part["part"] + 1)} if name in ELEMENTS else {}
+        fault_keys = {"effect": name, "names": sorted(fault.names or ()), "parameters": {**where, "by": size}}
         effects = [fault_keys | {"size": float(moved)}]
     moved_by = pulled(true, joints, force)
     sd = np.maximum(noise * np.linalg.norm(moved_by, axis=1), NOISE_FLOOR)

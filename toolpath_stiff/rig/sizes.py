@@ -15,7 +15,7 @@ from scipy.linalg import solve_triangular
 from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.rig.closure import ClosureError
 from toolpath_stiff.rig.draws import Shape
-from toolpath_stiff.rig.effects import at_strength, draw_shape, with_effect
+from toolpath_stiff.rig.effects import HIDEABLE, with_effect
 from toolpath_stiff.rig.fem_faults import FAULTS
 from toolpath_stiff.rig.hidden import HiddenMachine, Nuisances, readings
 from toolpath_stiff.rig.nominal import Nominal
@@ -39,7 +39,6 @@ class Scale:
         self, nominal: Nominal, rows: Rows, clamps: IntArray, nuisances: Nuisances, start: HiddenMachine
     ) -> None:
         self.nominal, self.rows, self.start = nominal, rows, start
-        self.vertices = int(nominal.vertices.max()) + 1
         self.setups = sorted(set(rows.setup.tolist()))
         self.base = np.log(readings(nominal, start, rows))
         self.whitened_length = whitened_length(clamps, _spread(self, nuisances), nuisances)
@@ -60,7 +59,7 @@ class Scale:
 
     def draw(self, name: str, size: float | None, rng: Generator) -> tuple[Shape, dict[str, float]]:
         """Draw an effect's parameters; returns them with their size and detectability."""
-        shape = draw_shape(name, rng, self.vertices, self.setups)
+        shape = HIDEABLE[name].shape(rng, self.nominal.corners, self.setups)
         fraction = rng.random()
         strength, change = self._reach(name, shape, 0.03)
         rms, seen = _rms(change), self._detectability(change)
@@ -73,7 +72,7 @@ class Scale:
         strength, change = self._reach(name, shape, size, start=strength)
         parameters = {
             key: float(f"{value:.4g}") if isinstance(value, float) else value
-            for key, value in at_strength(name, shape, strength).items()
+            for key, value in HIDEABLE[name].grown(strength, shape).items()
         }
         # Further digits depend on the processor.
         figures = {"size": _rms(change), "detectability": self._detectability(change)}
@@ -87,7 +86,7 @@ class Scale:
         low, high, strength = 0.0, math.inf, start
         change = np.zeros(len(self.base))
         for _ in range(25):
-            change = self.change(with_effect(self.start, name, at_strength(name, shape, strength)))
+            change = self.change(with_effect(self.start, name, HIDEABLE[name].grown(strength, shape)))
             rms = _rms(change)
             if abs(rms - size) <= 0.02 * size or (rms < size and strength == 1.0):
                 break
@@ -122,16 +121,10 @@ def _spread(scale: Scale, nuisances: Nuisances) -> FloatArray:
 
     (n, 7) of a law with one stiffness; of a law with more than two the points between move with the ends.
     """
-    step, lengths = 1e-4, scale.nominal.law_lengths
-    first, last = scale.nominal.law_ends
+    step, lengths, (first, last) = 1e-4, scale.nominal.law_lengths, scale.nominal.law_ends
     toward = (lengths - first) / (last - first)
-    columns = []
-    for strut in np.eye(6):
-        columns.append(
-            nuisances.strut_spread
-            * scale.change(dataclasses.replace(scale.start, strut_factors=1.0 + step * strut))
-            / step
-        )
+    weaker = (dataclasses.replace(scale.start, strut_factors=1.0 + step * strut) for strut in np.eye(6))
+    columns = [nuisances.strut_spread * scale.change(machine) / step for machine in weaker]
     for moved in [np.ones(1)] if len(lengths) == 1 else [1.0 - toward, toward]:
         stiffer = scale.nominal.law_stiffnesses * (1.0 + step * moved)
         other = dataclasses.replace(scale.nominal, law_stiffnesses=stiffer)

@@ -11,12 +11,16 @@ the last loads, solve, repeat. Newton's method would meet the infinite slope of 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
 
-from toolpath_stiff.arrays import FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.rig.beams import arm
+from toolpath_stiff.rig.kinematics import neutral_directions
+from toolpath_stiff.rig.nominal import Nominal
+from toolpath_stiff.rig.rows import Rows
 
 HUB, TIP = 6, 7  # nodes of the platform truss (the paper's Figure 2b) after its six joints
 SECANT_STEPS = 60
@@ -24,8 +28,8 @@ SECANT_TOLERANCE = 1e-11  # relative change of the tip's compliance between two 
 
 
 @dataclass(frozen=True)
-class Geometry:
-    """True positions in n rows, base axes, m.
+class PosedRows:
+    """n rows as the machine meets them: commanded strut lengths (n, 6) m and true positions, base axes, m.
 
     Attributes
     ----------
@@ -35,15 +39,43 @@ class Geometry:
         (n, 3, 3) platform to base.
     platform_joints, frame_joints
         (n, 6, 3).
-    vertices
-        (6,) vertex of the frame that holds each strut.
     """
 
+    nominal: Nominal
+    rows: Rows
+    lengths: FloatArray
     work_point: FloatArray
     rotation: FloatArray
     platform_joints: FloatArray
     frame_joints: FloatArray
-    vertices: IntArray
+
+    @cached_property
+    def distances(self) -> FloatArray:
+        """(n, 6) m between the joints of each strut."""
+        return np.asarray(np.linalg.norm(self.platform_joints - self.frame_joints, axis=2))
+
+    @cached_property
+    def units(self) -> FloatArray:
+        """(n, 6, 3) along the struts, from frame to platform."""
+        return np.asarray((self.platform_joints - self.frame_joints) / self.distances[:, :, None])
+
+    @property
+    def stretched(self) -> FloatArray:
+        """(n, 6) extension of the struts: 0 shortest, 1 longest."""
+        low, high = self.nominal.strut_range
+        return np.asarray((self.lengths - low) / (high - low))
+
+    @property
+    def swing(self) -> FloatArray:
+        """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
+        rest, now = neutral_directions(self.nominal)[1], self.units @ self.rotation
+        along = np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now)
+        return np.asarray(1.0 - np.minimum(along**2, 1.0))
+
+    def radial(self, vertex: int) -> FloatArray:
+        """(n, 3) horizontal unit vector from the machine's axis to a vertex of the frame."""
+        outward = self.frame_joints[:, self.nominal.vertices == vertex].mean(axis=1) * np.array([1.0, 1.0, 0.0])
+        return np.asarray(outward / np.linalg.norm(outward, axis=1, keepdims=True))
 
 
 class End(NamedTuple):
@@ -115,11 +147,6 @@ class Links:
     vertices: FloatArray
     ends: tuple[End, ...]
 
-    @property
-    def count(self) -> int:
-        """Unknowns beside the platform's: six joints, two a vertex, the ends."""
-        return 6 + self.vertices.size + len(self.ends)
-
     def with_ends(self, *ends: tuple[FloatArray, FloatArray | float]) -> Self:
         """Add links that carry the whole load: levers (n, 3) or (3,), compliances (n,) or one for all rows."""
         n = len(self.struts)
@@ -131,99 +158,85 @@ class Links:
         give = extra if callable(extra) else lambda forces: extra
         return replace(self, joints=lambda forces: self.joints(forces) + give(forces))
 
-    def with_factors(self, factor: FloatArray) -> Self:
-        """Multiply the stiffnesses of the struts by factors (n, 6)."""
-        root = np.sqrt(factor)
-        return replace(self, struts=self.struts * root[:, :, None] * root[:, None, :])
 
-
-def solved(
-    place: Geometry, links: Links, direction: FloatArray, force: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Solve the machine under loads `force` (n,) N along unit vectors `direction` (n, 3); results per unit load.
+def solved(state: PosedRows, links: Links) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Solve the machine under the loads of the rows; results per unit load.
 
     Returns
     -------
     compliance
         (n,) m/N between tool and workpiece.
     moved
-        (n, N) the unknowns: the platform's own, then six joints, the vertices, the ends (`Links.count` in all).
+        (n, N) the unknowns: the platform's own, then six joints, two a vertex, the ends.
     stretch
         (n, 6, N) what turns them into the elongation of each strut, its joints left out.
     """
-    stretch, platform_springs, platform_dofs = _struts(place, links)
-    load = _load_vector(links, direction, platform_dofs)
-    n, size = load.shape
-    give = _give(links, n)
+    stretch, platform_springs, first = _struts(state, links)
+    n, size, ends = len(stretch), stretch.shape[2], first + 6 + 2 * state.nominal.corners
+    load = np.zeros((n, size))  # what each unknown adds to the motion of tool against workpiece along the load
+    # Tip of a rigid platform: the first three unknowns; node TIP of a truss: three of its last ones.
+    tip = 0 if first == 6 else 3 * TIP
+    load[:, tip : tip + 3] = state.rows.direction
+    # The workpiece is pushed back: the load on it is -direction, so its give counts with the same sign.
+    load[:, ends:] = np.stack([np.einsum("ni,ni->n", state.rows.direction, end.lever) for end in links.ends], axis=1)
+    vertices = np.broadcast_to(links.vertices.ravel(), (n, links.vertices.size))
+    others = np.column_stack([vertices, *(end.compliance for end in links.ends)])
     per_stretch = links.struts @ stretch  # (n, 6, N) N/m
     fixed = platform_springs + np.swapaxes(stretch, 1, 2) @ per_stretch
-    first = platform_dofs
-    forces = np.zeros((n, 6))
-    compliance = np.zeros(n)
+    forces, compliance = np.zeros((n, 6)), np.zeros(n)
     for _ in range(SECANT_STEPS):
-        give[:, :6] = links.joints(forces)
-        held = np.ones((n, size))
-        held[:, first:] = give > 0.0
-        springs = np.zeros((n, size))
-        np.divide(1.0, give, out=springs[:, first:], where=give > 0.0)
-        springs[:, first:][give <= 0.0] = 1.0  # any value will do: the unknown is held
-        free = np.flatnonzero(held.any(axis=0))  # an unknown held in every row does not move
-        stiffness = fixed[:, free[:, None], free] * held[:, free, None] * held[:, None, free]
-        stiffness[:, range(len(free)), range(len(free))] += springs[:, free]
-        pull = (load * held)[:, free]
+        give = np.concatenate([links.joints(forces), others], axis=1)
+        # A link's unknown counts in units of the root of its compliance: its spring is 1, and rigid it does not move.
+        unit = np.ones((n, size))
+        unit[:, first:] = np.sqrt(give)
+        free = np.flatnonzero(unit.any(axis=0))  # an unknown held in every row does not move
+        stiffness = fixed[:, free[:, None], free] * unit[:, free, None] * unit[:, None, free]
+        stiffness[:, range(len(free)), range(len(free))] += free >= first
         moved = np.zeros((n, size))
-        moved[:, free] = np.linalg.solve(stiffness, pull[:, :, None])[:, :, 0]
-        moved *= held
+        moved[:, free] = np.linalg.solve(stiffness, (load * unit)[:, free, None])[:, :, 0]
+        moved *= unit
         before, compliance = compliance, np.einsum("ni,ni->n", load, moved)
-        forces = force[:, None] * (per_stretch @ moved[:, :, None])[:, :, 0]
+        forces = state.rows.force[:, None] * (per_stretch @ moved[:, :, None])[:, :, 0]
         if np.abs(compliance - before).max() <= SECANT_TOLERANCE * compliance.max():
             return compliance, moved, stretch
     raise RuntimeError("the secant stiffnesses of the joints did not settle")
 
 
-def _struts(place: Geometry, links: Links) -> tuple[FloatArray, FloatArray, int]:
+def _struts(state: PosedRows, links: Links) -> tuple[FloatArray, FloatArray, int]:
     """Rows that turn unknowns into strut elongations, springs on the platform's own unknowns, and their number."""
-    n = len(place.work_point)
-    strut = place.platform_joints - place.frame_joints
-    length = np.linalg.norm(strut, axis=2)
-    unit = strut / length[:, :, None]
-    nodes = _nodes(place)
-    rigid = _rigid_motions(nodes - place.work_point[:, None, :])  # (n, 24, 6)
+    n, nodes = len(state.lengths), _nodes(state)
+    rigid = arm(nodes - state.work_point[:, None, :])[..., :3, :].reshape(n, -1, 6)  # (n, 24, 6)
     flexible = np.isfinite(links.bars)
     motion = np.broadcast_to(np.eye(24), (n, 24, 24)) if flexible else rigid
     dofs = motion.shape[2]
-    size = dofs + links.count
+    size = dofs + 6 + 2 * state.nominal.corners + len(links.ends)
     # Displacement of the platform end minus that of the frame end, base axes, per unknown.
     relative = np.zeros((n, 6, 3, size))
     relative[..., :dofs] = motion[:, :18].reshape(n, 6, 3, dofs)
-    for i, vertex in enumerate(place.vertices):
-        column = dofs + 6 + 2 * int(vertex)
-        relative[:, i, :, column] = -radial(place, int(vertex))
+    for i, vertex in enumerate(state.nominal.vertices.tolist()):
+        column = dofs + 6 + 2 * vertex
+        relative[:, i, :, column] = -state.radial(vertex)
         relative[:, i, 2, column + 1] = -1.0
-    stretch = np.einsum("nki,nkij->nkj", unit, relative)
+    stretch = np.einsum("nki,nkij->nkj", state.units, relative)
     stretch[:, range(6), range(dofs, dofs + 6)] = -1.0  # elongation taken up by the joints is not the strut's
     springs = np.zeros((n, size, size))
     if flexible:
         springs[:, :dofs, :dofs] = links.bars * _truss(nodes)
     if np.any(np.asarray(links.moment) > 0.0):
         # Rotation of the platform: the rigid motion that follows its joints best; exact when it is rigid.
-        follow = np.linalg.pinv(rigid[:, :18])[:, 3:]  # (n, 3, 18)
-        platform_turn = np.zeros((n, 3, size))
-        platform_turn[..., :dofs] = follow @ motion[:, :18]
-        moment = np.broadcast_to(links.moment, (n, 6))
-        springs += _end_rotations(unit, length, relative, platform_turn, moment)
+        turn = np.zeros((n, 3, size))
+        turn[..., :dofs] = np.linalg.pinv(rigid[:, :18])[:, 3:] @ motion[:, :18]
+        springs += _end_rotations(state, relative, turn, np.broadcast_to(links.moment, (n, 6)))
     return stretch, springs, dofs
 
 
-def _end_rotations(
-    unit: FloatArray, length: FloatArray, relative: FloatArray, platform_turn: FloatArray, moment: FloatArray
-) -> FloatArray:
+def _end_rotations(state: PosedRows, relative: FloatArray, platform_turn: FloatArray, moment: FloatArray) -> FloatArray:
     """(n, N, N) stiffness of springs `moment` (n, 6) against the struts' rotations to frame and platform, without spin.
 
     A strut that stays straight turns by u x (displacement of its ends) / L; its spin about u meets no resistance.
     """
-    strut_turn = np.cross(unit[..., None], relative, axis=2) / length[:, :, None, None]
-    across = np.eye(3) - unit[..., :, None] * unit[..., None, :]
+    strut_turn = np.cross(state.units[..., None], relative, axis=2) / state.distances[:, :, None, None]
+    across = np.eye(3) - state.units[..., :, None] * state.units[..., None, :]
     at_platform = strut_turn - across @ platform_turn[:, None]
     return np.asarray(
         np.einsum("nk,nkci,nkcj->nij", moment, strut_turn, strut_turn, optimize=True)
@@ -231,12 +244,12 @@ def _end_rotations(
     )
 
 
-def _nodes(place: Geometry) -> FloatArray:
+def _nodes(state: PosedRows) -> FloatArray:
     """(n, 8, 3) m: joints, hub (on the tool axis at the joints' mean height) and tip; the paper's Figure 2b."""
-    axis = place.rotation[:, :, 2]
-    height = np.einsum("nki,ni->nk", place.platform_joints - place.work_point[:, None, :], axis).mean(axis=1)
-    hub = place.work_point + height[:, None] * axis
-    return np.concatenate([place.platform_joints, hub[:, None], place.work_point[:, None]], axis=1)
+    axis = state.rotation[:, :, 2]
+    height = np.einsum("nki,ni->nk", state.platform_joints - state.work_point[:, None, :], axis).mean(axis=1)
+    hub = state.work_point + height[:, None] * axis
+    return np.concatenate([state.platform_joints, hub[:, None], state.work_point[:, None]], axis=1)
 
 
 def truss_bars(nodes: FloatArray) -> list[tuple[int, int]]:
@@ -252,42 +265,9 @@ def truss_bars(nodes: FloatArray) -> list[tuple[int, int]]:
 
 def _truss(nodes: FloatArray) -> FloatArray:
     """(n, 24, 24) stiffness of the platform's bars, of 1 N/m each."""
-    total = np.zeros((len(nodes), 24, 24))
-    for i, j in truss_bars(nodes):
-        bar = nodes[:, j] - nodes[:, i]
-        unit = bar / np.linalg.norm(bar, axis=1, keepdims=True)
-        row = np.zeros((len(nodes), 24))
-        row[:, 3 * i : 3 * i + 3], row[:, 3 * j : 3 * j + 3] = -unit, unit
-        total += row[:, :, None] * row[:, None, :]
-    return total
-
-
-def _rigid_motions(arms: FloatArray) -> FloatArray:
-    """(n, 3 k, 6) displacements of k points at `arms` (n, k, 3) from unit translations and unit rotations."""
-    return arm(arms)[..., :3, :].reshape(len(arms), -1, 6)
-
-
-def radial(place: Geometry, vertex: int) -> FloatArray:
-    """(n, 3) horizontal unit vector from the machine's axis to a vertex of the frame."""
-    outward = place.frame_joints[:, place.vertices == vertex].mean(axis=1) * np.array([1.0, 1.0, 0.0])
-    return np.asarray(outward / np.linalg.norm(outward, axis=1, keepdims=True))
-
-
-def _give(links: Links, n: int) -> FloatArray:
-    """(n, .) compliances of the links' unknowns, in their order; those of joints are filled in during the iteration."""
-    vertices = np.broadcast_to(links.vertices.ravel(), (n, links.vertices.size))
-    return np.column_stack([np.zeros((n, 6)), vertices, *(end.compliance for end in links.ends)])
-
-
-def _load_vector(links: Links, direction: FloatArray, dofs: int) -> FloatArray:
-    """(n, N) contribution of each unknown to the motion of tool against workpiece along `direction`.
-
-    The workpiece is pushed back: the load on it is -direction, so its give counts with the same sign.
-    """
-    vector = np.zeros((len(direction), dofs + links.count))
-    # Tip of a rigid platform: the first three unknowns; node TIP of a truss: three of its last ones.
-    tip = 0 if dofs == 6 else 3 * TIP
-    vector[:, tip : tip + 3] = direction
-    for column, end in enumerate(links.ends, dofs + 6 + links.vertices.size):
-        vector[:, column] = np.einsum("ni,ni->n", direction, end.lever)
-    return vector
+    ends = np.array(truss_bars(nodes))
+    bar = nodes[:, ends[:, 1]] - nodes[:, ends[:, 0]]
+    unit = bar / np.linalg.norm(bar, axis=2, keepdims=True)
+    joins = np.eye(8)[ends[:, 1]] - np.eye(8)[ends[:, 0]]
+    rows = np.einsum("bk,nbi->nbki", joins, unit).reshape(len(nodes), -1, 24)
+    return np.asarray(np.swapaxes(rows, 1, 2) @ rows)

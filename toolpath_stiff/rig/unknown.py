@@ -14,21 +14,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from toolpath_stiff.arrays import FloatArray
-from toolpath_stiff.rig.draws import Draw, Shape, nothing
-from toolpath_stiff.rig.kinematics import neutral_directions
-from toolpath_stiff.rig.nominal import Nominal
-from toolpath_stiff.rig.rows import Rows
-from toolpath_stiff.rig.structure import Geometry, Links
+from toolpath_stiff.rig.draws import Hideable, Shape
 
 Physics = TypeVar("Physics", bound=Callable[..., Any])
 X, Y, Z = np.eye(3)
 
-# Words of a description.
-LINKS = ("instrument", "tool", "platform", "joints", "one strut", "struts", "frame", "table")
-VARIABLES = (
-    *("constant", "x", "y", "z", "radius", "tilt", "strut length", "strut force", "force sign"),
-    *("load", "time", "order", "setup", "temperature", "direction"),
-)
 # What can be told at the tip: joints and struts are in series, so an effect of all joints may be called either; so is
 # that of one strut, its joints and its drive. A strut's length follows height, radius and tilt of the pose, so what
 # varies with a swing may be called by any pose variable that swings the joints; what gives along a pin is constant
@@ -58,75 +48,19 @@ class Unknown:
     shape: Shape = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class CommandedRows:
-    """n rows as the machine sees them: commanded strut lengths (n, 6) m and true positions."""
-
-    nominal: Nominal
-    rows: Rows
-    lengths: FloatArray
-    place: Geometry
-
-    @property
-    def units(self) -> FloatArray:
-        """(n, 6, 3) along the struts, from frame to platform, base axes."""
-        strut = self.place.platform_joints - self.place.frame_joints
-        return np.asarray(strut / np.linalg.norm(strut, axis=2, keepdims=True))
-
-    @property
-    def stretched(self) -> FloatArray:
-        """(n, 6) extension of the struts: 0 shortest, 1 longest."""
-        low, high = self.nominal.strut_range
-        return np.asarray((self.lengths - low) / (high - low))
-
-    @property
-    def swing(self) -> FloatArray:
-        """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
-        rest, now = neutral_directions(self.nominal)[1], self.units @ self.place.rotation
-        along = np.einsum("nki,nki->nk", np.broadcast_to(rest, now.shape), now)
-        return np.asarray(1.0 - np.minimum(along**2, 1.0))
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of unknown.
-
-    Attributes
-    ----------
-    links, variables
-        What a description may name.
-    limit
-        Largest size that is tried.
-    act
-        What it does to the links; None: nothing.
-    read
-        (n,) factor on the stiffness that is read; None: 1.
-    shape
-        Draws what is not size; `sign` in it goes to the size.
-    columns
-        Columns that a measurement file needs to show it.
-    """
-
-    links: frozenset[str]
-    variables: frozenset[str]
-    limit: float
-    act: Callable[[Links, CommandedRows, Unknown], Links] | None = None
-    read: Callable[[Rows, Unknown], FloatArray] | None = None
-    shape: Draw = nothing
-    columns: tuple[str, ...] = ()
-
-
 def kind(
-    kinds: dict[str, Kind], role: str, links: str, variables: str, limit: float, **more: Any
+    kinds: dict[str, Hideable], role: str, links: str, variables: str, limit: float, **more: Any
 ) -> Callable[[Physics], Physics]:
-    """Register the decorated function as a kind under its name; links, variables, columns are separated by commas.
+    """Register the decorated function as a kind under its name; links, variables and needed columns with commas.
 
     `role`: `act` or `read`.
     """
+    more.update(links=frozenset(links.split(",")), variables=frozenset(variables.split(",")))
+    columns = tuple(filter(None, more.pop("needs", "").split(",")))
 
     def registered(physics: Physics) -> Physics:
-        more.update({role: physics, "columns": tuple(filter(None, more.get("columns", "").split(",")))})
-        kinds[physics.__name__] = Kind(frozenset(links.split(",")), frozenset(variables.split(",")), limit, **more)
+        more.update({role: physics, "change": lambda _, p: {"unknown": Unknown(physics.__name__, p["size"], dict(p))}})
+        kinds[physics.__name__] = Hideable(limit=limit, columns=columns, **more)
         return physics
 
     return registered

@@ -32,6 +32,7 @@ SIGNATURES = {
     "CYCLE800": "FR TC ST MODE X0 Y0 Z0 A B C X1 Y1 Z1 DIR FRI DMODE",
     "WORKPIECE": "WP REF HOLD FORM MODE Z0 Z1 ZB X0 Y0 X1 Y1",
 }  # fmt: skip
+TEXTS = ("TC", "WP", "REF", "HOLD", "FORM", "HIDE", "PITM", "PTAB", "PTABA")
 TAPS = ("CYCLE84", "CYCLE840")
 LENGTHS = frozenset((
     "RTP", "RFP", "SDIS", "DP", "DPR", "FDEP", "FDPR", "DAM", "PIT", "MDEP", "VRT", "DIS1", "FFR", "RFF", "SPCA",
@@ -62,17 +63,22 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
         raise block.fail(None, f"{code} whose depth is not below its reference plane RFP", "DP or DPR")
     values["DP"] = bottom
     block.refuse_if(values["RTP"] < values["TOP"], None, f"{code}: RTP is below RFP and SDIS", "a higher RTP")
-    block.refuse_if(not 0.0 <= values.get("DTB", 0.0) <= SECONDS_PER_DAY, "DTB", "is no time in seconds", "0 or more")
+    for name in ("DTB", "DTS", "DTD"):
+        block.refuse_if(not 0.0 <= values.get(name, 0.0) <= SECONDS_PER_DAY, name, "is no time in seconds", "0 or more")
+    units = f"{round(values.get('AMODE', 0.0)):09d}"  # digits from the last: of the depth, of dwells, of pecks
+    turns = "2" in units[-4 if code == "CYCLE83" else -2 : -1]
+    block.refuse_if(turns, "AMODE", "counts dwells in revolutions", "seconds")
     shank = values.get("GMODE", 0.0) // 10 % 10
     block.refuse_if(shank, "GMODE", "counts the depth from a diameter or the shank", "0: from the tip")
+    other = values.get("AXN", 3.0) not in (0.0, 3.0)
+    block.refuse_if(other, "AXN", "is another axis than that of the tool", "none")
     if code == "CYCLE83":
         first = values["RFP"] - abs(values["FDPR"]) if values.get("FDPR") else values.get("FDEP", bottom)
         block.refuse_if(not bottom <= first < values["RFP"], None, "CYCLE83 whose first depth does not fit", "FDPR")
-        block.refuse_if(values.get("DAM", 0.0) < 0.0, "DAM", "is a factor of the pecks", "0 or more")
+        factor = values.get("DAM", 0.0) < 0.0 or (values.get("DAM") and units[-6:-4] != "00")
+        block.refuse_if(factor, "DAM", "is a factor of the pecks, or counts as AMODE says", "0, or mm")
         least = min(values.get("MDEP") or values.get("DAM") or math.inf, values["RFP"] - first)
         block.refuse_if((first - bottom) / least > MOST_STROKES, None, "CYCLE83 with too many strokes", "a larger FDPR")
-        other = values.get("AXN", 3.0) not in (0.0, 3.0)
-        block.refuse_if(other, "AXN", "is another axis than that of the tool", "none")
         values |= {"FIRST": first, "LEAST": least}
     if code in TAPS:
         values["PIT"] = abs(values.get("PIT", 0.0)) or COARSE.get(round(abs(values.get("MPIT", 0.0))), 0.0)
@@ -132,9 +138,10 @@ def strokes(values: Values, feed: float | None, speed: float, turns: float = 1.0
 def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
     """CYCLE83: pecks that get shorter by DAM, down to DAM, the last two alike; retract out, or by 1 mm, in between."""
     depth, bottom, less = values["FIRST"], values["DP"], values.get("DAM", 0.0)
-    stroke, rate = values["RFP"] - depth, feed * (values.get("FRF") or 1.0)
+    stroke, share, last = values["RFP"] - depth, values.get("FRF") or 1.0, values.get("DTD") or values.get("DTB", 0.0)
     ahead = values.get("DIS1") or min(max(AHEAD_MM, AHEAD_SHARE * (values["RFP"] - bottom)), MOST_AHEAD_MM)
-    yield depth, rate, values.get("DTB", 0.0)
+    rate = feed * (share / 100.0 if share > 1.0 else share)  # above 1 it is per cent
+    yield depth, rate, values.get("DTB", 0.0) if depth > bottom + SAME_HEIGHT_MM else last
     while depth > bottom + SAME_HEIGHT_MM:
         if values.get("VARI"):
             yield values["TOP"], None, values.get("DTS", 0.0)
@@ -146,7 +153,7 @@ def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
             stroke = max(stroke - less, values["LEAST"])
             stroke = left / 2.0 if stroke < left < 2.0 * stroke and stroke <= less else stroke
         depth -= min(stroke, left)
-        yield depth, feed, values.get("DTB", 0.0)
+        yield depth, feed, values.get("DTB", 0.0) if depth > bottom + SAME_HEIGHT_MM else last
 
 
 def pattern(state: State, block: CurrentBlock, code: str) -> None:
@@ -157,6 +164,9 @@ def pattern(state: State, block: CurrentBlock, code: str) -> None:
     if plain.cycle is None:
         raise block.fail(None, f"{code} without a cycle", "MCALL CYCLE81(...) before it")
     number = values.get
+    block.refuse_if("HIDE" in given and block.values["HIDE"].text, None, f"{code} with hidden positions", "all of them")
+    on_circle = code == "HOLES2" and number("VARI", 0.0) // 10 % 10
+    block.refuse_if(on_circle, "VARI", "goes from hole to hole on the circle", "a tens digit of 0: straight")
     count, start = round(number("NUM", 1.0)), math.radians(number("STA1", 0.0))
     block.refuse_if(not 1 <= count <= 10_000, None, f"{code} with {count} holes", "1 or more")
     if code == "CYCLE802":

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from toolpath_stiff.nc.heidenhain.expressions import BLANK, Value
 from toolpath_stiff.nc.parametric.expressions import Value as Number
 from toolpath_stiff.nc.parametric.statements import Steering
-from toolpath_stiff.nc.siemens.cycles import SIGNATURES
+from toolpath_stiff.nc.siemens.cycles import SIGNATURES, TEXTS
 from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
 from toolpath_stiff.nc.siemens.motion import CORNERS, VECTOR
 from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS
@@ -117,6 +117,8 @@ def _named(scanner: SiemensScanner, name: str, column: int) -> list[Word]:
         names, values = SIGNATURES[name].split(), scanner.arguments()
         for key, value in zip(names, values, strict=False):
             if value is not None:
+                is_text = isinstance(value, str) and bool(value) and key not in TEXTS
+                scanner.refuse_if(is_text, f"{name} with the text {value!r} for {key}", "a number", column=column)
                 text = value if isinstance(value, str) else f"{key}={value:g}"
                 words.append(Word(key, 0.0 if isinstance(value, str) else float(value), column, text))
         scanner.refuse_if(any(values[len(names) :]), f"{name} with {len(values)} parameters", f"{len(names)} of them")
