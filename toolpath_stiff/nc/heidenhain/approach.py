@@ -16,6 +16,7 @@ from toolpath_stiff.nc.heidenhain.points import feed, in_plane, named, plane_of_
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
+Feeds = tuple[float | None, float | None]
 NO_ARC_MM = 1e-3  # an arc of LCT shorter than this is left out: the line continues smoothly
 OF_CENTER = "lines and arcs of APPR and DEP (LEN, R) are those of the tool's centre"
 
@@ -30,7 +31,7 @@ def approach(state: State, block: CurrentBlock, code: str) -> None:
     there, modal = _point(state, block, code), state.feed
     block.refuse_if(not there.keys() >= {first, second}, None, "without its contour point", "both coordinates")
     block.refuse_if(feed(state, block), "FMAX", "in an approach", "F with a number")
-    plain.approach = (there, partial(begin_contour, state, block, code, there, modal, state.feed))
+    plain.approach = (there, partial(begin_contour, state, block, code, there, (modal, state.feed)))
 
 
 def _point(state: State, block: CurrentBlock, code: str) -> dict[int, float]:
@@ -42,15 +43,10 @@ def _point(state: State, block: CurrentBlock, code: str) -> dict[int, float]:
 
 
 def begin_contour(
-    state: State,
-    block: CurrentBlock,
-    code: str,
-    there: dict[int, float],
-    modal: float | None,
-    rate: float | None,
-    heading: complex,
+    state: State, block: CurrentBlock, code: str, there: dict[int, float], feeds: Feeds, heading: complex
 ) -> None:
-    """Carry out an APPR, once the direction of the first contour element is known; feeds before and in it."""
+    """Carry out an APPR, once the direction of the first contour element is known; `feeds` before and in it."""
+    modal, rate = feeds
     state.plain.approach, (first, second, normal), after = None, PLANES[state.plane], state.feed
     contour, start, to_arc = complex(there[first], there[second]), in_plane(state, present(state)), code.endswith("LCT")
     rapid = state.plain.fast and not to_arc

@@ -66,12 +66,11 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     for name in ("DTB", "DTS", "DTD"):
         block.refuse_if(not 0.0 <= values.get(name, 0.0) <= SECONDS_PER_DAY, name, "is no time in seconds", "0 or more")
     units = f"{round(values.get('AMODE', 0.0)):09d}"  # digits from the last: of the depth, of dwells, of pecks
-    turns = "2" in units[-4 if code == "CYCLE83" else -2 : -1]
-    block.refuse_if(turns, "AMODE", "counts dwells in revolutions", "seconds")
+    dwells = units[-4 if code == "CYCLE83" else -2 : -1]
+    block.refuse_if("2" in dwells, "AMODE", "counts dwells in revolutions", "seconds")
     shank = values.get("GMODE", 0.0) // 10 % 10
     block.refuse_if(shank, "GMODE", "counts the depth from a diameter or the shank", "0: from the tip")
-    other = values.get("AXN", 3.0) not in (0.0, 3.0)
-    block.refuse_if(other, "AXN", "is another axis than that of the tool", "none")
+    block.refuse_if(values.get("AXN", 3.0) not in (0.0, 3.0), "AXN", "is another axis than that of the tool", "none")
     if code == "CYCLE83":
         first = values["RFP"] - abs(values["FDPR"]) if values.get("FDPR") else values.get("FDEP", bottom)
         block.refuse_if(not bottom <= first < values["RFP"], None, "CYCLE83 whose first depth does not fit", "FDPR")
@@ -165,8 +164,7 @@ def pattern(state: State, block: CurrentBlock, code: str) -> None:
         raise block.fail(None, f"{code} without a cycle", "MCALL CYCLE81(...) before it")
     number = values.get
     block.refuse_if("HIDE" in given and block.values["HIDE"].text, None, f"{code} with hidden positions", "all of them")
-    on_circle = code == "HOLES2" and number("VARI", 0.0) // 10 % 10
-    block.refuse_if(on_circle, "VARI", "goes from hole to hole on the circle", "a tens digit of 0: straight")
+    block.refuse_if(code == "HOLES2" and number("VARI", 0.0) // 10 % 10, "VARI", "goes from hole to hole on the circle")
     count, start = round(number("NUM", 1.0)), math.radians(number("STA1", 0.0))
     block.refuse_if(not 1 <= count <= 10_000, None, f"{code} with {count} holes", "1 or more")
     if code == "CYCLE802":
