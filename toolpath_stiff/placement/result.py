@@ -205,10 +205,12 @@ class Placement(FolderResult):
     def worse(self) -> list[Document]:
         """Figures that are worse there than at the present placement, and by how much."""
         worse: list[Document] = []
-        for figure, key in FIGURES.items() if self.present is not None else ():
-            chosen, before = getattr(self.chosen, key), getattr(self.present, key)
+        if (present := self.present) is None:
+            return worse
+        for figure, key in FIGURES.items():
+            chosen, before = getattr(self.chosen, key), getattr(present, key)
             by = chosen - before if figure == "range" else before - chosen
-            if by > ROUNDING * self.present.mean_N_per_mm:
+            if by > ROUNDING * present.mean_N_per_mm:
                 values = {"chosen_N_per_mm": chosen, "before_N_per_mm": before, "worse_by_N_per_mm": by}
                 worse.append({"figure": figure, **values})
         return worse
