@@ -99,6 +99,7 @@ def gauge(session: Session) -> Document:
     floor = left_out = None
     error = session.errors()["mean_abs_error_percent"]
     if diagnosed:
+        refitted = diagnosed["baseline"]["mean_abs_error_percent"]
         rows = [{"effect": row["effect"], **_sizes(row)} for row in diagnosed["candidates"]]
         on = [{"effect": name, **keys} for name, keys in state.on.items()]
         floor = diagnosed["baseline"]["noise_floor_percent"]
