@@ -125,7 +125,7 @@ def pocket(outer: Outline, step: float, heights: Heights, feeds: Feeds, turn: in
 
 
 def edge(path: Outline, heights: Heights, feeds: Feeds, turn: int, lead: float) -> Iterator[Cut]:
-    """Once round at each height, led in and out on quarter circles; on half circles, outside, where `lead` is negative."""
+    """Once round at each height, led in and out on quarter circles; outside, where `lead` is negative, on half ones."""
     (floors, safe, ahead), (feed, down) = heights, feeds
     above = safe
     begin = path.at(0.0, -path.width / 2.0)
