@@ -80,8 +80,8 @@ def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> No
     switch_off(state, block, side)
 
 
-def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
-    """The tool beside the contour from the next move on, by its radius in the tool table or TOOL DEF and its DR."""
+def tool_radius(state: State, block: CurrentBlock, side: str | None) -> float:
+    """Radius of the tool by the tool table or TOOL DEF, and its DR; a check goes on without one, with 0."""
     radius = state.plain.radius
     if math.isnan(radius):
         name = next((name for name, number in state.plain.names.items() if number == state.tool), "")
@@ -89,7 +89,13 @@ def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
         of_name = ", as that of the tool with this remark" if name else own * (state.dialect.name == "heidenhain")
         hint = f"give it in a tool table (--tools FILE){of_name}"
         state.fault(block.fail(side, f"needs the radius of tool {tool}", hint=hint))
-        radius = 0.0
+        return 0.0
+    return radius
+
+
+def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
+    """The tool beside the contour from the next move on."""
+    radius = tool_radius(state, block, side)
     state.assume(COMPENSATED)
     scale = state.plain.scale
     turned = SIDES[side] if radius >= 0.0 else -SIDES[side]
