@@ -29,7 +29,7 @@ PLUNGES = ("", "", "helix", "ramp")  # tens of VARI of pockets: at rapid, at fee
 
 def digit(value: float, place: int) -> int:
     """A decimal digit, counted from the last."""
-    return int(abs(value)) // 10**place % 10
+    return int(f"{int(abs(value)):09d}"[-1 - place])
 
 
 def begin(state: State, block: CurrentBlock, code: str) -> tuple[Values, float]:
