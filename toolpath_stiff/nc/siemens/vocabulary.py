@@ -150,7 +150,7 @@ LISTED = {
 }  # fmt: skip
 WORDS = frozenset((
     "ADIS", "ADISPOS", "SPOS", "SPOSA", "OVR", "OVRRAP", "FGREF", "CTOL", "OTOL", "ACC", "H", "FRC", "FL", "LIMS",
-    "ATOL", "DISC", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF", "FB",
+    "ATOL", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF", "FB",
 ))  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
 REFUSED = refused((
@@ -173,6 +173,7 @@ REFUSED = refused((
     ("G140 G141 G142 G143 G147 G148 G247 G248 G340 G341 G347 G348", "smooth approach and retraction",
      "post its moves", f"{BASICS}, Smooth approach and retraction"),
     ("G291", "the ISO dialect", "read it as G code: --dialect fanuc", f"{MANUAL}, ISO Milling"),
+    ("DISC", "corners between an arc and an intersection", "DISC=0", f"{BASICS}, Tool radius compensation"),
     ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
     ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
      f"{PLANNING}, Orientation"),
