@@ -123,9 +123,9 @@ _ROWS: Rows = (
         ("HOLES1 HOLES2 CYCLE801 CYCLE802", cycles.pattern, "holes on a line, on a circle, in a grid, at points"),
     )),
     ("corner", f"{CYCLES}, Milling cycles", (
-        ("POCKET3 POCKET4", milling.mill_pocket, "rectangular pocket, circular pocket"),
-        ("CYCLE76 CYCLE77", milling.mill_spigot, "rectangular spigot, circular spigot"),
-        ("CYCLE71 CYCLE61", milling.mill_face, "face"), ("CYCLE72", contours.mill_contour, "contour"),
+        ("POCKET3 POCKET4", milling.mill_area, "rectangular pocket, circular pocket"),
+        ("CYCLE76 CYCLE77", milling.mill_area, "rectangular spigot, circular spigot"),
+        ("CYCLE71 CYCLE61", milling.mill_area, "face"), ("CYCLE72", contours.mill_contour, "contour"),
     )),
     ("corner", f"{MANUAL}, Operating, Blank input", (("WORKPIECE", tools.blank, "blank"),)),
 )  # fmt: skip
