@@ -149,7 +149,19 @@ def _densely(start: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 REFUSALS = {
-    "FC DR- R10": ("FC is free contour programming", 3),
+    "FL AN+90 LEN5\nFSELECT 2": ("FSELECT is a choice of solutions", 4),
+    "FL X+10": ("not determined by its own data", 3),
+    "FL AN+90\nL X+10": ("not determined by its own data", 3),
+    "FL X+9 Y+9 AN+90": ("contradict each other", 3),
+    "FL X+9 AN+90\nFL X+9 Y+9 AN+0": ("not determined|contradict", 3),
+    "FL AN+0\nFC DR+ R5 CCX+20 CCY+3": ("not determined", 3),
+    "FL AN+0\nFCT DR+ R5 CCX+20 CCY+3": ("contradict each other", 4),
+    "FC DR+ R10 CCX+9 CCY+0 CCA90": ("contradict each other", 3),
+    "FC R10 CCX+10 CCY+0 CCA90": ("without its direction", 3),
+    "FLT LEN5": ("without a contour element before it", 3),
+    "FL AN+90 LEN5 PDX+3": ("no word of FL", 3),
+    "FL PR+5": ("both of them, behind FPOL", 3),
+    "L X-9\nAPPR LT X+0 Y+9 LEN5 RL\nCT X+5 Y+9": ("without a contour element in the plane", 5),
     "CYCL DEF 251 POCKET": ("cycle that is not supported", 3),
     "CYCL DEF 208 BORE Q200=2": ("draws without numbers", 3),
     "Q5 = 1\nTCH PROBE 0.0 PLANE Q5 X-\nTCH PROBE 0.1 X+5\nL X+Q5": ("Q5 is read before it is set", 6),
@@ -211,6 +223,7 @@ REFUSALS = {
     "FUNCTION MODE TURN": ("turning is not supported", 3),
     "L X+10\nRND R2 X+3\nL Y+10": ("X.3 is no word of RND", 4),
     "CYCL DEF 9.1 V.ZEIT": ("needs its time", 3),
+    "Q = 5": ("Q is no statement that is known", 3),
     "Q1 = 3 / 0": ("cannot be worked out", 3),
     "Q1 = ((3": ("3:7: a bracket that is not closed", 3),
     "L X+1 L Y+2": ("no word|is no word", 3),

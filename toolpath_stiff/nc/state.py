@@ -177,6 +177,9 @@ class Conversational:
         A contour element that waits for the corner behind it, with its feed, and that corner's statement (CHF, RND).
     approach
         The contour point of an APPR, and what it does once the direction of the first element is known.
+    free, free_pole, closes
+        Elements of a free contour (FK) that are not yet determined, with whether a corner follows; FPOL; where CLSD+
+        began the contour.
     fast
         Whether the last positioning was a rapid.
     to_corner
@@ -212,6 +215,9 @@ class Conversational:
     held: tuple[CurrentBlock, Element, float | None] | None = None
     corner: CurrentBlock | None = None
     approach: tuple[dict[int, float], Callable[[complex], None]] | None = None
+    free: list[tuple[CurrentBlock, str, bool]] = field(default_factory=list)
+    free_pole: complex | None = None
+    closes: complex | None = None
     fast: bool = False
     to_corner: bool = False
     cycle: tuple[int, dict[str, float]] | None = None

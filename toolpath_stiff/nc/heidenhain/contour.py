@@ -231,10 +231,11 @@ def circle(state: State, block: CurrentBlock, code: str) -> None:
         turns = max(1, math.ceil(abs(step.value) / 360.0 - 1e-9))
     with plane_of_pole(state, block) as center:
         there = polar(state, block, center) if code == "CP" else named(state, block)
-        _round(state, block, there, (center, turn, turns))
+        arc_to(state, block, there, (center, turn, turns))
 
 
-def _round(state: State, block: CurrentBlock, there: dict[int, float], about: Circle) -> None:
+def arc_to(state: State, block: CurrentBlock, there: dict[int, float], about: Circle) -> None:
+    """An arc to a point, with its feed; the side of the compensation may not change on it."""
     rapid = feed(state, block)
     block.refuse_if(rapid, "FMAX", "on an arc", "F with a number")
     side = take_side(block)
@@ -258,7 +259,7 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
     start, end = in_plane(state, present(state)), end_of(state, there)
     places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
     center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
-    _round(state, block, there, (center, turn, 1))
+    arc_to(state, block, there, (center, turn, 1))
 
 
 def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
@@ -280,7 +281,7 @@ def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
         return
     block.refuse_if(math.pi - abs(cmath.phase(chord)) < STRAIGHT_ON, None, "straight back", "another point")
     radius = abs(chord) ** 2 / (2.0 * chord.imag)  # to the left where positive
-    _round(state, block, there, (start + radius * 1j * ahead, 1 if radius > 0.0 else -1, 1))
+    arc_to(state, block, there, (start + radius * 1j * ahead, 1 if radius > 0.0 else -1, 1))
 
 
 def corner(state: State, block: CurrentBlock, code: str) -> None:
