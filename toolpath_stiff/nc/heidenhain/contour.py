@@ -6,6 +6,7 @@ Cartesian coordinates", "Polar coordinates"), "Tool compensation". Moves are rec
 
 import cmath
 import math
+from collections.abc import Iterable
 
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.center_path import arc_about
@@ -29,6 +30,7 @@ from toolpath_stiff.nc.heidenhain.points import (
     present,
 )
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Remark
+from toolpath_stiff.nc.pockets import Cut
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, Word
@@ -141,6 +143,17 @@ def move(
     middle, start = (center.real, center.imag), (here[first], here[second])
     sweep = geometry.sweep_about(middle, start, end, turn < 0, state.inch, turns)
     record(state, block, ARC, control, there, arc=arc_about(state, here, center, sweep))
+
+
+def mill(state: State, block: CurrentBlock, cuts: Iterable[Cut]) -> None:
+    """Carry out the moves of a milled pocket, slot or stud, and keep the modal feed."""
+    (first, second, normal), modal = PLANES[state.plane], state.feed
+    for place, height, rate, center, turn in cuts:
+        block.refuse_if(rate is not None and not rate > 0.0, None, "cuts without a feed", "its feed above 0")
+        there = {first: place.real, second: place.imag, normal: height}
+        state.feed = rate or modal
+        go(state, block, there, None if center is None else (center, turn, 1), rate is None)
+    state.feed, state.plain.heading = modal, None
 
 
 def _approach(state: State, block: CurrentBlock, ahead: complex) -> None:
