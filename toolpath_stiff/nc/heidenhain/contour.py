@@ -18,6 +18,7 @@ from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
 from toolpath_stiff.nc.elements import direction as direction_of
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.points import (
+    FREE_POLE,
     ON_CIRCLE_MM,
     end_of,
     feed,
@@ -46,14 +47,14 @@ UNKNOWN_POINT = "goes to a point of the machine that the program does not give: 
 
 
 def pole(state: State, block: CurrentBlock, code: str) -> None:
-    """CC: circle centre and pole, perhaps in another plane than the tool's; without coordinates the present point."""
+    """CC, FPOL: circle centre, pole, perhaps in another plane than the tool's; without coordinates the present one."""
     point = named(state, block)
     plane = next((name for name, axes in PLANES.items() if point.keys() == {*axes[:2]}), None) if point else state.plane
     if plane is None:
         raise block.fail(code, "with other coordinates than two of a plane", "two of X, Y, Z, or none")
     first, second, _ = PLANES[plane]
     point = point or dict(enumerate(present(state)))
-    state.plain.pole = plane, complex(point[first], point[second])
+    state.plain.pole = FREE_POLE if code == FREE_POLE else plane, complex(point[first], point[second])
 
 
 def take_side(block: CurrentBlock) -> str | None:
@@ -80,8 +81,8 @@ def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> No
     switch_off(state, block, side)
 
 
-def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
-    """The tool beside the contour from the next move on, by its radius in the tool table or TOOL DEF and its DR."""
+def tool_radius(state: State, block: CurrentBlock, side: str | None) -> float:
+    """Radius of the tool by the tool table or TOOL DEF, and its DR; a check goes on without one, with 0."""
     radius = state.plain.radius
     if math.isnan(radius):
         name = next((name for name, number in state.plain.names.items() if number == state.tool), "")
@@ -89,7 +90,13 @@ def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
         of_name = ", as that of the tool with this remark" if name else own * (state.dialect.name == "heidenhain")
         hint = f"give it in a tool table (--tools FILE){of_name}"
         state.fault(block.fail(side, f"needs the radius of tool {tool}", hint=hint))
-        radius = 0.0
+        return 0.0
+    return radius
+
+
+def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
+    """The tool beside the contour from the next move on."""
+    radius = tool_radius(state, block, side)
     state.assume(COMPENSATED)
     scale = state.plain.scale
     turned = SIDES[side] if radius >= 0.0 else -SIDES[side]

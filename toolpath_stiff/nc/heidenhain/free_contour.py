@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.contour import arc_to, compensate, corner, direction, go
-from toolpath_stiff.nc.heidenhain.points import ON_CIRCLE_MM, feed, in_plane, named, present
+from toolpath_stiff.nc.heidenhain.points import FREE_POLE, ON_CIRCLE_MM, feed, in_plane, present
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
@@ -21,7 +21,7 @@ WORDS = {"PR", "PA", "CCPR", "CCPA", "AN", "IAN", "R", "LEN", "CCA", "CLSD+", "C
          "F", "FMAX", "FAUTO"}  # beside the coordinates  # fmt: skip
 SAME_DIRECTION = 1e-3  # rad: data that say twice how an element begins may differ by rounding
 NOT_DETERMINED = "is not determined by its own data and those of the elements behind it, or has several solutions"
-Circle = tuple[complex, float]  # centre, radius with its sign
+Curve = tuple[complex, complex | float]  # a point and the direction of a line; centre and radius with its sign
 
 
 @dataclass(frozen=True)
@@ -30,29 +30,19 @@ class FreeElement:
 
     tangent: bool
     turn: int
-    radius: float | None
-    center: complex | None
+    radius: float
+    center: complex
     end: complex
     ahead: complex | None
-    length: float | None
-    angle: float | None
+    length: float
+    angle: float
 
     @property
-    def circle(self) -> Circle | None:
-        """The circle of an arc, where it is known; the end of a line, of radius 0."""
-        if cmath.isnan(self.end) and not self.radius:
-            return None
-        if not self.turn:
-            return self.end, 0.0
-        return self.center and (self.center, self.radius or self.turn * abs(self.end - self.center))
-
-
-def free_pole(state: State, block: CurrentBlock, code: str) -> None:
-    """FPOL: the pole of polar coordinates in free contours."""
-    first, second, _ = PLANES[state.plane]
-    there = named(state, block)
-    block.refuse_if(there.keys() != {first, second}, None, "without its coordinates", "both of the plane")
-    state.plain.free_pole = complex(there[first], there[second])
+    def curve(self) -> Curve | None:
+        """A line by its end and direction, an arc by its circle, an end as a circle of radius 0."""
+        radius = self.radius or self.turn * abs(self.end - self.center)
+        curve = (self.center, radius) if self.turn else (self.end, self.ahead or 0.0)
+        return None if cmath.isnan(curve[0]) or cmath.isnan(curve[1]) else curve
 
 
 def rounding(state: State, block: CurrentBlock, code: str) -> None:
@@ -78,15 +68,15 @@ def free_element(state: State, block: CurrentBlock, code: str) -> None:
             continue
         start = in_plane(state, present(state))
         known = [_known(state, b, c, start if b is block else None) for b, c, _ in plain.free if c in FREE]
-        found = (_arc if known[0].turn else _line)(block, [*known, None, None], start, _begin(state, block, known[0]))
+        heading = plain.heading if known[0].tangent else known[0].ahead
+        block.refuse_if(known[0].tangent and not heading, None, "without a contour element before it", "FL or FC")
+        found = _solved(block, [*known, None, None], start, heading and heading / abs(heading))
         if found is None:
             return
-        end, center = found
-        _agree(block, known[0].end.real - end.real, known[0].end.imag - end.imag, limit=ON_CIRCLE_MM)
         del plain.free[0]
-        plain.to_corner, there = to_corner, {first: end.real, second: end.imag}
-        if center is not None:
-            arc_to(state, block, there, (center, direction(block), 1))
+        plain.to_corner, there = to_corner, {first: found[0].real, second: found[0].imag}
+        if found[1] is not None:
+            arc_to(state, block, there, (found[1], direction(block), 1))
         else:
             rapid = feed(state, block)
             compensate(state, block, there)
@@ -96,46 +86,29 @@ def free_element(state: State, block: CurrentBlock, code: str) -> None:
 def _known(state: State, block: CurrentBlock, code: str, start: complex | None) -> FreeElement:
     """What a statement gives; steps count if the element's start is known."""
     plain, values = state.plain, {name: word.value for name, word in block.values.items()}
-    letters = [AXES[axis] for axis in PLANES[state.plane][:2]]
+    letters, unit = [AXES[axis] for axis in PLANES[state.plane][:2]], state.length_scale
+    pole = plain.pole[1] if plain.pole and plain.pole[0] == FREE_POLE else None
 
     def place(x: str, y: str, size: str, angle: str) -> complex:
-        if plain.free_pole is not None and size in values and angle in values:
-            return plain.free_pole + cmath.rect(values[size] * state.length_scale, math.radians(values[angle]))
+        if pole is not None and size in values and angle in values:
+            return pole + cmath.rect(values[size] * unit, math.radians(values[angle]))
         block.refuse_if(values.keys() & {size, angle}, None, f"with {size} or {angle}", "both of them, behind FPOL")
-        return complex(*(values.get(word, math.nan) * state.length_scale for word in (x, y)))
+        return complex(values.get(x, math.nan) * unit, values.get(y, math.nan) * unit)
 
-    def positive(word: str, scale: float = state.length_scale) -> float | None:
-        return values[word] * scale if values.get(word, 0.0) > 0.0 else None
-
-    end, center = place(*letters, "PR", "PA"), place(f"CC{letters[0]}", f"CC{letters[1]}", "CCPR", "CCPA")
+    x, y = letters
+    end, center, ahead = place(x, y, "PR", "PA"), place(f"CC{x}", f"CC{y}", "CCPR", "CCPA"), None
     if start is not None:
         plain.closes = start if "CLSD+" in values else plain.closes
-        stepped = start + complex(*(values.get(f"I{letter}", math.nan) * state.length_scale for letter in letters))
-        end = complex(*(b if math.isnan(a) else a for a, b in zip(_parts(end), _parts(stepped), strict=True)))
+        steps = start + complex(values.get(f"I{x}", math.nan) * unit, values.get(f"I{y}", math.nan) * unit)
+        end = complex(*(b if math.isnan(a) else a for a, b in ((end.real, steps.real), (end.imag, steps.imag))))
     if "CLSD-" in values and plain.closes is not None:
         end = plain.closes
-    turned = values.get("AN", values.get("IAN"))
-    ahead = None if turned is None else cmath.rect(1.0, math.radians(turned))
-    if ahead and "IAN" in values:
-        ahead = ahead * plain.heading / abs(plain.heading) if start is not None and plain.heading else None
-    turn, radius = 0 if code in ("FL", "FLT") else 1 if "DR+" in values else -1, positive("R")
-    return FreeElement(
-        code[-1] == "T", turn, radius and turn * radius, None if cmath.isnan(center) else center, end, ahead,
-        positive("LEN"), positive("CCA", 1.0),
-    )  # fmt: skip
-
-
-def _parts(point: complex) -> tuple[float, float]:
-    return point.real, point.imag
-
-
-def _begin(state: State, block: CurrentBlock, element: FreeElement) -> complex | None:
-    """Direction in which an element begins; None: not known."""
-    heading = state.plain.heading if element.tangent else element.ahead
-    block.refuse_if(element.tangent and not heading, None, "without a contour element before it", "FL or FC")
-    if heading and element.ahead:
-        _agree(block, cmath.phase(heading / element.ahead))
-    return heading and heading / abs(heading)
+    if "AN" in values or ("IAN" in values and start is not None and plain.heading):
+        before = 0.0 if "AN" in values else cmath.phase(plain.heading or 1.0)
+        ahead = cmath.rect(1.0, before + math.radians(values.get("AN", values.get("IAN", 0.0))))
+    turn = 0 if code in ("FL", "FLT") else 1 if "DR+" in values else -1
+    radius, length = turn * values.get("R", 0.0) * unit, values.get("LEN", 0.0) * unit
+    return FreeElement(code[-1] == "T", turn, radius, center, end, ahead, length, values.get("CCA", 0.0))
 
 
 def _agree(block: CurrentBlock, *differences: float, limit: float = SAME_DIRECTION) -> None:
@@ -143,79 +116,69 @@ def _agree(block: CurrentBlock, *differences: float, limit: float = SAME_DIRECTI
     block.refuse_if(wrong, None, "has data that contradict each other", "data that agree")
 
 
-def _tangent(one: Circle, other: Circle | None) -> tuple[complex, complex] | tuple[None, None]:
+def _tangent(one: Curve, other: Curve | None) -> tuple[complex, complex] | tuple[None, None]:
     """Points where the common tangent leaves one directed circle and reaches the other."""
-    apart, more = (other[0] - one[0], other[1] - one[1]) if other else (0j, 0.0)
-    square = abs(apart) ** 2 - more**2
-    if other is None or square <= 0.0:
+    if other is None or isinstance(one[1], complex) or isinstance(other[1], complex):
         return None, None
-    left = 1j * apart / complex(math.sqrt(square), more)
+    apart, more = other[0] - one[0], other[1] - one[1]
+    if abs(apart) <= abs(more):
+        return None, None
+    left = 1j * apart / complex(math.sqrt(abs(apart) ** 2 - more**2), more)
     return one[0] - one[1] * left, other[0] - other[1] * left
 
 
-def _crossing(start: complex, ahead: complex, other: complex, along: complex) -> complex | None:
-    """Point where two lines meet; None if they are parallel."""
-    sine = (ahead.conjugate() * along).imag
-    return start + ahead * ((other - start).conjugate() * along).imag / sine if abs(sine) > SAME_DIRECTION else None
+def _meeting(one: Curve, other: Curve) -> complex | None:
+    """Point where two lines meet, or two curves touch of which one at least is a circle; None: there is none."""
+    (p, u), (q, v) = one, other
+    if isinstance(u, complex) and isinstance(v, complex):
+        sine = (u.conjugate() * v).imag
+        return p + u * ((q - p).conjugate() * v).imag / sine if abs(sine) > SAME_DIRECTION else None
+    if isinstance(u, complex):
+        return p + u * ((q - p) / u).real
+    return p - u * 1j * v if isinstance(v, complex) else p - u * (q - p) / (v - u) if v != u else None
 
 
-def _line(
+def _solved(
     block: CurrentBlock, known: list[FreeElement | None], start: complex, ahead: complex | None
-) -> tuple[complex, None] | None:
-    """End of a line, without a centre; None: not determined yet."""
-    line, after, last = known[:3]
-    assert line is not None
-    circle, end = after.circle if after and after.tangent else None, None if cmath.isnan(line.end) else line.end
-    if end is None and ahead is None:
-        end = _tangent((start, 0.0), circle)[1]
-    elif end is None and ahead is not None:
-        shares = [
-            (there - here) / along
-            for here, there, along in zip(_parts(start), _parts(line.end), _parts(ahead), strict=True)
-            if not math.isnan(there) and abs(along) > SAME_DIRECTION
-        ] + [line.length]
-        if shares[0] is not None:
-            end = start + ahead * shares[0]
-        elif after and not after.turn and after.ahead and after.circle:
-            end = _crossing(start, ahead, after.circle[0], after.ahead)
-        elif after and circle:
-            end = start + ahead * ((circle[0] - start) / ahead).real
-        elif after and after.tangent and after.radius and last and last.tangent and last.ahead and last.circle:
-            left, right = (after.radius * 1j * v for v in (ahead, last.ahead))
-            middle = _crossing(start + left, ahead, last.circle[0] + right, last.ahead)
-            end = None if middle is None else middle - left
-    if end is None:
-        return None
-    block.refuse_if(abs(end - start) < ON_CIRCLE_MM, None, "ends where it begins", "another end")
-    _agree(block, cmath.phase((end - start) / ahead) if ahead else 0.0)
-    return end, None
-
-
-def _arc(
-    block: CurrentBlock, known: list[FreeElement | None], start: complex, ahead: complex | None
-) -> tuple[complex, complex] | None:
-    """End and centre of an arc; None: not determined yet."""
-    arc, after, last = known[:3]
-    assert arc is not None
-    center, end = arc.center, None if cmath.isnan(arc.end) else arc.end
-    if center is None and ahead and arc.radius:
-        center = start + arc.radius * 1j * ahead
-    elif center is None and ahead and end is not None:
+) -> tuple[complex, complex | None] | None:
+    """End and centre (None: of a line) of the first element; None: not determined yet."""
+    this, after, last = known[:3]
+    assert this is not None
+    end, center = this.end, this.center
+    _agree(block, cmath.phase(ahead / this.ahead) if ahead and this.ahead else 0.0)
+    if this.turn and cmath.isnan(center) and ahead:
         chord = (end - start) / ahead
-        center = start + 1j * ahead * abs(chord) ** 2 / (2.0 * chord.imag) if chord.imag else None
-    if center is None or center == start:
+        radius = this.radius or (abs(chord) ** 2 / (2.0 * chord.imag) if chord.imag else math.nan)
+        center = start + radius * 1j * ahead
+    if this.turn and cmath.isnan(center):
         return None
-    radius = arc.turn * abs(start - center)
-    _agree(block, radius - (arc.radius or radius), limit=ON_CIRCLE_MM)
-    _agree(block, cmath.phase(1j * (start - center) / radius / ahead) if ahead else 0.0)
-    if end is not None:
-        return end, center
-    if arc.angle:
-        end = center + (start - center) * cmath.exp(1j * arc.turn * math.radians(arc.angle))
-    elif after and after.tangent and not after.turn and after.ahead:
-        end = center - radius * 1j * after.ahead
-    elif after and after.tangent and not after.turn:
-        end = _tangent((center, radius), after.circle or (last.circle if last and last.tangent else None))[0]
-    elif after and after.tangent and after.circle and after.circle[1] != radius:
-        end = center - radius * (after.circle[0] - center) / (after.circle[1] - radius)
-    return None if end is None or abs(end - start) < ON_CIRCLE_MM else (end, center)
+    radius = this.turn * abs(start - center) if this.turn else 0.0
+    _agree(block, radius - (this.radius or radius), limit=ON_CIRCLE_MM)
+    own: Curve = (center, radius) if this.turn else (start, ahead or 0.0)
+    axes = ((start.real, end.real, (ahead or 0j).real), (start.imag, end.imag, (ahead or 0j).imag))
+    shares = [(to - at) / along for at, to, along in axes if not math.isnan(to) and abs(along) > SAME_DIRECTION]
+    found: complex | None = None if cmath.isnan(end) else end
+    if found is None and this.turn and this.angle:
+        found = center + (start - center) * cmath.exp(1j * this.turn * math.radians(this.angle))
+    elif found is None and not this.turn and ahead and (shares or this.length):
+        found = start + ahead * (shares[0] if shares else this.length)
+    elif found is None and after and not (this.turn or after.turn):
+        found = _meeting(own, after.curve) if ahead and after.ahead and after.curve else None
+    elif found is None and after and after.tangent:
+        target = after.curve or (last.curve if last and last.tangent else None)
+        if not after.turn and after.ahead:
+            found = _meeting(own, (0j, after.ahead))
+        elif not after.turn or (not this.turn and not ahead):
+            found = _tangent(own, target)[0 if this.turn else 1]
+        elif after.curve:
+            found = _meeting(own, after.curve)
+        elif after.radius and ahead and last and last.tangent and last.ahead and last.curve:
+            beside = (start + after.radius * 1j * ahead, ahead), (last.end + after.radius * 1j * last.ahead, last.ahead)
+            middle = _meeting(*beside)
+            found = None if middle is None else middle - after.radius * 1j * ahead
+    if found is None or (abs(found - start) < ON_CIRCLE_MM and cmath.isnan(end)):
+        return None
+    begins = 1j * (start - center) / radius if this.turn else found - start
+    _agree(block, cmath.phase(begins / ahead) if ahead and begins else 0.0)
+    _agree(block, found.real - end.real, found.imag - end.imag, limit=ON_CIRCLE_MM)
+    return found, center if this.turn else None

@@ -11,7 +11,7 @@ from pathlib import PurePath
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import Code
-from toolpath_stiff.nc.heidenhain.cycles import call
+from toolpath_stiff.nc.heidenhain.cycles import call, pattern
 from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, PARAMETER, assigned, condition, work_out
 from toolpath_stiff.nc.heidenhain.free_contour import CORNERS, FREE, NOT_DETERMINED
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
@@ -182,6 +182,8 @@ class HeidenhainRun(ProgramRun):
             for word in block.values.values():
                 if word.letter[0] == "Q" and not word.text.endswith(("MAX", "AUTO")):
                     self._scope(word.letter)[word.letter] = word.value
+        elif head == "PATTERN DEF":
+            pattern(self.state, block, rest, lambda text: self._value(row, text.replace(",", "."), statement.begins))
         elif head in CONDITIONS:
             holds, number, name = condition(head, rest, self._parameter, place)
             return self._jump_back(row, self._label(row, number, name)) if holds else after

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX
+from toolpath_stiff.nc.heidenhain.milling import AUTO, MAX
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.words import LONGEST_BLOCK, MOST_DIGITS, Word
@@ -36,13 +36,13 @@ _WORD = re.compile(
 )
 _LABEL = re.compile(r'\s*/?\s*(?:N?\d+\s+)?/?\s*LBL\s*(?:0*(\d+)|"([^"]*)")\s*$')
 PARAMETER = re.compile(r"\s*\bQ\d+\s*(?:=|F?AUTO|F?MAX)", re.IGNORECASE)
-_INCH = re.compile(r"\b(INCH)()\s*$")
-_NUMBER_BEHIND = re.compile(rf"()({VALUE})\s*$")  # a name in the control's language
-_OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|17)\.[1-5])")
+_INCH = re.compile(r"\b(INCH)()()\s*$")
+_NUMBERS = re.compile(rf"(DR[+-]|(?<![A-Z])[FXY]|)(?:(?<=DR[+-])()|\s*({VALUE}))")  # behind names in any language
+_OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|4|5|17)\.[1-6])")
 _VALUES = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
 # Heads whose rest has another form, or is irrelevant.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|TCH|FN|Q|DECLARE|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
+    r"(?:BEGIN|END|CALL) PGM|PATTERN|(?:CALL )?LBL|TCH|FN|Q|DECLARE|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
     r"|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 
@@ -88,7 +88,7 @@ def _form(head: str) -> tuple[str, re.Pattern[str] | None, bool]:
     shown = " ".join(head.split()).replace(",", ".").replace("FN ", "FN").rstrip(": ")
     if shown.startswith("CYCL DEF"):
         shown = "CYCL DEF " + shown.removeprefix("CYCL DEF").replace(" ", "")
-    special = _INCH if shown == "BEGIN PGM" else _NUMBER_BEHIND if _OLD.match(shown) else None
+    special = _INCH if shown == "BEGIN PGM" else _NUMBERS if _OLD.match(shown) else None
     return shown, special, special is None and look_up(shown) is not None and not _OTHERWISE.match(shown)
 
 
@@ -107,8 +107,10 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
         raise place.fail(f"a statement of {len(text)} characters", f"at most {LONGEST_BLOCK}")
     end, cycle = head.start() if shown == "M" else head.end(), shown.startswith("CYCL DEF") and "." not in shown
     rest, words, computed = text[end:], list[Word](), dict[int, str]()
-    if special is not None and (number := special.search(text, end)):
-        _add(words, computed, number[1] or "#", number[2].replace(",", "."), number.start() + 1, number[0].strip())
+    for number in special.finditer(text, end) if special is not None else ():
+        if number[0]:
+            written = (number[3] or "").replace(",", ".").replace(" ", "")
+            _add(words, computed, number[1] or "#", written, number.start() + 1, number[0].strip())
     if has_words:
         first = PARAMETER.search(text, end) if cycle else None  # the text before it is the cycle's name
         _words(words, computed, text, first.start() if first else len(text) if cycle else end, place, shown)

@@ -46,7 +46,7 @@ _ROWS: Rows = (
         ("CTP", contour.tangent_circle, "arc that goes on smoothly, in polar coordinates"),
     )),
     ("motion", _FREE, (
-        ("FPOL", free_contour.free_pole, "pole of a free contour"),
+        ("FPOL", contour.pole, "pole of a free contour"),
         ("FL|FC|FLT|FCT", free_contour.free_element, "straight, arc of a free contour; the latter two go on smoothly"),
     )),
     ("motion", f"{MANUAL}, Three-dimensional tool compensation", (
@@ -86,14 +86,24 @@ _ROWS: Rows = (
         ("CYCL DEF 205", cycles.define, "deep drilling"),
         ("CYCL DEF 240", cycles.define, "centring"),
         ("CYCL DEF 241", cycles.define, "single-lip drilling"),
+        ("CYCL DEF 208", cycles.define, "bore milling on a helix"),
         (_parts(1, 0, 5), cycles.define_older, "pecking, of older controls"),
-        ("CYCL CALL|CYCL CALL POS", cycles.call_statement, "carries out the cycle"),
+        ("CYCL CALL|CYCL CALL POS|CYCL CALL PAT", cycles.call_statement, "carries out the cycle"),
     )),
     ("motion", _TAPPING, (
         ("CYCL DEF 206|CYCL DEF 207|CYCL DEF 209", cycles.define, "tapping"),
         (f"{_parts(2, 0, 4)}|{_parts(17, 0, 3)}", cycles.define_older, "tapping, of older controls"),
     )),
-    ("motion", _PATTERNS, (("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),)),
+    ("motion", f"{_CYCLES}, Fixed cycles: pocket milling, stud milling, slot milling", (
+        ("CYCL DEF 251|CYCL DEF 252", cycles.define, "rectangular, circular pocket"),
+        ("CYCL DEF 253", cycles.define, "slot"),
+        ("CYCL DEF 256|CYCL DEF 257", cycles.define, "rectangular, circular stud"),
+        (f"{_parts(4, 0, 6)}|{_parts(5, 0, 5)}", cycles.define_older, "pockets, of older controls"),
+    )),
+    ("motion", _PATTERNS, (
+        ("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),
+        ("PATTERN DEF", _SILENT, "points, rows, patterns, circles for CYCL CALL PAT"),
+    )),
     ("motion", _SPECIAL, (("CYCL DEF 300", functions.left_out, "300 to 399: the machine builder's, left out"),)),
     ("motion", f"{_CYCLES}, Touch probe cycles", (("TCH PROBE", functions.left_out, "probing, left out"),)),
     ("dwell", _SPECIAL, (("CYCL DEF 9.1", functions.dwell, "dwell"),)),
@@ -131,8 +141,7 @@ _REFUSED = (
     ("PLANE PROJECTED, PLANE EULER, PLANE VECTOR, PLANE POINTS, PLANE RELATIV, PLANE RELATIVE",
      "a tilted plane given otherwise", "PLANE SPATIAL", _PLANE),
     ("CYCL DEF 204", "back boring", _BY_MOVES, _DRILLING),
-    ("CYCL DEF 208", "a helix whose way in the manual draws without numbers", _BY_MOVES, _DRILLING),
-    ("SEL, PATTERN, CALL, CYCL CALL PAT", "points of other files or patterns", "post the points one by one", _PATTERNS),
+    ("SEL, CALL", "points or programs of other files", "post the points one by one, CALL PGM", _PATTERNS),
     ("FN17", "data of the control", "put the numbers into the program", _Q),
     ("SPL", "a spline", "post lines and arcs", PATHS),
 )  # fmt: skip
