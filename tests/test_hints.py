@@ -145,7 +145,7 @@ def test_templates_and_imports(here, capsys):
     [
         ("tps pose 0 0 5000 --machine 'my machine.toml'", ["tps machine show 'my machine.toml'"]),
         ("tps pose 0 0 800 --machine 'other one.toml'", ["tps machine list", "tps machine new 'other one.toml'"]),
-        ("tps machine check 'other one.toml'", ["tps machine new 'other one.toml'"]),
+        ("tps machine check 'other one.toml'", ["tps machine list", "tps machine new 'other one.toml'"]),
         ("tps effects show nothing_like_it --effects own.py", ["tps effects list --effects own.py"]),
         ("tps effects list --effects another.py", ["tps effects new another.py"]),
     ],

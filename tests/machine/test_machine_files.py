@@ -94,6 +94,8 @@ def test_missing_section_and_missing_machine(tmp_path):
     binary.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="not a text file"):
         load_machine(binary)
+    binary.write_text(NIST, "utf-8-sig")  # as Windows' editor saves it
+    assert load_machine(binary).name == "nist"
 
 
 def test_a_machine_that_is_singular_everywhere_is_refused():

@@ -219,6 +219,7 @@ BAD_URDF = [
     (URDF.replace("<robot", "<robot xmlns:xacro='x'").replace("<link", "<xacro:link", 1), "tip", "Run xacro"),
     (URDF.replace('link name="link4"', 'link name="${p}link4"'), "tip", "Run xacro"),
     (URDF[:300], "tip", "not XML"),
+    (URDF.replace("<robot", "<sdf").replace("</robot", "</sdf"), "tip", "<sdf>; expected <robot>"),
     (URDF.replace('axis xyz="0 0 1"', 'axis xyz="0 0 0"', 1), "tip", "axis 0 0 0"),
     (URDF.replace('axis xyz="0 0 1"', 'axis xyz="0 0"', 1), "tip", "three numbers"),
     (URDF.replace('name="J3"', 'name="J2"'), "tip", "joint 'J2' is there twice"),
