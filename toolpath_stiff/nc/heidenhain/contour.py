@@ -18,6 +18,7 @@ from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
 from toolpath_stiff.nc.elements import direction as direction_of
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.points import (
+    FREE_POLE,
     ON_CIRCLE_MM,
     end_of,
     feed,
@@ -46,14 +47,14 @@ UNKNOWN_POINT = "goes to a point of the machine that the program does not give: 
 
 
 def pole(state: State, block: CurrentBlock, code: str) -> None:
-    """CC: circle centre and pole, perhaps in another plane than the tool's; without coordinates the present point."""
+    """CC, FPOL: circle centre, pole, perhaps in another plane than the tool's; without coordinates the present one."""
     point = named(state, block)
     plane = next((name for name, axes in PLANES.items() if point.keys() == {*axes[:2]}), None) if point else state.plane
     if plane is None:
         raise block.fail(code, "with other coordinates than two of a plane", "two of X, Y, Z, or none")
     first, second, _ = PLANES[plane]
     point = point or dict(enumerate(present(state)))
-    state.plain.pole = plane, complex(point[first], point[second])
+    state.plain.pole = FREE_POLE if code == FREE_POLE else plane, complex(point[first], point[second])
 
 
 def take_side(block: CurrentBlock) -> str | None:
@@ -250,10 +251,11 @@ def circle(state: State, block: CurrentBlock, code: str) -> None:
         turns = max(1, math.ceil(abs(step.value) / 360.0 - 1e-9))
     with plane_of_pole(state, block) as center:
         there = polar(state, block, center) if code == "CP" else named(state, block)
-        _round(state, block, there, (center, turn, turns))
+        arc_to(state, block, there, (center, turn, turns))
 
 
-def _round(state: State, block: CurrentBlock, there: dict[int, float], about: Circle) -> None:
+def arc_to(state: State, block: CurrentBlock, there: dict[int, float], about: Circle) -> None:
+    """An arc to a point, with its feed; the side of the compensation may not change on it."""
     rapid = feed(state, block)
     block.refuse_if(rapid, "FMAX", "on an arc", "F with a number")
     side = take_side(block)
@@ -277,7 +279,7 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
     start, end = in_plane(state, present(state)), end_of(state, there)
     places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
     center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
-    _round(state, block, there, (center, turn, 1))
+    arc_to(state, block, there, (center, turn, 1))
 
 
 def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
@@ -299,7 +301,7 @@ def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
         return
     block.refuse_if(math.pi - abs(cmath.phase(chord)) < STRAIGHT_ON, None, "straight back", "another point")
     radius = abs(chord) ** 2 / (2.0 * chord.imag)  # to the left where positive
-    _round(state, block, there, (start + radius * 1j * ahead, 1 if radius > 0.0 else -1, 1))
+    arc_to(state, block, there, (start + radius * 1j * ahead, 1 if radius > 0.0 else -1, 1))
 
 
 def corner(state: State, block: CurrentBlock, code: str) -> None:
