@@ -130,15 +130,17 @@ def edge(path: Outline, heights: Heights, feeds: Feeds, turn: int, lead: float) 
     above = safe
     begin = path.at(0.0, -path.width / 2.0)
     center, arc = path.at(0.0, lead - path.width / 2.0), turn if lead > 0.0 else -turn
-    turned = arc * 1j if lead > 0.0 else -1.0
+    turned = -1.0 if lead < 0.0 else arc * 1j
     for floor in floors:
         start, end = center + (begin - center) / turned, center + (begin - center) * turned
         yield start, safe, None, None, 0
         yield start, min(above + ahead, safe), None, None, 0
         yield start, floor, down, None, 0
-        yield begin, floor, feed, center, arc
+        if lead:
+            yield begin, floor, feed, center, arc
         for place, about in path.around(turn):
             yield place, floor, feed, about, turn
-        yield end, floor, feed, center, arc
+        if lead:
+            yield end, floor, feed, center, arc
         yield end, safe, None, None, 0
         above = floor

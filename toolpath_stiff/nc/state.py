@@ -206,6 +206,8 @@ class Conversational:
         G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450.
     base
         G500 in force: "machine", or "zero" where the program takes no other offset; "": it is not.
+    contour
+        Elements of the contour that CYCLE72 mills.
     offsets_named, changes_by_t, transformed
         Whether the program takes settable offsets, and changes tools by T alone; TRAORI in force.
     """
@@ -244,6 +246,7 @@ class Conversational:
     side: str = ""
     entry: str = ""
     base: str = ""
+    contour: list[Element] = field(default_factory=list)
     offsets_named: bool = False
     changes_by_t: bool = False
     transformed: bool = False
