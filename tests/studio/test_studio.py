@@ -285,7 +285,7 @@ def test_code_is_loaded_on_an_explicit_yes_alone(running, tmp_path):
     status, content, _ = running.ask("POST", "/file?name=my_screw.py", body)
     assert status == 200
     assert "my_screw.py is code" in json.loads(content)["confirm"]
-    assert not (running.folder / "effects").exists()
+    assert not (running.folder / "effects" / "my_screw.py").exists()
 
 
 def test_a_broken_effect_is_told_with_its_line(running):
@@ -938,7 +938,6 @@ def test_the_export_is_read_without_a_studio_and_has_the_figures_of_the_commands
     _, again = resumed
     content = again.ask("GET", "/export")[1].decode()
     state = again.idle()
-    again.end()
     assert again.token not in content
     head, mark, tail = content.partition('id="data">')
     document, end, rest = tail.partition("</script>")
