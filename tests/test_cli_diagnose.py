@@ -185,8 +185,9 @@ def test_wrong_input_is_one_message_and_nothing_is_written(files, tmp_path, caps
     }  # fmt: skip
     given = [argument.format(**places) for argument in arguments]
     out = tmp_path / "out"
-    assert main(["diagnose", *given, "--out", str(out)]) == 2
-    printed = capsys.readouterr()
-    assert said in printed.err and "Traceback" not in printed.err
-    assert printed.err.count("error:") == 1
-    assert not printed.out and not out.exists()
+    for command in ["diagnose", *(["plan"] if arguments else [])]:  # without data a plan is a first campaign
+        assert main([command, *given, "--out", str(out)]) == 2
+        printed = capsys.readouterr()
+        assert said in printed.err and "Traceback" not in printed.err
+        assert printed.err.count("error:") == 1
+        assert not printed.out and not out.exists()

@@ -91,6 +91,8 @@ class Argument:
 
     def value(self, word: str) -> Any:
         """Value of a command-line word. Raises `InputError`."""
+        if not word.strip() and self.option.read is not switches:  # a shell variable that is not set
+            raise self._wrong(repr(word), self.option.unit or "a value")
         try:
             value = self.option.read(word) if self.option.read else word
         except ValueError as error:

@@ -83,8 +83,8 @@ class Table:
         written = len(self.heading) - len(self.constants)
         if len(cells) != written:
             hint = "a decimal comma between commas? Write semicolons between the cells" if len(cells) > written else ""
-            found, wanted = f"row with {len(cells)} cells", f"{written} as in the heading"
-            raise InputError(found, expected=wanted, hint=hint, file=self.file, line=line)
+            found = f"row with {len(cells)} cell{'s' * (len(cells) != 1)}"
+            raise InputError(found, expected=f"{written} as in the heading", hint=hint, file=self.file, line=line)
         return {**dict(zip(self.heading, cells, strict=False)), **self.constants}
 
 

@@ -187,6 +187,7 @@ MISSING = {
     ),
     "diameter": ("diameter_mm = 10\n", "", "M3", "tool 1: diameter_mm not known"),
     "teeth and helix": ("flutes = 3\nhelix_deg = 30\n", "", "M3", "flutes, helix_deg not known"),
+    "core": ("core_mm = 8", "core_mm = 80", "M3", "tool 1: core_mm = 80; expected at most 10, the diameter"),
     "tool": ("number = 1", "number = 2", "M3", "[[tool]] with number = 1"),
     "spindle": ("", "", "M5", "wall.nc:5: a cut while the spindle stands"),
     "surface speed": ("", "", "M3 G96", "constant surface speed"),

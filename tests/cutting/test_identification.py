@@ -157,10 +157,12 @@ BROKEN = {
     "no such axes": ({}, {"axes": "x,x,z"}, "axes x,x,z"),
     "one feed": ({"feeds": (0.03,)}, {}, r"slots at 1 feed\b"),
     "two feeds": ({"feeds": (0.03, 0.05)}, {}, "slots at 2 feeds"),
-    "a tool that is not there": ({}, {"tool": 7}, "tool 7 is not told"),
+    "a tool that is not there": ({}, {"tool": 7}, "no tool 7"),
     "no depth": ({"depth": ""}, {}, "column depth_mm is missing"),
     "a depth below nothing": ({"depth": "=-3"}, {}, "depth_mm = -3"),
     "no number": ({"depth": "=deep"}, {}, "depth_mm = 'deep'"),
+    "nothing but zeros": ({"fx": "=0", "fy": "=0", "fz": "=0"}, {}, r"slot60.csv:2: forces up to 0 N"),
+    "no forces of this world": ({"fy": "=1e300"}, {}, "at most 1e\\+06 N"),
     "a speed far off": ({"spindle_rpm": "=60"}, {}, "whole turns of the full slot"),
 }
 

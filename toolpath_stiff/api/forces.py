@@ -22,7 +22,7 @@ def forces(
     *,
     columns: Mapped = None,
     axes: Annotated[str, Option("--axes", "FEED,LEFT,UP")] = "x,y,z",
-    tool: Annotated[int | None, Option("--tool", "NUMBER", at_least=0)] = None,
+    tool: Annotated[int | None, Option("--tool", at_least=0)] = None,
     material: Annotated[str, Option("--material", "NAME")] = "",
 ) -> CoefficientFit:
     r"""Coefficients of the cutting force from records of a dynamometer: slots at several feeds.
@@ -77,6 +77,6 @@ def forces(
     if number not in tools:
         named = ", ".join(map(str, tools)) or "none"
         hint = "say --tool NUMBER" if tools else "write [[tool]] with number, diameter_mm, flutes and helix_deg"
-        raise InputError(f"tool {number or 'of the slots'} is not told (tools: {named})", hint=hint, file=str(cut))
+        raise InputError(f"no tool {number or 'of the slots'} (tools: {named})", hint=hint, file=str(cut))
     files = [records] if isinstance(records, str | Path) else records
     return fit_coefficients([str(file) for file in files], cutter_of(tools[number]), columns, axes, material)

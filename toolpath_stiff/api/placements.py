@@ -179,8 +179,8 @@ def _check_together(unwritten: bool, as_written: bool, objective: str, uncut: bo
 def _keep_out(text: str) -> KeepOut:
     """The box of `NAME:X0,Y0,Z0,X1,Y1,Z1`."""
     name, _, corners = text.rpartition(":")
-    values = numbers(corners)
-    if not name or len(values) != 6:
+    values = numbers(corners) if name else ()
+    if len(values) != 6:
         raise ValueError("NAME:X0,Y0,Z0,X1,Y1,Z1")
     return KeepOut(name, values[:3], values[3:])
 

@@ -19,7 +19,7 @@ from toolpath_stiff.correction.on_elements import PullTask, build_pull_ladder
 from toolpath_stiff.correction.result import Update
 from toolpath_stiff.correction.task import INSTRUMENT, LIKELIHOOD, MACHINE, MEAN_ERROR, UpdateTask
 from toolpath_stiff.correction.update import update as update_machine
-from toolpath_stiff.diagnosis.diagnose import choice_on_path, with_plan
+from toolpath_stiff.diagnosis.diagnose import check_measured, choice_on_path, with_plan
 from toolpath_stiff.diagnosis.diagnose import diagnose as diagnose_readings
 from toolpath_stiff.diagnosis.examination import Diagnosis
 from toolpath_stiff.diagnosis.on_elements import ElementDiagnosis, diagnose_elements, pull_problem
@@ -128,7 +128,8 @@ def _noise(percent: Noise) -> float | tuple[float, float] | None:
         return None
     shares = [float(part) / 100.0 for part in ([percent] if isinstance(percent, int | float) else percent)]
     if len(shares) not in (1, 2) or not all(0.0 <= part <= 0.5 for part in shares) or shares[0] <= 0.0:
-        raise InputError(f"noise {percent} %", expected="one or two percentages, more than 0 and at most 50")
+        named = ",".join(f"{100.0 * part:g}" for part in shares)
+        raise InputError(f"--noise {named}", expected="one or two percentages, more than 0 and at most 50")
     return shares[0] if len(shares) == 1 else (shares[0], shares[1])
 
 
@@ -373,7 +374,9 @@ def draft_effect(
 
 def _cost(text: str) -> tuple[str, float]:
     """Name and minutes from `pose=15`."""
-    name, _, value = text.partition("=")
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise ValueError("WHAT=MINUTES")
     return name, finite_number(value)
 
 
@@ -462,6 +465,8 @@ def plan(
         fits = sorted([found.problem.none, *found.ranked], key=lambda fit: -fit.log_posterior)
         pulled = {"rivals": rivals_on_elements(fits, found.plausible, between), "noise": found.problem.noise.typical}
     readings = question.readings if question.data is not None and of_struts else None
+    if readings is not None:
+        check_measured(readings.of_tip, "to plan from")
     menu = Menu.of(readings).with_options(
         radius=None if radius_mm is None else m_from_mm(radius_mm),
         heights=_in_metres(heights_mm),

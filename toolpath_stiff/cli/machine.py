@@ -17,7 +17,6 @@ import toolpath_stiff as tps
 from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FOLDER, JSON, REPLACE, command
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.hints import command_line
 from toolpath_stiff.options import Option, finite_number, numbers
 from toolpath_stiff.results import TextFile
 
@@ -128,9 +127,6 @@ def _draw(args: Namespace, out: str | None, name: str, makers: Mapping[str, Call
 @command("machine check", "Machine.load", REPLACE, JSON, without=["machine"])
 def check_machine(args: Namespace, file: Annotated[str, Option("FILE")], out: Picture = None) -> int:
     """Check a machine file for mistakes, draw it; exit code 1 if it cannot be right."""
-    if not Path(file).is_file():
-        template = command_line("machine", "new", file)
-        raise InputError(f"cannot read machine file {file!r}", hint=f"`{template}` writes a template")
     check = tps.Machine.load(Path(file), **run.given(args, tps.Machine.load)).check()
     written = _draw(args, out, f"{Path(file).stem}_machine", {".png": check.picture})
     return run.show(args, check, written, code=0 if check.good else NOT_GOOD)

@@ -58,6 +58,8 @@ examples:
 `tps COMMAND --help` describes a command. Lengths are in mm, angles in degrees, stiffnesses in N/mm.
 """
 
+INTERRUPTED = "tps: interrupted; no file is half-written\n"
+
 
 def help_text() -> str:
     """Help text of `tps` itself."""
@@ -104,8 +106,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         except TpsError as error:
             return _ended(f"tps: error: {error}\n", error.exit_code)
         except KeyboardInterrupt:
-            return _ended("tps: interrupted; no file is half-written\n", 130)
+            return _ended(INTERRUPTED, 130)
         except Exception as error:
+            if isinstance(error.__cause__, KeyboardInterrupt):  # it came while a library was loaded
+                return _ended(INTERRUPTED, 130)
             return _ended(f"tps: error: {last_resort(error)}\n", 2)
 
 
@@ -113,6 +117,9 @@ def _run(words: list[str]) -> int:
     """Run the command that the words name."""
     name = next((word for word in words if not word.startswith("-")), "")
     if not name:
+        strange = [word for word in words if word not in ("-h", "--help", "--version")]
+        if strange:
+            raise InputError(f"tps does not know {strange[0]!r}", hint="see tps --help")
         print(f"tps {VERSION}" if "--version" in words else help_text())
         return 0 if words else 2
     title, actions = name, actions_of(name)
@@ -153,7 +160,9 @@ def _ended(text: str, code: int) -> int:
 
 
 def last_resort(error: Exception) -> str:
-    """One line on an error that no command foresaw: memory, recursion, the file system, a defect of this package."""
+    """One line on an error that no command foresaw: the file system, memory, recursion, a defect of this package."""
+    if isinstance(error, OSError):  # a name too long, a full disk
+        return f"{error.strerror or error}{f': {str(error.filename)!r}' if error.filename else ''}"
     frames = traceback.extract_tb(error.__traceback__)
     place = f", {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
     words = " ".join(str(error).split()) or "no more is known"

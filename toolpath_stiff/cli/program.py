@@ -211,8 +211,8 @@ def place(args: Namespace) -> int:
 
 def _region(text: str) -> tuple[str, tuple[float, ...]]:
     name, _, place = text.rpartition(":")
-    values = numbers(place)
-    if not name or len(values) not in (3, 4):
+    values = numbers(place) if name else ()
+    if len(values) not in (3, 4):
         raise ValueError("NAME:X,Y,Z or NAME:X,Y,Z,TURN")
     return name, values
 

@@ -102,8 +102,9 @@ def cutter_of(tool: ToolEntry) -> Cutter:
             hint=f"write it in cut.toml, [[tool]] with number = {tool.number}, or in the tool table (--tools)",
         )
     diameter, corner = given["diameter_mm"], given.get("corner_radius_mm", 0.0)
-    if corner > diameter / 2.0:
-        raise InputError(f"{name}: corner_radius_mm = {corner:g}", expected=f"at most {diameter / 2.0:g}, a ball")
+    for key, most in (("corner_radius_mm", f"{diameter / 2.0:g}, a ball"), ("core_mm", f"{diameter:g}, the diameter")):
+        if given.get(key, 0.0) > float(most.partition(",")[0]):
+            raise InputError(f"{name}: {key} = {given[key]:g}", expected=f"at most {most}")
     origin = [] if "corner_radius_mm" in given else [f"{name}: no corner_radius_mm is given, its end is flat"]
     lateral, axial, beam = _beam(given, tool.material)
     origin += [f"{name}: {beam}"] if beam else []

@@ -47,7 +47,7 @@ def check_measured(data: Readings, purpose: str, fewest: int = FEWEST) -> None:
     lacking = int(np.isnan(data.stiffness).sum())
     if len(data) < fewest or lacking:
         raise InputError(
-            f"{len(data)} readings, {lacking} without a stiffness",
+            f"{len(data)} reading{'s' * (len(data) != 1)}, {lacking} without a stiffness",
             expected=f"at least {fewest} measured stiffnesses {purpose}",
         )
 

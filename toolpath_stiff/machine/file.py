@@ -4,6 +4,7 @@ A key that is not known is an error, so that a typing mistake cannot fall back t
 key, value and bound.
 """
 
+import os
 from copy import deepcopy
 from dataclasses import replace
 from functools import cache
@@ -12,7 +13,7 @@ from pathlib import Path
 
 from toolpath_stiff import defaults
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import is_file, read_bytes
+from toolpath_stiff.files import read_bytes
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.limits import upright_middle
 from toolpath_stiff.machine.model import Hexapod, MachineTool
@@ -62,7 +63,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> MachineTool:
     if str(name_or_file) in known:
         return deepcopy(_packaged(known[str(name_or_file)]))  # a copy: the arrays belong to the caller
     path = Path(name_or_file)
-    if not is_file(path):
+    if not os.path.lexists(path):
         template = command_line("machine", "new", path.with_suffix(".toml") if path.name else "mine.toml")
         raise InputError(
             f"machine {str(name_or_file)!r} is neither a packaged machine nor a file",
@@ -70,7 +71,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> MachineTool:
             hint=f"`tps machine list` lists the machines, `{template}` writes a commented template",
         )
     try:
-        text = read_bytes(path, "machine file", LARGEST_BYTES).decode("utf-8")
+        text = read_bytes(path, "machine file", LARGEST_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         mistake = f"not a text file (byte {error.start})"
         raise InputError(mistake, expected="a machine file (TOML, UTF-8)", file=str(path)) from None

@@ -36,6 +36,8 @@ def machine_from_urdf(text: str, tip: str, file: str) -> tuple[str, list[str]]:
         robot, lines = _parsed(text)
     except expat.ExpatError as error:
         raise InputError(f"not XML: {expat.ErrorString(error.code)}", file=file, line=error.lineno) from None
+    if robot.tag != "robot":
+        raise fault(f"<{robot.tag}>", "<robot>", at=robot)
     for element in robot.iter():
         if "}" in element.tag or any("${" in value for value in element.attrib.values()):  # xacro's
             raise fault(*macros, at=element)

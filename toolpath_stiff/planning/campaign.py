@@ -167,7 +167,7 @@ def _poses(machine: Hexapod, menu: Menu, n: int, rng: Generator) -> FloatArray:
     """(n, 6) poses as unlike each other as possible: one and its images, others vertical, then n // 2 tilted."""
     levels = menu.heights or axis_levels(machine)
     if len(levels) < 4:
-        raise InputError(f"a first campaign at {len(levels)} heights", expected="4 or more")
+        raise InputError(f"heights of a first campaign: {len(levels)}", expected="4 or more")
     drawn = np.concatenate([draw_poses(machine, menu, TRIES // 4, rng) for _ in range(4)])
     tilt, largest = tilts(drawn), menu.max_tilt
     upright, tilted = drawn[tilt == 0.0], drawn[(tilt >= min(LEAST_TILT, 0.6 * largest)) & (largest > 0.0)]

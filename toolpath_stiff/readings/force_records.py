@@ -37,6 +37,7 @@ CUTS, AIR = 0.5, 1.5  # mean force of turns that cut, of the strongest's; swing 
 SLIGHT = 0.2  # of the swing: means no further apart are of one kind; that of one tooth in a slot is over a quarter
 STEADY = 0.05  # of the mean force, within which a turn is as the usual one
 STRONG = 90.0  # per cent of the turns that are weaker than the strongest, and stronger than the quietest
+MOST_FORCE = 1e6  # N
 LEAST_TURNS = 5  # of the full slot
 SPEED_RANGE = 0.03  # relative range of spindle speed about the stated one
 FINER = 8  # refinement of the search for the speed over the record's spectrum
@@ -76,6 +77,11 @@ def read_records(
                 row = int(rows[np.argmax(odd)])
                 mistake = f"{setting} = {table.record(table.rows[row][1]).get(setting, '')}"
                 raise MeasurementError(mistake, expected=expected, file=file, line=int(lines[row]))
+        largest = float(np.nanmax(np.abs(signal[rows, 1:])))
+        if not 0.0 < largest <= MOST_FORCE:
+            expected = f"more than 0 and at most {MOST_FORCE:g} N; is the unit right?"
+            mistake = f"forces up to {largest:g} N in a record"
+            raise MeasurementError(mistake, expected=expected, file=file, line=int(lines[rows[0]]))
         turns_a_second = float(rate[rows[0]]) / s_from_min(1.0)
         per_tooth = float(fed[rows[0]]) / (s_from_min(1.0) * turns_a_second * flutes if feed == FEEDS[1] else 1.0)
         settings = (m_from_mm(per_tooth), m_from_mm(float(depth[rows[0]])), turns_a_second)
@@ -167,6 +173,8 @@ def _cut_and_air(turn: IntArray, force: FloatArray, filling: int) -> tuple[IntAr
 
 def _heard_rate(time: FloatArray, force: FloatArray, rate: float, flutes: int) -> float:
     """Turns a second at which the teeth pass, near the stated rate; the stated rate if no teeth are heard."""
+    if time[-1] * rate < LEAST_TURNS:  # too short for the caller as well
+        return rate
     count = FINER * len(time)
     even = np.linspace(time[0], time[-1], len(time))
     power = np.zeros(count // 2 + 1)

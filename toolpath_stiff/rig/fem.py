@@ -118,7 +118,7 @@ class FemMachine(HiddenMachine):
         return Motions(
             tip=(tip + work) / rows.force, spindle=(tip - platform) / rows.force, table=work / rows.force,
             struts=proper * pull / force, joints=(joint * pull + extra) / force,
-            alone=1.0 / np.diagonal(strut_stiffness(nominal, self, alone), axis1=1, axis2=2),
+            alone=1.0 / strut_stiffness(nominal, self, alone),
             vertices=columns[:, 19:].reshape(len(pose), len(corners), NODE)[..., :3] / force[..., None],
             outward=np.broadcast_to(outward, (len(pose), len(corners), 3)),
         )  # fmt: skip
@@ -135,12 +135,12 @@ class FemMachine(HiddenMachine):
 
 def strut_give(machine: FemMachine, state: PosedRows) -> tuple[FloatArray, FloatArray]:
     """(n, 6) m/N along the struts, and (n, 6) m/N of both joints of each: the linear parts."""
-    nominal, every = state.nominal, range(6)
+    nominal = state.nominal
     first, last = nominal.law_ends
     share = (state.lengths - first) / (last - first)
     joint = JOINT_SHARE / float(nominal.law_stiffnesses.mean())
     law = (1.0 - share) * machine.law[0] + share * machine.law[1]
-    proper = law / strut_stiffness(nominal, machine, state.lengths)[:, every, every] - 2.0 * joint
+    proper = law / strut_stiffness(nominal, machine, state.lengths) - 2.0 * joint
     number, start, worn = machine.worn
     proper = proper + worn * ((share >= start) & (share <= start + WORN) & (np.arange(6) == number))
     give = 2.0 * joint + machine.joint + machine.swing * state.swing

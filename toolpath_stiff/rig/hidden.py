@@ -116,7 +116,7 @@ class HiddenMachine:
         return Motions(
             tip=compliance, spindle=along["spindle"], table=along["table"],
             struts=np.einsum("nki,ni->nk", stretch, moved), joints=joints,
-            alone=np.diagonal(np.linalg.inv(links.struts), axis1=1, axis2=2),
+            alone=1.0 / links.struts,
             vertices=give[..., :1] * outward + give[..., 1:] * AXES[2], outward=outward,
         )  # fmt: skip
 
@@ -167,7 +167,7 @@ def posed(nominal: Nominal, hidden: HiddenMachine, rows: Rows) -> PosedRows:
 
 
 def strut_stiffness(nominal: Nominal, hidden: HiddenMachine, lengths: FloatArray) -> FloatArray:
-    """(n, 6, 6) N/m: the paper's law, linear in length (its equation 5), with curvature and spread."""
+    """(n, 6) N/m: the paper's law, linear in length (its equation 5), with curvature and spread."""
     first, last = nominal.law_ends
     share = (lengths - first) / (last - first)
     points, stiffness = nominal.law_lengths, nominal.law_stiffnesses
@@ -178,7 +178,7 @@ def strut_stiffness(nominal: Nominal, hidden: HiddenMachine, lengths: FloatArray
         law = stiffness[piece] + (stiffness[piece + 1] - stiffness[piece]) * within
     # The exponential keeps strongly curved laws positive beyond the two lengths.
     law = law * np.exp(hidden.curvature * 4.0 * share * (1.0 - share))
-    return np.asarray((law * hidden.strut_factors)[:, :, None] * np.eye(6))
+    return np.asarray(law * hidden.strut_factors)
 
 
 def _joint_give(hidden: HiddenMachine, forces: FloatArray) -> FloatArray:

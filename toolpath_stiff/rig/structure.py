@@ -60,12 +60,6 @@ class PosedRows:
         return np.asarray((self.platform_joints - self.frame_joints) / self.distances[:, :, None])
 
     @property
-    def stretched(self) -> FloatArray:
-        """(n, 6) extension of the struts: 0 shortest, 1 longest."""
-        low, high = self.nominal.strut_range
-        return np.asarray((self.lengths - low) / (high - low))
-
-    @property
     def swing(self) -> FloatArray:
         """(n, 6) squared sine of the platform joints' swing from the neutral pose."""
         rest, now = neutral_directions(self.nominal)[1], self.units @ self.rotation
@@ -127,11 +121,11 @@ class Links:
     Attributes
     ----------
     struts
-        (n, 6, 6) N/m; diagonal unless struts are coupled.
+        (n, 6) N/m.
     joints
         Secant compliance (n, 6) m/N along the struts from strut forces (n, 6) N (tension positive).
     moment
-        N m/rad, rotational spring at both ends of every strut; (n, 6) where struts and rows differ.
+        N m/rad, rotational spring at both ends of every strut.
     bars
         N/m, bars of the platform truss; inf is rigid.
     vertices
@@ -142,7 +136,7 @@ class Links:
 
     struts: FloatArray
     joints: Callable[[FloatArray], FloatArray]
-    moment: float | FloatArray
+    moment: float
     bars: float
     vertices: FloatArray
     ends: tuple[End, ...]
@@ -181,7 +175,7 @@ def solved(state: PosedRows, links: Links) -> tuple[FloatArray, FloatArray, Floa
     load[:, ends:] = np.stack([np.einsum("ni,ni->n", state.rows.direction, end.lever) for end in links.ends], axis=1)
     vertices = np.broadcast_to(links.vertices.ravel(), (n, links.vertices.size))
     others = np.column_stack([vertices, *(end.compliance for end in links.ends)])
-    per_stretch = links.struts @ stretch  # (n, 6, N) N/m
+    per_stretch = links.struts[:, :, None] * stretch  # (n, 6, N) N/m
     fixed = platform_springs + np.swapaxes(stretch, 1, 2) @ per_stretch
     forces, compliance = np.zeros((n, 6)), np.zeros(n)
     for _ in range(SECANT_STEPS):
@@ -222,26 +216,24 @@ def _struts(state: PosedRows, links: Links) -> tuple[FloatArray, FloatArray, int
     springs = np.zeros((n, size, size))
     if flexible:
         springs[:, :dofs, :dofs] = links.bars * _truss(nodes)
-    if np.any(np.asarray(links.moment) > 0.0):
+    if links.moment > 0.0:
         # Rotation of the platform: the rigid motion that follows its joints best; exact when it is rigid.
         turn = np.zeros((n, 3, size))
         turn[..., :dofs] = np.linalg.pinv(rigid[:, :18])[:, 3:] @ motion[:, :18]
-        springs += _end_rotations(state, relative, turn, np.broadcast_to(links.moment, (n, 6)))
+        springs += links.moment * _end_rotations(state, relative, turn)
     return stretch, springs, dofs
 
 
-def _end_rotations(state: PosedRows, relative: FloatArray, platform_turn: FloatArray, moment: FloatArray) -> FloatArray:
-    """(n, N, N) stiffness of springs `moment` (n, 6) against the struts' rotations to frame and platform, without spin.
+def _end_rotations(state: PosedRows, relative: FloatArray, platform_turn: FloatArray) -> FloatArray:
+    """(n, N, N) stiffness of springs of 1 N m/rad against the struts' rotations to frame and platform, without spin.
 
     A strut that stays straight turns by u x (displacement of its ends) / L; its spin about u meets no resistance.
     """
     strut_turn = np.cross(state.units[..., None], relative, axis=2) / state.distances[:, :, None, None]
     across = np.eye(3) - state.units[..., :, None] * state.units[..., None, :]
     at_platform = strut_turn - across @ platform_turn[:, None]
-    return np.asarray(
-        np.einsum("nk,nkci,nkcj->nij", moment, strut_turn, strut_turn, optimize=True)
-        + np.einsum("nk,nkci,nkcj->nij", moment, at_platform, at_platform, optimize=True)
-    )
+    turns = np.concatenate([strut_turn, at_platform], axis=1)
+    return np.einsum("nkci,nkcj->nij", turns, turns, optimize=True)
 
 
 def _nodes(state: PosedRows) -> FloatArray:

@@ -19,11 +19,6 @@ from toolpath_stiff.rig.draws import Hideable, Shape
 Physics = TypeVar("Physics", bound=Callable[..., Any])
 X, Y, Z = np.eye(3)
 
-# What can be told at the tip: joints and struts are in series, so an effect of all joints may be called either; so is
-# that of one strut, its joints and its drive. A strut's length follows height, radius and tilt of the pose, so what
-# varies with a swing may be called by any pose variable that swings the joints; what gives along a pin is constant
-# there, and shows as the strut swings about it.
-ONE, ALL = "one strut,joints", "joints,struts"
 SOFT = 60e-9  # m/N, largest compliance that is tried: far beyond 30 % of a tip that gives 8 to 31 nm/N
 REACH = 0.3  # m, half the width of the workspace that the paper measured
 SIGN_WIDTH = 30.0  # N over which a seat opens: no contact lets go at a stroke (assumed)

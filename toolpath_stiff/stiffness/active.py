@@ -116,7 +116,9 @@ class ActiveEffect:
             raise self._fault(hook, f"returns {returned[first]:g}{at_pose(path, int(first[0]))}", expected)
 
     def _fault(self, hook: str, mistake: str, expected: str = "", line: int | None = None) -> EffectFault:
-        text, line = f"effect {self.effect.name}: {hook} {mistake}", line or line_of(type(self.effect), hook)
+        text = f"effect {self.effect.name}: {hook} {mistake}"
+        if line is None and not self.effect.file:
+            line = line_of(type(self.effect), hook)
         return EffectFault(text, expected=expected, file=file_of(self.effect), line=line)
 
 
