@@ -218,7 +218,7 @@ def _effect(effect: Effect) -> str:
         lines += ["", "It depends on the size of the load (`--force`); the stiffness is the secant one."]
     if effect.needs:
         columns = ", ".join(f"`{name}`" for name in effect.needs)
-        lines += ["", f"It needs {columns}: [what an effect waits for](effects.md#what-an-effect-waits-for)."]
+        lines += ["", f"It needs {columns}: [conditions](effects.md#conditions-of-an-effect)."]
     table = [("key", "meaning", "bounds", "typical", "source of the typical size")]
     table += [
         (f"`{p.key}`", p.meaning or p.name, _bounds(p), "chosen" if p.discrete else _typical(p), p.source)

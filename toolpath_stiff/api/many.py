@@ -4,7 +4,7 @@ import dataclasses
 import json
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -302,7 +302,8 @@ def _answer(task: Task, future: Future[ProgramOutcome]) -> ProgramOutcome:
         return future.result()
     if isinstance(error, ProcessExpired):
         return task.failed(death(error))
-    return task.failed(f"no process could do it: {_named(error)}")
+    guard = '; in a script, call it below `if __name__ == "__main__":`' if isinstance(error, BrokenExecutor) else ""
+    return task.failed(f"no process could do it: {_named(error)}{guard}")
 
 
 def _named(error: BaseException) -> str:

@@ -110,7 +110,7 @@ class Cut:
 
     @property
     def turning(self) -> BoolArray:
-        """(n,) True where a tool turns between rapids: it counts as cutting nothing there."""
+        """(n,) True where a tool cuts while it changes its orientation: no surface error is predicted there."""
         return np.asarray(self.samples.cutting & (self.work.tilts[self.samples.move] == TURNING))
 
     @property
@@ -348,12 +348,14 @@ def _warnings(cut: Cut, struck: BoolArray) -> tuple[str, ...]:
         warnings.append("no cut meets the stock: corner_mm in [stock] and the program's zero say where both are")
     along = np.abs(along_tool_axis(samples.tangent, samples.abc))
     plunges = (cut.removed > 0.0) & (along >= np.cos(defaults.PLUNGE_ANGLE) - ROUNDED)
+    on_the_spot = cut.turning & ~samples.tangent.any(axis=1)
     large = (np.abs(np.nan_to_num(cut.wall_mean)).max(axis=1) > THIN * cut.ae) & (cut.ae > 0.0)
     for rows, words in (
         (large, f"walls off by over {THIN:g} of the width of cut, predicted too large: the chip is not thinner for it"),
         (struck, "rapids run into material, which counts as still there afterwards"),
         (plunges, "plunges: cutting with the end is not modelled, no force is known there"),
-        (cut.turning, "the tool turns on its way: it counts as cutting nothing there"),
+        (cut.turning & ~on_the_spot, "the tool turns on its way: no error of the surface is predicted there"),
+        (on_the_spot, "the tool turns on the spot: it takes off what it meets, no force is known there"),
     ):  # fmt: skip
         warnings += cut.lines_warning(rows, words)
     chip = np.where(engaged, cut.feed_per_tooth, np.nan)

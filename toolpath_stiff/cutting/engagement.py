@@ -85,7 +85,7 @@ def engage(
 ) -> Engagement:
     """The engagement of samples; `stages` as from `workpiece.stages_of` for the moves, `cutters` by tool number.
 
-    Moves whose tool turns on the way are not looked at.
+    A rapid whose tool turns on the way is not looked at.
     """
     count, parts, tell = len(samples), [NO_PATCHES], counter(progress, "engagement")
     source, removed, struck = np.arange(count), np.zeros(count), np.zeros(count, dtype=bool)
@@ -357,8 +357,11 @@ def _rates(stations: AnyArray, patches: Patches) -> FloatArray:
     outer, inner = (stations["flat"] + corner * np.sin(angle) for angle in (second, first))
     below = np.where(rounded, 0.5 * (outer**2 - inner**2), 0.0)
     downward = below * (patches.exit - patches.entry)
-    turned = np.cos(patches.entry) - np.cos(patches.exit)
-    return np.asarray(stations["level"] * turned * sideways + stations["down"] * downward)
+    turned, aside = np.cos(patches.entry) - np.cos(patches.exit), np.sin(patches.exit) - np.sin(patches.entry)
+    beside = 0.5 * stations["reach"] * ((patches.high - corner) ** 2 - (patches.low - corner) ** 2)
+    swing = stations["swing_ahead"] * turned + stations["swing_left"] * aside
+    swing *= np.where(rounded, stations["flat"] * below, beside)
+    return np.asarray(stations["level"] * turned * sideways + stations["down"] * downward + swing)
 
 
 def _end_area(work: Workpiece, stations: AnyArray) -> FloatArray:
@@ -367,13 +370,16 @@ def _end_area(work: Workpiece, stations: AnyArray) -> FloatArray:
     Counted over a spiral of even points (Vogel 1979), which turns along the path: its errors cancel.
     """
     area = np.zeros(len(stations))
-    rows = np.flatnonzero(stations["end_alone"] | ((stations["down"] > 0.0) & (stations["flat"] > 0.0)))
+    swings = (stations["swing_ahead"] != 0.0) | (stations["swing_left"] != 0.0)
+    rows = np.flatnonzero(stations["end_alone"] | (((stations["down"] > 0.0) | swings) & (stations["flat"] > 0.0)))
     some, number = stations[rows], np.arange(END_POINTS)
     widest = np.where(some["end_alone"], some["reach"], some["flat"])
     radius = widest[:, None] * np.sqrt((number + 0.5) / END_POINTS)[None, :]
     angle = np.pi * (3.0 - np.sqrt(5.0)) * number[None, :] + (some["path"] / np.maximum(some["reach"], TOUCH))[:, None]
     height = rise(some["reach"][:, None], some["flat"][:, None], radius) + TOUCH
     cut = _cuts(work, some, radius, angle, height)
-    fall = np.where(some["recent"] == len(work.pieces), 1.0, np.maximum(some["down"], 0.0))
-    area[rows] = np.pi * widest**2 * cut.mean(axis=1) * fall
+    ahead, left = (some[name][:, None] for name in ("swing_ahead", "swing_left"))
+    fall = some["down"][:, None] + radius * (np.sin(angle) * ahead + np.cos(angle) * left)
+    fall = np.where((some["recent"] == len(work.pieces))[:, None], 1.0, np.maximum(fall, 0.0))
+    area[rows] = np.pi * widest**2 * (cut * fall).mean(axis=1)
     return area

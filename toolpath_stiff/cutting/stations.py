@@ -8,13 +8,16 @@ import numpy as np
 from toolpath_stiff import defaults
 from toolpath_stiff.arrays import AnyArray, FloatArray, IntArray, product
 from toolpath_stiff.cutting.cutters import Cutter, of_tools
+from toolpath_stiff.cutting.tilts import TURNING
 from toolpath_stiff.cutting.workpiece import Window, Workpiece
 from toolpath_stiff.nc.courses import points_along
 from toolpath_stiff.nc.moves import Moves
 from toolpath_stiff.path.sampling import Samples
 
 BLOCK = 8192  # stations at a time
-RECENT = 0.05  # radii of the cutter along the path, whose pieces are those just before
+# Radii of the cutter along the path, whose pieces are those just before. Where the tool turns on its way, these count
+# as not yet cut: a piece ends with the tool turned back a little from where the next begins.
+RECENT, RECENT_TURNING = 0.05, 0.25
 TOUCH = 1e-9  # m, by which the envelope is reduced: mere touching is no cut
 
 Seen = tuple[IntArray, FloatArray, FloatArray]
@@ -23,9 +26,11 @@ STATION = np.dtype([
     *((name, np.float64) for name in ("ahead_x", "ahead_y")),  # unit vector of the motion in the plane
     *((name, np.float64) for name in ("level", "down")),  # parts of the motion in the plane and down the axis
     *((name, np.float64) for name in ("reach", "flat", "longest")),  # cutter: radius, of its flat end, cutting length
+    *((name, np.float64) for name in ("swing_ahead", "swing_left")),  # motion per height above the corner
     ("move", np.int64),
-    ("piece", np.int64),  # the station's own piece, for a rapid the next: those before it have cut the material
+    ("piece", np.int64),  # the station's own piece, for a rapid the next
     ("recent", np.int64),  # first of the pieces just before
+    ("until", np.int64),  # pieces before this one have cut the material that the station meets
     ("path", np.float64),  # from the program's start
     ("tilt", np.int64),  # the frame of the quantities above
     ("end_alone", np.bool_),  # a plunge or a rapid: only material below the cutter's end counts
@@ -52,27 +57,52 @@ def stations_at(
     rapid = work.first[move + 1] == work.first[move]
     steep = np.cos(defaults.PLUNGE_ANGLE) * np.hypot(level, motion[:, 2])
     stations["end_alone"] = rapid | (np.abs(motion[:, 2]) >= steep - 1e-12)
-    recent = np.searchsorted(work.pieces["after"], path - RECENT * stations["reach"], "right")
+    turning = (work.tilts[move] == TURNING) & (stations["flat"] > 0.0)  # a ball moves the same however it turns
+    radii = np.where(turning, RECENT_TURNING, RECENT)
+    recent = np.searchsorted(work.pieces["after"], path - radii * stations["reach"], "right")
     stations["recent"] = np.where(rapid, len(work.pieces), recent)
+    stations["until"] = stations["piece"]
+    if turning.any():
+        part: AnyArray = work.pieces[np.minimum(stations["piece"], len(work.pieces) - 1)]
+        x, y, ahead_x, ahead_y = part["swing_x"], part["swing_y"], stations["ahead_x"], stations["ahead_y"]
+        stations["swing_ahead"], stations["swing_left"] = x * ahead_x + y * ahead_y, y * ahead_x - x * ahead_y
+        run = np.maximum.accumulate(
+            np.where(work.pieces["tilt"] > work.tilts.max(), 0, np.arange(1, len(work.pieces) + 1))
+        )
+        until = np.maximum(recent, run[np.maximum(stations["piece"] - 1, 0)])
+        stations["until"] = np.where(turning, np.minimum(until, stations["piece"]), stations["piece"])
     return stations
 
 
-def seen_upright(work: Workpiece, move: IntArray, position: FloatArray, tangent: FloatArray) -> Seen:
+def seen_upright(work: Workpiece, move: IntArray, path: FloatArray, position: FloatArray, tangent: FloatArray) -> Seen:
     """(n,) number of the frame in which the tool is upright at places along moves; tip and motion (n, 3) in it.
 
-    Where the tool turns (`tilts.TURNING`) neither means anything.
+    The motion is that per length of path. Where the tool turns, both are those of the piece of constant tilt; on a
+    rapid of which nothing is: the number is `TURNING`.
     """
     tilt = work.tilts[move]
-    if work.tilted:
-        position, tangent = (product(vectors[:, None], work.turns[tilt])[:, 0] for vectors in (position, tangent))
-    return tilt, position, tangent
+    if not work.tilted:
+        return tilt, position, tangent
+    piece = np.minimum(pieces_at(work, move, path), len(work.pieces) - 1)
+    part, turning = work.pieces[piece], (tilt == TURNING) & (work.first[move + 1] > work.first[move])
+    tilt = np.where(turning, part["tilt"], tilt)
+    turn = work.turns[tilt]
+    position, motion = (product(vectors[:, None], turn)[:, 0] for vectors in (position, tangent))
+    rows = np.flatnonzero(turning & (part["extent"] > 0.0) & (tangent != 0.0).any(axis=1))
+    some = part[rows]
+    length = some["after"] - some["before"]
+    along = some["extent"] * np.clip((path[rows] - some["before"]) / length, 0.0, 1.0)
+    place = np.stack([some["cos"], some["sin"], some["slope"]], axis=1)
+    motion[rows] = (some["extent"] / length)[:, None] * place
+    position[rows] = np.stack([some["x"], some["y"], some["z"]], axis=1) + along[:, None] * place
+    return tilt, position, motion
 
 
 def samples_seen(work: Workpiece, samples: Samples) -> tuple[IntArray, Samples]:
     """(n,) number of each sample's frame, and the samples as `seen_upright`."""
     if not work.tilted:
         return work.tilts[samples.move], samples
-    tilt, position, motion = seen_upright(work, samples.move, samples.position, samples.tangent)
+    tilt, position, motion = seen_upright(work, samples.move, samples.s, samples.position, samples.tangent)
     return tilt, replace(samples, position=position, tangent=motion, abc=np.zeros_like(samples.abc))
 
 
@@ -93,7 +123,7 @@ def stations_between(
     some = moves.take(slice(begin, int(move[-1]) + 1))
     before, after = work.pieces["before"][work.first[move]], work.pieces["after"][work.first[move + 1] - 1]
     share = np.clip((path - before) / (after - before), 0.0, 1.0)
-    seen = seen_upright(work, move, *points_along(some, move - begin, share))
+    seen = seen_upright(work, move, path, *points_along(some, move - begin, share))
     return stations_at(work, cutters, (moves.tool[move], move, path), seen)
 
 
@@ -121,6 +151,6 @@ def around(
 ) -> tuple[FloatArray, FloatArray, IntArray, Window]:
     """x, y of points as `points_around`; their tilts, and the window of pieces cut before each station."""
     x, y = points_around(stations, radius, angle)
-    names = ("tilt", "piece", "recent")
-    tilt, piece, recent = (np.repeat(stations[name], len(x) // max(len(stations), 1)) for name in names)
-    return x, y, tilt, (np.zeros_like(piece), piece, recent)
+    names = ("tilt", "until", "recent")
+    tilt, until, recent = (np.repeat(stations[name], len(x) // max(len(stations), 1)) for name in names)
+    return x, y, tilt, (np.zeros_like(until), until, recent)

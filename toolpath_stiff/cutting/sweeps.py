@@ -1,6 +1,7 @@
 """Volume swept by the cutter, piece by piece of the path: straight lines and arcs in the plane, with a slope.
 
-Each in the frame of its tilt, in which the tool stands upright. Moves on whose way the tool turns have no piece.
+Each in the frame of its tilt, in which the tool stands upright. Where the tool turns on its way, a piece is a chord
+with the tool as it stands in its middle, along which the middle of the cutter's corner goes: a ball stays where it is.
 """
 
 from collections.abc import Mapping
@@ -9,7 +10,7 @@ import numpy as np
 
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray, IntArray, numbered, product
 from toolpath_stiff.cutting.cutters import Cutter, of_tools
-from toolpath_stiff.cutting.tilts import TURNING, tilts_of
+from toolpath_stiff.cutting.tilts import TURNING, axes_along, tilts_of, upright_frames
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import arc_frame, move_lengths, points_along
 from toolpath_stiff.nc.moves import RAPID, Moves
@@ -18,6 +19,7 @@ from toolpath_stiff.path.sampling import Orient
 SAGITTA = 5e-7  # m, of the chords that replace an arc that is not parallel to the plane
 STRAIGHT, ARC_TURN, NARROW_TURN = 4.0, 0.5 * np.pi, np.pi / 60.0  # longest: radii of the cutter; rad, rad
 ROUNDED = 1e-9  # share of a radius: rounding of arcs rotated in space
+PIECE_TURN = np.radians(0.5)  # turn of a tool along a piece: a quarter of a degree is 4.4 um a mm above its corner
 
 
 # A piece of the cutting path; SI. Pieces stand in the order of time.
@@ -37,6 +39,8 @@ FIELDS = (
     "growth",  # of the radius per rad
     "reach",  # radius of the cutter
     "flat",  # radius of the flat part of its end
+    "swing_x",  # motion of the tool's axis per height above its corner and per path, 1/m
+    "swing_y",
 )
 PIECE = np.dtype([*((name, np.float64) for name in FIELDS), ("tilt", np.int64)])
 
@@ -50,21 +54,25 @@ def sweeps_of(
     first upright; `orient` gives roll, pitch, yaw of the tool of programmed angles. Raises `ProgramError` where the
     tool of a move is not known.
     """
-    length, (tilts, turns) = move_lengths(moves), tilts_of(moves, orient)
-    feeds = (moves.motion != RAPID) & (length > 0.0)
-    cuts = feeds & (tilts != TURNING)
-    if feeds.any() and not cuts.any():
-        expected = "cuts between which it is turned (3+2 axes)"
-        raise ProgramError("the tool turns in every cut", expected=expected, line=int(moves.line[np.argmax(feeds)]))
+    length, (tilts, turns, angle) = move_lengths(moves), tilts_of(moves, orient)
+    cuts = (moves.motion != RAPID) & ((length > 0.0) | (tilts == TURNING))
     radius, flat = _ends_of(moves, cutters, cuts)
     upward = moves.arc_normal[:, 2] if len(turns) == 1 else (moves.arc_normal * turns[tilts, :, 2]).sum(axis=1)
-    plane = cuts & (moves.arc_sweep != 0.0) & (np.abs(upward) > 1.0 - 1e-9)
-    counts = _counts(moves, length, radius, cuts, cuts & (moves.arc_sweep != 0.0) & ~plane)
+    plane = cuts & (moves.arc_sweep != 0.0) & (np.abs(upward) > 1.0 - 1e-9) & (tilts != TURNING)
+    counts = _counts(moves, length, radius, angle, cuts, cuts & (moves.arc_sweep != 0.0) & ~plane)
     first = np.append(0, np.cumsum(counts.astype(np.int64)))
     move, number = numbered(counts.astype(np.int64))
     share, part = number / counts[move], 1.0 / counts[move]
     start, end = points_along(moves, move, share)[0], points_along(moves, move, share + part)[0]
     tilt = tilts[move]
+    turning = np.flatnonzero(tilt == TURNING)
+    if len(turning):
+        of, share, part = move[turning], share[turning], part[turning]
+        axes = [axes_along(moves, of, share + half * part, orient) for half in (0.0, 0.5, 1.0)]
+        start[turning] += (radius - flat)[of, None] * (axes[0] - axes[1])
+        end[turning] += (radius - flat)[of, None] * (axes[2] - axes[1])
+        tilt[turning] = len(turns) + np.arange(len(turning))
+        turns = np.concatenate([turns, upright_frames(axes[1])])
     if len(turns) > 1:
         start, end = (product(ends[:, None], turns[tilt])[:, 0] for ends in (start, end))
     along = end - start
@@ -75,6 +83,10 @@ def sweeps_of(
     pieces["reach"], pieces["flat"] = radius[move], flat[move]
     pieces["before"] = (np.cumsum(length) - length)[move] + number / counts[move] * length[move]
     pieces["after"] = pieces["before"] + length[move] / counts[move]
+    if len(turning):
+        path = np.where(pieces["after"] > pieces["before"], pieces["after"] - pieces["before"], np.inf)[turning]
+        swing = product((axes[2] - axes[0])[:, None], turns[tilt[turning]])[:, 0]
+        pieces["swing_x"][turning], pieces["swing_y"][turning] = swing[:, :2].T / path
     pieces["x"], pieces["y"] = start[:, 0], start[:, 1]
     pieces["z"] = np.where(plunge, np.minimum(start, end)[:, 2], start[:, 2])
     pieces["heading"] = np.arctan2(along[:, 1], along[:, 0])
@@ -113,8 +125,10 @@ def _enter_arcs(pieces: AnyArray, rows: IntArray, arcs: Moves, turns: FloatArray
     pieces["growth"][rows] = (frame.radius_end - frame.radius_start) / np.abs(sweep)
 
 
-def _counts(moves: Moves, length: FloatArray, radius: FloatArray, cuts: BoolArray, bent: BoolArray) -> FloatArray:
-    """(n,) number of pieces of each move; `bent` arcs become chords."""
+def _counts(
+    moves: Moves, length: FloatArray, radius: FloatArray, angle: FloatArray, cuts: BoolArray, bent: BoolArray
+) -> FloatArray:
+    """(n,) number of pieces of each move; `bent` arcs become chords, `angle` is the turn of the tool."""
     counts = np.where(cuts, np.maximum(np.ceil(length / (STRAIGHT * np.where(cuts, radius, 1.0)) - 1e-9), 1.0), 0.0)
     arcs = np.flatnonzero(cuts & (moves.arc_sweep != 0.0))
     if len(arcs):
@@ -122,4 +136,4 @@ def _counts(moves: Moves, length: FloatArray, radius: FloatArray, cuts: BoolArra
         turn = np.where(frame.radius_start < (1.0 - ROUNDED) * radius[arcs], NARROW_TURN, ARC_TURN)
         turn = np.where(bent[arcs], np.sqrt(8.0 * SAGITTA / frame.radius_start), turn)
         counts[arcs] = np.ceil(sweep / turn - 1e-9)
-    return np.asarray(counts)
+    return np.where(cuts, np.maximum(counts, np.ceil(angle / PIECE_TURN - 1e-9)), 0.0)

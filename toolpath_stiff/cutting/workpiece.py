@@ -41,8 +41,8 @@ from toolpath_stiff.path.sampling import Orient
 SHARES = np.union1d(np.geomspace(1e-5, 0.0625, 13), np.linspace(1e-7, 1.0 - 1e-7, 9))
 HALVINGS = 20
 # The front of the cutter would touch what the pieces just before have left: these are taken for smaller by SLACK. It is
-# above the rounding of coordinates (4 decimals of a mm). Tools with other axes take more by it: what two of them only
-# touch is rounding.
+# above the rounding of coordinates (4 decimals of a mm); a turn of the tool moves it on by much more. Tools with other
+# axes take more by it: what two of them only touch is rounding.
 SLACK = 5e-7  # m
 CELL = 0.33  # radii of the smallest cutter, size of a cell of the index
 MOST_CUBES = 1e6  # of a stock, for inclined tools

@@ -234,7 +234,7 @@ class RivalPlan:
 
     @property
     def _work(self) -> str:
-        return f"{len(self.chosen)} poses, about {self.minutes:.0f} minutes"
+        return f"{len(self.chosen)} pose{'s' * (len(self.chosen) != 1)}, about {self.minutes:.0f} minutes"
 
     @property
     def sentences(self) -> list[str]:

@@ -10,7 +10,7 @@ from toolpath_stiff.documents import number
 from toolpath_stiff.placement.result import Placement, PlacementRow, Written
 from toolpath_stiff.report.pages import render
 from toolpath_stiff.report.place_path import drawn_path
-from toolpath_stiff.report.words import machine_text, plain
+from toolpath_stiff.report.words import counted, machine_text, plain
 from toolpath_stiff.units import mm_from_m
 
 COSTS = ("best_on_front_N_per_mm", "chosen_N_per_mm")
@@ -52,7 +52,7 @@ def facts(placed: Placement) -> list[tuple[str, str]]:
         ("  margin", f"{100.0 * margin:.1f} % of a limit's span at least, rapids included"),
         ("LinuxCNC", blocks.linuxcnc or blocks.linuxcnc_reason),
         ("Fanuc-style", blocks.fanuc or blocks.fanuc_reason),
-        ("front", f"{len(placed.front)} placements, {number(placed.pose_evaluations)} poses evaluated"),
+        ("front", f"{counted(len(placed.front), 'placement')}, {number(placed.pose_evaluations)} poses evaluated"),
     ]
 
 
