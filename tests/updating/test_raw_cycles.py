@@ -163,7 +163,7 @@ def over_years(tmp_path):
     def reduce(texts, **options):
         for date, text in texts.items():
             (tmp_path / f"{date}.csv").write_text(text, encoding="utf-8")
-        return tps.reduce(tmp_path, **options)
+        return tps.reduce(*sorted(tmp_path.glob("*.csv")), **options)
 
     return reduce
 
