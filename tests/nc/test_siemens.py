@@ -193,7 +193,7 @@ def test_every_word_has_its_source_and_meaning_and_stands_in_a_program():
     own = [name for name, row in TABLE.items() if row.controls == ("siemens",) and not row.listed]
     unproved = {name for name in own if not re.search(rf"(?<![A-Z]){name[0]}0*{name[1:]}(?!\d\d)", bodies)}
     siblings = {"G53", "G153", "KONT", "G450", "G451", "NORM", "ASCALE", "AMIRROR", "CSPLINE", "WORKPIECE",
-                 "G74", "M17", "$P_UIFR"}  # fmt: skip
+                 "G74", "M17", "$P_UIFR", "CFC"}  # fmt: skip
     assert {name for name in unproved if not re.fullmatch(r"G5[0-9]{1,2}", name)} <= siblings
 
 
