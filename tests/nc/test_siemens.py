@@ -103,6 +103,7 @@ REFUSALS = {
     "$P_UIFR[1]=CTRANS(X,2):CROT(Z,9)": "more than a shift: CROT",
     "$P_UIFR[1,X,FI]=2": "no shift of an axis",
     "G1 X2\n$P_UIFR[1]=CTRANS(X,2)": "writes the offset in force",
+    "$P_UIFR[R1]=CTRANS(X,2)": "without its number",
     "$P_UIFR[0]=CTRANS(X,2)": "no settable offset",
     "G1 X1 DISC=50": "DISC is corners between an arc",
     "UP1\nM30\n%_N_UP1_SPF\nPROC UP1 SAVE\nTRANS X5\nM17": "SAVE brings back frames",
