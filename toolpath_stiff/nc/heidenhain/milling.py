@@ -27,10 +27,10 @@ MILLED = {
     256: (*_ALL, "Q218", "Q219", "Q424", "Q425"), 257: (*_ALL, "Q222", "Q223"),
 }  # fmt: skip
 OLD, BORE, SLOT, STUDS = (4, 5), 208, 253, (256, 257)
-# Where the tool stands at the call (Q367), in half lengths and widths from the middle; along a slot, where 2 and 3 are
-# the centres of its ends.
-PLACES = ((0.0, 0.0), (-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
-SLOT_PLACES = (0.0, -1.0, -1.0, 1.0, 1.0)
+# Where the tool stands at the call (Q367), from the middle: half lengths and half widths along, half widths across; in
+# slots 2 and 3 are the centres of the ends.
+PLACES = ((0, 0, 0), (-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1))
+SLOT_PLACES = ((0, 0, 0), (-1, 0, 0), (-1, 1, 0), (1, -1, 0), (1, 0, 0))
 BESIDE_MM = 2.0  # from the blank of a stud to the tool (manual, cycle 256: "2 mm to the right of the unmachined stud")
 OLD_OVERLAP = 1.4  # of cycles 4 and 5, in radii of the tool (machine parameter 7430, at most 1.414)
 MOST_RINGS = 10_000
@@ -88,11 +88,9 @@ def _form(block: CurrentBlock, number: int, given: Values, here: complex) -> Out
     block.refuse_if(number == SLOT and length < width, "Q218", "is shorter than the slot is wide", "the length")
     place = given["Q367"]
     block.refuse_if(place not in range(len(PLACES)), "Q367", "is no position", "0 to 4")
-    along, across = (part * half / 2.0 for part, half in zip(PLACES[int(place)], (length, width), strict=True))
-    if number == SLOT:
-        along, across = SLOT_PLACES[int(place)] * (length - width * (place in (2.0, 3.0))) / 2.0, 0.0
+    lengths, widths, across = (SLOT_PLACES if number == SLOT else PLACES)[int(place)]
     form = Outline(here, length, width, corner, math.radians(given["Q374" if number == SLOT else "Q224"]))
-    return replace(form, middle=form.at(-along, -across))
+    return replace(form, middle=form.at(-(lengths * length + widths * width) / 2.0, -across * width / 2.0))
 
 
 def _floors(top: float, bottom: float, most: float) -> list[float]:
