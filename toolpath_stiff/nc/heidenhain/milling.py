@@ -33,7 +33,7 @@ PLACES = ((0, 0, 0), (-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1))
 SLOT_PLACES = ((0, 0, 0), (-1, 0, 0), (-1, 1, 0), (1, -1, 0), (1, 0, 0))
 BESIDE_MM = 2.0  # from the blank of a stud to the tool (manual, cycle 256: "2 mm to the right of the unmachined stud")
 OLD_OVERLAP = 1.4  # of cycles 4 and 5, in radii of the tool (machine parameter 7430, at most 1.414)
-MOST_RINGS = 10_000
+MOST_ROUNDS = 10_000
 INSIDE = "the way into and within milled bores, pockets and slots, and to studs, is assumed: manuals only draw it"
 
 
@@ -46,17 +46,13 @@ def mill_form(state: State, block: CurrentBlock, number: int, values: Values) ->
     infeed, hole = given["Q334" if number == BORE else "Q202"], given["Q342"]
     overlap = given["Q370"] or (OLD_OVERLAP if number in OLD else 1.0)
     rings = max(path.width, given["Q424"], given["Q425"], given["Q222"]) / (overlap * radius or math.inf)
+    rounds = -given["Q201"] * max(rings, 1.0) / (infeed or 1.0)
     core = number == BORE and given["Q335"] > 4.0 * radius and not hole
     several = number == BORE and given["Q370"] and 2.0 * path.width > hole + 2.0 * given["Q370"] * radius
     for name, wrong, problem, expected in (
         ("", radius and min(path.length, path.width) < 0.0, "is narrower than its tool", "a smaller tool"),
         ("", state.turn < 0 or state.plain.mirrored, "under M4 or cycle 8: where climb milling goes then", "M3"),
-        (
-            "",
-            infeed < 0.0 or -given["Q201"] * max(rings, 1.0) > MOST_RINGS * (infeed or 1.0),
-            "makes too many rounds",
-            "",
-        ),
+        ("", not 0.0 <= rounds <= MOST_ROUNDS, "makes too many rounds", "larger infeeds and steps"),
         ("Q215", stud and "Q215" in values and (given["Q368"] or given["Q369"]), "finishes a stud", "no allowances"),
         ("Q439", given["Q439"], "gives feeds of the cutting edge", "0"),
         ("Q335", radius and core, "is more than two tools: a core would be left", "Q342, the hole before it"),
