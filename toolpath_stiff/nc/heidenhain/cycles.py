@@ -217,9 +217,9 @@ def _pattern(state: State, block: CurrentBlock, number: int, values: Values) -> 
             step = (last - first) / (count if abs(last - first) == 360.0 else count - 1)
         places = _circle(complex(values["Q216"], values["Q217"]), count, values["Q244"], first, step)
     else:
-        sizes = (_count(block, values[name]) for name in ("Q242", "Q243"))
+        columns, rows = (_count(block, values[name]) for name in ("Q242", "Q243"))
         along, across = values["Q237"] * _turned(values["Q224"]), values["Q238"] * 1j * _turned(values["Q224"])
-        places = _lines(complex(values["Q225"], values["Q226"]), *sizes, along, across, to_and_fro=True)
+        places = _lines(complex(values["Q225"], values["Q226"]), columns, rows, along, across, to_and_fro=True)
     change: Values = {name: values[name] for name in ("Q200", "Q203", "Q204") if name in values}
     _visit(state, block, [(place, 0.0) for place in places], change, far=bool(values.get("Q301", 1.0)))
 

@@ -19,8 +19,8 @@ STRAIGHT, HALF = 1.0, 3.0  # AS1, AS2; 2: a quarter of a circle
 def elements_of(drawn: State, block: CurrentBlock) -> list[Element]:
     """Contour elements from the trace of moves that its blocks made; the first goes to where the contour begins."""
     first, second, normal = PLANES[drawn.plane]
-    contour, (start, *moves) = list[Element](), drawn.trace or [None]
-    for move in moves:
+    contour, trace = list[Element](), drawn.trace or []
+    for move in trace[1:]:
         begins, ends = (complex(point[first], point[second]) for point in (move.start, move.end))
         level = abs(move.end[normal] - move.start[normal]) < LEAST_MM
         block.refuse_if(not level, None, "CYCLE72 along a contour that leaves its plane", "moves in the plane")
@@ -29,8 +29,8 @@ def elements_of(drawn: State, block: CurrentBlock) -> list[Element]:
             contour.append((begins, ends, complex(move.arc.center[first], move.arc.center[second]), turn))
         elif abs(ends - begins) > LEAST_MM:
             contour.append((begins, ends, None, 0))
-    straight = start is not None and start.arc is None
-    block.refuse_if(not contour or not straight, None, "CYCLE72 along no contour", "G1 to its start, and its elements")
+    arc = not contour or trace[0].arc is not None
+    block.refuse_if(arc, None, "CYCLE72 along no contour", "G1 to its start, and its elements")
     return contour
 
 

@@ -123,9 +123,9 @@ _ROWS: Rows = (
         ("HOLES1 HOLES2 CYCLE801 CYCLE802", cycles.pattern, "holes on a line, on a circle, in a grid, at points"),
     )),
     ("corner", f"{CYCLES}, Milling cycles", (
-        ("POCKET3 POCKET4", milling.mill_pocket, "rectangular pocket, circular pocket"),
-        ("CYCLE76 CYCLE77", milling.mill_spigot, "rectangular spigot, circular spigot"),
-        ("CYCLE71 CYCLE61", milling.mill_face, "face"), ("CYCLE72", contours.mill_contour, "contour"),
+        ("POCKET3 POCKET4", milling.mill_area, "rectangular pocket, circular pocket"),
+        ("CYCLE76 CYCLE77", milling.mill_area, "rectangular spigot, circular spigot"),
+        ("CYCLE71 CYCLE61", milling.mill_area, "face"), ("CYCLE72", contours.mill_contour, "contour"),
     )),
     ("corner", f"{MANUAL}, Operating, Blank input", (("WORKPIECE", tools.blank, "blank"),)),
 )  # fmt: skip
@@ -150,7 +150,7 @@ LISTED = {
 }  # fmt: skip
 WORDS = frozenset((
     "ADIS", "ADISPOS", "SPOS", "SPOSA", "OVR", "OVRRAP", "FGREF", "CTOL", "OTOL", "ACC", "H", "FRC", "FL", "LIMS",
-    "ATOL", "DISC", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF", "FB",
+    "ATOL", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF", "FB",
 ))  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
 REFUSED = refused((
@@ -173,6 +173,7 @@ REFUSED = refused((
     ("G140 G141 G142 G143 G147 G148 G247 G248 G340 G341 G347 G348", "smooth approach and retraction",
      "post its moves", f"{BASICS}, Smooth approach and retraction"),
     ("G291", "the ISO dialect", "read it as G code: --dialect fanuc", f"{MANUAL}, ISO Milling"),
+    ("DISC", "corners between an arc and an intersection", "DISC=0", f"{BASICS}, Tool radius compensation"),
     ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
     ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
      f"{PLANNING}, Orientation"),
