@@ -37,8 +37,8 @@ CONTRACTION = 0.3  # ratio of a turn's change to that of the turn before; above 
 SHORT = 3e-3  # m of a move, below which it is a part of a wall
 SAME = 1e-7  # m by which the error of a wall may grow: rounding of the numbers written, and of the stock's grid
 WORSE = "it would be worse"
-ELSEWHERE = "lines beside it make its wall afterwards"
-BETWEEN = "it lies between two walls: what a shift takes off one it adds to the other"
+ELSEWHERE = "other lines cut its wall afterwards"
+BETWEEN = "it lies between two walls: what a shift removes from one it adds to the other"
 
 
 @dataclass(frozen=True)
@@ -285,7 +285,7 @@ def compensate_program(
     if not len(before.row):
         raise ProgramError("no pass makes a wall of the finished part", file=program.name)
     still = np.unique(before.row[~movable_rows(moves)[before.row]]).tolist()
-    alone = dict.fromkeys(still, "a plunge, an arc on edge, or a tool aslant")
+    alone = dict.fromkeys(still, "a plunge, a vertical arc, or a tilted tool")
     alone |= _too_far(before)
     fixed = shift_program(program, origin, {}, decimals=decimals, control=control)[2]
     alone |= {
@@ -382,12 +382,12 @@ def _lines(
 
 
 def _notes(change: float, contraction: float, cut: Cut, rewritten: RewrittenProgram) -> tuple[str, ...]:
-    notes = [*rewritten.notes, *cut.lines_warning(cut.turning, "left alone: the tool turns on its way")]
+    notes = [*rewritten.notes, *cut.lines_warning(cut.turning, "not shifted: the tool turns along the move")]
     if contraction > CONTRACTION:
         notes.append(
-            f"the force depends on the shift: a turn of the iteration leaves {contraction:.2f} of the change before "
-            f"it, more than {CONTRACTION:g}; a wider cut or a stiffer tool would be surer"
+            f"the force depends on the shift: an iteration leaves {contraction:.2f} of the change before "
+            f"it, more than {CONTRACTION:g}; a wider cut or a stiffer tool would make it more reliable"
         )
     if change > SETTLED:
-        notes.append(f"the iteration did not settle: the last turn still changed shifts by {um_from_m(change):.2f} um")
+        notes.append(f"the iteration did not converge: its last step changed shifts by {um_from_m(change):.2f} um")
     return (*notes, "floors are not compensated")
