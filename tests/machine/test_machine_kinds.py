@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import toolpath_stiff as tps
 from tests.machine.linuxcnc_kinematics import Module
+from tests.machine.test_machine_readers import filled
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.chain import STILL
 from toolpath_stiff.machine.chain_search import all_solutions
@@ -211,7 +212,7 @@ def test_the_delta_is_lineardeltakins(folder):
 
 def test_hexapods_are_genhexkins(folder):
     hal = (Path(__file__).parents[2] / "programs/hexapod.hal").read_text()
-    machine = parse_machine(tps.machine_from_linuxcnc(Path(__file__).parents[2] / "programs/hexapod.hal", "mm").text)
+    machine = filled(tps.machine_from_linuxcnc(Path(__file__).parents[2] / "programs/hexapod.hal", "mm").text)
     pins = {f"genhexkins.{pin}": float(value) for pin, value in re.findall(r"setp genhexkins\.(\S+)\s+(\S+)", hal)}
     module = Module("genhexkins", pins, folder)
     pose = np.random.default_rng(5).uniform(-1.0, 1.0, (200, 6)) * [60, 60, 60, 10, 10, 10]

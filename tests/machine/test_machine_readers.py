@@ -44,7 +44,13 @@ rod_spacing_mm = 220.0
 effector_joint_height_mm = 95.0
 carriage_mm = [500, 1300]
 rail_radius_mm = 610.0
-centre_height_mm = 40.0""".splitlines()
+centre_height_mm = 40.0
+stiffness_N_per_um = 50.0
+frame_max_deg = 60.0
+platform_max_deg = 60.0
+neutral_pose_mm_deg = [0, 0, 550, 0, 0, 0]
+default_origin_mm = [0, 0, 550]
+rapid_mm_per_min = 10000.0""".splitlines()
 )
 
 
@@ -252,9 +258,9 @@ def test_a_bad_urdf_is_one_line(tmp_path, text, tip, words):
         ("linuxcnc", "m.hal", "".join(f"setp genserkins.{n}-{i} -90\n" for i in range(6) for n in ("ALPHA", "A", "D")),
          "ALPHA-0 = -90; expected rad, not degrees"),
         ("linuxcnc", "m.hal", "setp lineardeltakins.L many\n", "expected a number"),
-        ("linuxcnc", "m.hal", "loadrt [KINS]KINEMATICS\n", "36 joint pins are not set"),
+        ("linuxcnc", "m.hal", "loadrt [KINS]KINEMATICS\n", "no machine of a kinematics module"),
         ("linuxcnc", "m.hal", "setp xyzac-trt-kins.tool-offset 3\n", "tool-offset is not 0"),
-        ("linuxcnc", "m.ini", "[KINS]\nKINEMATICS = maxkins\n", "no machine of maxkins; expected genhexkins, trivkins"),
+        ("linuxcnc", "m.ini", "[KINS]\nKINEMATICS = maxkins\n", "no machine of maxkins; expected trivkins"),
         ("linuxcnc", "m.ini", "[KINS]\nKINEMATICS = rotarydeltakins\n", "rotarydeltakins.platformradius is not set"),
     ],
 )  # fmt: skip

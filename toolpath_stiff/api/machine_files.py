@@ -8,11 +8,10 @@ from toolpath_stiff.api.inputs import template
 from toolpath_stiff.files import read_text
 from toolpath_stiff.machine import dh_table, freecad, urdf
 from toolpath_stiff.machine.file import KINDS
-from toolpath_stiff.machine.linuxcnc import hexapod_of_pins
 from toolpath_stiff.machine.linuxcnc_files import read_control
 from toolpath_stiff.machine.linuxcnc_kinds import MODULES, machine_from_control
 from toolpath_stiff.machine.model import Hexapod
-from toolpath_stiff.machine.writer import TEMPLATE_REMARK, machine_toml, toml_text
+from toolpath_stiff.machine.writer import TEMPLATE_REMARK, toml_text
 from toolpath_stiff.options import Option, checked, names
 from toolpath_stiff.results import TextFile
 
@@ -52,10 +51,10 @@ def machine_from_linuxcnc(
     file: Annotated[str | Path, Option("FILE.hal|FILE.ini")],
     units: Annotated[str | None, Option("--units", choices=("mm", "inch"))] = None,
 ) -> TextFile:
-    """The machine of the kinematics pins in LinuxCNC's HAL and ini files.
+    """The machine of the kinematics pins in LinuxCNC's HAL and ini files; compliances are left to fill in.
 
-    Of genhexkins strut stiffness and limits are assumed; of other modules (trivkins, 5axiskins, xyzac-trt-kins,
-    xyzbc-trt-kins, genserkins, pumakins, pentakins, lineardeltakins, rotarydeltakins) compliances are left to fill in.
+    Modules: trivkins, 5axiskins, xyzac-trt-kins, xyzbc-trt-kins, genserkins, pumakins, genhexkins, pentakins,
+    lineardeltakins, rotarydeltakins.
 
     Parameters
     ----------
@@ -77,12 +76,7 @@ def machine_from_linuxcnc(
     toolpath_stiff.errors.InputError: cannot read the file of HAL pins 'nowhere.hal': No such file or directory
     """
     path = Path(file)
-    files = read_control(path, {*MODULES, "genhexkins"}, units)
-    if files.module not in ("", "genhexkins"):
-        return TextFile(path.stem, *machine_from_control(files, path.stem))
-    machine, notes = hexapod_of_pins(files)
-    heading = f"Made from {path.name}, pins in {files.units}.\n" + "\n".join(notes)
-    return TextFile(machine.name, machine_toml(machine, heading), notes)
+    return TextFile(path.stem, *machine_from_control(read_control(path, MODULES, units), path.stem))
 
 
 @checked

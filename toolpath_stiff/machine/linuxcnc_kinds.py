@@ -1,8 +1,8 @@
-"""Machines of LinuxCNC's kinematics modules besides genhexkins: files whose compliances are left to fill in.
+"""Machines of LinuxCNC's kinematics modules: files whose compliances are left to fill in.
 
-trivkins(9), 5axiskins(9), xyzac-trt-kins(9), xyzbc-trt-kins(9), genserkins(9), pumakins(9), pentakins(9),
-lineardeltakins(9) and rotarydeltakins(9); their units are those of the machine, angles of genserkins' rows in rad,
-limits in degrees.
+trivkins(9), 5axiskins(9), xyzac-trt-kins(9), xyzbc-trt-kins(9), genserkins(9), pumakins(9), genhexkins(9),
+pentakins(9), lineardeltakins(9) and rotarydeltakins(9); their units are those of the machine, angles of genserkins'
+rows in rad, limits in degrees.
 """
 
 from collections.abc import Callable
@@ -13,6 +13,7 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.linuxcnc_files import ControlFiles
 from toolpath_stiff.machine.unfilled import EXPERIENCE, JOINTS, SPINDLE, axis_row, carriages, file_text, section
+from toolpath_stiff.machine.writer import HEADINGS
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
 GIVE = dict.fromkeys(("translation_nm_per_N", "rotation_nrad_per_Nm"))
@@ -24,8 +25,8 @@ RADIANS = 2.0 * np.pi + 0.01
 def machine_from_control(files: ControlFiles, name: str) -> tuple[str, list[str]]:
     """A machine file and notes. Raises `InputError` for pins that are missing and modules without a kind."""
     if files.module not in MODULES:
-        known = ", ".join(("genhexkins", *MODULES))
-        raise InputError(f"no machine of {files.module or 'a kinematics module'}", expected=known, file=files.file)
+        what = f"no machine of {files.module or 'a kinematics module'}"
+        raise InputError(what, expected=", ".join(MODULES), file=files.file)
     kind, parts = MODULES[files.module](files)
     notes = [f"Made from {files.file}: {files.module}."]
     notes += [f"{pin} is not set: 0, as {files.module} has it then" for pin in files.unset]
@@ -88,17 +89,37 @@ def _puma(files: ControlFiles) -> tuple[str, list[str]]:
     return _rows(files, [(0.0, 0.0, 0.0), (-square, 0.0, 0.0), (0.0, a2, d3), *wrist])
 
 
+def _genhex(files: ControlFiles) -> tuple[str, list[str]]:
+    """Six struts; tool-offset and spindle-offset are added to Z of all joints (genhexkins.c, genhex_read_hal_pins)."""
+    raised = files.length("tool-offset", 0.0) + files.length("spindle-offset", 0.0)
+    parts = []
+    for part, name in (("base", "frame_joints"), ("platform", "platform_joints")):
+        joints = np.array([[files.length(f"{part}.{i}.{axis}") for axis in "xyz"] for i in range(6)])
+        parts.append(section(f"[{name}]", {"mm": joints + np.array([0.0, 0.0, raised]), "origin": "published"}))
+    low, high = files.travel
+    blanks: dict[str, Document] = {
+        "reference_tool": {"length_mm": None},
+        "strut_law": {"stiffness_N_per_um": None},
+        "limits.strut_length": {"min_mm": low, "max_mm": high},
+        "limits.joint_angle": dict.fromkeys(("frame_max_deg", "platform_max_deg", "neutral_pose_mm_deg")),
+        "setup": dict.fromkeys(("default_origin_mm", "rapid_mm_per_min")),
+    }
+    note = "# screw-lead, base-n and platform-n, which correct lengths for the turning screw, are left out.\n"
+    for name, values in blanks.items():
+        heading = HEADINGS["strut_law, constant" if name == "strut_law" else name]
+        parts.append(f"# {heading}\n" + section(f"[{name}]", {**values, "origin": "assumed"}))
+    return "hexapod", [note + parts[0], *parts[1:]]
+
+
 def _penta(files: ControlFiles) -> tuple[str, list[str]]:
     top: Document = {
         "base_mm": np.array([[files.length(f"base.{i}.{axis}") for axis in "xyz"] for i in range(5)]),
         "ring_radius_mm": [files.length(f"effector.{i}.r") for i in range(5)],
         "ring_height_mm": [files.length(f"effector.{i}.z") for i in range(5)],
     }
-    travel: Document = dict.fromkeys(("min_mm", "max_mm"))
-    if files.limits:
-        low, high = np.array(list(files.limits.values())).T * files.scale
-        travel = {"min_mm": float(low.max()), "max_mm": float(high.min())}
-    strut = {"length_mm": None, "compliance_nm_per_N": None, "slope_nm_per_N_per_m": None, **travel}
+    low, high = files.travel
+    blank = dict.fromkeys(("length_mm", "compliance_nm_per_N", "slope_nm_per_N_per_m"))
+    strut: Document = {**blank, "min_mm": low, "max_mm": high}
     torsion = dict.fromkeys(("strut", "EI_MNm2", "hinge_nrad_per_Nm"))
     return "pentapod", [section("", top), STRUT + section("[strut]", strut), section("[torsion]", torsion), SPINDLE]
 
@@ -133,6 +154,7 @@ MODULES: dict[str, Callable[[ControlFiles], tuple[str, list[str]]]] = {
     "xyzbc-trt-kins": _trunnion,
     "genserkins": _genser,
     "pumakins": _puma,
+    "genhexkins": _genhex,
     "pentakins": _penta,
     "lineardeltakins": _delta,
     "rotarydeltakins": _rotary_delta,

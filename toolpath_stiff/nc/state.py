@@ -177,12 +177,15 @@ class Conversational:
         A contour element that waits for the corner behind it, with its feed, and that corner's statement (CHF, RND).
     approach
         The contour point of an APPR, and what it does once the direction of the first element is known.
+    free, closes
+        Elements of a free contour (FK) not determined yet, with whether a corner follows; where CLSD+ began it.
     fast
         Whether the last positioning was a rapid.
     to_corner
         Whether the next statement is a corner.
-    cycle, modal
-        The cycle defined last with its parameters, and whether M89 calls it after each positioning.
+    cycle, modal, pattern
+        The cycle defined last with its parameters, whether M89 calls it after each positioning, and the points of
+        PATTERN DEF with what each adds to the surface, in the program's unit.
     shift, outer, angle, mirrored, scale, tilt
         Cycle 7 (in the tilted plane; before the tilting), 10, 8 (axes), 11, and PLANE or cycle 19; None: not tilted.
     doubt
@@ -203,6 +206,8 @@ class Conversational:
         G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450.
     base
         G500 in force: "machine", or "zero" where the program takes no other offset; "": it is not.
+    contour
+        Elements of the contour that CYCLE72 mills.
     offsets_named, changes_by_t, transformed
         Whether the program takes settable offsets, and changes tools by T alone; TRAORI in force.
     """
@@ -212,10 +217,13 @@ class Conversational:
     held: tuple[CurrentBlock, Element, float | None] | None = None
     corner: CurrentBlock | None = None
     approach: tuple[dict[int, float], Callable[[complex], None]] | None = None
+    free: list[tuple[CurrentBlock, str, bool]] = field(default_factory=list)
+    closes: complex | None = None
     fast: bool = False
     to_corner: bool = False
     cycle: tuple[int, dict[str, float]] | None = None
     modal: bool = False
+    pattern: list[tuple[complex, float]] = field(default_factory=list)
     shift: list[float] = field(default_factory=lambda: [0.0] * 3)
     outer: list[float] = field(default_factory=lambda: [0.0] * 3)
     angle: float = 0.0
@@ -238,6 +246,7 @@ class Conversational:
     side: str = ""
     entry: str = ""
     base: str = ""
+    contour: list[Element] = field(default_factory=list)
     offsets_named: bool = False
     changes_by_t: bool = False
     transformed: bool = False

@@ -31,6 +31,7 @@ def approach(state: State, block: CurrentBlock, code: str) -> None:
     there, modal = _point(state, block, code), state.feed
     block.refuse_if(not there.keys() >= {first, second}, None, "without its contour point", "both coordinates")
     block.refuse_if(feed(state, block), "FMAX", "in an approach", "F with a number")
+    plain.heading = None
     plain.approach = (there, partial(begin_contour, state, block, code, there, (modal, state.feed)))
 
 
@@ -114,6 +115,8 @@ def depart(state: State, block: CurrentBlock, code: str) -> None:
     heading, cutter, to_point = plain.heading / abs(plain.heading), state.cutter, code.endswith("LCT")
     block.refuse_if(cutter is None and code != "DEP LT", None, "without RL or RR, which give its side", "L statements")
     there = _point(state, block, code)
+    if to_point and there:  # a coordinate that is not named is that of the contour's last point
+        there = {axis: present(state)[axis] for axis in (first, second)} | there
     block.refuse_if(feed(state, block), "FMAX", "on the way off a contour", "F with a number")
     block.take("R0")
     depth = there.pop(normal, None)

@@ -6,6 +6,7 @@ Cartesian coordinates", "Polar coordinates"), "Tool compensation". Moves are rec
 
 import cmath
 import math
+from collections.abc import Iterable
 
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.center_path import arc_about
@@ -17,6 +18,7 @@ from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
 from toolpath_stiff.nc.elements import direction as direction_of
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.points import (
+    FREE_POLE,
     ON_CIRCLE_MM,
     end_of,
     feed,
@@ -29,6 +31,7 @@ from toolpath_stiff.nc.heidenhain.points import (
     present,
 )
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Remark
+from toolpath_stiff.nc.pockets import Cut
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, Word
@@ -44,14 +47,14 @@ UNKNOWN_POINT = "goes to a point of the machine that the program does not give: 
 
 
 def pole(state: State, block: CurrentBlock, code: str) -> None:
-    """CC: circle centre and pole, perhaps in another plane than the tool's; without coordinates the present point."""
+    """CC, FPOL: circle centre, pole, perhaps in another plane than the tool's; without coordinates the present one."""
     point = named(state, block)
     plane = next((name for name, axes in PLANES.items() if point.keys() == {*axes[:2]}), None) if point else state.plane
     if plane is None:
         raise block.fail(code, "with other coordinates than two of a plane", "two of X, Y, Z, or none")
     first, second, _ = PLANES[plane]
     point = point or dict(enumerate(present(state)))
-    state.plain.pole = plane, complex(point[first], point[second])
+    state.plain.pole = FREE_POLE if code == FREE_POLE else plane, complex(point[first], point[second])
 
 
 def take_side(block: CurrentBlock) -> str | None:
@@ -78,8 +81,8 @@ def compensate(state: State, block: CurrentBlock, there: dict[int, float]) -> No
     switch_off(state, block, side)
 
 
-def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
-    """The tool beside the contour from the next move on, by its radius in the tool table or TOOL DEF and its DR."""
+def tool_radius(state: State, block: CurrentBlock, side: str | None) -> float:
+    """Radius of the tool by the tool table or TOOL DEF, and its DR; a check goes on without one, with 0."""
     radius = state.plain.radius
     if math.isnan(radius):
         name = next((name for name, number in state.plain.names.items() if number == state.tool), "")
@@ -87,7 +90,13 @@ def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
         of_name = ", as that of the tool with this remark" if name else own * (state.dialect.name == "heidenhain")
         hint = f"give it in a tool table (--tools FILE){of_name}"
         state.fault(block.fail(side, f"needs the radius of tool {tool}", hint=hint))
-        radius = 0.0
+        return 0.0
+    return radius
+
+
+def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
+    """The tool beside the contour from the next move on."""
+    radius = tool_radius(state, block, side)
     state.assume(COMPENSATED)
     scale = state.plain.scale
     turned = SIDES[side] if radius >= 0.0 else -SIDES[side]
@@ -141,6 +150,17 @@ def move(
     middle, start = (center.real, center.imag), (here[first], here[second])
     sweep = geometry.sweep_about(middle, start, end, turn < 0, state.inch, turns)
     record(state, block, ARC, control, there, arc=arc_about(state, here, center, sweep))
+
+
+def mill(state: State, block: CurrentBlock, cuts: Iterable[Cut]) -> None:
+    """Carry out the moves of a milled pocket, slot or stud, and keep the modal feed."""
+    (first, second, normal), modal = PLANES[state.plane], state.feed
+    for place, height, rate, center, turn in cuts:
+        block.refuse_if(rate is not None and not rate > 0.0, None, "cuts without a feed", "its feed above 0")
+        there = {first: place.real, second: place.imag, normal: height}
+        state.feed = rate or modal
+        go(state, block, there, None if center is None else (center, turn, 1), rate is None)
+    state.feed, state.plain.heading = modal, None
 
 
 def _approach(state: State, block: CurrentBlock, ahead: complex) -> None:
@@ -231,10 +251,11 @@ def circle(state: State, block: CurrentBlock, code: str) -> None:
         turns = max(1, math.ceil(abs(step.value) / 360.0 - 1e-9))
     with plane_of_pole(state, block) as center:
         there = polar(state, block, center) if code == "CP" else named(state, block)
-        _round(state, block, there, (center, turn, turns))
+        arc_to(state, block, there, (center, turn, turns))
 
 
-def _round(state: State, block: CurrentBlock, there: dict[int, float], about: Circle) -> None:
+def arc_to(state: State, block: CurrentBlock, there: dict[int, float], about: Circle) -> None:
+    """An arc to a point, with its feed; the side of the compensation may not change on it."""
     rapid = feed(state, block)
     block.refuse_if(rapid, "FMAX", "on an arc", "F with a number")
     side = take_side(block)
@@ -258,7 +279,7 @@ def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
     start, end = in_plane(state, present(state)), end_of(state, there)
     places, clockwise = ((start.real, start.imag), (end.real, end.imag)), turn < 0
     center = complex(*geometry.center_from_radius(*places, radius * state.length_scale, clockwise))
-    _round(state, block, there, (center, turn, 1))
+    arc_to(state, block, there, (center, turn, 1))
 
 
 def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
@@ -280,7 +301,7 @@ def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
         return
     block.refuse_if(math.pi - abs(cmath.phase(chord)) < STRAIGHT_ON, None, "straight back", "another point")
     radius = abs(chord) ** 2 / (2.0 * chord.imag)  # to the left where positive
-    _round(state, block, there, (start + radius * 1j * ahead, 1 if radius > 0.0 else -1, 1))
+    arc_to(state, block, there, (start + radius * 1j * ahead, 1 if radius > 0.0 else -1, 1))
 
 
 def corner(state: State, block: CurrentBlock, code: str) -> None:

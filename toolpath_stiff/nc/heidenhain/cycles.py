@@ -1,4 +1,4 @@
-"""Drilling, tapping and boring cycles (1, 2, 17, 200 to 209, 240, 241), expanded to their moves; patterns 220, 221.
+"""Fixed cycles (1, 2, 4, 5, 17, 200 to 209, 240, 241, 251 to 257), expanded to their moves; patterns 220, 221.
 
 HEIDENHAIN, user's manual "Cycles" of the iTNC 530 and the TNC 640, "Fixed cycles: drilling", "Fixed cycles: tapping",
 "Fixed cycles: pattern definitions"; of the TNC 407, "Pecking", "Tapping". Heights are mm of the tool axis, feeds
@@ -7,12 +7,15 @@ mm/min, dwells s; a stroke without a feed is a rapid.
 
 import cmath
 import math
-from collections.abc import Iterable, Iterator
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator
 
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import check_known, go
-from toolpath_stiff.nc.heidenhain.points import inch_tenths, named, outside_contour, present
+from toolpath_stiff.nc.heidenhain.contour import check_known, direction, go
+from toolpath_stiff.nc.heidenhain.milling import AUTO, MAX, MILLED, mill_form
+from toolpath_stiff.nc.heidenhain.points import feed, inch_tenths, named, outside_contour, present
 from toolpath_stiff.nc.moves import CYCLE, RAPID
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
@@ -26,20 +29,26 @@ NEEDED = {
     200: (*_DRILL, "Q202"), 201: _DRILL, 202: _DRILL, 203: (*_DRILL, "Q202"), 205: (*_DRILL, "Q202"), 206: _DRILL,
     207: (*_ALL, "Q239"), 209: (*_ALL, "Q239", "Q257", "Q256"), 240: _DRILL, 241: _DRILL,
     220: ("Q216", "Q217", "Q244", "Q245", "Q246", "Q247", "Q241"),
-    221: ("Q225", "Q226", "Q237", "Q238", "Q242", "Q243", "Q224"),
+    221: ("Q225", "Q226", "Q237", "Q238", "Q242", "Q243", "Q224"), **MILLED,
 }  # fmt: skip
 PECKS, TAPS = (200, 203, 205), (207, 209)
-# Cycles of older controls, with parameters in statements -> the present cycle, and the meaning of the parts.
+# Cycles of older controls, with parameters in statements -> the cycle whose moves they make, and the parameters of each
+# part by their words ("#": a number behind a name).
 OLDER = {
-    "1": (205, ("Q200", "Q201", "Q202", "Q211", "Q206")), "2": (206, ("Q200", "Q201", "Q211", "Q206")),
-    "17": (207, ("Q200", "Q201", "Q239")),
+    "1": (205, ("#Q200", "#Q201", "#Q202", "#Q211", "FQ206")), "2": (206, ("#Q200", "#Q201", "#Q211", "FQ206")),
+    "4": (4, ("#Q200", "#Q201", "#Q202 FQ206", "XQ218", "YQ219", "FQ207 #Q220")),
+    "5": (5, ("#Q200", "#Q201", "#Q202 FQ206", "#Q220", "FQ207")), "17": (207, ("#Q200", "#Q201", "#Q239")),
 }  # fmt: skip
 KNOWN = {"Q200", "Q201", "Q202", "Q203", "Q204", "Q205", "Q206", "Q208", "Q210", "Q211", "Q212", "Q213", "Q214", "Q239",
          "Q256", "Q257", "Q258", "Q259", "Q253", "Q336", "Q343", "Q344", "Q351", "Q379", "Q395", "Q403", "Q301", "Q365",
-         "Q357", "Q359", "Q350", "Q426", "Q427", "Q428", "Q429", "Q430", "Q435", "Q401"}  # fmt: skip
-FEEDS, MAX, AUTO = ("Q206", "Q208", "Q253"), -1.0, -2.0
+         "Q357", "Q359", "Q350", "Q426", "Q427", "Q428", "Q429", "Q430", "Q435", "Q401", "Q207", "Q215", "Q220", "Q224",
+         "Q334", "Q338", "Q342", "Q366", "Q367", "Q368", "Q369", "Q370", "Q374", "Q385", "Q437"}  # fmt: skip
+FEEDS = ("Q206", "Q207", "Q208", "Q253", "Q385")
 LEAST_AHEAD_MM, MOST_AHEAD_MM = 0.6, 7.0  # end of the older pecking's rapids above the last depth
 MOST_POINTS = 1000
+_FORM = re.compile(r"(POS|ROW|PAT|CIRC|PITCHCIRC)\d+\s*\(([^)]*)\)")
+_WORD = re.compile(r"(I?[A-Z]+)\s*([^A-Z\s]\S*|Q[LR]?\d+)")
+FORMS = "POS, ROW, PAT, CIRC, PITCHCIRC with their words in brackets"
 HAVE_NO_SHIFT = "the shift off the wall before the tool leaves the hole"
 
 
@@ -61,17 +70,21 @@ def define(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def define_older(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCL DEF 1, 2 and 17: one parameter a statement; holes begin at the tool's height, the set-up clearance above."""
+    """CYCL DEF 1, 2, 4, 5, 17: parameters in statements; the surface is the set-up clearance below the tool."""
     cycle, part = code.removeprefix("CYCL DEF ").split(".")
     number, names = OLDER[cycle]
-    value, values = block.take("#"), dict(state.plain.cycle[1]) if state.plain.cycle else {"Q203": 0.0}
+    values = dict(state.plain.cycle[1]) if state.plain.cycle else {"Q203": 0.0}
     block.refuse_if(part != "0" and "Q203" in values, None, "without its heading", f"CYCL DEF {cycle}.0 before it")
     if part == "0":
         state.plain.cycle, state.plain.modal = (number, {}), False
-    elif value is not None:
-        name = names[int(part) - 1]
-        values[name] = value if name == "Q201" else abs(value)
-        state.plain.cycle = (number, values)
+        return
+    if block.has("DR+") or block.has("DR-"):
+        values["Q351"] = direction(block)
+    for word, name in ((item[0], item[1:]) for item in names[int(part) - 1].split()):
+        value = block.take(word)
+        if value is not None:
+            values[name] = value if name == "Q201" else abs(value)
+    state.plain.cycle = (number, values)
 
 
 def _check(block: CurrentBlock, number: int, values: Values) -> None:
@@ -102,9 +115,13 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
     if plain.cycle is None:
         raise block.fail(None, "calls a cycle, and none is defined", "CYCL DEF before it")
     outside_contour(state, block, "calls a cycle")
-    unit, (number, values) = state.length_scale, plain.cycle
-    values = values | (change or {})
-    if "Q203" not in values:  # an older one
+    unit, (number, values), change = state.length_scale, plain.cycle, change or {}
+    if "Q203" in values:
+        kept = (name for name, value in values.items() if plain.parameters.get(name, value) != value)
+        changed = next((name for name in kept if name not in change), None)
+        block.refuse_if(changed, None, f"after {changed} was set again behind the cycle", "its value in CYCL DEF")
+        values = values | change
+    else:  # an older one
         ahead = min(max(LEAST_AHEAD_MM, abs(values.get("Q201", 0.0) * unit) / 50.0), MOST_AHEAD_MM) / unit
         here = present(state)[normal] / unit
         values = {"Q258": ahead, "Q259": ahead, "Q203": here - values.get("Q200", 0.0)} | values
@@ -115,6 +132,9 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
         return
     check_known(state, block, {normal: 0.0}, rapid=True)
     block.refuse_if(plain.unknown, None, "calls a cycle where X or Y is not known", "X and Y before it")
+    if number in MILLED:
+        mill_form(state, block, number, values)
+        return
     block.refuse_if(number in TAPS and state.speed <= 0.0, None, "taps without a speed", "S above 0")
     pitch = unit if number in TAPS else inch_tenths(state)
     path = strokes(number, values, state.speed)
@@ -189,45 +209,84 @@ def _pecks(number: int, values: Values, down: float, out: float | None) -> Itera
 
 def _pattern(state: State, block: CurrentBlock, number: int, values: Values) -> None:
     """220: points on a circle; 221: on lines to and fro; between them at the set-up clearance, or the second one."""
-    plain, unit = state.plain, state.length_scale
-    if plain.cycle is None:
-        raise block.fail(None, "without a cycle to call", "CYCL DEF before it")
-    change: Values = {name: values[name] for name in ("Q200", "Q203", "Q204") if name in values}
-    cycle = plain.cycle[1] | change
-    clear, far = cycle["Q203"] + cycle["Q200"], values.get("Q301", 1.0)
-    second = max(clear, cycle["Q203"] + cycle.get("Q204", 0.0))
-    first, other, normal = PLANES[state.plane]
     block.refuse_if(values.get("Q365"), "Q365", "goes from point to point on arcs", "0")
-    points = list(_points(block, number, values))
-    for count, (x, y) in enumerate(points):
-        go(state, block, {normal: (second if count == 0 or far else clear) * unit}, rapid=True)
-        go(state, block, {first: x * unit, other: y * unit}, rapid=True)
-        call(state, block, change | ({} if far or count + 1 == len(points) else {"Q204": 0.0}))
-
-
-def _points(block: CurrentBlock, number: int, values: Values) -> Iterator[tuple[float, float]]:
-    for name in ("Q241",) if number == 220 else ("Q242", "Q243"):
-        count = values[name]
-        block.refuse_if(count != int(count) or not 1 <= count <= MOST_POINTS, name, "is no number of points")
     if number == 220:
-        count, first, last, step = (values[name] for name in ("Q241", "Q245", "Q246", "Q247"))
+        first, last, step = (values[name] for name in ("Q245", "Q246", "Q247"))
+        count = _count(block, values["Q241"])
         if not step and count > 1:
             step = (last - first) / (count if abs(last - first) == 360.0 else count - 1)
-        for index in range(int(count)):
-            place = cmath.rect(values["Q244"] / 2.0, math.radians(first + index * step))
-            yield values["Q216"] + place.real, values["Q217"] + place.imag
-        return
-    turned = cmath.rect(1.0, math.radians(values["Q224"]))
-    for row in range(int(values["Q243"])):
-        columns = range(int(values["Q242"]))
-        for column in columns if row % 2 == 0 else columns[::-1]:
-            place = turned * complex(column * values["Q237"], row * values["Q238"])
-            yield values["Q225"] + place.real, values["Q226"] + place.imag
+        places = _circle(complex(values["Q216"], values["Q217"]), count, values["Q244"], first, step)
+    else:
+        columns, rows = (_count(block, values[name]) for name in ("Q242", "Q243"))
+        along, across = values["Q237"] * _turned(values["Q224"]), values["Q238"] * 1j * _turned(values["Q224"])
+        places = _lines(complex(values["Q225"], values["Q226"]), columns, rows, along, across, to_and_fro=True)
+    change: Values = {name: values[name] for name in ("Q200", "Q203", "Q204") if name in values}
+    _visit(state, block, [(place, 0.0) for place in places], change, far=bool(values.get("Q301", 1.0)))
+
+
+def _visit(
+    state: State, block: CurrentBlock, points: list[tuple[complex, float]], change: Values, far: bool = True,
+    least: float = -math.inf, rapid: bool = True,
+) -> None:  # fmt: skip
+    """Call the cycle at points with what each adds to the surface; between them not below `least`."""
+    plain, unit, (first, second, normal) = state.plain, state.length_scale, PLANES[state.plane]
+    cycle = plain.cycle[1] | change if plain.cycle else {}
+    block.refuse_if("Q203" not in cycle or not points, None, "without a cycle to call, or points", "CYCL DEF before it")
+    for count, (place, more) in enumerate(points, 1):
+        surface = cycle["Q203"] + more
+        clear = surface + cycle["Q200"]
+        high = max(clear, surface + cycle.get("Q204", 0.0), least) if count == 1 or far else clear
+        go(state, block, {normal: high * unit}, rapid=True)
+        go(state, block, {first: place.real * unit, second: place.imag * unit}, rapid=rapid)
+        call(state, block, change | {"Q203": surface} | ({} if far or count == len(points) else {"Q204": 0.0}))
+
+
+def pattern(state: State, block: CurrentBlock, text: str, number: Callable[[str], float]) -> None:
+    """PATTERN DEF: points for CYCL CALL PAT, each with what it adds to the surface; `number` reads a value."""
+    points, here, forms = list[tuple[complex, float]](), 0j, _FORM.findall(text)
+    block.refuse_if(len(forms) != text.count("(") or not forms, None, "with a form that is not known", FORMS)
+    for kind, words in forms:
+        v = defaultdict(float, {name: number(value) for name, value in _WORD.findall(words)})
+        here = complex(v["X"] if "X" in v else here.real + v["IX"], v["Y"] if "Y" in v else here.imag + v["IY"])
+        count, rows = (_count(block, value or 1.0) for value in (v["NUMX"] or v["NUM"], v["NUMY"]))
+        along, across = _turned(v["ROT"] + v["ROTX"], v["DX"] or v["D"]), 1j * _turned(v["ROT"] + v["ROTY"], v["DY"])
+        circle = _circle(here, count, v["D"], v["START"], v["STEP"] or 360.0 / count)
+        places = circle if "CIRC" in kind else _lines(here, count, rows, along, across)
+        points += [(place, v["Z"]) for place in places]
+    if "PAT" in dict(forms):
+        state.assume("PATTERN DEF goes to the points of PAT line by line, each line in the same direction")
+    state.plain.pattern = points
+
+
+def _count(block: CurrentBlock, value: float) -> int:
+    block.refuse_if(
+        value != int(value) or not 1 <= value <= MOST_POINTS, None, f"with {value:g} for a number of points"
+    )
+    return int(value)
+
+
+def _turned(degrees: float, size: float = 1.0) -> complex:
+    return cmath.rect(size, math.radians(degrees))
+
+
+def _circle(middle: complex, count: int, diameter: float, first: float, step: float) -> list[complex]:
+    return [middle + _turned(first + index * step, diameter / 2.0) for index in range(count)]
+
+
+def _lines(
+    start: complex, columns: int, rows: int, along: complex, across: complex, to_and_fro: bool = False
+) -> list[complex]:
+    ways = range(columns), range(columns)[::-1]
+    return [start + i * along + j * across for j in range(rows) for i in ways[j % 2 if to_and_fro else 0]]
 
 
 def call_statement(state: State, block: CurrentBlock, code: str) -> None:
     """CYCL CALL: at the present point; CYCL CALL POS: at a point, its height added to the surface's."""
     change, plain = None, state.plain
+    if code == "CYCL CALL PAT":
+        rapid, high = feed(state, block), present(state)[PLANES[state.plane][2]] / state.length_scale
+        _visit(state, block, plain.pattern, {}, least=high, rapid=rapid)
+        return
     if code == "CYCL CALL POS" and plain.cycle is not None:
         normal, there, unit = PLANES[state.plane][2], named(state, block), state.length_scale
         block.take("F"), block.take("FMAX")

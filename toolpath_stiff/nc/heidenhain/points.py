@@ -16,6 +16,7 @@ from toolpath_stiff.units import MM_PER_INCH
 
 WORDS_OF_AXES = {f"{step}{letter}": axis for axis, letter in enumerate(AXES) for step in ("", "I")}
 ROTARY = "A, B, C are roll, pitch and yaw of the platform: where they are another machine's axes, [kinematics] says so"
+FREE_POLE = "FPOL"  # of free contours alone: the user's manual asks for a new CC behind them
 ON_CIRCLE_MM = 0.016  # how far an end may lie off its circle (user's manual, "Circular path C")
 
 
@@ -70,7 +71,7 @@ def named(state: State, block: CurrentBlock) -> dict[int, float]:
 @contextmanager
 def plane_of_pole(state: State, block: CurrentBlock) -> Iterator[complex]:
     """The pole in its own plane, which is in force meanwhile: CC X Z in G17 gives a circle in ZX."""
-    if state.plain.pole is None:
+    if state.plain.pole is None or state.plain.pole[0] == FREE_POLE:
         problem = "without a circle centre or pole, or after a change of the coordinates"
         raise block.fail(None, problem, "CC before it")
     kept, (state.plane, pole) = state.plane, state.plain.pole

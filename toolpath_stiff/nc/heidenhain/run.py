@@ -11,11 +11,12 @@ from pathlib import PurePath
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import Code
-from toolpath_stiff.nc.heidenhain.cycles import call
+from toolpath_stiff.nc.heidenhain.cycles import call, pattern
 from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, PARAMETER, assigned, condition, work_out
+from toolpath_stiff.nc.heidenhain.free_contour import CORNERS, FREE, NOT_DETERMINED
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
 from toolpath_stiff.nc.heidenhain.plain_statements import EMPTY, as_g_code, corner_follows
-from toolpath_stiff.nc.heidenhain.statements import PlainStatement, code_text, labels, read_statement
+from toolpath_stiff.nc.heidenhain.statements import PlainStatement, labels, read_statement
 from toolpath_stiff.nc.heidenhain.system_data import SYSREAD, system_value
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up, meaning_of, refusal_of
 from toolpath_stiff.nc.moves import Remark
@@ -29,7 +30,7 @@ from toolpath_stiff.nc.state import CurrentBlock, Flow
 from toolpath_stiff.nc.words import Block, Word
 
 CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*\d+)?)?\s*$')
-CONTOUR = frozenset(("RND", "CHF", "L", "LP", "C", "CP", "CR", "CT", "CTP", "LN"))
+CONTOUR = frozenset(("RND", "CHF", "L", "LP", "C", "CP", "CR", "CT", "CTP", "LN", *FREE))
 FORMULAS = ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
 OF_CONTROL = ("FN18", "FN28")
 TO_MACHINE = ("M91", "M92")  # with these FMAX may lead to an unknown point
@@ -97,6 +98,8 @@ class HeidenhainRun(ProgramRun):
             raise self._fail(row, f"{head} {problem}", "", hint, statement.column)
         block = self._block_of(row, statement)
         plain.to_corner = corner_follows(self.lines, statement.after)
+        if plain.free and head not in (*FREE, *CORNERS):
+            raise plain.free[0][0].fail(None, NOT_DETERMINED, "more of its data, or L and C")
         if plain.held is not None and head not in CONTOUR and not head.startswith("DEP"):
             raise block.fail(None, "stands between a corner (CHF, RND) and the element behind it", "the element")
         with block.placing():
@@ -114,7 +117,7 @@ class HeidenhainRun(ProgramRun):
         before = len(self.state.recorder)
         code.act(self.state, block, head)
         unused = next((letter for letter in block.values if letter in block.free), None)
-        if unused is not None and not head.startswith("APPR"):
+        if unused is not None and not head.startswith("APPR") and not plain.free and head not in FREE:
             raise block.fail(unused, f"is no word of {head}", "its own words")
         positioned = head in ("L", "LP") and (len(self.state.recorder) > before or bool(block.values.keys() & {*"XYZ"}))
         if once is not None or ((modal is not None or plain.modal) and positioned):
@@ -174,11 +177,13 @@ class HeidenhainRun(ProgramRun):
     def _flow(self, row: int, statement: PlainStatement, block: CurrentBlock) -> int | None:
         """Line where the run goes on after a statement, with parameters and jumps carried out; None at the end."""
         head, rest, after = statement.head, statement.rest, statement.after
-        place = self._place(row)._replace(column=len(code_text(self.lines[row])) - len(rest) + 1)
+        place = self._place(row)._replace(column=statement.begins)
         if head.startswith("CYCL DEF 2"):
             for word in block.values.values():
                 if word.letter[0] == "Q" and not word.text.endswith(("MAX", "AUTO")):
                     self._scope(word.letter)[word.letter] = word.value
+        elif head == "PATTERN DEF":
+            pattern(self.state, block, rest, lambda text: self._value(row, text.replace(",", "."), statement.begins))
         elif head in CONDITIONS:
             holds, number, name = condition(head, rest, self._parameter, place)
             return self._jump_back(row, self._label(row, number, name)) if holds else after
@@ -268,6 +273,8 @@ class HeidenhainRun(ProgramRun):
     def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
         """Warning on text after END PGM; raises an error if a corner or an approach is still pending."""
         plain = self.state.plain
+        if plain.free:
+            raise plain.free[0][0].fail(None, NOT_DETERMINED, "more of its data, or L and C")
         if plain.held is not None or plain.approach is not None:
             raise self._fail(self._at, "the program ends before the element behind a corner or an APPR", "the element")
         statement = self._statements.get(self._at)

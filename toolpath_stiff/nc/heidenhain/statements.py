@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from toolpath_stiff.nc.heidenhain.cycles import AUTO, MAX
+from toolpath_stiff.nc.heidenhain.milling import AUTO, MAX
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.words import LONGEST_BLOCK, MOST_DIGITS, Word
@@ -26,30 +26,30 @@ _HEAD = re.compile(
     r"|TRANS\s+DATUM(?:\s+(?:AXIS|RESET))?|[A-Z]+"
 )
 _WORD = re.compile(
-    r"(R0(?![\d.,])|R[LR]|DR[+-](?!\s*[\d.,Q])|F\s*MAX|F\s*AUTO|MB\s*MAX|S(?:EQ|YM)[+-]|STAY|TURN|MOVE|(?:TABLE|COORD)\s+ROT"
+    r"(R0(?![\d.,])|R[LR]|DR[+-](?!\s*[\d.,Q])|F\s*MAX|F\s*AUTO|MB\s*MAX|(?:SEQ|SYM|CLSD)[+-]|STAY|TURN|MOVE|(?:TABLE|COORD)\s+ROT"
     r"|AXIS\s+(?:POS|SPAT)|PATHCTRL\s+(?:AXIS|VECTOR)|F\s+(?:TCP|CONT)|REFPNT\s+[A-Z-]+)"
-    rf"|(I?(?:PA|PR|ROT|SP[ABC]|[XYZABCUVW])|CCA|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
-    rf"|(Q[LRS]?\d+)\s*=\s*({VALUE}|F?AUTO|F?MAX|PREDEF)"
+    rf"|(I?(?:PA|PR|AN|ROT|SP[ABC]|[XYZABCUVW])|CC(?:[XYZA]|P[RA])|LEN|DR2|D[LR]|MB|[NT][XYZ]|DIST|ABST|SCL|HSC-MODE:|TA|LA|F[UZ]|[A-PR-Z])\s*({VALUE})"
+    rf"|(Q[LRS]?\d+)\s*(?:=\s*({VALUE}|PREDEF)|=?\s*(F?AUTO|F?MAX))"
     r"|([XYZABCUVW])(?![A-Z])"
     rf"|(#\s*Q?\d+)|({VALUE})|\"([^\"]*)\"|[FRM](?![A-Z\d])"
     r"|\([^)]*\)?|(\S)"  # a remark, as simulators write it; anything else that is no word
 )
 _LABEL = re.compile(r'\s*/?\s*(?:N?\d+\s+)?/?\s*LBL\s*(?:0*(\d+)|"([^"]*)")\s*$')
-PARAMETER = re.compile(r"\s*\bQ\d+\s*=", re.IGNORECASE)
-_INCH = re.compile(r"\b(INCH)()\s*$")
-_NUMBER_BEHIND = re.compile(rf"()({VALUE})\s*$")  # a name in the control's language
-_OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|17)\.[1-5])")
+PARAMETER = re.compile(r"\s*\bQ\d+\s*(?:=|F?AUTO|F?MAX)", re.IGNORECASE)
+_INCH = re.compile(r"\b(INCH)()()\s*$")
+_NUMBERS = re.compile(rf"(DR[+-]|(?<![A-Z])[FXY]|)(?:(?<=DR[+-])()|\s*({VALUE}))")  # behind names in any language
+_OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|4|5|17)\.[1-6])")
 _VALUES = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
 # Heads whose rest has another form, or is irrelevant.
 _OTHERWISE = re.compile(
-    r"(?:BEGIN|END|CALL) PGM|(?:CALL )?LBL|TCH|FN|Q|DECLARE|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
+    r"(?:BEGIN|END|CALL) PGM|PATTERN|(?:CALL )?LBL|TCH|FN|Q|DECLARE|BLK FORM (?!0)|FUNCTION (?!TCPM|RESET)"
     r"|CYCL DEF (?!(?:7|8|10|11|19)\.[1-9])\d+\."
 )
 
 
 @dataclass(frozen=True)
 class PlainStatement:
-    """A statement: its head, its words, its rest as text, and the line after it.
+    """A statement: its head, its words, its rest as text with its column, and the line after it.
 
     Of a bare axis letter a word's key is "X!", of a bare number "#", of a name `"`. `computed`: place of a word -> its
     value as it is written, where that is a Q parameter or no number.
@@ -61,6 +61,7 @@ class PlainStatement:
     words: tuple[Word, ...]
     computed: dict[int, str]
     rest: str
+    begins: int
     optional: bool
     after: int
 
@@ -87,7 +88,7 @@ def _form(head: str) -> tuple[str, re.Pattern[str] | None, bool]:
     shown = " ".join(head.split()).replace(",", ".").replace("FN ", "FN").rstrip(": ")
     if shown.startswith("CYCL DEF"):
         shown = "CYCL DEF " + shown.removeprefix("CYCL DEF").replace(" ", "")
-    special = _INCH if shown == "BEGIN PGM" else _NUMBER_BEHIND if _OLD.match(shown) else None
+    special = _INCH if shown == "BEGIN PGM" else _NUMBERS if _OLD.match(shown) else None
     return shown, special, special is None and look_up(shown) is not None and not _OTHERWISE.match(shown)
 
 
@@ -98,7 +99,7 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
     assert begin is not None
     head = _HEAD.match(text, begin.end())
     if begin.end() == len(text) or text[begin.end()] in "*(%":
-        return PlainStatement(row + 1, "", 1, (), {}, "", False, after)
+        return PlainStatement(row + 1, "", 1, (), {}, "", 1, False, after)
     if head is None:
         raise place.fail(f"{text[begin.end() :][:20]!r} is no statement", "plain language", "", begin.end() + 1)
     shown, special, has_words = _form(head[0])
@@ -106,24 +107,28 @@ def read_statement(lines: Sequence[str], row: int, name: str) -> PlainStatement:
         raise place.fail(f"a statement of {len(text)} characters", f"at most {LONGEST_BLOCK}")
     end, cycle = head.start() if shown == "M" else head.end(), shown.startswith("CYCL DEF") and "." not in shown
     rest, words, computed = text[end:], list[Word](), dict[int, str]()
-    if special is not None and (number := special.search(text, end)):
-        _add(words, computed, number[1] or "#", number[2].replace(",", "."), number.start() + 1, number[0].strip())
+    for number in special.finditer(text, end) if special is not None else ():
+        if number[0]:
+            written = (number[3] or "").replace(",", ".").replace(" ", "")
+            _add(words, computed, number[1] or "#", written, number.start() + 1, number[0].strip())
     if has_words:
         first = PARAMETER.search(text, end) if cycle else None  # the text before it is the cycle's name
         _words(words, computed, text, first.start() if first else len(text) if cycle else end, place, shown)
     while after < len(lines) and (lines[after - 1].rstrip().endswith("~") or (cycle and PARAMETER.match(lines[after]))):
         if has_words and (cycle or ";" not in lines[after - 1]):  # otherwise a remark continues
             _words(words, computed, code_text(lines[after]), 0, Place(name, after + 1), shown)
+        elif ";" not in lines[after - 1]:
+            rest += f" {code_text(lines[after]).lstrip()}"
         after += 1
     return PlainStatement(
-        row + 1, shown, head.start() + 1, tuple(words), computed, rest, bool(begin[1] or begin[2]), after
+        row + 1, shown, head.start() + 1, tuple(words), computed, rest, end + 1, bool(begin[1] or begin[2]), after
     )
 
 
 def _words(words: list[Word], computed: dict[int, str], text: str, position: int, place: Place, head: str) -> None:
     """Add the words of a text from a position on."""
     for match in _WORD.finditer(text, position):
-        flag, key, value, parameter, given, axis, table, bare, quoted, wrong = match.groups()
+        flag, key, value, parameter, given, feed, axis, table, bare, quoted, wrong = match.groups()
         column = match.start() + 1
         if wrong is not None:
             raise place.fail(f"{text[column - 1 : column + 11]!r} is no word of {head}", "", "", column)
@@ -132,7 +137,7 @@ def _words(words: list[Word], computed: dict[int, str], text: str, position: int
             if flag
             else key or parameter or (f"{axis}!" if axis else "TABLE" if table else "#" if bare else '"')
         )
-        written = (value or given or bare or (table or "")[1:]).replace(" ", "").replace(",", ".")
+        written = (value or given or feed or bare or (table or "")[1:]).replace(" ", "").replace(",", ".")
         if len(written) > 2 * MOST_DIGITS and sum(map(str.isdigit, written)) > 2 * MOST_DIGITS:
             raise place.fail(f"a number of {len(written)} characters", "", "", column)
         if key == "M":

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 from toolpath_stiff.nc.codes.code import Code, Rows, holds_anyway, refused, table
 from toolpath_stiff.nc.codes.registry import code_meaning
-from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, functions, tools
+from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, free_contour, functions, tools
 from toolpath_stiff.nc.heidenhain.contour import MANUAL, PATHS, POLAR
 
 CONTROLS = ("heidenhain",)
@@ -19,7 +19,7 @@ _TAPPING, _PATTERNS = f"{_CYCLES}, Fixed cycles: tapping", f"{_CYCLES}, Pattern 
 _APPROACH, _TOOLS = f"{MANUAL}, Contour approach and departure", f"{MANUAL}, Tool data"
 _PLANE, _FLOW = f"{MANUAL}, The PLANE function", f"{MANUAL}, Subprograms and program section repeats"
 _Q, _BASICS = f"{MANUAL}, Programming: Q parameters", f"{MANUAL}, Fundamentals of programming"
-_SPECIAL = f"{_CYCLES}, Special cycles"
+_SPECIAL, _FREE = f"{_CYCLES}, Special cycles", f"{MANUAL}, Path contours: FK free contour programming"
 
 
 def _parts(cycle: int, first: int, last: int) -> str:
@@ -37,13 +37,17 @@ _ROWS: Rows = (
         ("C", contour.circle, "arc about CC"),
         ("CR", contour.radius_circle, "arc of a radius"),
         ("CT", contour.tangent_circle, "arc that goes on smoothly"),
-        ("CHF", contour.corner, "chamfer of the corner to the next element"),
-        ("RND", contour.corner, "rounding of the corner to the next element"),
+        ("CHF", free_contour.rounding, "chamfer of the corner to the next element"),
+        ("RND", free_contour.rounding, "rounding of the corner to the next element"),
     )),
     ("motion", POLAR, (
         ("LP", contour.polar_line, "straight, in polar coordinates"),
         ("CP", contour.circle, "arc about CC by a polar angle, helix"),
         ("CTP", contour.tangent_circle, "arc that goes on smoothly, in polar coordinates"),
+    )),
+    ("motion", _FREE, (
+        ("FPOL", contour.pole, "pole of a free contour"),
+        ("FL|FC|FLT|FCT", free_contour.free_element, "straight, arc of a free contour; the latter two go on smoothly"),
     )),
     ("motion", f"{MANUAL}, Three-dimensional tool compensation", (
         ("LN", functions.vectors, "straight, with a tool axis"),
@@ -82,14 +86,24 @@ _ROWS: Rows = (
         ("CYCL DEF 205", cycles.define, "deep drilling"),
         ("CYCL DEF 240", cycles.define, "centring"),
         ("CYCL DEF 241", cycles.define, "single-lip drilling"),
+        ("CYCL DEF 208", cycles.define, "bore milling on a helix"),
         (_parts(1, 0, 5), cycles.define_older, "pecking, of older controls"),
-        ("CYCL CALL|CYCL CALL POS", cycles.call_statement, "carries out the cycle"),
+        ("CYCL CALL|CYCL CALL POS|CYCL CALL PAT", cycles.call_statement, "carries out the cycle"),
     )),
     ("motion", _TAPPING, (
         ("CYCL DEF 206|CYCL DEF 207|CYCL DEF 209", cycles.define, "tapping"),
         (f"{_parts(2, 0, 4)}|{_parts(17, 0, 3)}", cycles.define_older, "tapping, of older controls"),
     )),
-    ("motion", _PATTERNS, (("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),)),
+    ("motion", f"{_CYCLES}, Fixed cycles: pocket milling, stud milling, slot milling", (
+        ("CYCL DEF 251|CYCL DEF 252", cycles.define, "rectangular, circular pocket"),
+        ("CYCL DEF 253", cycles.define, "slot"),
+        ("CYCL DEF 256|CYCL DEF 257", cycles.define, "rectangular, circular stud"),
+        (f"{_parts(4, 0, 6)}|{_parts(5, 0, 5)}", cycles.define_older, "pockets, of older controls"),
+    )),
+    ("motion", _PATTERNS, (
+        ("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),
+        ("PATTERN DEF", _SILENT, "points, rows, patterns, circles for CYCL CALL PAT"),
+    )),
     ("motion", _SPECIAL, (("CYCL DEF 300", functions.left_out, "300 to 399: the machine builder's, left out"),)),
     ("motion", f"{_CYCLES}, Touch probe cycles", (("TCH PROBE", functions.left_out, "probing, left out"),)),
     ("dwell", _SPECIAL, (("CYCL DEF 9.1", functions.dwell, "dwell"),)),
@@ -106,7 +120,7 @@ _ROWS: Rows = (
         ("FN14", _SILENT, "error: the program stops"),
         ("FN18", _LISTED, "data of the control: tool, datum shift, rotation, scale; others are not known"),
         ("FN28", _LISTED, "data of the control: the parameter is not known from there on"),
-        ("FN15|FN16|FN19|FN20|FN29|FN37|FN38", _LISTED, "message, PLC: changes no path"),
+        ("FN15|FN16|FN19|FN20|FN26|FN27|FN29|FN37|FN38", _LISTED, "message, PLC, table: changes no path"),
     )),
     ("non-modal", _BASICS, (
         ("BLK FORM 0.1|BLK FORM 0.2", tools.blank, "corner of the blank"),
@@ -121,15 +135,14 @@ OWN = {
     "M92": "points of the machine builder", "M126": "rotary axes go the shorter way", "M127": "they go as programmed",
     "M128": "tool centre point control", "M129": "tool centre point control off", "M140": "retract along the tool",
 }  # fmt: skip
-_BY_MOVES, _FK = "post the moves of the cycle", f"{MANUAL}, FK"
+_BY_MOVES = "post the moves of the cycle"
 _REFUSED = (
-    ("FL, FLT, FC, FCT, FPOL, FSELECT, FCTP, FLP", "free contour programming (FK)", "post lines and arcs", _FK),
+    ("FSELECT", "a choice of solutions that the manual only draws", "convert the FK program to L and C", _FREE),
     ("PLANE PROJECTED, PLANE EULER, PLANE VECTOR, PLANE POINTS, PLANE RELATIV, PLANE RELATIVE",
      "a tilted plane given otherwise", "PLANE SPATIAL", _PLANE),
     ("CYCL DEF 204", "back boring", _BY_MOVES, _DRILLING),
-    ("CYCL DEF 208", "a helix whose way in the manual draws without numbers", _BY_MOVES, _DRILLING),
-    ("SEL, PATTERN, CALL, CYCL CALL PAT", "points of other files or patterns", "post the points one by one", _PATTERNS),
-    ("FN17, FN26, FN27", "data of the control or of a table", "put the numbers into the program", _Q),
+    ("SEL, CALL", "points or programs of other files", "post the points one by one, CALL PGM", _PATTERNS),
+    ("FN17", "data of the control", "put the numbers into the program", _Q),
     ("SPL", "a spline", "post lines and arcs", PATHS),
 )  # fmt: skip
 REFUSED = refused(_REFUSED, ", ")
@@ -143,7 +156,7 @@ def look_up(head: str) -> Code | None:
     """Row of a statement's head; Q parameters have the row "Q", the machine builder's cycles that of 300."""
     head = "TCH PROBE" if head.startswith("TCH PROBE") else "CYCL DEF 300" if _BUILDERS.fullmatch(head) else head
     parameter = _PARAMETER.match(head)
-    return STATEMENTS.get(parameter[1].rstrip("LR") if parameter else head)
+    return STATEMENTS.get(parameter[1].rstrip("LR") if parameter else head * (head != "Q"))
 
 
 def refusal_of(head: str) -> tuple[str, str]:

@@ -1,15 +1,22 @@
 """A block in Siemens' language: words sorted, then codes in their order, then the move, then the cycles."""
 
+from collections.abc import Iterable
+
 from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.nc.elements import Element
+from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.run_records import Tally
+from toolpath_stiff.nc.siemens.contours import elements_of
 from toolpath_stiff.nc.siemens.cycles import repeated
 from toolpath_stiff.nc.siemens.motion import move, moves
 from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS
-from toolpath_stiff.nc.state import STEPS, CurrentBlock, State
+from toolpath_stiff.nc.state import STEPS, CurrentBlock, Flow, State
+from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import Block
 
 SINGLE = ("motion", "distance", "plane", "cutter compensation", "work offset", "units", "feed mode")
 BETWEEN = frozenset((*SINGLE[:2], "F", "S", "look-ahead", "M coolant", "M stop"))  # the moves of a corner
+SETS = frozenset(("F", "S", "G0", "G1"))
 OTHER_NUMBERS = {"G4", "G25", "G26"}  # beside these, F and S are no feed and no speed
 
 
@@ -56,6 +63,8 @@ def carry_out(state: State, block: CurrentBlock) -> None:
     if moves(state, block):
         move(state, block)
         repeated(state, block)
+    elif state.motion in ("G0", "G1") and not SETS.isdisjoint(block.codes):  # MCALL acts there too
+        repeated(state, block)
     for code in codes:
         if code.rank > STEPS["motion"]:
             code.act(state, block, code.name)
@@ -67,3 +76,16 @@ def carry_out(state: State, block: CurrentBlock) -> None:
             hint="remove it, or give a call its own block",
         )
         state.note(block.line, block.values[letter], "how the control moves: the path is taken as programmed")
+
+
+def draw(state: State, block: CurrentBlock, blocks: Iterable[Block]) -> list[Element]:
+    """Contour elements that blocks draw, up to the end of their program; the tool of `state` stays where it is."""
+    drawn = State(state.name, frames=Frames(Offsets(), None, (0.0,) * 6), dialect=state.dialect, feed=1.0, trace=[])
+    drawn.plane, drawn.inch, drawn.motion = state.plane, state.inch, "G1"
+    for part in blocks:
+        current = sort_words(drawn, part, None)
+        with current.placing():
+            carry_out(drawn, current)
+        if current.flow is not Flow.NEXT:
+            break
+    return elements_of(drawn, block)

@@ -5,6 +5,8 @@ Job Planning, "Transformations"; Operating Manual Milling, "Swivel". A point goe
 swivelled one, then the settable offset. mm, degrees.
 """
 
+from collections.abc import Mapping
+
 from toolpath_stiff.nc.codes import coordinates as settable
 from toolpath_stiff.nc.codes import tools
 from toolpath_stiff.nc.frames import rotation_matrix
@@ -17,7 +19,8 @@ from toolpath_stiff.nc.tables import WORK_OFFSETS, WorkOffset
 from toolpath_stiff.nc.words import AXES
 
 BASE_IS_ZERO = "G500 (no settable offset) is program zero: the program takes no other one"
-FIRST_ADDITIONAL, LAST_ADDITIONAL = 505, 599
+MODES = ("motion", "plane", "absolute", "inch", "feed_mode")  # of SAVE
+FIRST_ADDITIONAL, LAST_OF_FOUR = 505, 4
 G70_INCH = "under G70 F counts inches a minute too, as on a control whose basic system is inch"
 
 
@@ -67,7 +70,7 @@ def offset(state: State, block: CurrentBlock, code: str) -> None:
         return
     plain.base = ""
     if int(code[1:]) >= FIRST_ADDITIONAL:
-        number = int(code[1:]) - FIRST_ADDITIONAL + 5
+        number = int(code[1:]) - FIRST_ADDITIONAL + 1 + LAST_OF_FOUR
         if number not in frames.offsets.additional:
             state.warnings.append(Remark(f"{code} is an offset that nothing defines: taken as 0", block.line))
         frames.offsets.additional.setdefault(number, WorkOffset())
@@ -75,6 +78,34 @@ def offset(state: State, block: CurrentBlock, code: str) -> None:
     else:
         settable.work_offset(state, block, code)
     frames.g92 = list(frames.g92)  # the coordinates of the present point change
+
+
+def modes_of(state: State) -> dict[str, object]:
+    """Modes and frames in force, which the end of a subprogram with SAVE brings back."""
+    plain, frames = state.plain, state.frames
+    return {name: getattr(state, name) for name in MODES} | {"": (plain.inner, plain.base, frames.g92, frames.active)}
+
+
+def bring_back(state: State, kept: Mapping[str, object]) -> bool:
+    """Put modes that were kept into force again; False if the frames have changed."""
+    for name in MODES:
+        setattr(state, name, kept[name])
+    return kept[""] == modes_of(state)[""]
+
+
+def set_offset(state: State, block: CurrentBlock, code: str) -> None:
+    """$P_UIFR: the shift of a settable offset, all of it or (TR) of one axis; it acts from the next G54 to G599 on."""
+    number, frames = int(block.codes[code].value), state.frames
+    block.refuse_if(not 1 <= number <= 99, code, "is no settable offset", "1 to 99")
+    index = number - 1 + (len(WORK_OFFSETS) if number > LAST_OF_FOUR else 0)
+    waits = len(state.recorder) and index == frames.active and not state.plain.base
+    block.refuse_if(waits, code, "writes the offset in force, which acts from its next call on", "it before G54")
+    offset = frames.offsets.additional.setdefault(number, WorkOffset()) if index >= number else frames.offsets.at(index)
+    block.take("FRAME")
+    kept = offset.axes if block.take("TR") is not None else [0.0] * 6
+    scales, given = [state.length_scale] * 3 + [1.0] * 3, [block.take(letter) for letter in AXES]
+    offset.axes[:] = [k if g is None else g * scale for k, g, scale in zip(kept, given, scales, strict=True)]
+    offset.given = True
 
 
 def swivel(state: State, block: CurrentBlock, code: str) -> None:

@@ -19,6 +19,7 @@ from toolpath_stiff.units import SECONDS_PER_DAY
 
 _HEIGHTS, _MODES = "RTP RFP SDIS DP DPR", "GMODE DMODE AMODE"
 _THREAD = f"AXN PITA TECHNO VARI DAM VRT PITM PTAB PTABA {_MODES}"
+_MILL, _SIGNS = "MID FAL FALD FFP1 FFD CDIR", f"UMODE FS ZFS {_MODES}"
 SIGNATURES = {
     "CYCLE81": f"{_HEIGHTS} DTB {_MODES}", "CYCLE82": f"{_HEIGHTS} DTB {_MODES}",
     "CYCLE83": f"{_HEIGHTS} FDEP FDPR DAM DTB DTS FRF VARI AXN MDEP VRT DTD DIS1 {_MODES}",
@@ -26,22 +27,32 @@ SIGNATURES = {
     "CYCLE840": f"{_HEIGHTS} DTB SDR SDAC ENC MPIT PIT {_THREAD.replace('VARI DAM VRT ', '')}",
     "CYCLE85": f"{_HEIGHTS} DTB FFR RFF {_MODES}", "CYCLE86": f"{_HEIGHTS} DTB SDIR RPA RPO RPAP POSS {_MODES}",
     "CYCLE87": f"{_HEIGHTS} SDIR", "CYCLE88": f"{_HEIGHTS} DTB SDIR", "CYCLE89": f"{_HEIGHTS} DTB {_MODES}",
+    "POCKET3": f"RTP RFP SDIS DP LENG WID CRAD _PA _PO STA {_MILL} VARI MIDA AP1 AP2 AD RAD1 DP1 {_SIGNS}",
+    "POCKET4": f"RTP RFP SDIS DP PRAD _PA _PO {_MILL} VARI MIDA AP1 AD RAD1 DP1 {_SIGNS}",
+    "CYCLE76": f"{_HEIGHTS} LENG WID CRAD _PA _PO STA {_MILL} VARI AP1 AP2 {_SIGNS.removeprefix('UMODE ')}",
+    "CYCLE77": f"{_HEIGHTS} PRAD _PA _PO {_MILL} VARI AP1 {_SIGNS.removeprefix('UMODE ')}",
+    "CYCLE71": "RTP RFP SDIS DP _PA _PO LENG WID STA MID MIDA FDP FALD FFP1 VARI FDP1",
+    "CYCLE61": "RTP RFP SDIS DP _PA _PO LENG WID MID MIDA FALD FFP1 VARI LIM DMODE AMODE",
+    "CYCLE72": f"KNAME RTP RFP SDIS DP MID FAL FALD FFP1 FFD VARI RL AS1 LP1 FF3 AS2 LP2 {_SIGNS}",
+    "CYCLE801": "SPCA SPCO STA1 DIS1 DIS2 NUM1 NUM2 VARI UMODE ANG1 ANG2 HIDE NSP DMODE",
     "HOLES1": "SPCA SPCO STA1 FDIS DBH NUM VARI UMODE HIDE NSP DMODE",
     "HOLES2": "CPA CPO RAD STA1 INDA NUM VARI UMODE HIDE NSP DMODE",
     "CYCLE802": f"XA YA {' '.join(f'X{n} Y{n}' for n in range(9))} VARI UMODE DMODE",
     "CYCLE800": "FR TC ST MODE X0 Y0 Z0 A B C X1 Y1 Z1 DIR FRI DMODE",
     "WORKPIECE": "WP REF HOLD FORM MODE Z0 Z1 ZB X0 Y0 X1 Y1",
 }  # fmt: skip
-TEXTS = ("TC", "WP", "REF", "HOLD", "FORM", "HIDE", "PITM", "PTAB", "PTABA")
+TEXTS = ("KNAME", "TC", "WP", "REF", "HOLD", "FORM", "HIDE", "PITM", "PTAB", "PTABA")
 TAPS = ("CYCLE84", "CYCLE840")
 LENGTHS = frozenset((
     "RTP", "RFP", "SDIS", "DP", "DPR", "FDEP", "FDPR", "DAM", "PIT", "MDEP", "VRT", "DIS1", "FFR", "RFF", "SPCA",
-    "SPCO", "FDIS", "DBH", "CPA", "CPO", "RAD",
+    "SPCO", "FDIS", "DBH", "CPA", "CPO", "RAD", "LENG", "WID", "CRAD", "_PA", "_PO", "MID", "FAL", "FALD", "FFP1",
+    "FFD", "AP1", "AP2", "AD", "DP1", "PRAD", "FDP", "FDP1", "LP1", "LP2", "FF3", "DIS1", "DIS2",
 ))  # fmt: skip
 # Pitches of coarse threads (ISO 261) by their size, mm.
 COARSE = {3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 8: 1.25, 10: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5, 22: 2.5,
           24: 3.0, 27: 3.0, 30: 3.5, 33: 3.5, 36: 4.0, 39: 4.0, 42: 4.5, 45: 4.5, 48: 5.0}  # fmt: skip
 CHIP_BREAK_MM, AHEAD_MM, AHEAD_SHARE, MOST_AHEAD_MM = 1.0, 0.6, 1.0 / 50.0, 7.0  # of CYCLE83
+GRID = "the holes of CYCLE801 are drilled row by row, to and fro"
 SHIFT = "the shift off the wall before the tool leaves the hole"
 
 
@@ -50,11 +61,17 @@ def modal(state: State, block: CurrentBlock, code: str) -> None:
     state.plain.modal, state.plain.cycle = False, None
 
 
+def parameters(state: State, block: CurrentBlock, code: str) -> Values:
+    """The parameters that a cycle's call gives, lengths in mm; now taken. If they name a plane, it is in force."""
+    plane = round(block.values["DMODE"].value) % 10 if block.has("DMODE") else 0
+    block.refuse_if(plane not in (0, int(state.plane[1:]) - 16), "DMODE", "names another plane", "the one in force")
+    given, scale = [name for name in SIGNATURES[code].split() if block.has(name)], state.length_scale
+    return {name: (block.take(name) or 0.0) * (scale if name in LENGTHS else 1.0) for name in given}
+
+
 def cycle(state: State, block: CurrentBlock, code: str) -> None:
     """A drilling cycle, run here or, after MCALL, wherever a block moves to."""
-    scale = state.length_scale
-    values = {name: block.take(name) or 0.0 for name in SIGNATURES[code].split() if block.has(name)}
-    values = {name: value * (scale if name in LENGTHS else 1.0) for name, value in values.items()}
+    values = parameters(state, block, code)
     missing = next((name for name in ("RTP", "RFP") if name not in values), None)
     block.refuse_if(missing, None, f"{code} without {missing}", SIGNATURES[code].replace(" ", ", "))
     values |= {"number": float(code.removeprefix("CYCLE")), "TOP": values["RFP"] + abs(values.get("SDIS", 0.0))}
@@ -82,7 +99,8 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     if code in TAPS:
         values["PIT"] = abs(values.get("PIT", 0.0)) or COARSE.get(round(abs(values.get("MPIT", 0.0))), 0.0)
         block.refuse_if(values.get("PITA", 0.0) > 1.0, "PITA", "is a pitch in other units than mm", "0, 1")
-        block.refuse_if(not values["PIT"], None, f"{code} without a pitch", "PIT, or MPIT of 3 to 48")
+        by_feed = code == "CYCLE840" and values.get("ENC") == 1.0  # without encoder the feed has to fit the speed
+        block.refuse_if(not values["PIT"] and not by_feed, None, f"{code} without a pitch", "PIT, or MPIT of 3 to 48")
         block.refuse_if(values.get("VARI"), "VARI", "taps in pecks", "0")
     for name in ("RPA", "RPO", "RPAP"):
         if values.get(name):
@@ -117,7 +135,9 @@ def strokes(values: Values, feed: float | None, speed: float, turns: float = 1.0
     number, top, bottom = int(values["number"]), values["TOP"], values["DP"]
     down = feed or 0.0
     out: float | None = None
-    if number in (84, 840):
+    if number == 840 and values.get("ENC") == 1.0:
+        out = down
+    elif number in (84, 840):
         speed = values.get("SST") or speed
         down, out = (values["PIT"] * rate / turns for rate in (speed, values.get("SST1") or speed))
     elif number == 85:
@@ -156,14 +176,15 @@ def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
 
 
 def pattern(state: State, block: CurrentBlock, code: str) -> None:
-    """HOLES1: holes on a line, from the nearer end; HOLES2: on a circle; CYCLE802: at points. Runs MCALL's cycle."""
+    """HOLES1: holes on a line, from the nearer end; HOLES2: on a circle; CYCLE801, CYCLE802: grids, points."""
     plain, (first, second, _) = state.plain, PLANES[state.plane]
-    given = {name for name in SIGNATURES[code].split() if block.has(name)}
-    values = {name: (block.take(name) or 0.0) * (state.length_scale if name in LENGTHS else 1.0) for name in given}
+    values = parameters(state, block, code)
     if plain.cycle is None:
         raise block.fail(None, f"{code} without a cycle", "MCALL CYCLE81(...) before it")
     number = values.get
-    block.refuse_if("HIDE" in given and block.values["HIDE"].text, None, f"{code} with hidden positions", "all of them")
+    block.refuse_if(
+        "HIDE" in values and block.values["HIDE"].text, None, f"{code} with hidden positions", "all of them"
+    )
     block.refuse_if(code == "HOLES2" and number("VARI", 0.0) // 10 % 10, "VARI", "goes from hole to hole on the circle")
     count, start = round(number("NUM", 1.0)), math.radians(number("STA1", 0.0))
     block.refuse_if(not 1 <= count <= 10_000, None, f"{code} with {count} holes", "1 or more")
@@ -171,7 +192,18 @@ def pattern(state: State, block: CurrentBlock, code: str) -> None:
         steps = any({*f"{number(name, 0.0):.0f}"} != {"1"} for name in ("XA", "YA"))
         block.refuse_if(steps, None, f"{code} with steps", "111111111: absolute points")
         pairs = [(f"X{index}", f"Y{index}") for index in range(9)]
-        points = [complex(values[x], values[y]) * state.length_scale for x, y in pairs if {x, y} <= given]
+        points = [complex(values[x], values[y]) * state.length_scale for x, y in pairs if {x, y} <= values.keys()]
+    elif code == "CYCLE801":
+        sheared = number("VARI", 0.0) or number("ANG1", 0.0) or number("ANG2", 0.0)
+        block.refuse_if(sheared, None, "CYCLE801 of a frame, or of a sheared grid", "VARI, ANG1 and ANG2 of 0")
+        columns, rows = round(number("NUM1", 1.0)), round(number("NUM2", 1.0))
+        block.refuse_if(
+            not 1 <= columns * rows <= 10_000, None, f"CYCLE801 with {columns} times {rows} holes", "1 or more"
+        )
+        state.assume(GRID)
+        ways = [range(columns)[:: (-1) ** row] for row in range(rows)]
+        grid = [complex(x * number("DIS1", 0.0), y * number("DIS2", 0.0)) for y, way in enumerate(ways) for x in way]
+        points = [complex(number("SPCA", 0.0), number("SPCO", 0.0)) + cmath.rect(1.0, start) * point for point in grid]
     elif code == "HOLES1":
         along, base = cmath.rect(1.0, start), complex(number("SPCA", 0.0), number("SPCO", 0.0))
         points = [base + (number("FDIS", 0.0) + index * number("DBH", 0.0)) * along for index in range(count)]

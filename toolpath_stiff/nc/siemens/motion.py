@@ -59,12 +59,15 @@ def move(state: State, block: CurrentBlock) -> None:
     size = (block.take(corner) or 0.0) * state.length_scale if corner else 0.0
     block.refuse_if(size < 0.0, corner, "is the size of a corner", "more than 0")
     plain.to_corner = size > 0.0
+    modal, alone = state.feed, block.take("FB")
+    state.feed = modal if alone is None else alone * state.feed_scale
     once = next((name for name in MACHINE if name in block.codes), "G500" if plain.base == "machine" else "")
     _name_steps(state, block)
     if once:
         _machine(state, block, once, mode)
     else:
         MOTIONS[mode](state, block, mode)
+    state.feed = modal if alone is not None else state.feed
     if plain.to_corner and plain.held is not None:
         head = Word("", size, block.values[corner].column, "RND" if corner == "RND" else "CHF")
         plain.corner = CurrentBlock(block.name, type(block.block)(block.line, (head,)))

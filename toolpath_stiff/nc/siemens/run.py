@@ -6,12 +6,12 @@ SIEMENS, SINUMERIK 840D sl, Programming Manual Job Planning, "Flexible NC progra
 
 import math
 import re
+from collections.abc import Iterator
 from itertools import zip_longest
 
 from toolpath_stiff.nc.heidenhain.expressions import Value
 from toolpath_stiff.nc.heidenhain.statements import code_text
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.parametric.expressions import Value as Number
 from toolpath_stiff.nc.parametric.run import ParametricRun, Step
 from toolpath_stiff.nc.parametric.statements import Statement, Steering
 from toolpath_stiff.nc.parametric.variables import Values
@@ -19,24 +19,23 @@ from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
-from toolpath_stiff.nc.siemens.blocks import carry_out, sort_words
+from toolpath_stiff.nc.siemens.blocks import carry_out, draw, sort_words
+from toolpath_stiff.nc.siemens.coordinates import bring_back, modes_of
 from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
+from toolpath_stiff.nc.siemens.programs import PROGRAM, heads_of, labels_of, plain_texts, programs_of
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
 from toolpath_stiff.nc.siemens.words import read_words, steering_of
-from toolpath_stiff.nc.state import LATHE_HINT, Flow, Then
+from toolpath_stiff.nc.state import LATHE_HINT, CurrentBlock, Flow, Then
 from toolpath_stiff.nc.words import AXES, Block, Word
 
-HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
-PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
-PLAIN = re.compile(r"\s*(?:N\d+\s*)?((?:(?:G|[XYZABCIJKFS]=?|CR=)[-+]?[\d.]+\s*)*)(?:;.*)?", re.ASCII | re.IGNORECASE)
 OFFSET = re.compile(r"\bG(?:5[4-7]|5(?:0[5-9]|[1-9]\d))(?!\d)")
 CHANGE = re.compile(r"(?<![A-Z])M0*6(?!\d)")
 OF_LATHES = re.compile(r"\bG(?:18|96)(?!\d)|\bLIMS\b|\bDIAM(?:ON|90)\b")
 ALONG_Y = re.compile(r"(?<![A-Z_$])Y\s*[-+=\d.]")
 IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
+BY_TEXT, PATH = ("CALL", "EXTCALL"), re.compile(r"^(?:.*/)?(?:_N_)?|[._][SM]PF$")
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
-REMARK = re.compile(r"^\s*(?:N\d+\s*)?\([^()]*\)$", re.ASCII)  # a comment as the ISO dialect and some posts write it
 ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
@@ -69,29 +68,10 @@ class SiemensRun(ParametricRun):
 
     def _lex(self) -> None:
         """Find programs and labels; plain blocks are left to the reader of plain lines."""
-        self._labels: dict[str, list[int]] = {}
-        self._subs: dict[str, int] = {}
-        self._begins: list[re.Match[str]] = []
-        texts, opened = list[str](), -1
-        for row, line in enumerate(self.lines):
-            code, plain = REMARK.sub("", code_text(line)), PLAIN.fullmatch(line)
-            begin, program = HEAD.match(code), PROGRAM.match(code)
-            assert begin is not None
-            self._begins.append(begin)
-            for label in (begin[5], begin[2] and f"N{begin[2]}", begin[3]):
-                self._labels.setdefault(label or "", []).append(row)
-            if program is not None:
-                self._subs.setdefault(program[1] or program[2], opened if program[2] and opened >= 0 else row)
-                opened = row
-            elif code.strip():
-                opened = -1
-            if re.search(r"\bCT\b", code) and texts:  # it takes its direction from the block before
-                texts[-1] = "?"
-            texts.append(
-                plain[1].upper().replace("CR=", "R").replace("=", "") if plain is not None and begin[3] is None else "?"
-            )
+        self._begins = heads_of(self.lines)
+        self._labels, self._subs = labels_of(self._begins), programs_of(self._begins)
         self._ends = {row for row in self._subs.values() if any(code_text(text).strip() for text in self.lines[:row])}
-        self._plain = self._lexer = PlainRun(self.state, texts, self.name)
+        self._plain = self._lexer = PlainRun(self.state, plain_texts(self.lines, self._begins), self.name)
 
     def run(self) -> list[Remark]:
         """Run to the program's end; a lathe's program is refused. Returns warnings."""
@@ -120,7 +100,9 @@ class SiemensRun(ParametricRun):
             block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
             steering = None
             if not self._is_head(row):
-                steering = steering_of(self._scanner(row, begin.end()), lambda place: self._at_place(row, place))
+                steering = steering_of(
+                    self._scanner(row, begin.end()), lambda place: lambda _: self._scanner(row, place).real()
+                )
             self._statements[row] = Statement(block, steering=steering)
         return self._statements[row]
 
@@ -128,10 +110,6 @@ class SiemensRun(ParametricRun):
         """True if a line only names the program that begins there."""
         code = self._begins[row].string
         return PROGRAM.match(code) is not None or code.lstrip()[:1] == "%"
-
-    def _at_place(self, row: int, place: int) -> Number:
-        """The value of an expression in a line."""
-        return lambda _: self._scanner(row, place).real()
 
     def _read(self, row: int) -> Block:
         statement, code = self._statement(row), self._begins[row].string
@@ -201,12 +179,30 @@ class SiemensRun(ParametricRun):
     def _execute(self, block: Block) -> Then:
         state, plain = self.state, self.state.plain
         current = sort_words(state, block, self.tally)
+        if "CYCLE72" in current.codes:
+            plain.contour = draw(state, current, self._contour(current))
         with current.placing():
             carry_out(state, current)
         slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
         self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
         called = any(level.stop < 0 for level in self._levels)
         return Flow.RETURN if current.flow is Flow.END and called else current.flow
+
+    def _contour(self, block: CurrentBlock) -> Iterator[Block]:
+        """Blocks of the contour of CYCLE72: those of a subprogram ("NAME"), or between labels ("BEGIN:END")."""
+        block.refuse_if(block.take("KNAME") is None, None, "CYCLE72 without its contour", "its name, or labels")
+        first, _, last = (part.strip() for part in block.values["KNAME"].text.upper().partition(":"))
+        if last:
+            begin, stop = (self._to_label(self._at, "GOTO", label) for label in (first, last))
+        else:
+            begin = self._sub(first, self._at, block.block.words[0].column) + 1
+            stop = min(end for end in (*self._ends, len(self.lines)) if end > begin) - 1
+        for row in range(begin, stop + 1):
+            steering = self._statement(row).steering
+            if steering is not None and steering.kind == "RET":
+                return
+            block.refuse_if(steering, None, "CYCLE72 along a contour with jumps, loops or calls", "moves alone")
+            yield self._read(row)
 
     # Flow
 
@@ -227,11 +223,13 @@ class SiemensRun(ParametricRun):
         """M17, RET, the end of a program: the line after the call, or the end of the run."""
         while self._levels and self._levels[-1].stop >= 0:
             self._levels.pop()
+        if self._levels and self._levels[-1].kept and not bring_back(self.state, self._levels[-1].kept):
+            raise self._fail(row, "SAVE brings back frames that the subprogram changed", "TRANS before its end")
         return self._leave(row) if self._levels else len(self.lines)
 
     def _to_label(self, row: int, way: str, label: str) -> int:
         """The line of a label: forward (GOTOF), backward (GOTOB), backward first (REPEAT), or forward first (GOTO)."""
-        first = self._program_of(row)
+        first = max((begin for begin in self._ends if begin <= row), default=0)
         stop = min((end for end in self._ends if end > first), default=len(self.lines))
         rows = [place for place in self._labels.get(label, []) if first <= place < stop]
         ahead, behind = [place for place in rows if place > row], [place for place in rows[::-1] if place <= row]
@@ -242,9 +240,6 @@ class SiemensRun(ParametricRun):
         while self._levels and self._levels[-1].stop >= 0 and not self._levels[-1].first <= to < self._levels[-1].stop:
             self._levels.pop()
         return to
-
-    def _program_of(self, row: int) -> int:
-        return max((begin for begin in self._ends if begin <= row), default=0)
 
     def _jump_to(self, row: int, steering: Steering) -> int | None:
         way, label = steering.label.split()
@@ -313,28 +308,38 @@ class SiemensRun(ParametricRun):
 
     def _call_sub(self, row: int, steering: Steering) -> int | None:
         name, scanner = steering.label, self._scanner(row, self._begins[row].end())
-        scanner.part(NAME)
-        if name not in self._subs:
-            self._load_sub(name)
-        if name not in self._subs:
-            problem = f"{name} is no word that is known, and no subprogram of the file or of a folder"
-            raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=steering.column)
-        first = self._subs[name] + 1
+        if scanner.part(NAME) in BY_TEXT:
+            name = PATH.sub("", str(scanner.result()).upper())
+        first = self._sub(name, row, steering.column) + 1
         level = Subprogram(name, first, row + 1, 0)
-        level.arguments, level.references = self._bound(row, first - 1, scanner)
+        heads = (PROGRAM.match(code_text(line)) for line in self.lines[first - 1 : first + 19])
+        proc = next((head[3] for head in heads if head is not None and head[2]), "")
+        level.arguments, level.references = self._bound(row, proc, scanner)
         times = self._times(scanner)
         scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind the call of {name}", "a block of its own")
         level.again = times - 1
         if times:
             self._begin(level, row, steering.column)
+            level.kept = modes_of(self.state) if re.search(r"\bSAVE\b", proc) else {}
         return first if times else None
 
+    def _sub(self, name: str, row: int, column: int) -> int:
+        """The line that a subprogram begins with, in the file or in one of the folder."""
+        files = () if name in self._subs else self._files_called(name, SUFFIXES)
+        if self._load(files, (f"%_N_{name}_SPF",)) is not None:
+            self.lines = (*self.lines, END_OF_FILE)
+            self._structure_known = None
+            self._lex()
+        if name not in self._subs:
+            problem = f"{name} is no word that is known, and no subprogram of the file or of a folder"
+            raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=column)
+        return self._subs[name]
+
     def _bound(
-        self, row: int, first: int, scanner: SiemensScanner
+        self, row: int, proc: str, scanner: SiemensScanner
     ) -> tuple[dict[str, float | None], dict[str, tuple[Values, str]]]:
         """PROC's parameters with the values of a call; those by reference (VAR), with the variables that they name."""
-        heads = (PROGRAM.match(code_text(line)) for line in self.lines[first : first + 20])
-        parameters = PARAMETER.findall(next((head[3] for head in heads if head is not None and head[2]), ""))
+        parameters = PARAMETER.findall(proc)
         named = {place for place, (by, *_) in enumerate(parameters) if by}
         values = scanner.arguments(named) if scanner.sign("") and scanner.begins("(") else []
         bound, references = dict[str, float | None](), dict[str, tuple[Values, str]]()
@@ -351,13 +356,6 @@ class SiemensRun(ParametricRun):
             bound[name] = bool(given) if kind == "BOOL" else float(given)
         return bound, references
 
-    def _load_sub(self, name: str) -> None:
-        """Read a subprogram's file from the folder, if it exists."""
-        if self._load(self._files_called(name, SUFFIXES), (f"%_N_{name}_SPF",)) is not None:
-            self.lines = (*self.lines, END_OF_FILE)
-            self._structure_known = None
-            self._lex()
-
     def _end(self, row: int, what: str, ended: bool = False) -> list[Remark]:
         if self.state.plain.held is not None:
             raise self._fail(self._at, "the program ends before the move behind a corner (RND, CHF, CHR)", "the move")
@@ -370,5 +368,6 @@ class SiemensRun(ParametricRun):
 SIEMENS_STEPS: dict[str, Step] = {
     "JUMP": SiemensRun._jump_to, "FOR": SiemensRun._for, "ENDFOR": SiemensRun._end_for,
     "UNTIL": SiemensRun._until, "SECTION": SiemensRun._section, "CALL": SiemensRun._call_sub,
-    "ENDLOOP": SiemensRun._back, "RET": lambda run, row, steering: run._return(row, Flow.RETURN),
+    "ENDLOOP": SiemensRun._back,
+    **dict.fromkeys(("RET", "ENDPROC"), lambda run, row, steering: run._return(row, Flow.RETURN)),
 }  # fmt: skip

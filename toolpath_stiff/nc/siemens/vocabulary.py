@@ -5,10 +5,10 @@ are those of the SINUMERIK 840D sl (Fundamentals, Job Planning) and of the 840D 
 """
 
 from toolpath_stiff.nc.codes.code import Code, Rows, holds_anyway, refused, table
-from toolpath_stiff.nc.codes.feeds import time_word
+from toolpath_stiff.nc.codes.feeds import feed_mode, time_word
 from toolpath_stiff.nc.codes.registry import CODES, code_meaning
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.siemens import coordinates, cycles, tools
+from toolpath_stiff.nc.siemens import contours, coordinates, cycles, milling, tools
 from toolpath_stiff.nc.siemens.motion import SIDES
 from toolpath_stiff.nc.state import CurrentBlock, Flow, State
 
@@ -17,7 +17,7 @@ MANUAL = "SIEMENS, SINUMERIK 840D"
 BASICS, PLANNING, CYCLES = f"{MANUAL}, Fundamentals", f"{MANUAL}, Job Planning", f"{MANUAL}, Cycles"
 # Codes of `codes.registry` that mean the same here.
 SHARED = (
-    "G17", "G18", "G19", "G90", "G91", "G93", "G94", "G95", "G96", "G97", "M0", "M1", "M2", "M3", "M4", "M5", "M7",
+    "G17", "G18", "G19", "G90", "G91", "G93", "G94", "G95", "M0", "M1", "M2", "M3", "M4", "M5", "M7",
     "M8", "M9", "M19", "M30", "F", "S",
 )  # fmt: skip
 
@@ -53,6 +53,11 @@ def dwell(state: State, block: CurrentBlock, code: str) -> None:
     state.pause(block, code, seconds, "G4 F1.5")
 
 
+def per_revolution(state: State, block: CurrentBlock, code: str) -> None:
+    """G97: the speed is one of revolutions, and F is per revolution, as in G95 (both of G94's group)."""
+    feed_mode(state, block, "G95")
+
+
 def fixed_point(state: State, block: CurrentBlock, code: str) -> None:
     """G74, G75: moves to the machine's fixed points; ignored, and the position after them is unknown."""
     state.warnings.append(Remark(f"{code} goes to points of the machine: left out of the path", block.line))
@@ -81,6 +86,9 @@ _ROWS: Rows = (
         (" ".join(["G54 G55 G56 G57", *(f"G{n}" for n in range(505, 600))]), coordinates.offset, "settable offset"),
         ("G500", coordinates.offset, "no settable offset"),
     )),
+    ("feed mode", f"{BASICS}, Constant cutting rate", (
+        ("G97", per_revolution, "feed per revolution, at a speed in revolutions"),
+    )),
     ("units", f"{BASICS}, Inch or metric dimensions", (
         ("G70 G700", coordinates.units, "inch"), ("G71 G710", coordinates.units, "mm"),
     )),
@@ -97,6 +105,7 @@ _ROWS: Rows = (
     ("dwell", f"{BASICS}, Dwell time", (("G4", dwell, "dwell: F in seconds, S in turns"),)),
     ("dynamic offset", _FRAMES, (
         ("TRANS ATRANS", coordinates.frame, "shift"), ("ROT AROT", coordinates.frame, "rotation"),
+        ("$P_UIFR", coordinates.set_offset, "values of a settable offset"),
         ("SCALE ASCALE", coordinates.frame, "scale"), ("MIRROR AMIRROR", coordinates.frame, "mirror image"),
     )),
     ("dynamic offset", f"{CYCLES}, Swivelling", (("CYCLE800", coordinates.swivel, "swivelled plane"),)),
@@ -111,7 +120,12 @@ _ROWS: Rows = (
         ("CYCLE86 CYCLE87 CYCLE88 CYCLE89", cycles.cycle, "boring"),
     )),
     ("corner", f"{CYCLES}, Drilling patterns", (
-        ("HOLES1 HOLES2 CYCLE802", cycles.pattern, "holes on a line, on a circle, at points"),
+        ("HOLES1 HOLES2 CYCLE801 CYCLE802", cycles.pattern, "holes on a line, on a circle, in a grid, at points"),
+    )),
+    ("corner", f"{CYCLES}, Milling cycles", (
+        ("POCKET3 POCKET4", milling.mill_area, "rectangular pocket, circular pocket"),
+        ("CYCLE76 CYCLE77", milling.mill_area, "rectangular spigot, circular spigot"),
+        ("CYCLE71 CYCLE61", milling.mill_area, "face"), ("CYCLE72", contours.mill_contour, "contour"),
     )),
     ("corner", f"{MANUAL}, Operating, Blank input", (("WORKPIECE", tools.blank, "blank"),)),
 )  # fmt: skip
@@ -136,15 +150,15 @@ LISTED = {
 }  # fmt: skip
 WORDS = frozenset((
     "ADIS", "ADISPOS", "SPOS", "SPOSA", "OVR", "OVRRAP", "FGREF", "CTOL", "OTOL", "ACC", "H", "FRC", "FL", "LIMS",
-    "ATOL", "DISC", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF",
+    "ATOL", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF", "FB",
 ))  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
 REFUSED = refused((
-    ("POCKET1 POCKET2 POCKET3 POCKET4 SLOT1 SLOT2 LONGHOLE CYCLE71 CYCLE72 CYCLE73 CYCLE74 CYCLE75 CYCLE76 CYCLE77 "
-     "CYCLE61 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 CYCLE90 CYCLE60 CYCLE899 CYCLE801",
+    ("POCKET1 POCKET2 SLOT1 SLOT2 LONGHOLE CYCLE73 CYCLE74 CYCLE75 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 "
+     "CYCLE90 CYCLE60 CYCLE899",
      "a cycle whose path the manual draws without numbers", _BY_MOVES, f"{CYCLES}, Milling cycles"),
     ("CYCLE92 CYCLE93 CYCLE94 CYCLE95 CYCLE96 CYCLE97 CYCLE98 CYCLE99 CYCLE930 CYCLE940 CYCLE951 CYCLE952 DIAMON "
-     "DIAM90 G33 G34 G35", "a code of lathes", "post it for a mill", f"{CYCLES}, Turning cycles"),
+     "DIAM90 G33 G34 G35 G96", "a code of lathes", "post it for a mill", f"{CYCLES}, Turning cycles"),
     ("CYCLE971 CYCLE976 CYCLE977 CYCLE978 CYCLE979 CYCLE996 CYCLE998 CYCLE982 MEAS MEAW MEASA", "probing",
      "leave probing out", f"{MANUAL}, Measuring cycles"),
     ("BSPLINE POLY PW PO", "a spline of coefficients", "post lines and arcs", f"{PLANNING}, Spline interpolation"),
@@ -153,17 +167,18 @@ REFUSED = refused((
     ("G58 G59", "an offset axis by axis", "TRANS, ATRANS", _FRAMES),
     ("ROTS AROTS CROTS", "a rotation by spatial angles", "ROT, AROT", _FRAMES),
     ("PRESETON PRESETONS", "another number of the machine's axis", "TRANS", f"{PLANNING}, Preset offset"),
-    ("ANG FB", "a line by its angle, or a feed of one block", "X, Y; F", f"{BASICS}, Motion commands"),
+    ("ANG", "a line by its angle", "X, Y", f"{BASICS}, Motion commands"),
     ("DEFINE", "a macro", "what it stands for", f"{PLANNING}, Macro technique"),
     ("G63 G331 G332", "tapping without a cycle", "CYCLE84", f"{BASICS}, Tapping"),
     ("G140 G141 G142 G143 G147 G148 G247 G248 G340 G341 G347 G348", "smooth approach and retraction",
      "post its moves", f"{BASICS}, Smooth approach and retraction"),
     ("G291", "the ISO dialect", "read it as G code: --dialect fanuc", f"{MANUAL}, ISO Milling"),
+    ("DISC", "corners between an arc and an intersection", "DISC=0", f"{BASICS}, Tool radius compensation"),
     ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
     ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
      f"{PLANNING}, Orientation"),
     ("WHEN WHENEVER EVERY DO ID IDS CASE", "a synchronised action, or a choice", "IF with GOTOF", PLANNING),
-    ("EXTCALL PCALL CALL CALLPATH ISOCALL", "a call by path", "the subprogram's name, with --subprograms",
+    ("PCALL CALLPATH ISOCALL", "a call by path", "the subprogram's name, with --subprograms",
      f"{PLANNING}, Subprogram technique"),
 ))  # fmt: skip
 TABLE = table(_ROWS, CONTROLS)

@@ -28,7 +28,9 @@ ADDRESSES = {
     *AXES, *VECTOR, *CORNERS, *WORDS, *"IJKFSTDMGH", "RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL", "FP",
     "X1", "Y1", "Z1",
 }  # fmt: skip
-STEERING = ("ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "FOR", "IF", "WHILE", "UNTIL")
+STEERING = (
+    "ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "ENDPROC", "FOR", "IF", "WHILE", "UNTIL",
+)  # fmt: skip
 OTHERWISE = {"T": "#", "RP": "PR", "AP": "PA", "CR": "R"}  # other names under which these words are kept
 SPINDLE = re.compile(r"([SM])1")  # address of the master spindle
 Define = Callable[[str, Value, int, str], None]  # sets a variable: name, value, column, its type if it is declared
@@ -84,6 +86,9 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
         if scanner.begins("==") or not scanner.sign("="):
             words += _named(scanner, name, column)
             continue
+        if name == "$P_UIFR":
+            words += _offset(scanner, index, column)
+            continue
         spindle = SPINDLE.fullmatch(name)
         name = spindle[1] if spindle else name
         if name in REFUSED:
@@ -107,6 +112,25 @@ def _addressed(scanner: SiemensScanner, name: str, column: int, begin: int) -> W
     name = OTHERWISE.get(name, name)
     letter = name if name in ("#", "PA", "PR") and dimension == "AC" else PREFIX[dimension] + name
     return Word(letter, float(value or 0.0), column, shown)
+
+
+def _offset(scanner: SiemensScanner, index: str, column: int) -> list[Word]:
+    """A settable offset: $P_UIFR[1]=CTRANS(X,10,Y,5), $P_UIFR[1,X,TR]=10."""
+    number, *part = index.strip("[]").split(",")
+    words = [Word("$P_UIFR", float(number), column, f"$P_UIFR{index}")]
+    if part:
+        known = len(part) == 2 and part[0] in tuple(AXES) and part[1] == "TR"
+        scanner.refuse_if(not known, f"$P_UIFR{index} is no shift of an axis", "$P_UIFR[1,X,TR]", column=column)
+        return [*words, Word(part[0], scanner.real(), column, part[0]), Word("TR", 0.0, column, "TR")]
+    while len(words) == 1 or scanner.sign(":"):
+        name, values = scanner.part(NAME), scanner.arguments(range(0, 2 * len(AXES), 2))
+        for axis, value in zip(values[::2], values[1::2], strict=False):
+            shifts = name == "CTRANS" and str(axis) in tuple(AXES) and isinstance(value, float)
+            wrong = not shifts and (name != "CROT" or value)
+            scanner.refuse_if(wrong, f"$P_UIFR with more than a shift: {name}", "CTRANS(X,10,Y,5)", column=column)
+            words += [Word(str(axis), float(value or 0.0), column, str(axis))] if shifts else []
+        words += [Word("FRAME", 0.0, column, name)] if len(words) == 1 else []
+    return words
 
 
 def _named(scanner: SiemensScanner, name: str, column: int) -> list[Word]:

@@ -1,0 +1,80 @@
+"""Contour milling (CYCLE72): a contour of labelled blocks or of a subprogram, milled layer by layer beside its line.
+
+SIEMENS, SINUMERIK 840D, Programming Guide Cycles (11/2002), "Milling cycles", "Path milling - CYCLE72".
+"""
+
+from toolpath_stiff.nc.codes.cutter import switch_off
+from toolpath_stiff.nc.compensation import RadiusCompensation
+from toolpath_stiff.nc.elements import Element, direction
+from toolpath_stiff.nc.geometry import PLANES
+from toolpath_stiff.nc.heidenhain.contour import COMPENSATED, mill
+from toolpath_stiff.nc.pockets import LEAST_MM, Cut, layers
+from toolpath_stiff.nc.siemens.milling import FINISH, approached, begin, digit
+from toolpath_stiff.nc.state import CurrentBlock, State
+
+SIDES = {0.0: 0, 40.0: 0, 41.0: 1, 42.0: -1}  # of RL
+STRAIGHT, HALF = 1.0, 3.0  # AS1, AS2; 2: a quarter of a circle
+
+
+def elements_of(drawn: State, block: CurrentBlock) -> list[Element]:
+    """Contour elements from the trace of moves that its blocks made; the first goes to where the contour begins."""
+    first, second, normal = PLANES[drawn.plane]
+    contour, trace = list[Element](), drawn.trace or []
+    for move in trace[1:]:
+        begins, ends = (complex(point[first], point[second]) for point in (move.start, move.end))
+        level = abs(move.end[normal] - move.start[normal]) < LEAST_MM
+        block.refuse_if(not level, None, "CYCLE72 along a contour that leaves its plane", "moves in the plane")
+        if move.arc is not None:
+            turn = 1 if move.arc.sweep * move.arc.normal[normal] > 0.0 else -1
+            contour.append((begins, ends, complex(move.arc.center[first], move.arc.center[second]), turn))
+        elif abs(ends - begins) > LEAST_MM:
+            contour.append((begins, ends, None, 0))
+    arc = not contour or trace[0].arc is not None
+    block.refuse_if(arc, None, "CYCLE72 along no contour", "G1 to its start, and its elements")
+    return contour
+
+
+def mill_contour(state: State, block: CurrentBlock, code: str) -> None:
+    """CYCLE72: lead in on a line or an arc, along the contour, lead out; at each depth."""
+    values, radius = begin(state, block, code)
+    contour, side, finish = state.plain.contour, SIDES.get(values["RL"]), digit(values["VARI"], 0) == FINISH
+    if side is None:
+        raise block.fail("RL", "is no side", "40, 41, 42")
+    block.refuse_if(values["VARI"] >= 1000.0, "VARI", "goes along the contour backward", "up to 332")
+    apart, leads = (
+        (radius + (0.0 if finish else values["FAL"])) * abs(side),
+        list[tuple[complex, complex, complex | None]](),
+    )
+    for name, way, place, element in (("1", -1, contour[0][0], contour[0]), ("2", 1, contour[-1][1], contour[-1])):
+        kind, size, ahead = values[f"AS{name}"], values[f"LP{name}"], direction(element, place)
+        wrong = kind not in (1.0, 2.0, 3.0) or size <= 0.0 or (kind > STRAIGHT and not side)
+        block.refuse_if(wrong, f"AS{name}", "is no lead in the plane with a length (LP1, LP2)", "1; 2, 3 beside a side")
+        beside = place + side * apart * 1j * ahead
+        center = beside + side * size * 1j * ahead
+        turned = -1.0 if kind == HALF else side * way * 1j
+        away = beside + way * size * ahead if kind == STRAIGHT else center + (beside - center) * turned
+        leads.append((away, beside, None if kind == STRAIGHT else center))
+    (start, into, before), (stop, out, after) = leads
+    feed, ahead_mm, between = values["FFP1"], values["TOP"] - values["RFP"], values["FF3"] or values["FFP1"]
+    floors, path = layers(values["TOP"], values["DP" if finish else "FLOOR"], values["MID"]), list[Cut]()
+    path = approached(state, values, start)
+    for floor in floors:
+        mill(state, block, [*path, (start, floor, values["FFD"], None, 0), (into, floor, feed, before, side)])
+        if side:
+            state.assume(COMPENSATED)
+            state.cutter = RadiusCompensation(
+                side, apart, PLANES[state.plane], state.length_scale, straight=True, rounded=True
+            )
+        with block.placing():
+            mill(state, block, [(contour[0][0], floor, feed, None, 0)])
+            mill(state, block, [(end, floor, feed, center, turn) for _, end, center, turn in contour])
+            switch_off(state, block, code)
+        lifted = (values["RTP"], values["TOP"], floor + ahead_mm, floor)[min(digit(values["VARI"], 2), 3)]
+        lifted = values["RTP"] if floor == floors[-1] else lifted
+        leave: list[Cut] = [
+            (out, floor, feed, None, 0),
+            (stop, floor, feed, after, side),
+            (stop, lifted, None, None, 0),
+        ]
+        mill(state, block, leave)
+        path = [(start, lifted, between if digit(values["VARI"], 1) else None, None, 0)]

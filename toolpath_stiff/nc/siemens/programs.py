@@ -1,0 +1,53 @@
+"""Programs, labels and plain blocks of a file in Siemens' language, found before it runs.
+
+SIEMENS, SINUMERIK 840D sl, Programming Manual Fundamentals, "Structure and contents of an NC program".
+"""
+
+import re
+
+from toolpath_stiff.nc.heidenhain.statements import code_text
+
+HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
+PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
+PLAIN = re.compile(r"\s*(?:N\d+\s*)?((?:(?:G|[XYZABCIJKFS]=?|CR=)[-+]?[\d.]+\s*)*)(?:;.*)?", re.ASCII | re.IGNORECASE)
+REMARK = re.compile(r"^\s*(?:N\d+\s*)?\([^()]*\)$", re.ASCII)  # a comment as the ISO dialect and some posts write it
+
+
+def heads_of(lines: tuple[str, ...]) -> list[re.Match[str]]:
+    """Skip, number and label at the head of each line, matched in its code."""
+    heads = (HEAD.match(REMARK.sub("", code_text(line))) for line in lines)
+    return [head for head in heads if head is not None]
+
+
+def labels_of(heads: list[re.Match[str]]) -> dict[str, list[int]]:
+    """Lines of each label; block numbers are labels too."""
+    labels: dict[str, list[int]] = {}
+    for row, head in enumerate(heads):
+        for label in (head[5], head[2] and f"N{head[2]}", head[3]):
+            labels.setdefault(label or "", []).append(row)
+    return labels
+
+
+def programs_of(heads: list[re.Match[str]]) -> dict[str, int]:
+    """First line of each program: that of its file, or its PROC."""
+    programs, opened = dict[str, int](), -1
+    for row, head in enumerate(heads):
+        program = PROGRAM.match(head.string)
+        if program is not None:
+            programs.setdefault(program[1] or program[2], opened if program[2] and opened >= 0 else row)
+            opened = row
+        elif head.string.strip():
+            opened = -1
+    return programs
+
+
+def plain_texts(lines: tuple[str, ...], heads: list[re.Match[str]]) -> list[str]:
+    """Plain blocks as G code, for the reader of plain lines; "?" for others, and before CT, which needs a direction."""
+    texts = list[str]()
+    for line, head in zip(lines, heads, strict=True):
+        plain = PLAIN.fullmatch(line)
+        if re.search(r"\bCT\b", head.string) and texts:
+            texts[-1] = "?"
+        as_code = plain[1].upper().replace("CR=", "R").replace("=", "") if plain is not None else "?"
+        texts.append("?" if head[3] else as_code)
+    return texts
