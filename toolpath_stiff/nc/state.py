@@ -219,7 +219,7 @@ class Conversational:
     corner: CurrentBlock | None = None
     approach: tuple[dict[int, float], Callable[[complex], None]] | None = None
     free: list[tuple[CurrentBlock, str, bool]] = field(default_factory=list)
-    closes: complex | None = None
+    closes: complex = complex(math.nan, math.nan)
     fast: bool = False
     to_corner: bool = False
     cycle: tuple[int, dict[str, float]] | None = None
