@@ -63,8 +63,8 @@ def carry_out(state: State, block: CurrentBlock) -> None:
     if moves(state, block):
         move(state, block)
         repeated(state, block)
-    elif state.motion in ("G0", "G1") and not SETS.isdisjoint(block.codes):  # MCALL acts there too
-        repeated(state, block)
+    elif state.motion in ("G0", "G1") and SETS & block.codes.keys() and "MCALL" not in block.codes:
+        repeated(state, block)  # in blocks without a move, too
     for code in codes:
         if code.rank > STEPS["motion"]:
             code.act(state, block, code.name)
