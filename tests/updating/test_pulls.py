@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import toolpath_stiff as tps
+from tests.updating.planning import read_filled
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.elements import Stance
-from toolpath_stiff.readings.measurements import model_stiffness, read_measurements
+from toolpath_stiff.readings.measurements import model_stiffness
 from toolpath_stiff.stiffness.element_sum import tip_compliance
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model, parameter_slopes, path_of_stance
 
@@ -225,7 +226,7 @@ def test_a_plan_tells_elements_apart_on_every_kind(kind: str, tmp_path: Path) ->
     softer.write_text(f'{machine.stated.text}\n[[effect]]\nname = "{effect}"\nelement = "{first}"\n{entry}\n', "utf-8")
     plan.save(tmp_path / "plan", plots=False)
     head, *rows = (tmp_path / "plan" / "plan.csv").read_text("utf-8").splitlines()
-    planned = read_measurements(str(tmp_path / "plan" / "plan.csv"), machine.stated, planned=True)
+    planned = read_filled(tmp_path / "plan" / "plan.csv", machine.stated)
     read = model_stiffness(tps.Machine.load(softer).model, planned) / 1e3
     column = head.split(",").index("stiffness_N_per_mm")
     cells = [row.split(",") for row in rows]
