@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.browser import needs_browser, opened, painted, viridis
+from tests.browser import needs_browser, painted, run_in, viridis
 from tests.placement.test_placement_search import headline_figures
 from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
@@ -140,10 +140,14 @@ def test_more_cuts_than_points_leaves_whole_cuts_out():
 
 
 @needs_browser
-def test_a_browser_draws_the_placement_of_the_address(tilted, tmp_path):
+def test_a_browser_draws_the_placement_that_is_clicked(tilted, tmp_path):
     folder, data = tilted
     chosen = 3 if data["recommended"] == 2 else 2  # the recommended one is called so
-    done = opened(f"{(folder / 'report.html').as_uri()}#{chosen + 1},workspace", tmp_path)
+    click = (
+        f"for (const one of [document.querySelectorAll('.dot')[{chosen}], document.querySelector('[value=workspace]')])"
+    )
+    click += " one.dispatchEvent(new MouseEvent('click', { bubbles: true }));"
+    done = run_in((folder / "report.html").read_text("utf-8"), click, tmp_path)
     assert "CONSOLE" not in done.stderr  # neither an error nor a blocked script
     assert f"Placement {chosen + 1} of {len(data['front'])}" in done.stdout
     assert f"{data['front'][chosen]['x_mm']:.3f}" in done.stdout

@@ -90,7 +90,7 @@ def evil_analysis():
 def test_the_page_parses_and_loads_nothing(analysis, parsed):
     for _, attrs in parsed.elements:
         assert not {"src", "href", "srcset", "action", "data"} & set(attrs)
-    text = render(analysis)
+    text = render(analysis).replace('"http://www.w3.org/2000/svg"', "")  # a name that nothing is fetched from
     assert not re.search(r"https?://|//[a-z]+\.|@import|url\(|fetch\(|XMLHttpRequest|import\(", text)
     policy = next(attrs["content"] for _, attrs in parsed.elements if "http-equiv" in attrs)
     assert policy.startswith("default-src 'none'")

@@ -77,7 +77,27 @@ class Running:
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory):
+    """A studio on an empty case."""
     found = Running(tmp_path_factory.mktemp("studio") / "case")
+    yield found
+    found.end()
+
+
+@pytest.fixture
+def fresh(tmp_path):
+    """A studio on an empty case of its own."""
+    found = Running(tmp_path / "case")
+    yield found
+    found.end()
+
+
+@pytest.fixture(scope="module")
+def exercised(tmp_path_factory):
+    """A studio with a judged exercise and a program; each test takes back what it does."""
+    found = Running(tmp_path_factory.mktemp("exercised") / "case")
+    found.do(do="exercise", seed=SEED, layout=LAYOUT)
+    found.ask("POST", "/file?name=slot.nc", SLOT.encode())
+    found.idle()
     yield found
     found.end()
 
@@ -140,7 +160,7 @@ def test_large_bodies_are_refused_before_they_are_read(running):
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"do": "format"}, "nothing called"),
+        ({"do": "format"}, "unknown action"),
         ({"do": "aside", "file": "../x.csv", "line": 3}, ""),
         ({"do": "switch", "effect": "ghost", "values": {}}, ""),
         ({"do": "claim", "effects": "weak_strut"}, "sealed"),
@@ -265,7 +285,7 @@ def test_code_is_loaded_on_an_explicit_yes_alone(running, tmp_path):
     status, content, _ = running.ask("POST", "/file?name=my_screw.py", body)
     assert status == 200
     assert "my_screw.py is code" in json.loads(content)["confirm"]
-    assert not (running.folder / "effects").exists()
+    assert not (running.folder / "effects" / "my_screw.py").exists()
 
 
 def test_a_broken_effect_is_told_with_its_line(running):
@@ -278,10 +298,10 @@ def test_a_broken_effect_is_told_with_its_line(running):
     assert running.state()["history"][-1]["kind"] != "effects"
 
 
-def test_an_own_effect_that_is_dropped_again_is_replaced(running, browser, tmp_path):
+def test_an_own_effect_that_is_dropped_again_is_replaced(exercised, browser, tmp_path):
     text = tps.effect_template("my_screw").text
     title = re.search(r'title = "([^"]*)"', text)[1]
-    tab = Tab(browser, running.address)
+    tab = Tab(browser, exercised.address)
     page = tab.page
     page.wait_for_selector("#sw-table_compliance", state="attached")
     label = "document.querySelector('label[for=sw-my_screw]')"
@@ -298,7 +318,7 @@ def test_an_own_effect_that_is_dropped_again_is_replaced(running, browser, tmp_p
         page.wait_for_selector("#ask[open]")
         page.click("#yes")
         tab.until(seen)
-    assert tps.Case.open(running.folder).state.effects == ("effects/my_screw-2.py",)
+    assert tps.Case.open(exercised.folder).state.effects == ("effects/my_screw-2.py",)
     # Undone, the first one is back, and gone.
     page.click("#undo")
     tab.until(f"{label}.textContent.includes({json.dumps(title)})")
@@ -402,8 +422,8 @@ def test_a_page_asks_again_where_an_answer_was_overtaken(tmp_path, browser):
         studio.end()
 
 
-def test_the_journey_by_mouse(running, browser, tmp_path):
-    tab = Tab(browser, running.address)
+def test_the_journey_by_mouse(fresh, browser, tmp_path):
+    tab = Tab(browser, fresh.address)
     page = tab.page
     # Start a blind exercise.
     tab.go("exercise")
@@ -411,8 +431,8 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     page.select_option("#layout", LAYOUT)
     page.click("#start-exercise")
     page.wait_for_selector("#g-floor:has-text('%')")
-    state = settled(running)
-    case = tps.Case.open(running.folder)
+    state = settled(fresh)
+    case = tps.Case.open(fresh.folder)
     asked = [case.path(name) for name in case.state.data]
     command = tps.diagnose(asked, case.path(case.state.machine)).to_dict()
     tab.until("document.querySelector('#sentence small') !== null")
@@ -429,7 +449,7 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     tab.until("document.querySelector('#status').textContent.includes('measured')")
     page.mouse.click(box["x"] + spot[0], box["y"] + spot[1])
     tab.until("document.querySelector('#machine-name').textContent.includes('41 readings')")
-    assert len(tps.Case.open(running.folder).state.aside) == 1
+    assert len(tps.Case.open(fresh.folder).state.aside) == 1
     page.click("#undo")
     tab.until("document.querySelector('#machine-name').textContent.includes('42 readings')")
     # Switch an effect on, move its size, fit, accept.
@@ -438,22 +458,22 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     page.wait_for_selector("#weak_strut-factor")
     page.select_option("#weak_strut-strut", "4")
     tab.until("document.querySelector('#weak_strut-strut').value === '4'")
-    settled(running)
+    settled(fresh)
     slider = tab.box("#weak_strut-factor")
     page.mouse.move(slider["x"] + 5, slider["y"] + slider["height"] / 2)
     page.mouse.down()
     page.mouse.move(slider["x"] + 0.4 * slider["width"], slider["y"] + slider["height"] / 2, steps=3)
     page.mouse.up()
-    settled(running)
-    on = tps.Case.open(running.folder).state.on
+    settled(fresh)
+    on = tps.Case.open(fresh.folder).state.on
     assert on["weak_strut"]["strut"] == 4
     hand = tps.preview(case.data, case.machine).at(on)["mean_abs_error_percent"]
     tab.until(f"Math.abs(parseFloat(document.querySelector('#g-now').textContent) - {hand}) < 0.006")
-    settled(running)
+    settled(fresh)
     page.click("#fit")
     page.wait_for_selector("#fit-text")
-    state = settled(running)
-    kept = json.loads((running.folder / tps.Case.open(running.folder).latest("update") / "update.json").read_text())
+    state = settled(fresh)
+    kept = json.loads((fresh.folder / tps.Case.open(fresh.folder).latest("update") / "update.json").read_text())
     assert tab.number("#g-now") == pytest.approx(kept["steps"][-1]["mean_abs_error_percent"], abs=0.006)
     assert state["fit"]["text"] == kept["text"]
     assert state["fit"]["holds"] or kept["verdict"] != "updated"
@@ -468,8 +488,8 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     (tmp_path / "slot.nc").write_text(SLOT)
     page.set_input_files("#file", tmp_path / "slot.nc")
     page.wait_for_selector("#p-mean")
-    state = settled(running)
-    case = tps.Case.open(running.folder)
+    state = settled(fresh)
+    case = tps.Case.open(fresh.folder)
     assert tab.number("#p-mean") == pytest.approx(state["program"]["summary"]["mean_N_per_mm"], abs=0.5)
     tab.go("placement")
     box = tab.box("#drag")
@@ -478,8 +498,8 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     page.mouse.move(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2 - 20, steps=4)
     page.mouse.up()
     tab.until("Math.abs(parseFloat(document.querySelector('#o-Xn').value)) > 20")
-    settled(running)
-    case = tps.Case.open(running.folder)
+    settled(fresh)
+    case = tps.Case.open(fresh.folder)
     on = case.machine_with(case.state.on)  # with the effect that is switched on
     there = tps.try_placement(case.program, on).at(case.state.origin)
     assert there != tps.try_placement(case.program, case.machine).at(case.state.origin)
@@ -489,29 +509,29 @@ def test_the_journey_by_mouse(running, browser, tmp_path):
     # For the shop floor: every warning, offsets, the set-up sheet, the program for this place.
     page.click("#set-up")
     page.wait_for_selector("#set-up-files")
-    kept = json.loads((running.folder / tps.Case.open(running.folder).latest("set_up") / "placement.json").read_text())
+    kept = json.loads((fresh.folder / tps.Case.open(fresh.folder).latest("set_up") / "placement.json").read_text())
     shown = tab.text("#set-up-files")
     assert all(" ".join(text.split()) in " ".join(shown.split()) for text in kept["warnings"])
     assert kept["offset_blocks"]["linuxcnc"] in shown
     written = page.get_attribute("#set-up-written", "href")
-    status, program, _ = running.ask("GET", written)
-    assert (status, running.ask("GET", page.get_attribute("#set-up-sheet", "href"))[0]) == (200, 200)
+    status, program, _ = fresh.ask("GET", written)
+    assert (status, fresh.ask("GET", page.get_attribute("#set-up-sheet", "href"))[0]) == (200, 200)
     again = tps.analyze(tps.Program.from_text(program.decode()), on)
     assert again.mean_N_per_mm == pytest.approx(there["mean_N_per_mm"], rel=1e-6)
     # The best place; a point of the front becomes the placement.
     page.click("#best")
     page.wait_for_selector("button[id^=use-]")
-    front = json.loads((running.folder / tps.Case.open(running.folder).latest("place") / "placement.json").read_text())
+    front = json.loads((fresh.folder / tps.Case.open(fresh.folder).latest("place") / "placement.json").read_text())
     cells = [re.sub(r"[^\d.-]", "", one) for one in page.locator("tr:has(button[id^=use-]) td").all_inner_texts()][:8]
-    placed = tps.Case.open(running.folder).history[-1]
+    placed = tps.Case.open(fresh.folder).history[-1]
     assert f"--machine {placed.result}/machine.toml" in placed.command  # which carries what is switched on
-    first = front["front"][0]
+    first = front["chosen"]
     keys = ("mean_N_per_mm", "range_N_per_mm", "min_N_per_mm", "x_mm", "y_mm", "z_mm", "rotation_deg")
     assert [float(one) for one in cells[1:]] == pytest.approx([first[key] for key in keys], abs=0.51)
     page.locator("button[id^=use-]").first.click()
     tab.until("document.querySelector('#set-up-files') === null")
-    settled(running)
-    assert tps.Case.open(running.folder).state.origin[0] == pytest.approx(front["front"][0]["x_mm"], abs=1e-5)
+    settled(fresh)
+    assert tps.Case.open(fresh.folder).state.origin[0] == pytest.approx(first["x_mm"], abs=1e-5)
     # Reveal, export.
     tab.go("exercise")
     page.select_option("#claim", "weak_strut")
@@ -593,8 +613,8 @@ class Keys:
         raise AssertionError("no file chooser")
 
 
-def test_the_journey_by_keyboard(running, browser, tmp_path, monkeypatch, capsys):
-    tab = Tab(browser, running.address)
+def test_the_journey_by_keyboard(fresh, browser, tmp_path, monkeypatch, capsys):
+    tab = Tab(browser, fresh.address)
     page, keys = tab.page, Keys(tab)
     page.wait_for_selector("[id^=sw-]")
     keys.go("exercise")
@@ -602,7 +622,7 @@ def test_the_journey_by_keyboard(running, browser, tmp_path, monkeypatch, capsys
     keys.type("#layout", "14")
     keys.on("#start-exercise", "Enter")
     tab.until("document.querySelector('#machine-name').textContent.includes('42 readings')")
-    settled(running)
+    settled(fresh)
     tab.until("document.querySelector('#sentence small') !== null")
     # Look at a reading, set it aside, take it back.
     keys.on("#scene .overlay", ".")
@@ -618,12 +638,12 @@ def test_the_journey_by_keyboard(running, browser, tmp_path, monkeypatch, capsys
     page.wait_for_selector("#weak_strut-strut")
     tab.until("document.activeElement.id === 'sw-weak_strut'")
     keys.type("#weak_strut-strut", "4")
-    settled(running)
+    settled(fresh)
     keys.on("#weak_strut-factor", "ArrowLeft")
-    state = settled(running)
+    state = settled(fresh)
     tab.until("document.activeElement.id === 'weak_strut-factor'")
     step = next(one for one in reversed(state["history"]) if one["kind"] == "switch")
-    monkeypatch.chdir(running.folder)
+    monkeypatch.chdir(fresh.folder)
     assert main([*shlex.split(step["command"])[1:], "--json", "--no-plots"]) == 0
     by_command = json.loads(capsys.readouterr().out)["baseline"]["mean_abs_error_percent"]
     assert state["gauge"]["now"] == pytest.approx(by_command, rel=1e-6)
@@ -637,18 +657,18 @@ def test_the_journey_by_keyboard(running, browser, tmp_path, monkeypatch, capsys
     with page.expect_download() as plan:
         keys.press("Enter")
     plan.value.save_as(tmp_path / "plan.csv")
-    exercise = tps.Case.open(running.folder).state.exercise
-    text, _ = rig.measured_again(running.folder / exercise, str(tmp_path / "plan.csv"), 1)
+    exercise = tps.Case.open(fresh.folder).state.exercise
+    text, _ = rig.measured_again(fresh.folder / exercise, str(tmp_path / "plan.csv"), 1)
     (tmp_path / "measured.csv").write_text(text)
     keys.add(tmp_path / "measured.csv")
     tab.until("!document.querySelector('#machine-name').textContent.includes('42 readings')")
     keys.stop()  # nothing here hangs on the new diagnosis
-    assert "case.add_data('measured.csv')" in [one["python"] for one in settled(running)["history"]]
+    assert "case.add_data('measured.csv')" in [one["python"] for one in settled(fresh)["history"]]
     # Fit, accept.
     keys.go("effects")
     keys.on("#fit", "Enter")
     page.wait_for_selector("#fit-text")
-    settled(running)
+    settled(fresh)
     keys.on("#accept:not(:disabled)", "Enter")
     page.wait_for_selector("#sw-weak_strut", state="detached")
     assert page.evaluate("document.activeElement.id") == "panel"  # the button is of no use any more
@@ -659,20 +679,20 @@ def test_the_journey_by_keyboard(running, browser, tmp_path, monkeypatch, capsys
     page.wait_for_selector("#p-mean")
     keys.on("#profile .overlay", "ArrowRight")
     tab.until("document.querySelector('#status').textContent.startsWith('line ')")
-    settled(running)
+    settled(fresh)
     keys.go("placement")
     keys.reach("#drag")
     for key in ("ArrowRight", "ArrowRight", "Shift+ArrowUp"):
         keys.press(key)
-    settled(running)
-    origin = tps.Case.open(running.folder).state.origin
+    settled(fresh)
+    origin = tps.Case.open(fresh.folder).state.origin
     assert (origin[0], origin[5]) == (20, 5)
     keys.on("#best", "Enter")
     page.wait_for_selector("button[id^=use-]")
     keys.on("button[id^=use-]", "Enter")
-    front = json.loads((running.folder / tps.Case.open(running.folder).latest("place") / "placement.json").read_text())
-    settled(running)
-    assert tps.Case.open(running.folder).state.origin[0] == pytest.approx(front["front"][0]["x_mm"], abs=1e-5)
+    front = json.loads((fresh.folder / tps.Case.open(fresh.folder).latest("place") / "placement.json").read_text())
+    settled(fresh)
+    assert tps.Case.open(fresh.folder).state.origin[0] == pytest.approx(front["chosen"]["x_mm"], abs=1e-5)
     # Export, reveal.
     keys.reach("#export")
     with page.expect_download() as exported:
@@ -720,30 +740,46 @@ SMALL = """
 """
 
 
-def test_a_robot_moves_along_the_path(tmp_path, browser):
+def test_one_s_own_machine_is_dropped_and_moves_along_the_path(fresh, tmp_path, browser):
     (tmp_path / "slot.nc").write_text(SLOT)
     robot = Path(__file__).parents[1] / "machine/data/robot200.toml"
-    studio = Running(tmp_path / "case", "--machine", str(robot), "--program", str(tmp_path / "slot.nc"))
-    tab = Tab(browser, studio.address)
-    try:
-        tab.page.wait_for_selector("#which-now")
-        scene = studio.idle()["machine"]["scene"]
-        assert [body["name"] for body in scene["bodies"]] == ["J1", "J2", "J3", "J4", "J5", "J6", "tool"]
-        assert len(scene["frames"]) > 40
-        for focus in ("part", "machine", "work"):
-            tab.page.click(f"[data-focus={focus}]")
-        tab.page.click("#play")
-        tab.until("Number(document.querySelector('#scrub').value) > 3")
-        tab.go("placement")
-        tab.page.wait_for_selector("#drag")
-        assert tab.faults == []
-    finally:
-        tab.close()
-        studio.end()
+    tab = Tab(browser, fresh.address)
+    tab.page.set_input_files("#file", [tmp_path / "slot.nc", robot])
+    tab.page.wait_for_selector("#message.notice:has-text('program slot.nc')")
+    tab.page.wait_for_selector("#machine-name:has-text('robot200')")
+    tab.page.wait_for_selector("#which-now")
+    scene = fresh.idle()["machine"]["scene"]
+    assert [body["name"] for body in scene["bodies"]] == ["J1", "J2", "J3", "J4", "J5", "J6", "tool"]
+    assert len(scene["frames"]) > 40
+    for focus in ("part", "machine", "work"):
+        tab.page.click(f"[data-focus={focus}]")
+    tab.page.click("#play")
+    tab.until("Number(document.querySelector('#scrub').value) > 3")
+    tab.go("placement")
+    tab.page.wait_for_selector("#drag")
+    assert tab.faults == []
+    tab.close()
 
 
-def test_the_work_is_dragged_by_touch(running, browser, tmp_path):
-    tab = Tab(browser, running.address, viewport={"width": 390, "height": 844}, has_touch=True)
+def test_what_was_stopped_is_said_and_can_be_asked_for_again(fresh, browser):
+    fresh.do(do="exercise", seed=SEED, layout=LAYOUT)
+    fresh.do(do="cancel")
+    tab = Tab(browser, fresh.address)
+    tab.page.wait_for_selector("#sentence:has-text('not judged')")
+    tab.page.click("#judge")
+    tab.page.wait_for_selector("#sentence:not(.waiting)")
+    # Ten stops of a slider are one line of the history, whatever was worked out between them.
+    for k in range(10):
+        fresh.do(do="switch", effect="weak_strut", values={"strut": 4, "factor": 0.7 + 0.01 * k})
+    tab.go("history")
+    tab.page.wait_for_selector("#panel:has-text('(10 stops)')")
+    assert tab.page.locator(".step", has_text="weak_strut on").count() == 1
+    assert tab.faults == []
+    tab.close()
+
+
+def test_the_work_is_dragged_by_touch(exercised, browser, tmp_path):
+    tab = Tab(browser, exercised.address, viewport={"width": 390, "height": 844}, has_touch=True)
     (tmp_path / "touch.nc").write_text(SLOT)
     tab.page.set_input_files("#file", tmp_path / "touch.nc")
     tab.page.wait_for_selector("#p-mean")
@@ -756,16 +792,16 @@ def test_the_work_is_dragged_by_touch(running, browser, tmp_path):
         points = [] if by is None else [{"x": x + by, "y": y}]
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
     tab.until("Math.abs(parseFloat(document.querySelector('#o-Xn').value)) > 20")
-    settled(running)
-    assert tps.Case.open(running.folder).state.origin[0] > 20
+    settled(exercised)
+    assert tps.Case.open(exercised.folder).state.origin[0] > 20
     tab.page.click("#undo")
     tab.page.click("#undo")
     assert tab.faults == []
     tab.close()
 
 
-def test_two_tabs_see_the_same(running, browser):
-    one, two = Tab(browser, running.address), Tab(browser, running.address)
+def test_two_tabs_see_the_same(exercised, browser):
+    one, two = Tab(browser, exercised.address), Tab(browser, exercised.address)
     for tab in (one, two):
         tab.page.wait_for_selector("#sw-table_compliance", state="attached")
     one.page.click("#unlikely > summary")
@@ -778,8 +814,8 @@ def test_two_tabs_see_the_same(running, browser):
     two.close()
 
 
-def test_a_program_out_of_reach_is_told(running, browser, tmp_path):
-    tab = Tab(browser, running.address)
+def test_a_program_out_of_reach_is_told(exercised, browser, tmp_path):
+    tab = Tab(browser, exercised.address)
     tab.page.wait_for_selector("#sw-table_compliance", state="attached")
     (tmp_path / "far.nc").write_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X2500\nM2\n")
     tab.page.set_input_files("#file", tmp_path / "far.nc")
@@ -798,17 +834,17 @@ CUT = (
 )
 
 
-def test_error_width_and_compensated_path_are_layers_of_the_path(running, browser, tmp_path):
-    tab = Tab(browser, running.address)
+def test_error_width_and_compensated_path_are_layers_of_the_path(exercised, browser, tmp_path):
+    tab = Tab(browser, exercised.address)
     tab.page.wait_for_selector("#sw-table_compliance", state="attached")
     for name, text in (("wall.nc", WALL), ("cut.toml", CUT)):
         (tmp_path / name).write_text(text)
         tab.page.set_input_files("#file", tmp_path / name)
     tab.page.wait_for_selector("#which-shift")
-    program = running.idle()["program"]
-    path, case = program["path"], tps.Case.open(running.folder)
+    program = exercised.idle()["program"]
+    path, case = program["path"], tps.Case.open(exercised.folder)
     same = tps.compensate(case.program, case.machine_with(case.state.on), cut=case.cut)
-    assert (running.folder / program["compensated"]["written"]).read_bytes() == same.rewritten.content
+    assert (exercised.folder / program["compensated"]["written"]).read_bytes() == same.rewritten.content
     assert max(path["shift"]) == pytest.approx(max(same.shift) * 1e6, abs=0.01)
     assert max(filter(None, path["error"])) == pytest.approx(np.nanmax(same.before.errors) * 1e6, abs=0.01)
     assert max(filter(None, path["width"])) == pytest.approx(0.5, abs=1e-3)
@@ -821,10 +857,10 @@ def test_error_width_and_compensated_path_are_layers_of_the_path(running, browse
     tab.close()
 
 
-def test_broken_files_are_told_and_change_nothing(running, browser, tmp_path):
-    tab = Tab(browser, running.address)
+def test_broken_files_are_told_and_change_nothing(exercised, browser, tmp_path):
+    tab = Tab(browser, exercised.address)
     tab.page.wait_for_selector("#sw-table_compliance", state="attached")
-    steps = len(tps.Case.open(running.folder).history)
+    steps = len(tps.Case.open(exercised.folder).history)
     for name, text, said in (
         ("broken<b>.csv", "x_mm,y_mm,z_mm,direction,stiffness_N_per_mm\n0,0,800,X,soft\n", "soft"),
         ("broken.toml", "name = \n", "TOML"),
@@ -835,15 +871,18 @@ def test_broken_files_are_told_and_change_nothing(running, browser, tmp_path):
         tab.page.wait_for_selector("#message:not([hidden])")
         tab.until(f"document.querySelector('#message').textContent.includes({json.dumps(said)})")
         tab.page.evaluate("document.querySelector('#message').hidden = true")
-    running.idle()
-    assert [s.kind for s in tps.Case.open(running.folder).history[steps:] if s.kind == "data"] == []
+    exercised.idle()
+    kinds = [s.kind for s in tps.Case.open(exercised.folder).history[steps:]]
+    assert "data" not in kinds
+    for _ in kinds:
+        exercised.do(do="undo")
     assert tab.page.locator("b", has_text=".csv").count() == 0
     tab.close()
 
 
-def test_axe_finds_nothing_serious(running, browser):
+def test_axe_finds_nothing_serious(exercised, browser):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
-    tab = Tab(browser, running.address)
+    tab = Tab(browser, exercised.address)
     tab.page.wait_for_selector("#sw-table_compliance", state="attached")
     serious = []
     for panel in ("effects", "why", "next", "program", "placement", "exercise", "history"):
@@ -864,12 +903,10 @@ def test_axe_finds_nothing_serious(running, browser):
 
 
 @pytest.fixture(scope="module")
-def resumed(running, browser):
-    """What the studio knew, and another on its folder after the first was killed."""
-    before = running.idle()
-    running.process.kill()
-    running.process.wait()
-    again = Running(running.folder)
+def resumed(exercised, tmp_path_factory):
+    """What a studio knew, and another on what would be left of its folder if it were killed now."""
+    before = exercised.idle()
+    again = Running(shutil.copytree(exercised.folder, tmp_path_factory.mktemp("killed") / "case"))
     yield before, again
     again.end()
 
@@ -901,7 +938,6 @@ def test_the_export_is_read_without_a_studio_and_has_the_figures_of_the_commands
     _, again = resumed
     content = again.ask("GET", "/export")[1].decode()
     state = again.idle()
-    again.end()
     assert again.token not in content
     head, mark, tail = content.partition('id="data">')
     document, end, rest = tail.partition("</script>")

@@ -27,7 +27,7 @@ from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import plain
 from toolpath_stiff.units import deg_from_rad, mm_from_m, n_per_mm_from_n_per_m, um_from_m
 
-SCRIPTS = ("stage.js", "viewer.js", "solids.js", "machine.js", "profile.js", "listing.js", "analysis.js")
+SCRIPTS = ("stage.js", "elements.js", "viewer.js", "solids.js", "machine.js", "profile.js", "listing.js", "analysis.js")
 
 
 def page(analysis: Analysis, drawn: Mapping[str, bytes]) -> Iterator[str]:

@@ -29,7 +29,7 @@ def do(session: Session, question: Document) -> Document:
     """Carry out the action that a page requests. Raises `InputError` if it is impossible."""
     name = str(question.get("do"))
     if name not in ACTIONS:
-        raise InputError(f"nothing called {name!r} can be done")
+        raise InputError(f"unknown action {name!r}")
     given = {key: value for key, value in question.items() if key != "do"}
     with session.lock:
         session.message = ""
@@ -79,6 +79,10 @@ def _accept(session: Session) -> None:
     session.case.accept(session.case.folder / fit.result / "machine.toml")
 
 
+def _queue(kind: str) -> Callable[..., None]:
+    return lambda session: session.queue(kind)
+
+
 def _measure(session: Session) -> None:
     plan = session.case.latest("plan")
     if not plan:
@@ -120,10 +124,11 @@ def take_file(session: Session, name: str, content: bytes, run: bool) -> Documen
                 "cut": case.set_cut,
             }
             takers.get(kind, case.add_program)(file)
-        session.message = f"{plain}: {case.history[-1].text}"
+        session.message = ""
         session.follow_up()
         session.tell()
-    return {"message": session.message}
+        done = case.history[-1].text
+    return {"message": done}
 
 
 def _unnumbered(name: str) -> str:
@@ -154,10 +159,7 @@ ACTIONS: dict[str, Callable[..., Document | None]] = {
     "fit": _fit,
     "accept": _accept,
     "plan": lambda session, n=6: session.queue("plan", n=max(1, min(MOST_POSES, int(n)))),
-    "compare": lambda session: session.queue("compare"),
-    "draft": lambda session: session.queue("draft"),
-    "set_up": lambda session: session.queue("set_up"),
-    "place": lambda session: session.queue("place"),
+    **{kind: _queue(kind) for kind in ("diagnose", "analyze", "compensate", "compare", "draft", "set_up", "place")},
     "measure": _measure,
     "exercise": lambda session, seed, layout="tilted": session.case.start_exercise(seed, layout=layout),
     "claim": lambda session, effects: session.case.claim(str(effects)),

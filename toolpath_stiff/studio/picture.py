@@ -14,7 +14,6 @@ from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.machine.elements import turns
 from toolpath_stiff.poses import pose_in_mm, pose_in_si
-from toolpath_stiff.readings.measurements import reading_columns
 from toolpath_stiff.report.scene import machine_scene, reach_boundary
 from toolpath_stiff.stiffness.contract import ELEMENT
 from toolpath_stiff.studio.session import Session
@@ -34,6 +33,7 @@ def document(session: Session) -> Document:
             "readings": readings(session) if state.data else None,
             "gauge": gauge(session) if state.data else None,
             "verdict": verdict(session),
+            "unjudged": session.failed("diagnose"),
             "effects": effects(session),
             "fit": {**fit, "holds": session.is_fitted} if fit else None,
             "plan": result(session, "plan"),
@@ -171,12 +171,7 @@ def _slider(parameter: tps.Parameter, candidate: Document, session: Session, of_
 
 def _setups(session: Session) -> list[str]:
     """Names of the set-ups in the readings, in order."""
-
-    def make() -> list[str]:
-        columns = reading_columns(session.case.data.on(session.machine))
-        return sorted({*columns.get("setup", ())} - {""})
-
-    return session.once("setups", session.case.state.judged, make) if session.case.state.data else []
+    return sorted({*session.readings()["setup"]} - {""}) if session.case.state.data else []
 
 
 def program(session: Session) -> Document:

@@ -140,7 +140,7 @@ class Session:
             names = {self.case.path(name): name for name in state.data}
             read = reading_columns(tps.Measurements(list(names)).on(self.machine))
             numbers = {name: np.round(read[name], 4).tolist() for name in ("line", *READING)}
-            return {"file": [names[file] for file in read["file"]], **numbers}
+            return {"file": [names[file] for file in read["file"]], "setup": list(read.get("setup", ())), **numbers}
 
         return self.once("readings", (state.machine, state.data), make)
 

@@ -117,15 +117,16 @@ def _addressed(scanner: SiemensScanner, name: str, column: int, begin: int) -> W
 def _offset(scanner: SiemensScanner, index: str, column: int) -> list[Word]:
     """A settable offset: $P_UIFR[1]=CTRANS(X,10,Y,5), $P_UIFR[1,X,TR]=10."""
     number, *part = index.strip("[]").split(",")
+    scanner.refuse_if(not number.isdigit(), f"$P_UIFR{index} without its number", "$P_UIFR[1]", column=column)
     words = [Word("$P_UIFR", float(number), column, f"$P_UIFR{index}")]
     if part:
-        known = len(part) == 2 and part[0] in AXES and part[1] == "TR"
+        known = len(part) == 2 and part[0] in tuple(AXES) and part[1] == "TR"
         scanner.refuse_if(not known, f"$P_UIFR{index} is no shift of an axis", "$P_UIFR[1,X,TR]", column=column)
         return [*words, Word(part[0], scanner.real(), column, part[0]), Word("TR", 0.0, column, "TR")]
     while len(words) == 1 or scanner.sign(":"):
         name, values = scanner.part(NAME), scanner.arguments(range(0, 2 * len(AXES), 2))
         for axis, value in zip(values[::2], values[1::2], strict=False):
-            shifts = name == "CTRANS" and axis in AXES and isinstance(value, float)
+            shifts = name == "CTRANS" and str(axis) in tuple(AXES) and isinstance(value, float)
             wrong = not shifts and (name != "CROT" or value)
             scanner.refuse_if(wrong, f"$P_UIFR with more than a shift: {name}", "CTRANS(X,10,Y,5)", column=column)
             words += [Word(str(axis), float(value or 0.0), column, str(axis))] if shifts else []

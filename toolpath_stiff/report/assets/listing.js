@@ -3,9 +3,8 @@
 const ROW = 19;
 class Listing {
   constructor(element, lines, on) {
-    Object.assign(this, { element, lines, on, here: 0, space: document.createElement("div") });
+    Object.assign(this, { element, lines, on, here: 0, space: h("div", { style: `height:${lines.length * ROW}px` }) });
     element.style.setProperty("--digits", String(lines.length).length);
-    this.space.style.height = `${lines.length * ROW}px`;
     element.replaceChildren(this.space);
     element.addEventListener("scroll", () => this.draw());
     element.addEventListener("click", (e) => {
@@ -23,16 +22,9 @@ class Listing {
   draw() {
     const { element, lines, on } = this, first = Math.max(0, Math.floor(element.scrollTop / ROW) - 5), rows = [];
     const last = Math.min(lines.length, Math.ceil((element.scrollTop + element.clientHeight) / ROW) + 5);
-    for (let i = first; i < last; i++) {
-      const row = document.createElement("div"), label = document.createElement("span");
-      row.className = i + 1 === this.here ? "row here" : "row";
-      row.style.top = `${i * ROW}px`;
-      row.dataset.line = label.textContent = i + 1;
-      row.title = on.title?.(i + 1) ?? "";
-      label.style.borderLeftColor = on.colour(i + 1) ?? "transparent";
-      row.append(label, document.createTextNode(lines[i]));
-      rows.push(row);
-    }
+    for (let n = first + 1; n <= last; n++) rows.push(h("div", { class: n === this.here ? "row here" : "row",
+      style: `top:${(n - 1) * ROW}px`, "data-line": n, title: on.title?.(n) },
+      h("span", { style: `border-left-color:${on.colour(n) ?? "transparent"}` }, n), lines[n - 1]));
     this.space.replaceChildren(...rows);
   }
   show(number) {

@@ -33,7 +33,7 @@ class MachineBody {
     const points = this.hangs ? this.feet : bodies.flatMap((body) => body.points), middle = centreOf(points);
     // mm, by which what no file says is drawn: how thick struts, joints, platform and spindle are.
     this.size = points.reduce((sum, p) => sum + Math.hypot(...minus(p, middle)), 0) / points.length;
-    this.iso = this.hangs ? [-5, 26] : VIEWS.iso;  // a leg does not stand before the work
+    this.iso = this.hangs ? [-22, 26] : VIEWS.iso;  // a leg does not stand before the work
     this.floor = Math.min(...(this.hangs ? data.reach?.flat() ?? [points[0]] : this.feet).map((p) => p[2]));
   }
   // What a view of the whole machine is fitted to: a ring and a ball do not reach the corners of their box.
@@ -95,7 +95,8 @@ class MachineBody {
     const colour = (link, name, plain) => (lit(this.lit, link, name) ? ink.accent : plain);
     const add = (shape, a, b, radius, paint, alpha = through(between(a, b, 0.5))) =>
       items.push(shape(view, a, b, radius * size, paint, alpha));
-    const joint = (place, radius, paint) => items.push(ball(view, place, radius * size, paint, through(place)));
+    const joint = (place, radius, paint) => items.push(ball(view, place, radius * size, paint,
+      paint === ink.accent ? Math.min(1, clear + 0.35) : through(place)));
     const bodies = this.at(pose).filter(({ points: [a, b] }) => Math.hypot(...minus(a, b)) > 1e-3);
     bodies.forEach(({ name, link, points }, k) => {
       const [a, b] = points, plain = colour(link, name, k % 2 || hangs ? metal : pale);
@@ -104,7 +105,9 @@ class MachineBody {
         const [nose, tip] = bodies[k + 1].points, thick = unit(minus(nose, tip)).map((v) => 0.035 * size * v);
         const body = lit(this.lit, "geometry") ? ink.accent : colour(link, "", mix(metal, ink.plunge, 0.35));
         const [lower, upper] = [-1, 1].map((side) => points.map((p) => p.map((v, i) => v + side * thick[i])));
-        items.push(prism(view, lower, upper, body, clear));
+        // Joints and struts stand on it: seen from above they are painted after it.
+        const beneath = dot3(thick, view.axes()[2]) > 0 ? size : 0, solid = prism(view, lower, upper, body, clear);
+        items.push({ ...solid, depth: solid.depth - beneath });
       } else if (name === "tool") {
         const neck = between(a, b, 0.45), held = hangs && between(centreOf(bodies[k - 1].points), a, -0.45);
         if (hangs) add(cylinder, held, a, 0.05, colour(link, "", dark));
@@ -122,7 +125,7 @@ class MachineBody {
         joint(a, 0.13 - 0.009 * k, colour("joints", name, dark));
       }
       const [x, y, depth] = view.project(between(a, b, hangs && close ? 0.82 : 0.6));
-      const named = !["platform", "tool", "bed", "work"].includes(name) && x > 0 && x < view.width && y > 0;
+      const named = !["platform", "tool", "bed", "work"].includes(name) && view.holds([x, y]) && (hangs || !close);
       if (named) items.push({ depth: depth + size,
         paint: (g) => view.write(g, name.replace("strut ", ""), x, y, "middle") });
     });

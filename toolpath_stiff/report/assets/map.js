@@ -5,7 +5,7 @@ const known = values.flat().filter((v) => v !== null);
 const least = known.reduce((a, b) => Math.min(a, b), Infinity), most = known.reduce((a, b) => Math.max(a, b),
   -Infinity);
 const share = (v) => (v - least) / (most - least || 1);
-const colourOf = (v) => coloursNow()[Math.min(CLASSES - 1, Math.floor(share(v) * CLASSES))];
+const colourOf = (v) => coloursNow()[classAt(v, [least, most], CLASSES)];
 
 const span = Math.max(xs[across - 1] - xs[0], ys[deep - 1] - ys[0]);
 const bottom = Math.min(...planes), top = Math.max(...planes);

@@ -64,7 +64,8 @@ function sceneOf(placeNow) {
         const tip = place.zero.map((z, m) => z + 0.09 * reach * axis[m]), [x, y] = viewer.project(tip),
           [x0, y0] = viewer.project(place.zero);
         if (Math.hypot(x - x0, y - y0) < 3) return;
-        viewer.segment(g, place.zero, tip, ink.second, 2);
+        trace(g, [[x0, y0], [x, y]], false);
+        stroke(g, ink.second, 2);
         g.fillStyle = ink.second;
         aligned(g, "center", "middle");
         g.fillText("XYZ"[k], x + 6, y - 6);
@@ -72,9 +73,8 @@ function sceneOf(placeNow) {
     },
     keepOut(g, viewer, name, box) {
       viewer.edges(g, box, ink.bad, 1.5);
-      const corners = cornersOf(box).map((corner) => viewer.project(corner)), [x, y] = corners
-        .reduce((a, b) => (b[1] < a[1] ? b : a));
-      if (x > 0 && x < viewer.width && y > 0 && y < viewer.height) viewer.write(g, name, x, y - 9, "middle");
+      const [x, y] = cornersOf(box).map((corner) => viewer.project(corner)).sort((a, b) => a[1] - b[1])[0];
+      if (viewer.holds([x, y])) viewer.write(g, name, x, y - 9, "middle");
     },
     overlay(g) {
       if (here >= 0) mark(g, ...path.at(here), 5);
@@ -100,7 +100,7 @@ function drawFront() {
   front.append(...grid(ticks(...meanSpan, 4), true, X, T, H - B).flat(), ...grid(ticks(...rangeSpan, 4), false, Y, L,
     W - R).flat());
   dots = d.front.map((row, i) => h("circle", { cx: X(row.mean_N_per_mm), cy: Y(row.range_N_per_mm), r: 5, class: "dot",
-    role: "radio", "aria-label": nameOf(row, i), onclick: () => choose(i, true) },
+    role: "radio", "aria-label": nameOf(row, i), onclick: () => choose(i) },
     h("title", {}, nameOf(row, i))));
   const best = d.front[d.recommended], now = d.before;
   front.append(h("text", { x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" },
@@ -117,11 +117,11 @@ function markChosen() {
   for (const now of front.querySelectorAll(".now")) now.style.fill = weakColour(d.before.min_N_per_mm);
 }
 front.addEventListener("keydown", (event) => {
-  const step = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key],
-    jump = { Home: 0, End: dots.length - 1 }[event.key];
-  if (step === undefined && jump === undefined) return;
-  event.preventDefault(); choose(jump !== undefined ? jump : (chosen + step + dots.length) % dots.length, true);
-    dots[chosen].focus();
+  const step = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+  if (!step) return;
+  event.preventDefault();
+  choose((chosen + step + dots.length) % dots.length);
+  dots[chosen].focus();
 });
 // The profile.
 // Plunges along the tool axis are stiffer by far and would take all of the axis: they stand beside it. Between two cuts
@@ -190,14 +190,7 @@ function draw() {
     : "Placement ") + `${chosen + 1} of ${places.length}`;
   chosenView.overlay.setAttribute("aria-label", "Path, coloured by stiffness; " + nameOf(place.row, chosen));
 }
-function choose(i, remember) { chosen = i; if (remember) history.replaceState(null, "", i === d.recommended
-  ? "#recommended" : "#" + (i + 1)); draw(); }
-// #recommended or #7, the seventh of the front; a zoom may follow: #7,workspace
-function fromAddress() {
-  const [name, zoom] = location.hash.slice(1).split(","), i = name === "recommended" ? d.recommended : Number(name) - 1;
-  for (const radio of document.querySelectorAll("input[name=zoom]")) if (radio.value === zoom) radio.checked = true;
-  choose(Number.isInteger(i) && i >= 0 && i < places.length ? i : d.recommended, false);
-}
+function choose(i) { chosen = i; draw(); }
 // Everything together.
 // Turned or brought nearer, one placement takes the other along.
 const together = (moved) => { for (const view of views) if (view !== moved) view.follow(moved); };
@@ -215,6 +208,5 @@ watchTheme(draw);
 for (const stage of [...views, profile]) stage.resize();
 for (const radio of document.querySelectorAll("input[name=zoom]")) radio.addEventListener("change",
   () => { for (const view of views) view.turnTo("iso"); });
-addEventListener("hashchange", fromAddress);
 drawFront();
-fromAddress();
+draw();

@@ -13,7 +13,7 @@
 //   nearest(x, y, viewer) what is at a place of the screen, -1 where there is nothing
 //   heavy                whether it is drawn coarsely while it is turned
 //   frame                false: neither box nor the figures of its ends
-// and the viewer calls on.point(i), on.pick(i), on.step(by) and on.moved(viewer) where they are given.
+// and the viewer calls on.point(i), on.pick(i), on.step(by), on.enter() and on.moved(viewer) where they are given.
 
 const VIEWS = { iso: [30, 32], top: [0, 90], front: [0, 0], side: [90, 0] };  // yaw and pitch, degrees
 class Viewer extends Stage {
@@ -42,6 +42,7 @@ class Viewer extends Stage {
       this.cy - this.zoom * ((x - mx) * u[0] + (y - my) * u[1] + h * u[2]),
       (x - mx) * d[0] + (y - my) * d[1] + h * d[2]];
   }
+  holds([x, y]) { return x > 0 && x < this.width && y > 0 && y < this.height; }
   fit() {
     this.box = this.scene.box();
     this.middle = this.box.map(([low, high]) => (low + high) / 2);
@@ -99,10 +100,6 @@ class Viewer extends Stage {
       g.moveTo(corners[c][0], corners[c][1]);
       g.lineTo(corners[c | bit][0], corners[c | bit][1]);
     }
-    stroke(g, colour, width, dash);
-  }
-  segment(g, from, to, colour, width, dash = []) {
-    trace(g, [this.project(from), this.project(to)], false);
     stroke(g, colour, width, dash);
   }
   drawTriad(g) {
@@ -202,6 +199,7 @@ class Viewer extends Stage {
     else if (named) this.turnTo(named);
     else if (zoom) this.zoomAt(zoom, this.width / 2, this.height / 2);
     else if (along && this.on.step) this.on.step(along);
+    else if (e.key === "Enter" && this.on.enter) this.on.enter();
     else return;
     e.preventDefault();
   }

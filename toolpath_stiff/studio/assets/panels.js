@@ -5,7 +5,13 @@ const short = (v) => (typeof v !== "number" ? String(v) : Math.abs(v) >= 1e5 ? g
   : String(Number(v.toPrecision(4))));
 const button = (label, run, attributes = {}) => h("button", { type: "button", class: "live", onclick: run,
   ...attributes }, label);
-const list = (items) => h("ul", {}, items.map((text) => h("li", {}, text)));
+// Text of a result: a figure stays beside its unit where a line breaks.
+const told = (text) => text.replace(/ \+- /g, " \u00b1 ").replace(/N m\b/g, "N\u00a0m")
+  .replace(/(\d) (?=%|([kM]?N|[mun]?m|deg|minutes)\b)/g, "$1\u00a0");
+const list = (items) => h("ul", {}, items.map((text) => h("li", {}, told(text))));
+const unfolded = new Set(["Plane by direction"]);  // titles
+const folding = (title, rows, id) => h("details", { id, open: unfolded.has(title),
+  ontoggle: (e) => unfolded[e.target.open ? "add" : "delete"](title) }, h("summary", {}, title), rows);
 const table = (head, rows) => h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "table" },
   h("table", {}, h("thead", {}, h("tr", {}, head.map((t) => h("th", { scope: "col" }, t)))),
   h("tbody", {}, rows.map((row) => h("tr", {}, row.map((cell) => h("td", typeof cell === "string" && cell.length > 24
@@ -23,12 +29,12 @@ function gaugeOf(state) {
     `${100 * Math.min(1, v / most)}%`;
   const stages = STAGES.filter(([key]) => key !== "refitted" || state.machine.scene.joints);  // struts alone have a law
   return h("dl", { class: "gauge", "aria-label": "Mean error of the model" }, stages.map(([key, label]) => {
-    const note = key === "left_out" && g[key] === null ? "Fit tells" : percent(g[key]);
+    const note = key === "left_out" && g[key] === null ? "after Fit" : percent(g[key]);
     return [h("dt", {}, label), h("dd", { class: "track", "aria-hidden": "true" },
       h("span", { class: `fill ${key}`, style: `width:${width(g[key] ?? 0)}` }),
       g.floor === null ? null : h("span", { class: "floor", style: `left:${width(g.floor)}` })),
         h("dd", { class: "number", id: `g-${key}` }, note)];
-  }), h("dt", {}, "noise floor"), h("dd", { class: "muted" }, "dashed: no model can be better"),
+  }), h("dt", {}, "noise floor"), h("dd", { class: "muted" }, "dashed line"),
     h("dd", { class: "number", id: "g-floor" }, percent(g.floor)));
 }
 // Effects.
@@ -53,19 +59,17 @@ function effectsPanel(state, act) {
       button("Accept the fit", () => act({ do: "accept" }), { id: "accept", disabled: !(fit?.accepted && fit.holds) }),
       state.machine.effects.length ? h("span", { class: "muted" },
         `in the machine: ${state.machine.effects.join(", ")}`) : null),
-    fit ? h("p", { id: "fit-text", class: fit.accepted ? "" : "warning" }, fit.text) : null,
-    (fit?.support ?? []).flatMap((one) => one.reasons).map((reason) => h("p", { class: "muted" }, reason)),
+    fit ? h("p", { id: "fit-text", class: fit.accepted ? "" : "warning" }, told(fit.text)) : null,
+    (fit?.support ?? []).flatMap((one) => one.reasons).map((reason) => h("p", { class: "muted" }, told(reason))),
     portrait(state.verdict?.portrait, act),
     state.verdict ? null : h("p", { class: "muted" }, state.readings ? "The ranking comes with the diagnosis."
       : "Without readings nothing is ranked."),
     rows,
-    folded.length ? h("details", { id: "unlikely", open: unfolded, ontoggle: (e) => { unfolded = e.target.open; } },
-      h("summary", {}, "further effects, each less likely than 1 %"), folded) : null,
+    folded.length ? folding("further effects, each less likely than 1 %", folded, "unlikely") : null,
     h("p", { class: "muted live" },
       "Drop a Python file with an effect of your own on the page: it joins these; dropped again, it is replaced."),
   ];
 }
-let unfolded = false; // the unlikely effects
 // What no effect explains, as far as the readings describe it.
 function portrait(p, act) {
   if (!p) return null;
@@ -73,7 +77,7 @@ function portrait(p, act) {
     rows.map((one) => h("li", {}, h("span", { class: "bars", "aria-hidden": "true" },
     h("i", { style: `width:${100 * (one.probability ?? 0)}%` })), ` ${one[key]} ${chance(one.probability ?? 0)}`)));
   return h("section", { class: "portrait", id: "portrait" }, h("h3", {}, "What the missing thing looks like"),
-    h("p", {}, p.text),
+    h("p", {}, told(p.text)),
     h("div", { class: "two" }, h("div", {}, h("b", {}, "where"), bars(p.links, "link")),
       h("div", {}, h("b", {}, "varies with"), bars(p.variables, "variable"))),
     figures([["rms at left-out points", percent(p.held_out_rms_percent)],
@@ -130,23 +134,23 @@ function whyPanel(state, act) {
     ["structure", v.gates.structure_probability], ["gain of the best effect", v.gates.gain_probability]];
   const c = state.compare;
   return [
-    h("h2", {}, "Why believe it?"), h("p", {}, v.text), list([...v.why, ...v.warnings]),
+    h("h2", {}, "Why believe it?"), h("p", {}, told(v.text)), list([...v.why, ...v.warnings]),
     h("h3", {}, "Residuals"), residuals(state, act),
-    gates && [h("h3", {}, "Gates: how often scatter alone would look so"), table(["test", "probability"],
-      gates.map(([name, p]) => [name, p === null ? "\u2013" : short(p)]))],
-    h("h3", {}, "Plane by direction"),
-    c ? [table(["readings", "number", "mean error", "bias", "rms"], Object.entries(c.by_plane_and_direction)
-      .map(([name, one]) => [name, one.readings, percent(one.mean_abs_error_percent), percent(one.bias_percent),
-      percent(one.rms_percent)])),
-      h("p", {}, c.text), list(c.findings.map((one) => one.text)),
-        h("a", { class: "live", href: `/case/${c.result}/report.html`, target: "_blank", rel: "noreferrer" },
-        "the whole comparison, with residuals against every variable")]
+    c ? folding("Plane by direction", [table(["readings", "number", "mean error", "bias", "rms"],
+      Object.entries(c.by_plane_and_direction).map(([name, one]) => [name, one.readings,
+        ...["mean_abs_error", "bias", "rms"].map((key) => percent(one[`${key}_percent`]))])),
+    h("p", {}, told(c.text)), list(c.findings.map((one) => one.text)),
+    h("a", { class: "live", href: `/case/${c.result}/report.html`, target: "_blank", rel: "noreferrer" },
+      "the whole comparison, with residuals against every variable")])
       : button("Where the model fails", () => act({ do: "compare" }), { id: "compare" }),
-    h("h3", {}, "Assumed"), list(v.assumptions), v.notes.length ? [h("h3", {}, "Notes"), list(v.notes)] : null,
+    gates && folding("How often scatter alone would look so", table(["test", "probability"],
+      gates.map(([name, p]) => [name, p === null ? "\u2013" : short(p)]))),
+    folding("What is assumed", list(v.assumptions)), v.notes.length ? folding("Notes", list(v.notes)) : null,
   ];
 }
 function residuals(state, act) {
-  const r = state.readings, values = r[against], W = 520, H = 210, pad = 42, end = 24, dev = act.scene.deviation;
+  const r = state.readings, values = r[against], dev = act.scene.deviation, pad = 42, end = 24, H = 210;
+  const W = Math.min(520, $("panel").clientWidth - 24);  // letters keep their size on a phone
   const used = values.map((_, i) => i).filter((i) => !r.aside[i]), low = Math.min(...used.map((i) => values[i])),
     high = Math.max(...used.map((i) => values[i]));
   const most = Math.max(1, ...used.map((i) => Math.abs(dev[i] ?? 0))) * 1.08, x = (v) => pad + (v - low) / (high - low
@@ -156,8 +160,8 @@ function residuals(state, act) {
   return [h("div", { class: "bar" }, h("label", { for: "against" }, "against "), pick),
     h("svg", { viewBox: `0 0 ${W} ${H}`, class: "drag", style: "cursor:default", role: "img",
     "aria-label": `Errors of ${used.length} readings against ${against}` },
-    grid(ticks(-most, most, 4), false, y, pad, W - end), grid(ticks(low, high > low ? high : low + 1, 6), true, x, 20,
-      H - 32), h("line", { x1: pad, x2: W - end, y1: y(0), y2: y(0), stroke: "var(--muted)" }),
+    grid(ticks(-most, most, 4), false, y, pad, W - end), grid(ticks(low, high > low ? high : low + 1, W / 90), true, x,
+      20, H - 32), h("line", { x1: pad, x2: W - end, y1: y(0), y2: y(0), stroke: "var(--muted)" }),
       h("text", { x: 4, y: 12 }, "error %"),
     used.map((i) => h("circle", { cx: x(values[i]).toFixed(1), cy: y(dev[i] ?? 0).toFixed(1), r: 3,
       fill: errorColour(dev[i] ?? 0, act.scene.scale), "fill-opacity": 0.8 })))];
@@ -196,7 +200,8 @@ function programPanel(state, act) {
     disabled: act.readonly });
   return [
     h("h2", {}, p.name),
-    p.error ? h("p", { class: "warning", id: "program-error" }, p.error) : null,
+    p.error ? h("p", { class: "warning", id: "program-error" }, p.error, " ",
+      button("Try again", () => act({ do: s ? "compensate" : "analyze" }))) : null,
     s ? [figures([["mean N/mm", n(s.mean_N_per_mm), "p-mean"], ["weakest N/mm", n(s.min_N_per_mm), "p-min"],
       ["range N/mm", n(s.range_N_per_mm), "p-range"], ["weakest in line", String(s.weakest?.line ?? "\u2013")],
       ...(s.plunges ? [["plunges, mean N/mm", n(s.plunges.mean_N_per_mm)]] : [])]),
@@ -219,13 +224,13 @@ function programPanel(state, act) {
 function placementPanel(state, act) {
   const p = state.placement;
   if (!p) return [h("h2", {}, "Placement"), h("p", {}, "Open a program first.")];
-  const at = act.origin, ends = endsOf(state.machine.scene.reach.flat());
-  const rows = [...["X", "Y", "Z"].map((name, k) => [name, k, ...ends[k].map(Math.round)]), ["C", 5, -180, 360]];
+  const at = act.origin, ends = endsOf(state.machine.scene.reach.flat()), best = p.chosen?.number;
+  const axes = [...["X", "Y", "Z"].map((name, k) => [name, k, ...ends[k].map(Math.round)]), ["C", 5, 0, 360]];
   return [
     h("h2", {}, "Where the work sits"),
     placementFigures(p.now, state, "pl"),
-    dragMap(state, act),
-    h("div", { class: "place live" }, rows.map(([name, axis, low, high]) => {
+    h("div", { class: "where" }, dragMap(state, act), h("div", { class: "place live" }, axes
+      .map(([name, axis, low, high]) => {
       const number = h("input", { type: "number", id: `o-${name}n`, "aria-label": `${name} of program zero`,
         step: axis === 5 ? 1 : 5, value: Number(at[axis].toFixed(3)), onchange: (e) => act.move(axis,
         Number(e.target.value), true) });
@@ -233,17 +238,16 @@ function placementPanel(state, act) {
         step: 1, value: at[axis], oninput: (e) => { number.value = e.target.value;
         act.move(axis, Number(e.target.value), false); }, onchange: (e) => act.move(axis, Number(e.target.value), true)
         }), number];
-    })),
+    }))),
     h("div", { class: "actions live" }, button("Best", () => act({ do: "place" }), { id: "best", class: "main live" }),
       h("span", { class: "muted" },
       "searches the whole workspace; none of mean, range and weakest gets worse where that can be avoided")),
     setUp(p, state, act),
-    p.front ? [(p.warnings ?? []).map((text) => h("p", { class: "warning" }, text)), h("h3", {}, "Front"),
-      offsets(p.offset_blocks),
-      table(["", "mean", "range", "weakest N/mm", "X", "Y", "Z mm", "C deg", ""], p.front
-        .map((row) => [`${row.number}${row.number === p.chosen?.number ? " recommended" : ""}`,
-        group(row.mean_N_per_mm), group(row.range_N_per_mm), group(row.min_N_per_mm), ...["x_mm", "y_mm", "z_mm",
-        "rotation_deg"].map((k) => row[k].toFixed(1)),
+    p.front ? [(p.warnings ?? []).map((text) => h("p", { class: "warning" }, told(text))), h("h3", {}, "What it found"),
+      table(["", "mean N/mm", "range N/mm", "weakest N/mm", "X mm", "Y mm", "Z mm", "C deg", ""], [...p.front]
+        .sort((a, b) => (b.number === best) - (a.number === best)).map((row) => [row.number === best
+          ? "recommended" : String(row.number), ...["mean", "range", "min"].map((k) => group(row[`${k}_N_per_mm`])),
+        ...["x_mm", "y_mm", "z_mm", "rotation_deg"].map((k) => row[k].toFixed(1)),
         button("use", () => act({ do: "place_at", origin: [row.x_mm, row.y_mm, row.z_mm, row.a_deg, row.b_deg,
           row.rotation_deg] }), { id: `use-${row.number}`, "aria-label": `use point ${row.number}` })]))] : null,
   ];
@@ -258,7 +262,7 @@ function setUp(p, state, act) {
     h("div", { class: "actions live" }, button("Offsets, set-up sheet, program", () => act({ do: "set_up" }),
       { id: "set-up", disabled: !moved }), h("span", { class: "muted" }, moved ? "for this placement, as files"
       : "move the work first")),
-    made ? h("div", { id: "set-up-files" }, made.warnings.map((text) => h("p", { class: "warning" }, text)),
+    made ? h("div", { id: "set-up-files" }, made.warnings.map((text) => h("p", { class: "warning" }, told(text))),
       offsets(made.offset_blocks),
       h("p", { class: "actions live" }, [["sheet", "Set-up sheet", `${made.result}/setup.pdf`],
         ["written", made.written.endsWith("not_written.txt") ? "Why the program was not written"
@@ -268,13 +272,13 @@ function setUp(p, state, act) {
   ];
 }
 function placementFigures(now, state, id) {
-  const told = (one, key) => (!Number.isFinite(one?.[key]) ? "\u2013"
+  const figure = (one, key) => (!Number.isFinite(one?.[key]) ? "\u2013"
     : key.endsWith("margin") ? group(100 * one[key], 1) : group(one[key]));
   const shown = [["mean N/mm", "mean_N_per_mm", "pl-mean"], ["range N/mm", "range_N_per_mm", "pl-range"],
     ["weakest N/mm", "min_N_per_mm", "pl-min"], ["margin of cuts, %", "margin", "pl-margin"],
     ["margin of rapids, %", "rapid_margin"]];
-  return h("div", { id }, figures(shown.map(([name, key, label]) => [name, told(now, key), label,
-    ` before ${told(state.placement?.before, key)}`])),
+  return h("div", { id }, figures(shown.map(([name, key, label]) => [name, figure(now, key), label,
+    ` before ${figure(state.placement?.before, key)}`])),
   now && now.mean_N_per_mm === null ? h("p", { class: "warning" }, "A cut is out of reach here.") : null);
 }
 // The boundary of the reach at the height of program zero, from above: the farthest crossing of each meridian.
@@ -295,14 +299,10 @@ function outline(reach, z) {
 }
 function dragMap(state, act) {
   const reach = outline(state.machine.scene.reach, act.origin[2]), path = state.program?.path;
+  const bounded = act.scene.body.hangs || act.scene.body.slides;  // rays from the middle of a hollow space say little
   const [[left, right], [near, far]] = endsOf(state.machine.scene.reach.flat()), pen = (right - left) / 300;
-  const points = [];
-  if (path) {
-    const from = state.program.origin, c = Math.cos(-from[5] * Math.PI / 180), s = Math.sin(-from[5] * Math.PI / 180);
-    const step = Math.max(1, Math.floor(path.x_mm.length / 900));
-    for (let i = 0; i < path.x_mm.length; i += step) if (path.cut[i]) { const [x, y] = [path.x_mm[i] - from[0],
-      path.y_mm[i] - from[1]]; points.push([c * x - s * y, s * x + c * y]); }
-  }
+  const [xs, ys] = path ? carried(state.program, [0, 0, 0, 0, 0, 0]) : [[], []], step = Math.ceil(xs.length / 900);
+  const points = Array.from(xs, (x, i) => [x, ys[i]]).filter((_, i) => i % step === 0 && path.cut[i]);
   const work = h("g", {}, h("polyline", { points: points.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" "),
     fill: "none", stroke: "var(--blue)", "stroke-width": pen }), h("circle", { r: 2.4 * pen, fill: "var(--pink)" }),
     h("line", { x1: 0, y1: 0, x2: 18 * pen, y2: 0, stroke: "var(--pink)", "stroke-width": pen }));
@@ -311,32 +311,30 @@ function dragMap(state, act) {
   put();
   act.put = put;
   const viewBox = [left - 9 * pen, -far - 9 * pen, right - left + 18 * pen, far - near + 18 * pen].join(" ");
-  const svg = h("svg", { viewBox, class: "drag live", id: "drag",
-    role: "application", tabindex: "0",
-    "aria-label": "Work over the reach boundary, from above. Drag or use arrow keys to move, Shift to turn." },
-    h("g", { transform: "scale(1 -1)" }, h("polygon", { points: reach.map((p) => p.map((v) => v.toFixed(0)).join(","))
-      .join(" "), fill: "var(--soft)", stroke: "var(--muted)", "stroke-width": pen }),
-      [[12 * pen, 0], [0, 12 * pen]].map(([x, y]) => h("line", { x1: -x, x2: x, y1: -y, y2: y, stroke: "var(--muted)",
-        "stroke-width": pen / 2 })), work));
   const where = (e) => { const m = svg.getScreenCTM().inverse(), p = new DOMPoint(e.clientX, e.clientY).matrixTransform(
     m); return [p.x, -p.y]; };
   let last = null;
-  svg.addEventListener("pointerdown", (e) => { svg.setPointerCapture(e.pointerId); last = where(e); });
-  svg.addEventListener("pointermove", (e) => {
-    if (!last) return;
-    const now = where(e);
-    if (e.shiftKey) act.shift(5, (now[0] - last[0]) / 4); else { act.shift(0, now[0] - last[0]);
-      act.shift(1, now[1] - last[1]); }
-    last = now;
-  });
-  svg.addEventListener("pointerup", () => { if (last) act.drop(); last = null; });
-  svg.addEventListener("keydown", (e) => {
-    const by = { ArrowLeft: [0, -10], ArrowRight: [0, 10], ArrowUp: [1, 10], ArrowDown: [1, -10] }[e.key];
-    if (!by) return;
-    e.preventDefault();
-    if (e.shiftKey) act.shift(5, Math.sign(by[1]) * 5); else act.shift(...by);
-    act.drop("drag");
-  });
+  const svg = h("svg", { viewBox, class: "drag live", id: "drag", role: "application", tabindex: "0",
+    "aria-label": "Work over the reach boundary, from above. Drag or use arrow keys to move, Shift to turn.",
+    onpointerdown: (e) => { svg.setPointerCapture(e.pointerId); last = where(e); },
+    onpointermove: (e) => {
+      if (!last) return;
+      const [dx, dy] = minus(where(e), last);
+      if (e.shiftKey) act.shift(5, dx / 4); else { act.shift(0, dx); act.shift(1, dy); }
+      last = where(e);
+    },
+    onpointerup: () => { if (last) act.drop(); last = null; },
+    onkeydown: (e) => {
+      const by = { ArrowLeft: [0, -10], ArrowRight: [0, 10], ArrowUp: [1, 10], ArrowDown: [1, -10] }[e.key];
+      if (!by) return;
+      e.preventDefault();
+      if (e.shiftKey) act.shift(5, Math.sign(by[1]) * 5); else act.shift(...by);
+      act.drop();
+    } },
+  h("g", { transform: "scale(1 -1)" }, bounded && h("polygon", { points: reach.map((p) => p.map((v) => v.toFixed(0))
+    .join(",")).join(" "), fill: "var(--soft)", stroke: "var(--muted)", "stroke-width": pen }),
+  [[12 * pen, 0], [0, 12 * pen]].map(([x, y]) => h("line", { x1: -x, x2: x, y1: -y, y2: y, stroke: "var(--muted)",
+    "stroke-width": pen / 2 })), work));
   return svg;
 }
 // The exercise, the history.
@@ -373,14 +371,16 @@ function historyPanel(state, act) {
     : one.text), line(one.command), line(one.python));
   return [h("h2", {}, "What was done"), h("p", { class: "muted" },
     "Commands run in the case's folder; Python lines on case = tps.Case.open(folder)."),
-    folded([...state.history].reverse()).map(step)];
+    h("div", { class: "steps" }, folded([...state.history].reverse()).map(step))];
 }
 // Steps, latest first: of the stops of one slider, or of one move of the work, the latest stands for all.
+// What was worked out at a stop that has passed goes with it.
 function folded(steps) {
-  const rows = [], of = (one) => (["switch", "place_at"].includes(one.kind) ? `${one.kind} ${one.text.split(" ")[0]}`
+  const rows = [], of = (one) => (["switch", "place_at"].includes(one?.kind) ? `${one.kind} ${one.text.split(" ")[0]}`
     : null);
   for (const one of steps) {
-    if (rows.length && of(one) && of(one) === of(rows.at(-1))) rows.at(-1).stops++;
+    const last = rows.findLastIndex((row) => !["analyze", "compensate"].includes(row.kind));
+    if (of(one) && of(one) === of(rows[last])) { rows[last].stops++; rows.length = last + 1; }
     else rows.push({ ...one, stops: 1 });
   }
   return rows;

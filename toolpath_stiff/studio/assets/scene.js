@@ -12,8 +12,7 @@ class MachineScene {
     this.focus = "work";
     this.frame = false;
     this.beside = 30;
-    this.room = [56, 30];
-    this.showReach = true;
+    this.room = [52, 50];
     this.selected = -1;   // reading
     this.paths = [];
     this.scale = 10;      // per cent at full colour
@@ -39,16 +38,21 @@ class MachineScene {
   outline() {
     if (!this.state || this.focus === "part" && this.paths[0]) return null;
     const { body } = this, r = this.state.readings, work = this.work();
-    if (this.focus !== "work" || !body.hangs) return [...body.outline(this.pose), ...(work ? cornersOf(work) : [])];
     const near = [...(r ? r.x_mm.map((x, i) => [x, r.y_mm[i], r.z_mm[i]]) : []), ...(work ? cornersOf(work) : [])];
-    return near.length ? [...near, ...body.at(this.pose).at(-2).points] : body.data.reach.flat();
+    return this.close ? [...near, ...body.at(this.pose).at(-2).points] : [...body.outline(this.pose),
+      ...(work ? cornersOf(work) : [])];
+  }
+  // Whether the work is looked at, or all that there is.
+  get close() {
+    const part = this.paths[0], there = this.body.hangs && (this.state.readings || part);
+    return Boolean(this.focus === "part" ? part : this.focus === "work" && there);
   }
   draw(g, view) {
     if (!this.state) return;
     this.spots = [];
-    if (this.focus !== "part" && this.showReach) this.body.drawReach(g, view);
-    const close = this.focus === "part" || this.focus === "work" && this.body.hangs;
-    const machine = this.body.items(view, this.pose, { work: this.work(), close, floor: this.body.floor });
+    if (this.focus !== "part") this.body.drawReach(g, view);
+    const { close } = this, machine = this.body.items(view, this.pose, { work: this.work(), close,
+      floor: this.body.floor });
     const dots = this.state.readings ? this.dots(view) : null;
     paint(g, view, [...machine, dots, ...this.plan(view), this.pathItem(view)].filter(Boolean), close);
   }

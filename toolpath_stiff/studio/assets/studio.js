@@ -12,8 +12,9 @@ async function post(path, body) {
   if (found.error) throw new Error(found.error);
   return found;
 }
-function tell(text) {
+function tell(text, good = false) {
   $("message").hidden = !text;
+  $("message").classList.toggle("notice", good);
   $("message").textContent = text;
 }
 // One thing after the other, in the order of the keys; until all is done the page's own placement holds.
@@ -88,10 +89,11 @@ Object.assign(act, {
     if (done) act.drop();
   },
   drop: () => act({ do: "place_at", origin: act.origin.map((v) => Number(v.toFixed(3))) })
-    .then(() => { if (scene.focus === "part") view.turnTo("fit"); }),
+    .then(() => { if (!scene.outline()?.every((p) => view.holds(view.project(p)))) view.turnTo("fit"); }),
 });
 // The machine, the profile.
-const view = new Viewer($("scene"), scene, { point, pick, step: (by) => stepReading(by) });
+const view = new Viewer($("scene"), scene, { point, pick, step: (by) => stepReading(by),
+  enter: () => { if (scene.selected >= 0) aside(scene.selected); } });
 let profile = null, playing = 0;
 function describe(i) {
   const r = state.readings, d = scene.deviation[i], turned = [r.a_deg[i], r.b_deg[i], r.c_deg[i]];
@@ -128,8 +130,6 @@ function stepReading(by) {
   const n = state.readings?.line.length;
   if (n) select((scene.selected + by + n) % n);
 }
-$("scene").querySelector(".overlay").addEventListener("keydown",
-  (e) => { if (e.key === "Enter" && scene.selected >= 0) { e.preventDefault(); aside(scene.selected); } });
 
 function classify() {
   const path = state.program?.path;
@@ -205,9 +205,8 @@ function drawProfile() {
       drawText(path.line[Math.max(0, here)]); } }, name)));
   refocus(focus, "");
   const other = which === "now" && path.given?.some((v, i) => v !== path.now[i]);
-  $("curves").textContent = [layer()[2], other && "orange: as given", which === "now" && path.sd
-    && "grey: 95 % band of what was fitted", state.program.require && !layer()[2] && "dashed: required"]
-    .filter(Boolean).join(", ");
+  $("curves").textContent = [layer()[2], other && "orange: given", which === "now" && path.sd && "grey: 95 % band",
+    state.program.require && !layer()[2] && "dashed: required"].filter(Boolean).join(", ");
 }
 function goTo(i) {
   const path = state.program?.path;
@@ -258,7 +257,7 @@ function play() {
 function drawLegend() {
   const parts = [];
   if (state.readings) parts.push(h("div", { title: "Larger dots: larger errors. Rings: set aside." },
-    `softer -${scene.scale} %`,
+    `softer \u2212${scene.scale} %`,
     h("span", { class: "ramp",
     style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }),
     `+${scene.scale} % stiffer`));
@@ -296,7 +295,7 @@ let held = false, late = false;
 $("panel").addEventListener("pointerdown", () => { held = true; });
 for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => {
   held = false;
-  if (late) draw();
+  if (late) setTimeout(draw);  // after the change of what was held has been told
 });
 function draw() {
   late = held;
@@ -309,19 +308,24 @@ function draw() {
   if (!scene.scaled && sizes.length) { scene.scale = Math.max(5,
     5 * Math.ceil(sizes[Math.floor(0.95 * sizes.length)] / 5)); scene.scaled = true; }
   if (scene.selected >= (r?.line.length ?? 0)) scene.selected = -1;
-  const rest = (state.program?.origin ?? state.machine.origin).slice(0, 3);
-  if (scene.selected < 0 && here < 0) scene.pose = [...rest, 0, 0, 0];
+  const home = (state.program?.origin ?? state.machine.origin).slice(0, 3);
+  if (scene.selected < 0 && here < 0) scene.pose = [...home, 0, 0, 0];
   if (!pending) act.origin = [...(state.program?.origin ?? state.machine.origin)];
   $("title").textContent = state.case;
   $("machine-name").textContent =
     `${state.machine.title}${r ? `, ${r.line.length - r.aside.filter(Boolean).length} readings` : ""}`
       + `${state.program ? `, ${state.program.name}` : ""}`;
   document.title = `${state.case}: toolpath_stiff studio`;
-  const waiting = r && !v ? "Judging the readings" : r ? "" : "What does the machine do, and does the model say so?";
+  const waiting = !r ? "What does the machine do, and does the model say so?" : v ? "" : state.unjudged
+    ? "The readings are not judged" : "Judging the readings";
   $("sentence").classList.toggle("waiting", Boolean(waiting));
   const [, said, name] = v?.sentence.match(/^(.*) \(([^()]*)\)$/) ?? [0, v?.sentence, ""];
-  $("sentence").replaceChildren(...(waiting ? [waiting] : [`${said}.`,
-    h("small", {}, `${name ? `${name}. ` : ""}${v.text.slice(v.sentence.length + 2)}`)]));
+  // The gauge has the errors, and "Why believe it?" the whole text.
+  const rest = v?.text.slice(v.sentence.length + 2).split(/(?<=\.) (?=[A-Z])/).filter((one) =>
+    !/^(Mean error|Of all rivals)/.test(one));
+  $("sentence").replaceChildren(...(waiting ? [waiting, state.unjudged && r ? h("small", {}, told(state.unjudged), " ",
+    button("Judge them", () => act({ do: "diagnose" }), { id: "judge" })) : ""]
+    : [told(`${said}.`), h("small", {}, told([name ? `${name}.` : "", ...rest].join(" ")))]));
   $("gauge").replaceChildren(gaugeOf(state));
   if ($("undo")) $("undo").disabled = !state.history[1];
   scene.paths = [];
@@ -331,12 +335,19 @@ function draw() {
   drawLegend();
   drawPanel();
   if (here >= 0 && scene.selected < 0) goTo(here);  // its figures are others now
-  if (view.width) { if (!scene.fitted) { scene.fitted = true; view.turnTo("iso"); } view.redraw(); }
+  if (!scene.fitted) {
+    scene.fitted = true;
+    [view.yaw, view.pitch] = scene.iso;
+    if (view.width) view.fit();
+  }
+  if (view.width) view.redraw();
 }
+const JOBS = { diagnose: "judging the readings", update: "fitting", analyze: "analyzing", compensate: "compensating",
+  place: "searching", plan: "planning", compare: "comparing", draft: "drafting", set_up: "writing files" };
 let began = { of: "", at: 0, done: 0 };  // the work that runs, when it was first seen, how far it was then
 function drawJob(job) {
   if (readonly) return;
-  const name = job ? job.text || job.kind : "", now = performance.now();
+  const name = job ? JOBS[job.text] ?? job.text : "", now = performance.now();
   if (name !== began.of || (job && job.done < began.done)) began = { of: name, at: now, done: job?.done ?? 0 };
   const run = job?.total ? (now - began.at) / 1000 * (job.total - job.done) / Math.max(job.done - began.done, 1e-9) : 0;
   $("job").classList.toggle("busy", Boolean(job));
@@ -372,8 +383,6 @@ for (const one of document.querySelectorAll("[data-focus]")) one.addEventListene
     String(other === one));
   view.turnTo("fit");
 });
-$("show-reach").addEventListener("click", (e) => { scene.showReach = !scene.showReach;
-  e.target.setAttribute("aria-pressed", String(scene.showReach)); view.redraw(); });
 $("scrub").addEventListener("input", (e) => goTo(Number(e.target.value)));
 $("play").addEventListener("click", () => {
   if (playing) cancelAnimationFrame(playing);
@@ -398,14 +407,14 @@ async function take(file, run = false) {
       return;
     }
     await refresh();
-    tell(found.message);
+    tell(found.message, true);
     if (state.program && !/\.(csv|xlsx|toml|py)$/i.test(file.name)) open("program");
   } catch (error) { tell(error.message); }
 }
 // What one does first, until it is put away.
-const keep = (use) => { try { return use(localStorage); } catch { return null; } };  // a page may keep nothing
-$("guide").hidden = readonly || Boolean(keep((of) => of.getItem("guided")));
-$("guided").addEventListener("click", () => { $("guide").hidden = true; keep((of) => of.setItem("guided", "yes")); });
+$("guide").hidden = readonly || document.cookie.includes("tps_guided");  // the port is another at each start
+$("guided").addEventListener("click", () => { $("guide").hidden = true;
+  document.cookie = "tps_guided=yes; max-age=31536000; SameSite=Strict"; });
 window.tpsStudio = { spots: () => scene.spots.map((spot) => [...spot]) };  // where readings stand on the screen
 if (readonly) draw();
 else {
