@@ -102,9 +102,8 @@ class SiemensRun(ParametricRun):
             block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
             steering = None
             if not self._is_head(row):
-                steering = steering_of(
-                    self._scanner(row, begin.end()), lambda place: lambda _: self._scanner(row, place).real()
-                )
+                scanner = self._scanner(row, begin.end())
+                steering = steering_of(scanner, lambda place: lambda _: self._scanner(row, place).real())
             self._statements[row] = Statement(block, steering=steering)
         return self._statements[row]
 
